@@ -1,0 +1,19 @@
+# mbtfm_library(NAME sources… [PUBLIC libs…] [PRIVATE libs…]) and mbtfm_executable(NAME sources… [PRIVATE libs…]):
+# a target with the project's include root and warnings.
+
+add_library(mbtfm_options INTERFACE)
+target_include_directories(mbtfm_options INTERFACE ${CMAKE_SOURCE_DIR})
+# -Wno-restrict: GCC 12 sees overlapping copies in std::string concatenation that are not there (GCC PR 105651)
+target_compile_options(mbtfm_options INTERFACE -Wall -Wextra -Wshadow -Wno-restrict $<$<BOOL:${MBTFM_STRICT}>:-Werror>)
+
+function(mbtfm_library name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PUBLIC;PRIVATE")
+  add_library(${name} STATIC ${arg_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name} PUBLIC mbtfm_options ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
+endfunction()
+
+function(mbtfm_executable name)
+  cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PRIVATE")
+  add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
+  target_link_libraries(${name} PRIVATE mbtfm_options ${arg_PRIVATE})
+endfunction()

@@ -1,0 +1,66 @@
+/// The active cable network (thesis 3.2.3): its equilibrium, the forces on what holds it, and their derivatives.
+///
+///   U(x) = sum_k share_k [ t_g(k) l_k + EA / (2 l0_k) max(0, l_k − l0_k)² ],   l_k = sqrt(|x_a − x_b|² + eps²)
+///
+/// Convex in x, so the equilibrium for given tensions is the minimiser of U over the free vertices.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+#include <vector>
+
+#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/report.h"
+#include "pipeline/contract/types.h"
+
+namespace mbtfm::network {
+
+struct CableParameters {
+  double axial_stiffness_nN = 50;  ///< EA: force at 100 % strain beyond the rest length (thesis 3.2.3)
+  double smoothing = 1e-5;         ///< eps in mean rest lengths: far below what the forces can tell
+  double force_tolerance = 1e-9;   ///< largest net force on a free vertex, relative to the largest tension
+  int max_iterations = 500;        ///< of Newton's method: every loop ends
+};
+void declare(ParameterList& list, CableParameters& parameters);
+
+struct Equilibrium {
+  std::vector<Vec2> positions_um;
+  std::vector<double> link_force_nN;  ///< by link
+  double energy_fJ = 0;               ///< nN·um
+  Report report;
+};
+
+/// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix.
+class CableNetwork {
+ public:
+  /// @throws InvalidData where nothing holds the network
+  explicit CableNetwork(Network network, CableParameters parameters = {});
+  ~CableNetwork();
+  CableNetwork(CableNetwork&&) noexcept;
+  CableNetwork& operator=(CableNetwork&&) noexcept;
+
+  const Network& network() const;
+  /// Labels of the groups that have a tension: front() is 0, the actin network; then the fibres in rising order.
+  const std::vector<int>& fibre_ids() const;
+  /// Labels of the adhesions that hold vertices, in rising order.
+  const std::vector<int>& adhesion_ids() const;
+
+  /// @param tensions_nN  by group, >= 0
+  /// @param start  vertex positions to start from (a previous equilibrium), or empty: the network's own
+  Equilibrium equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start = {}) const;
+
+  /// Force of the network on each held vertex, by vertex (zero for the free ones).
+  std::vector<Vec2> reactions_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
+  /// Force on the substrate by adhesion: (fx, fy) of adhesion_ids()[i] at 2i, 2i+1.
+  Eigen::VectorXd adhesion_forces_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
+  /// dR/dt of the adhesion forces: 2·adhesions × groups, by the implicit function theorem (thesis has none):
+  /// dR/dt = −(B_x − H_xf H_ff⁻¹ B_f), H = d²U/dx², B = d²U/dx dt.
+  Eigen::MatrixXd adhesion_force_derivatives(const std::vector<double>& tensions_nN,
+                                             const Equilibrium& equilibrium) const;
+
+ private:
+  struct Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace mbtfm::network

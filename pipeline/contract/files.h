@@ -1,0 +1,88 @@
+/// One reader and one writer for each file that passes between stages. All of them call `check`.
+/// Readers throw InputError with the line, the column and the label of the row; writers throw OutputError.
+#pragma once
+
+#include <filesystem>
+#include <istream>
+#include <ostream>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/report.h"
+#include "pipeline/contract/types.h"
+
+namespace mbtfm {
+
+using Path = std::filesystem::path;
+
+std::vector<Adhesion> read_adhesions(const Path& file);
+void write_adhesions(const Path& file, const std::vector<Adhesion>& adhesions);
+
+/// fibres.csv and fibre_points.csv
+std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file);
+void write_fibres(const Path& fibres_file, const Path& points_file, const std::vector<Fibre>& fibres);
+
+Polygon read_outline(const Path& file);
+void write_outline(const Path& file, const Polygon& outline_um);
+
+/// adhesions.csv, fibres.csv, fibre_points.csv, outline.csv of a folder, checked against each other
+Cell read_cell(const Path& folder);
+
+DisplacementField read_displacement(const Path& file);
+void write_displacement(const Path& file, const DisplacementField& field);
+
+/// Columns x_um, y_um.
+std::vector<Vec2> read_points(const Path& file);
+
+/// Columns fibre_id, tension_nN at least.
+std::vector<Tension> read_tensions(const Path& file);
+void write_tensions(const Path& file, const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres);
+
+/// Columns adhesion_id, fx_nN, fy_nN at least.
+std::vector<AdhesionForce> read_adhesion_forces(const Path& file);
+void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& forces,
+                           const std::vector<Adhesion>& adhesions);
+
+/// Columns vertex, fx_nN, fy_nN: the force of the network on the substrate at each held vertex.
+void write_reactions(const Path& file, const std::vector<int>& vertices, const std::vector<Vec2>& forces_nN);
+
+/// What the fit found for the cell as a whole: fit.json.
+struct FitSummary {
+  double relative_l2 = 0;           ///< |u_measured − u_model| / |u_measured|
+  double expected_relative_l2 = 0;  ///< what the bead noise alone would give
+  double noise_um = 0;              ///< standard deviation of a displacement component far from the cell
+  double total_force_nN = 0;        ///< sum of force magnitudes over adhesions
+  double network_force_nN = 0;      ///< the same with every fibre at the network's tension
+  double fibre_force_nN = 0;        ///< the difference
+  double network_surface_tension_nN_per_um = 0;
+  int n_meshes = 1;
+  int iterations = 0;
+  bool converged = false;
+  Figures more;  ///< further figures, written after the named ones
+};
+FitSummary read_fit_summary(const Path& file);
+void write_fit_summary(const Path& file, const FitSummary& summary);
+
+// VTK (XML, binary appended, compressed)
+
+Network read_network(const Path& file);
+void write_network(const Path& file, const Network& network);
+
+/// A named array over the points or cells of a VTK file, one value or (x, y) each; the name carries the unit.
+struct PointArray {
+  std::string name;
+  std::vector<double> scalars;
+  std::vector<Vec2> vectors;
+};
+/// Outline, adhesion ellipses and fibres as polygons and lines, with adhesion_id, fibre_id and fibre_type by cell.
+void write_cell_vtp(const Path& file, const Cell& cell);
+/// A point cloud with arrays.
+void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays);
+/// Adhesion ellipses with arrays by adhesion.
+void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
+                        const std::vector<PointArray>& arrays);
+/// A network at other positions, with tension_nN (force carried) by link.
+void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
+                              const std::vector<double>& link_force_nN);
+
+}  // namespace mbtfm

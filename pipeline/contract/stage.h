@@ -1,0 +1,70 @@
+/// The frame of every executable: arguments, parameters, errors to exit codes, atomic outputs, provenance.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/report.h"
+
+namespace mbtfm {
+
+struct FileArgument {
+  enum class Kind { input, optional_input, output, output_folder };
+  std::string name;  ///< the flag --name
+  Kind kind = Kind::input;
+  std::string meaning;
+};
+
+struct StageDescription {
+  std::string name;  ///< the executable is mbtfm-<name>
+  std::string purpose;
+  std::vector<FileArgument> files;
+};
+
+/// A stage's files and surroundings. Outputs go to temporary names and take their own only when the stage is done.
+class StageContext {
+ public:
+  int threads = 1;
+  Progress progress;
+  bool was_interrupted() const;
+
+  /// Path of an input that was given. An input that is a folder: path of `file` in it.
+  std::filesystem::path input(const std::string& name, const std::string& file = {});
+  bool has_input(const std::string& name) const { return inputs_.contains(name); }
+  /// Temporary path to write an output to.
+  std::filesystem::path output(const std::string& name);
+  /// Temporary path for `file` of an output folder.
+  std::filesystem::path output(const std::string& name, const std::string& file);
+
+  // used by run_stage
+  std::map<std::string, std::filesystem::path> inputs_, outputs_;
+  std::vector<std::filesystem::path> read_;
+  struct Pending {
+    std::filesystem::path temporary, destination;
+  };
+  std::vector<Pending> pending_;
+};
+
+/// Parse the arguments, read the parameters, call `body`, put the outputs in place, write the record, return the exit
+/// code. Flags of every stage: --help --version --threads --quiet --config --record --parameters.
+int run_stage(const StageDescription& description, int argc, char** argv,
+              const std::function<void(ParameterList&)>& declare_parameters,
+              const std::function<StageReport(StageContext&)>& body);
+
+/// The same for a struct with a `declare(ParameterList&, Parameters&)` beside it.
+template <class Parameters>
+int run_stage(const StageDescription& description, int argc, char** argv,
+              const std::function<StageReport(const Parameters&, StageContext&)>& body) {
+  Parameters parameters;
+  return run_stage(
+      description, argc, argv, [&](ParameterList& list) { declare(list, parameters); },
+      [&](StageContext& context) { return body(parameters, context); });
+}
+
+}  // namespace mbtfm

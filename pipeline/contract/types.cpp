@@ -1,0 +1,187 @@
+#include "pipeline/contract/types.h"
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm {
+
+std::string_view name_of(FibreType type) {
+  switch (type) {
+    case FibreType::dorsal:
+      return "dorsal";
+    case FibreType::arc:
+      return "arc";
+    case FibreType::ventral:
+      return "ventral";
+  }
+  throw InternalError("unknown fibre type");
+}
+
+std::optional<FibreType> fibre_type_of(std::string_view name) {
+  for (const FibreType type : kFibreTypes) {
+    if (name_of(type) == name) return type;
+  }
+  return std::nullopt;
+}
+
+double length_um(const Polyline& points) {
+  double length = 0;
+  for (std::size_t i = 1; i < points.size(); ++i) length += norm(points[i] - points[i - 1]);
+  return length;
+}
+
+double signed_area_um2(const Polygon& polygon) {
+  double doubled = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) doubled += cross(polygon[i], polygon[(i + 1) % polygon.size()]);
+  return 0.5 * doubled;
+}
+
+bool contains(const Polygon& polygon, Vec2 point) {
+  bool is_inside = false;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2 a = polygon[i];
+    const Vec2 b = polygon[(i + 1) % polygon.size()];
+    if ((a.y > point.y) == (b.y > point.y)) continue;
+    if (point.x < a.x + (b.x - a.x) * (point.y - a.y) / (b.y - a.y)) is_inside = !is_inside;
+  }
+  return is_inside;
+}
+
+Vec2 nearest_on_boundary_um(const Polygon& polygon, Vec2 point) {
+  Vec2 nearest;
+  double smallest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2 a = polygon[i];
+    const Vec2 edge = polygon[(i + 1) % polygon.size()] - a;
+    const double squared = dot(edge, edge);
+    const double along = squared > 0 ? std::clamp(dot(point - a, edge) / squared, 0.0, 1.0) : 0.0;
+    const Vec2 candidate = a + along * edge;
+    const double distance = norm(point - candidate);
+    if (distance < smallest) {
+      smallest = distance;
+      nearest = candidate;
+    }
+  }
+  return nearest;
+}
+
+double distance_to_boundary_um(const Polygon& polygon, Vec2 point) {
+  return norm(point - nearest_on_boundary_um(polygon, point));
+}
+
+namespace {
+
+std::string shown(double value) { return "'" + std::to_string(value) + "'"; }
+
+void require(bool holds, const std::string& element, const std::string& expected, const std::string& found) {
+  if (!holds) throw InvalidData(element, expected, found);
+}
+
+void require_positive(double value, const std::string& name, const std::string& element) {
+  require(std::isfinite(value) && value > 0, "'" + name + "' of " + element, "a number > 0", shown(value));
+}
+
+void require_finite(Vec2 point, const std::string& element) {
+  require(is_finite(point), "position of " + element, "finite numbers", shown(point.x) + ", " + shown(point.y));
+}
+
+void require_unique(std::set<int>& seen, int id, const std::string& kind) {
+  require(id >= 1, kind + "_id", "an integer >= 1", "'" + std::to_string(id) + "'");
+  require(seen.insert(id).second, kind + "_id " + std::to_string(id), "each label once", "it a second time");
+}
+
+}  // namespace
+
+void check(const std::vector<Adhesion>& adhesions) {
+  std::set<int> seen;
+  for (const Adhesion& a : adhesions) {
+    require_unique(seen, a.adhesion_id, "adhesion");
+    const std::string element = "adhesion " + std::to_string(a.adhesion_id);
+    require_finite(a.position_um, element);
+    require_positive(a.area_um2, "area_um2", element);
+    require_positive(a.major_axis_um, "major_axis_um", element);
+    require_positive(a.minor_axis_um, "minor_axis_um", element);
+    require(a.minor_axis_um <= a.major_axis_um * (1 + 1e-9), "'minor_axis_um' of " + element,
+            "at most major_axis_um = " + shown(a.major_axis_um), shown(a.minor_axis_um));
+    require(std::isfinite(a.angle_rad), "'angle_deg' of " + element, "a finite number", shown(a.angle_rad));
+  }
+}
+
+void check(const std::vector<Fibre>& fibres) {
+  std::set<int> seen;
+  for (const Fibre& f : fibres) {
+    require_unique(seen, f.fibre_id, "fibre");
+    const std::string element = "fibre " + std::to_string(f.fibre_id);
+    require_positive(f.width_um, "width_um", element);
+    require(f.points_um.size() >= 2, element, "at least two points", std::to_string(f.points_um.size()));
+    for (std::size_t i = 0; i < f.points_um.size(); ++i) {
+      require_finite(f.points_um[i], "point " + std::to_string(i) + " of " + element);
+      require(i == 0 || !(f.points_um[i] == f.points_um[i - 1]), "point " + std::to_string(i) + " of " + element,
+              "another place than the point before", "the same");
+    }
+  }
+}
+
+void check(const Cell& cell) {
+  check(cell.adhesions);
+  check(cell.fibres);
+  require(cell.outline_um.size() >= 3, "outline", "at least three points", std::to_string(cell.outline_um.size()));
+  for (const Vec2 point : cell.outline_um) require_finite(point, "a point of the outline");
+  require(std::abs(signed_area_um2(cell.outline_um)) > 0, "outline", "an area > 0", "'0'");
+  std::set<int> known;
+  for (const Adhesion& a : cell.adhesions) known.insert(a.adhesion_id);
+  for (const Fibre& f : cell.fibres) {
+    for (const auto& end : {f.start_adhesion_id, f.end_adhesion_id}) {
+      require(!end || known.contains(*end), "adhesion at an end of fibre " + std::to_string(f.fibre_id),
+              "the label of an adhesion", end ? "'" + std::to_string(*end) + "'" : "");
+    }
+  }
+}
+
+void check(const DisplacementField& field) {
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    const std::string element = "bead " + std::to_string(i);
+    require_finite(field[i].position_um, element);
+    require(is_finite(field[i].displacement_um), "displacement of " + element, "finite numbers",
+            shown(field[i].displacement_um.x) + ", " + shown(field[i].displacement_um.y));
+    require(std::isfinite(field[i].sigma_um) && field[i].sigma_um >= 0, "'sigma_um' of " + element, "a number >= 0",
+            shown(field[i].sigma_um));
+  }
+}
+
+void check(const Gel& gel) {
+  require_positive(gel.youngs_modulus_kPa, "youngs_modulus_kPa", "the gel");
+  require_positive(gel.thickness_um, "thickness_um", "the gel");
+  require(gel.poisson_ratio >= 0 && gel.poisson_ratio < 0.5, "'poisson_ratio' of the gel",
+          "a number from 0 to below 0.5 (0.49 or 0.499 for an incompressible gel)", shown(gel.poisson_ratio));
+}
+
+void check(const Network& network) {
+  const int n_vertices = static_cast<int>(network.vertices_um.size());
+  require(network.adhesion_id.size() == network.vertices_um.size(), "adhesion_id", "one value a vertex",
+          std::to_string(network.adhesion_id.size()) + " values for " + std::to_string(n_vertices) + " vertices");
+  for (int v = 0; v < n_vertices; ++v) {
+    require_finite(network.vertices_um[v], "vertex " + std::to_string(v));
+    require(network.adhesion_id[v] >= 0, "adhesion_id of vertex " + std::to_string(v), "an integer >= 0",
+            "'" + std::to_string(network.adhesion_id[v]) + "'");
+  }
+  for (std::size_t k = 0; k < network.links.size(); ++k) {
+    const Link& link = network.links[k];
+    const std::string element = "link " + std::to_string(k);
+    for (const int end : {link.vertex_a, link.vertex_b}) {
+      require(end >= 0 && end < n_vertices, "an end of " + element, "a vertex below " + std::to_string(n_vertices),
+              "'" + std::to_string(end) + "'");
+    }
+    require(link.vertex_a != link.vertex_b, element, "two different vertices",
+            "vertex " + std::to_string(link.vertex_a) + " twice");
+    require(link.fibre_id >= 0, "'fibre_id' of " + element, "an integer >= 0",
+            "'" + std::to_string(link.fibre_id) + "'");
+    require_positive(link.rest_length_um, "rest_length_um", element);
+    require_positive(link.share, "share", element);
+  }
+}
+
+}  // namespace mbtfm

@@ -1,0 +1,129 @@
+/// The data that flows between stages. Plain structs; `check` states what must hold and is called by every reader
+/// and writer. Units: um, nN, kPa, rad. Axes: x right, y down, origin at the outer corner of the top-left pixel.
+#pragma once
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace mbtfm {
+
+struct Vec2 {
+  double x = 0;
+  double y = 0;
+};
+
+inline Vec2 operator+(Vec2 a, Vec2 b) { return {a.x + b.x, a.y + b.y}; }
+inline Vec2 operator-(Vec2 a, Vec2 b) { return {a.x - b.x, a.y - b.y}; }
+inline Vec2 operator*(double s, Vec2 a) { return {s * a.x, s * a.y}; }
+inline Vec2& operator+=(Vec2& a, Vec2 b) { return a = a + b; }
+inline bool operator==(Vec2 a, Vec2 b) { return a.x == b.x && a.y == b.y; }
+inline double dot(Vec2 a, Vec2 b) { return a.x * b.x + a.y * b.y; }
+inline double cross(Vec2 a, Vec2 b) { return a.x * b.y - a.y * b.x; }
+inline double norm(Vec2 a) { return std::hypot(a.x, a.y); }
+inline bool is_finite(Vec2 a) { return std::isfinite(a.x) && std::isfinite(a.y); }
+
+/// A point set whose last point joins its first.
+using Polygon = std::vector<Vec2>;
+using Polyline = std::vector<Vec2>;
+
+/// A segmented focal adhesion: the ellipse of equal second moments, scaled to the area of the segmented component.
+struct Adhesion {
+  int adhesion_id = 0;  ///< stable label, >= 1
+  Vec2 position_um;
+  double area_um2 = 0;
+  double major_axis_um = 0;  ///< full axes, not semi-axes
+  double minor_axis_um = 0;
+  double angle_rad = 0;  ///< of the major axis, from +x towards +y
+  double eccentricity = 0;
+  double mean_intensity = 0;
+};
+
+/// Hotulainen & Lappalainen (2006): dorsal fibres end on an adhesion with one end, arcs with none, ventral with both.
+enum class FibreType { dorsal, arc, ventral };
+inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral};
+std::string_view name_of(FibreType type);
+std::optional<FibreType> fibre_type_of(std::string_view name);
+
+struct Fibre {
+  int fibre_id = 0;  ///< stable label, >= 1
+  FibreType type = FibreType::arc;
+  double width_um = 0;
+  std::optional<int> start_adhesion_id;  ///< the adhesion that holds points_um.front()
+  std::optional<int> end_adhesion_id;    ///< the adhesion that holds points_um.back()
+  double mean_intensity = 0;
+  double confidence = 1;  ///< of the type, 0 to 1
+  Polyline points_um;     ///< at least two, no two in a row equal
+};
+
+/// A segmented cell.
+struct Cell {
+  std::vector<Adhesion> adhesions;
+  std::vector<Fibre> fibres;
+  Polygon outline_um;
+};
+
+/// Displacement (stressed minus relaxed position) of one bead.
+struct Bead {
+  Vec2 position_um;  ///< in the relaxed state
+  Vec2 displacement_um;
+  double sigma_um = 0;  ///< standard error of each component
+  std::string flag;     ///< why it must not be used; empty: good
+};
+using DisplacementField = std::vector<Bead>;
+
+struct Gel {
+  double youngs_modulus_kPa = 0;
+  double poisson_ratio = 0.49;
+  double thickness_um = 60;
+};
+
+/// A cable between two vertices of a network.
+struct Link {
+  int vertex_a = 0;
+  int vertex_b = 0;
+  int fibre_id = 0;  ///< 0: the actin network
+  double rest_length_um = 0;
+  double share = 1;  ///< multiplies its group's tension and its stiffness: the width of material this cable stands for
+};
+
+struct Network {
+  std::vector<Vec2> vertices_um;
+  std::vector<int> adhesion_id;  ///< by vertex; the substrate holds it where it is not 0
+  std::vector<Link> links;
+};
+
+struct Tension {
+  int fibre_id = 0;  ///< 0: the actin network
+  double tension_nN = 0;
+  std::optional<double> low_nN, high_nN;  ///< 95 % interval
+  bool identifiable = true;
+};
+
+struct AdhesionForce {
+  int adhesion_id = 0;
+  Vec2 force_nN;  ///< of the cell on the substrate
+  std::optional<double> sigma_nN;
+  bool connected = false;  ///< a segmented fibre ends on it
+};
+
+double length_um(const Polyline& points);
+/// Signed area; positive where the polygon turns from +x towards +y.
+double signed_area_um2(const Polygon& polygon);
+bool contains(const Polygon& polygon, Vec2 point);
+/// Distance to the nearest point of the closed line, inside or outside.
+double distance_to_boundary_um(const Polygon& polygon, Vec2 point);
+/// Nearest point of the closed line.
+Vec2 nearest_on_boundary_um(const Polygon& polygon, Vec2 point);
+
+/// State what must hold of a value. @throws InvalidData naming the element and the finding.
+void check(const std::vector<Adhesion>& adhesions);
+void check(const std::vector<Fibre>& fibres);
+void check(const Cell& cell);
+void check(const DisplacementField& field);
+void check(const Gel& gel);
+void check(const Network& network);
+
+}  // namespace mbtfm
