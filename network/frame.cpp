@@ -157,7 +157,7 @@ class Builder {
       end_on(line, *adhesion_of_vertex_.at(before), graph_.points_um[before], near_um);
       std::reverse(line.begin(), line.end());
     }
-    line = without_short_pieces(simplified(line, kFlat * edge_), near_um);
+    line = evenly_divided(without_short_pieces(simplified(line, kFlat * edge_), near_um), edge_);
     if (length_um(line) <= kMerge * edge_) return false;
     Chain chain;
     chain.fibre_id = fibre.fibre_id;

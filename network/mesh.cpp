@@ -143,15 +143,23 @@ int count_parts(const Network& network) {
   return n_parts;
 }
 
-void measure_quality(const RelaxedMesh& mesh, GeneratedNetwork& result) {
-  result.worst_quality = 1;
+void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& result) {
+  result.worst_quality = result.worst_free_quality = 1;
+  double sum_of_free = 0;
+  int n_free = 0;
   for (const auto& t : mesh.triangulation.triangles) {
     const double q = quality(mesh.points_um[t[0]], mesh.points_um[t[1]], mesh.points_um[t[2]]);
     result.mean_quality += q / static_cast<double>(mesh.triangulation.triangles.size());
     result.worst_quality = std::min(result.worst_quality, q);
+    if (t[0] >= n_of_frame) {  // the smallest of the three
+      result.worst_free_quality = std::min(result.worst_free_quality, q);
+      sum_of_free += q;
+      ++n_free;
+    }
     result.area_um2 +=
         0.5 * std::abs(cross(mesh.points_um[t[1]] - mesh.points_um[t[0]], mesh.points_um[t[2]] - mesh.points_um[t[0]]));
   }
+  result.mean_free_quality = n_free > 0 ? sum_of_free / n_free : 1;
   result.n_triangles = static_cast<int>(mesh.triangulation.triangles.size());
 }
 
@@ -192,7 +200,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
     return std::tie(a.vertex_a, a.vertex_b, a.fibre_id) < std::tie(b.vertex_a, b.vertex_b, b.fibre_id);
   });
   result.n_parts = count_parts(result.network);
-  measure_quality(mesh, result);
+  measure_quality(mesh, static_cast<int>(frame.points_um.size()), result);
   check(result.network);
   return result;
 }

@@ -24,6 +24,8 @@ struct GeneratedNetwork {
   Report report;
   double mean_quality = 0;  ///< of the triangles: 2 · inradius / circumradius
   double worst_quality = 0;
+  double mean_free_quality = 0;   ///< of those away from fibres, adhesions and outline, whose shape nothing forces
+  double worst_free_quality = 0;  ///< of the same; 1 where there are none
   int n_triangles = 0;
   double area_um2 = 0;        ///< of the triangles
   int n_parts = 1;            ///< that no link joins: more than one where a neck is thinner than a tenth of an edge

@@ -41,6 +41,8 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
                     {"mean_edge_um", mean_edge_um},
                     {"mean_quality", generated.mean_quality},
                     {"worst_quality", generated.worst_quality},
+                    {"mean_free_quality", generated.mean_free_quality},
+                    {"worst_free_quality", generated.worst_free_quality},
                     {"relaxation_steps", static_cast<std::int64_t>(generated.report.iterations)},
                     {"last_move_edges", generated.report.last_change},
                     {"clipped_fibre_ids", listed(generated.clipped_fibre_ids)},

@@ -49,11 +49,26 @@ std::vector<char> used_vertices(const PlanarGraph& graph) {
   return is_used;
 }
 
+/// Take out detours to a vertex and straight back (but to an adhesion's): splitting at close vertices would add to
+/// them in every round.
+void collapse_backtracks(const PlanarGraph& graph, std::vector<int>& vertices) {
+  std::vector<int> straight;
+  for (const int v : vertices) {
+    if (!straight.empty() && straight.back() == v) continue;
+    if (straight.size() > 1 && straight[straight.size() - 2] == v && graph.rank[straight.back()] != kHeld) {
+      straight.pop_back();
+      continue;
+    }
+    straight.push_back(v);
+  }
+  vertices = std::move(straight);
+}
+
 /// Replace every vertex by the one it merged into; no chain names a vertex twice in a row.
 void rename(PlanarGraph& graph, const std::vector<int>& name) {
   for (Chain& chain : graph.chains) {
     for (int& v : chain.vertices) v = name[v];
-    chain.vertices.erase(std::unique(chain.vertices.begin(), chain.vertices.end()), chain.vertices.end());
+    collapse_backtracks(graph, chain.vertices);
     while (chain.is_closed && chain.vertices.size() > 1 && chain.vertices.front() == chain.vertices.back()) {
       chain.vertices.pop_back();
     }
@@ -119,6 +134,18 @@ double segment_grid_cell(const PlanarGraph& graph, const std::vector<Segment>& s
   return sum / static_cast<double>(std::max<std::size_t>(1, segments.size()));
 }
 
+/// The chain passes through v a few segments before or after: to go there again would make a knot that grows.
+bool is_nearby(const Chain& chain, int place, int v) {
+  if (chain.fibre_id == 0) return false;  // a whisker of the outline comes back along itself
+  constexpr int kReach = 4;
+  const int n = static_cast<int>(chain.vertices.size());
+  for (int i = place - kReach; i <= place + 1 + kReach; ++i) {
+    if (!chain.is_closed && (i < 0 || i >= n)) continue;
+    if (chain.vertices[((i % n) + n) % n] == v) return true;
+  }
+  return false;
+}
+
 bool split_at_close_vertices(PlanarGraph& graph, double tolerance) {
   const std::vector<Segment> segments = segments_of(graph);
   const std::vector<char> is_used = used_vertices(graph);
@@ -131,7 +158,7 @@ bool split_at_close_vertices(PlanarGraph& graph, double tolerance) {
     const Vec2 a = graph.points_um[s.a];
     const Vec2 step = graph.points_um[s.b] - a;
     vertices.for_each_near(a, graph.points_um[s.b], tolerance, [&](int v) {
-      if (v == s.a || v == s.b) return;
+      if (v == s.a || v == s.b || is_nearby(graph.chains[s.chain], s.place, v)) return;
       const double along = dot(graph.points_um[v] - a, step) / dot(step, step);
       if (along <= 0 || along >= 1) return;
       if (norm(graph.points_um[v] - (a + along * step)) < tolerance) cuts.push_back({s.chain, s.place, along, v});

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -66,6 +67,37 @@ Polyline without_short_pieces(Polyline points_um, double shortest_um) {
     points_um.erase(points_um.begin() + static_cast<std::ptrdiff_t>(lost));
   }
   return points_um;
+}
+
+Polyline evenly_divided(const Polyline& points_um, double edge_um) {
+  constexpr double kKink = 25 * std::numbers::pi / 180;
+  Polyline even = {points_um.front()};
+  std::size_t from = 0;
+  for (std::size_t i = 1; i < points_um.size(); ++i) {
+    if (i + 1 < points_um.size()) {
+      const Vec2 before = points_um[i] - points_um[i - 1];
+      const Vec2 after = points_um[i + 1] - points_um[i];
+      if (std::abs(std::atan2(cross(before, after), dot(before, after))) < kKink) continue;
+    }
+    const Polyline run(points_um.begin() + static_cast<std::ptrdiff_t>(from),
+                       points_um.begin() + static_cast<std::ptrdiff_t>(i) + 1);
+    const double length = length_um(run);
+    const int pieces = std::max(1, static_cast<int>(std::lround(length / edge_um)));
+    std::size_t k = 0;
+    double start = 0;
+    for (int piece = 1; piece < pieces; ++piece) {
+      const double s = length * piece / pieces;
+      while (k + 2 < run.size() && start + norm(run[k + 1] - run[k]) < s) {
+        start += norm(run[k + 1] - run[k]);
+        ++k;
+      }
+      const Vec2 step = run[k + 1] - run[k];
+      even.push_back(run[k] + ((s - start) / norm(step)) * step);
+    }
+    even.push_back(run.back());
+    from = i;
+  }
+  return even;
 }
 
 Polyline densified(const Polyline& points_um, double longest_um) {

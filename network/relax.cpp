@@ -74,6 +74,8 @@ class Size {
   std::vector<Fine> fine_;
 };
 
+enum class Density { even_out, thin_out };  // take out and put in, or only take out
+
 class Relaxation {
  public:
   Relaxation(const Frame& frame, const OutlineCurve& outline, double edge, Random& random)
@@ -96,7 +98,7 @@ class Relaxation {
       mesh.report.last_change = move() / edge_;
       if (step % kDensityInterval == 0 && step <= kLastDensityStep) {
         renew();
-        if (even_out_density()) renew();
+        if (change_density(Density::even_out)) renew();
         continue;
       }
       if (moved_since_renewal() > kRenew * edge_) renew();
@@ -106,7 +108,7 @@ class Relaxation {
         break;
       }
     }
-    renew();
+    thin_out();
     mesh.points_um = std::move(points_);
     mesh.triangulation = std::move(mesh_);
     return mesh;
@@ -152,6 +154,22 @@ class Relaxation {
         if (is_clear) points_.push_back(p);
       }
     }
+  }
+
+  /// What still crowds at the end gives way, and its neighbours settle.
+  void thin_out() {
+    constexpr int kPasses = 4;
+    constexpr int kSettlingSteps = 8;
+    renew();
+    for (int pass = 0; pass < kPasses && change_density(Density::thin_out); ++pass) {
+      for (int step = 0; step < kSettlingSteps; ++step) {
+        renew();
+        move();
+      }
+      renew();
+    }
+    renew();
+    for (int pass = 0; pass < kPasses && change_density(Density::thin_out); ++pass) renew();
   }
 
   /// Triangulate anew and leave out the free vertices that are outside the cell.
@@ -273,7 +291,7 @@ class Relaxation {
   }
 
   /// Take out free vertices that crowd, put some into long edges; neighbours of a change wait for the next time.
-  bool even_out_density() {
+  bool change_density(Density density) {
     std::vector<int> order(mesh_.edges.size());
     std::iota(order.begin(), order.end(), 0);
     std::vector<double> relative(mesh_.edges.size());
@@ -299,7 +317,7 @@ class Relaxation {
       is_touched[e.vertex_a] = is_touched[e.vertex_b] = 1;
       has_changed = true;
     }
-    for (auto k = order.rbegin(); k != order.rend() && relative[*k] > kTooLong; ++k) {
+    for (auto k = order.rbegin(); density == Density::even_out && k != order.rend() && relative[*k] > kTooLong; ++k) {
       const auto& e = mesh_.edges[*k];
       if (e.is_of_frame || !is_untouched(e)) continue;
       added.push_back(0.5 * (points_[e.vertex_a] + points_[e.vertex_b]));

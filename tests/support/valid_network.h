@@ -38,8 +38,8 @@ inline void expect_valid(const network::GeneratedNetwork& generated, const Cell&
   std::set<std::tuple<int, int, int>> seen;
   std::vector<int> degree(net.vertices_um.size(), 0);
   for (const Link& link : net.links) {
-    // Vertices within a tenth of an edge are merged, but not two adhesions', which are kept a fifth apart. What a
-    // free vertex may come close to is another matter: distances of a hundredth occur in no cell seen.
+    // vertices of the frame within a tenth of an edge merge (adhesions are kept a fifth apart), and free ones give way
+    // at half the wanted length, which is 0.4 edges at least
     EXPECT_GT(link.rest_length_um, 0.1 * (1 - 1e-9) * edge_length_um);
     const auto [low, high] = std::minmax(link.vertex_a, link.vertex_b);
     EXPECT_TRUE(seen.insert({low, high, link.fibre_id}).second) << "link " << low << "-" << high << " twice";
