@@ -57,7 +57,7 @@ class Layer {
 };
 
 /// Averages a layer's point field over one ellipse: exact half-space field + averaged correction near it, the average
-/// of the whole field far from it, to about 1e-9 of the field.
+/// of the whole field far from it, to about 1e-8 of the field.
 class LayerEllipse {
  public:
   LayerEllipse(const Layer& layer, const Ellipse& ellipse);
@@ -66,6 +66,7 @@ class LayerEllipse {
  private:
   const Layer& layer_;
   Ellipse ellipse_;
+  HalfSpaceEllipse half_space_;
   std::vector<DiscPoint> correction_rule_;
   struct FarRule {
     double from_um;
