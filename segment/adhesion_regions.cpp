@@ -55,7 +55,7 @@ cv::Mat split_regions(const cv::Mat& height, const cv::Mat& noise, const cv::Mat
     const int x = pixel % columns, y = pixel / columns;
     const float level = value.at<float>(y, x);
     int own = -1;
-    for (const auto [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
+    for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}}) {
       const int u = x + dx, v = y + dy;
       if (u < 0 || v < 0 || u >= columns || v >= height.rows || labels.at<int>(v, u) < 0) continue;
       int other = regions.root(labels.at<int>(v, u));
