@@ -159,7 +159,8 @@ class Builder {
     }
     line = without_short_pieces(simplified(line, kFlat * edge_), near_um);
     if (length_um(line) <= kMerge * edge_) return false;
-    Chain chain{.fibre_id = fibre.fibre_id};
+    Chain chain;
+    chain.fibre_id = fibre.fibre_id;
     for (std::size_t i = 0; i < line.size(); ++i) {
       const bool is_front = i == 0;
       const bool is_back = i + 1 == line.size();
@@ -199,7 +200,8 @@ class Builder {
     }
     if (knots.empty()) knots.push_back(sliding_vertex(outline_.length_um() * random_.uniform()));
     std::sort(knots.begin(), knots.end());
-    Chain chain{.fibre_id = 0, .is_closed = true};
+    Chain chain;
+    chain.is_closed = true;
     for (std::size_t i = 0; i < knots.size(); ++i) {
       chain.vertices.push_back(knots[i].second);
       const bool is_last = i + 1 == knots.size();
@@ -240,7 +242,9 @@ class Builder {
     for (const Chain& chain : graph_.chains) {
       const std::size_t n = chain.vertices.size();
       for (std::size_t i = 0; i < (chain.is_closed ? n : n - 1); ++i) {
-        const auto [a, b] = std::minmax(numbered(chain.vertices[i]), numbered(chain.vertices[(i + 1) % n]));
+        const int first = numbered(chain.vertices[i]);
+        const int second = numbered(chain.vertices[(i + 1) % n]);
+        const auto [a, b] = std::minmax(first, second);
         FrameSegment& segment = segments[{a, b}];
         segment.vertex_a = a;
         segment.vertex_b = b;

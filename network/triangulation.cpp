@@ -51,6 +51,7 @@ std::vector<Delaunay::Vertex_handle> insert_points(Delaunay& delaunay, const std
 
 /// Walk in from outside; each segment that bounds the cell is a step in or out.
 void mark_inside(Delaunay& delaunay, const std::set<Ends>& bounds) {
+  for (const auto& face : delaunay.all_face_handles()) face->info() = kUnknown;
   std::vector<Delaunay::Face_handle> open = {delaunay.infinite_face()};
   open.front()->info() = kOutside;
   while (!open.empty()) {
@@ -94,8 +95,8 @@ std::optional<Triangulation> triangulate(const std::vector<Vec2>& points_um,
   for (const auto& [face, i] : delaunay.finite_edges()) {
     const Delaunay::Face_handle other = face->neighbor(i);
     if (face->info() != kInside && other->info() != kInside) continue;
-    const auto [a, b] = std::minmax(face->vertex((i + 1) % 3)->info(), face->vertex((i + 2) % 3)->info());
-    Triangulation::Edge edge{.vertex_a = a, .vertex_b = b, .is_of_frame = face->is_constrained(i)};
+    const Ends ends = std::minmax(face->vertex((i + 1) % 3)->info(), face->vertex((i + 2) % 3)->info());
+    Triangulation::Edge edge{.vertex_a = ends.first, .vertex_b = ends.second, .is_of_frame = face->is_constrained(i)};
     if (face->info() == kInside) edge.apexes[0] = face->vertex(i)->info();
     if (other->info() == kInside) edge.apexes[1] = other->vertex(other->index(face))->info();
     result.edges.push_back(edge);
