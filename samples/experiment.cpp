@@ -36,11 +36,12 @@ Network span(const Cell& cell, const ScenarioParameters& p) {
 }
 
 std::vector<Tension> tensions_of(const DrawnCell& drawn, const TensionParameters& p) {
+  std::vector<Tension> tensions(1 + drawn.cell.fibres.size());
   // surface tension of a triangular lattice of cables: sqrt(3) t / edge
-  std::vector<Tension> tensions{
-      {.fibre_id = 0, .tension_nN = p.surface_tension_nN_per_um * kReferenceEdge_um / std::sqrt(3.0)}};
+  tensions.front().tension_nN = p.surface_tension_nN_per_um * kReferenceEdge_um / std::sqrt(3.0);
   for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i) {
-    tensions.push_back({.fibre_id = drawn.cell.fibres[i].fibre_id, .tension_nN = drawn.tensions_nN[i]});
+    tensions[i + 1].fibre_id = drawn.cell.fibres[i].fibre_id;
+    tensions[i + 1].tension_nN = drawn.tensions_nN[i];
   }
   return tensions;
 }

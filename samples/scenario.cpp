@@ -108,6 +108,7 @@ void declare(ParameterList& list, ScenarioParameters& p) {
   list.table("");
   list.add("pixel_size_um", p.microscope.pixel_size_um, Range::positive(), "side of a pixel on the specimen (um)");
   declare(list, p.gel);
+  for (Parameter& q : list.all()) q.is_required = false;  // a scenario's gel has defaults, a real one has not
   list.table("scenario");
   list.add("scenario", p.scenario, "name of a scenario, or path of a scenario file");
   list.add("seed", p.seed, "of all that is random");
