@@ -88,7 +88,7 @@ TEST(ElasticSystem, the_base_bears_the_whole_load) {
     const auto is_too_large = [](const Box& box) {
       return box.low_um[2] == 0 && box.size_um[0] > 1 && std::abs(box.low_um[0]) < 3 && std::abs(box.low_um[1]) < 3;
     };
-    const ElasticSystem system(gel_of(0.4999, 10), make_block_mesh(lines, order, is_too_large, 100000, 2), 2, 2);
+    const ElasticSystem system(gel_of(0.4999, 10), make_block_mesh(lines, order, is_too_large, 100000, 2), 2, 2, 2);
     const auto load = system.load_weights(ellipse);
     double share = 0;
     for (const auto& [node, weight] : load) share += weight;
@@ -230,8 +230,8 @@ TEST(Split, is_the_same_for_any_number_of_threads) {
   const SubstrateParameters parameters = test::model_named("split");
   const Gel gel = gel_of(0.49, 30);
   const Eigen::MatrixXd one = make_substrate(gel, parameters, 1)->compliance_um_per_nN(points, ellipses);
-  EXPECT_EQ(one, make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses));
-  EXPECT_EQ(one, make_substrate(gel, parameters, 4)->compliance_um_per_nN(points, ellipses));
+  EXPECT_TRUE(one == make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses));
+  EXPECT_TRUE(one == make_substrate(gel, parameters, 4)->compliance_um_per_nN(points, ellipses));
 }
 
 }  // namespace
