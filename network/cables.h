@@ -25,7 +25,9 @@ void declare(ParameterList& list, CableParameters& parameters);
 
 struct Equilibrium {
   std::vector<Vec2> positions_um;
-  std::vector<double> link_force_nN;  ///< by link
+  std::vector<Vec2> spans_um;  ///< by link, x_b − x_a: to the last digit even where the cable has collapsed, which the
+                               ///< difference of the rounded positions is not; the forces follow from these
+  std::vector<double> link_force_nN;  ///< by link; of a collapsed cable anything up to its tension
   double energy_fJ = 0;               ///< nN·um
   Report report;
 };

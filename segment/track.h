@@ -11,12 +11,12 @@
 namespace mbtfm::segment {
 
 struct TrackParameters {
-  double pixel_size_um = 0;           ///< 0: from the images' own calibration
-  double detection_snr = 5;           ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
+  double pixel_size_um = 0;            ///< 0: from the images' own calibration
+  double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
-  double far_field_share = 0.12;      ///< of the image's side: the frame that is taken for far from the cell
-  double least_similarity = 0.6;      ///< correlation of a bead's neighbourhoods below which it is no match
-  double outlier_threshold = 4;       ///< in robust sd: 4 rejects one good bead in 16 000
+  double far_field_share = 0.12;       ///< of the image's side: the frame that is taken for far from the cell
+  double least_similarity = 0.6;       ///< correlation of a bead's neighbourhoods below which it is no match
+  double outlier_threshold = 4;        ///< in robust sd: 4 rejects one good bead in 16 000
 };
 void declare(ParameterList& list, TrackParameters& parameters);
 
@@ -34,12 +34,12 @@ std::vector<DetectedBead> detect_beads(const Image& image, double detection_snr 
                                        int threads = 1);
 
 struct Tracking {
-  DisplacementField field;       ///< one entry for each bead found in the relaxed image, good or flagged
-  Vec2 drift_um;                 ///< of the stressed image as a whole; taken off the field
-  double far_field_rms_um = 0;   ///< of a displacement component in the frame, after the drift is taken off
-  double bead_sigma_um = 0;      ///< of a bead's picture
+  DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
+  Vec2 drift_um;                ///< of the stressed image as a whole; taken off the field
+  double far_field_rms_um = 0;  ///< of a displacement component in the frame, after the drift is taken off
+  double bead_sigma_um = 0;     ///< of a bead's picture
   int n_good = 0;
-  int n_beads_stressed = 0;      ///< found in the stressed image
+  int n_beads_stressed = 0;  ///< found in the stressed image
 };
 
 /// Displacement of each bead of `relaxed`.

@@ -22,7 +22,19 @@ struct Ellipse {
 Ellipse ellipse_of(const Adhesion& adhesion);
 
 struct SubstrateParameters {
-  std::string model = "split";  ///< half-space, layer, split or refined
+  std::string model = "split";  ///< exact near field, real sides and bottom, a second a cell
+
+  // split and refined: the block
+  double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
+  // split: the grid of the smooth correction
+  double cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
+
+  // refined
+  std::string element = "q2-p1disc";  ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
+  double elements_per_adhesion = 10;  ///< elements that cross each adhesion (area over element face); 20 for 1 %
+  double growth = 2;                  ///< element side over distance to the adhesion: what 2:1 balance gives anyway
+
+  double memory_limit_GB = 0;  ///< of split and refined; 0: what the machine has free
 };
 void declare(ParameterList& list, SubstrateParameters& parameters);
 
@@ -31,14 +43,24 @@ class Substrate {
   virtual ~Substrate() = default;
   /// Displacement (um) of each point for a unit force (1 nN) on each ellipse: rows 2i, 2i+1 are x, y at points[i];
   /// columns 2j, 2j+1 are a force along x, y on ellipses[j].
+  /// @throws InvalidData where a point or an ellipse is not finite, is no ellipse or lies outside the model's block;
+  ///         NotSolved where the memory would not suffice
   virtual Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                                const std::vector<Ellipse>& ellipses) const = 0;
-  /// What it took into account, and its size.
+  /// Displacement (um) of each point for given forces on the ellipses, without forming the matrix.
+  /// @throws as compliance_um_per_nN, and InvalidData where a force is not finite or their number differs
+  virtual std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                             const std::vector<Vec2>& forces_nN) const;
+  /// What it took into account.
   virtual std::vector<Effect> effects() const = 0;
+  /// Its size, and what the calls so far cost.
   virtual Figures figures() const = 0;
 };
 
 /// The model named in the parameters. @throws UsageError, InvalidData
 std::unique_ptr<Substrate> make_substrate(const Gel& gel, const SubstrateParameters& parameters, int threads);
+
+/// The same for `half-space` and `layer` alone, which need no finite elements: links without deal.II.
+std::unique_ptr<Substrate> make_greens(const Gel& gel, const SubstrateParameters& parameters, int threads);
 
 }  // namespace mbtfm::substrate

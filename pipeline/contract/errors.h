@@ -16,28 +16,28 @@ struct UsageError : std::runtime_error {
 /// A file is missing, truncated, malformed or breaks an invariant. Exit code 3.
 struct InputError : std::runtime_error {
   std::string where, expected, found, hint;
-  InputError(std::string where, std::string expected, std::string found, std::string hint = {})
-      : std::runtime_error(where + ": expected " + expected + ", found " + found),
-        where(std::move(where)),
-        expected(std::move(expected)),
-        found(std::move(found)),
-        hint(std::move(hint)) {}
+  InputError(std::string at, std::string wanted, std::string got, std::string advice = {})
+      : std::runtime_error(at + ": expected " + wanted + ", found " + got),
+        where(std::move(at)),
+        expected(std::move(wanted)),
+        found(std::move(got)),
+        hint(std::move(advice)) {}
 };
 
 /// A value breaks its type's invariant: what `check` throws. Readers add the file and line and throw InputError.
 struct InvalidData : std::invalid_argument {
   std::string element, expected, found;
-  InvalidData(std::string element, std::string expected, std::string found)
-      : std::invalid_argument(element + ": expected " + expected + ", found " + found),
-        element(std::move(element)),
-        expected(std::move(expected)),
-        found(std::move(found)) {}
+  InvalidData(std::string at, std::string wanted, std::string got)
+      : std::invalid_argument(at + ": expected " + wanted + ", found " + got),
+        element(std::move(at)),
+        expected(std::move(wanted)),
+        found(std::move(got)) {}
 };
 
 /// Not converged or ill-posed. The outputs are still written, marked as such. Exit code 4.
 struct NotSolved : std::runtime_error {
   Report report;
-  explicit NotSolved(Report report) : std::runtime_error(report.reason), report(std::move(report)) {}
+  explicit NotSolved(Report what) : std::runtime_error(what.reason), report(std::move(what)) {}
 };
 
 /// Cannot write. Exit code 5.

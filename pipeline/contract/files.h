@@ -81,7 +81,12 @@ void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, cons
 /// Adhesion ellipses with arrays by adhesion.
 void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
                         const std::vector<PointArray>& arrays);
-/// A network at other positions, with tension_nN (force carried) by link.
+/// A network in equilibrium: its vertices are where the cables have drawn them; force_nN is carried by each link.
+struct ContractedNetwork {
+  Network network;
+  std::vector<double> link_force_nN;
+};
+ContractedNetwork read_contracted_network(const Path& file);
 void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
                               const std::vector<double>& link_force_nN);
 

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <limits>
+#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -25,10 +26,14 @@ struct Range {
   static Range between(double low, double high) { return {.low = low, .high = high}; }
 };
 
+bool is_inside(const Range& range, double value);
+/// "a number > 0", for messages and the parameter page.
+std::string describe(const std::string& noun, const Range& range);
+
 struct Parameter {
   std::string table;  ///< of cell.toml; empty: above the first table
   std::string name;   ///< key in the table, and the flag --name
-  std::variant<double*, int*, std::uint64_t*, bool*, std::string*> member;
+  std::variant<double*, std::optional<double>*, int*, std::uint64_t*, bool*, std::string*> member;
   Range range;
   std::vector<std::string> choices;  ///< of a string; empty: any
   std::string meaning;               ///< one sentence, with the unit
@@ -42,6 +47,8 @@ class ParameterList {
   /// The following parameters belong to [name] of cell.toml.
   void table(std::string name) { table_ = std::move(name); }
   void add(std::string name, double& member, Range range, std::string meaning);
+  /// May stay unset; `meaning` says what holds then.
+  void add(std::string name, std::optional<double>& member, Range range, std::string meaning);
   void add(std::string name, int& member, Range range, std::string meaning);
   void add(std::string name, std::uint64_t& member, std::string meaning);
   void add(std::string name, bool& member, std::string meaning);
@@ -61,6 +68,8 @@ class ParameterList {
 /// Set the list's members from a cell.toml. Tables of other stages are left to them; unknown tables, and unknown or
 /// repeated keys in the list's own tables are errors that name the nearest known one. @throws InputError
 void read_toml(ParameterList& list, const std::filesystem::path& file);
+/// The same, of the text of a file called `name` in messages.
+void read_toml(ParameterList& list, std::string_view text, const std::string& name);
 /// Set one parameter from text, as a flag does. @throws UsageError
 void set_from_text(Parameter& parameter, const std::string& text);
 std::string to_text(const Parameter& parameter);

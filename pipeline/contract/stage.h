@@ -42,9 +42,12 @@ class StageContext {
   /// Temporary path for `file` of an output folder.
   std::filesystem::path output(const std::string& name, const std::string& file);
 
+  /// Folders that outputs need are made, and unmade where the stage fails.
+  void make_folder(const std::filesystem::path& folder);
+
   // used by run_stage
   std::map<std::string, std::filesystem::path> inputs_, outputs_;
-  std::vector<std::filesystem::path> read_;
+  std::vector<std::filesystem::path> read_, made_;
   struct Pending {
     std::filesystem::path temporary, destination;
   };
@@ -52,7 +55,8 @@ class StageContext {
 };
 
 /// Parse the arguments, read the parameters, call `body`, put the outputs in place, write the record, return the exit
-/// code. Flags of every stage: --help --version --threads --quiet --config --record --parameters.
+/// code. Flags of every stage: --help --version --threads --quiet --config (or --gel)
+/// --record --check --parameters.
 int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<void(ParameterList&)>& declare_parameters,
               const std::function<StageReport(StageContext&)>& body);

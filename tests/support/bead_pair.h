@@ -58,14 +58,14 @@ struct BeadScene {
   int width = 512;
   int n_beads = 5242;
   double bead_sigma = 1.3;
-  double brightness = 1500;       ///< median peak of a bead
-  double brightness_spread = 0.4; ///< of its logarithm
+  double brightness = 1500;        ///< median peak of a bead
+  double brightness_spread = 0.4;  ///< of its logarithm
   double background = 150;
   double read_noise = 5;
-  double jitter = 0;         ///< sd of a bead's own random step between the images
-  double lost = 0;           ///< share of beads that only one of the images shows, in each
-  double uneven_light = 0;   ///< relative fall of the light towards a corner, another one in each image
-  double gain = 1;           ///< of the stressed image over the relaxed one
+  double jitter = 0;        ///< sd of a bead's own random step between the images
+  double lost = 0;          ///< share of beads that only one of the images shows, in each
+  double uneven_light = 0;  ///< relative fall of the light towards a corner, another one in each image
+  double gain = 1;          ///< of the stressed image over the relaxed one
   double offset = 0;
   Vec2 drift;
   std::uint64_t seed = 1;
@@ -124,8 +124,8 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
         const double light = (is_stressed ? scene.gain : 1) * (1 - scene.uneven_light * along);
         const double mean = light * (image->at(i, j) + scene.background);
         const double counted = static_cast<double>(std::poisson_distribution<int>(mean)(random));
-        image->at(i, j) = static_cast<float>(
-            std::max(0.0, std::round(counted + scene.read_noise * normal(random) + 100 + (is_stressed ? scene.offset : 0))));
+        image->at(i, j) = static_cast<float>(std::max(
+            0.0, std::round(counted + scene.read_noise * normal(random) + 100 + (is_stressed ? scene.offset : 0))));
       }
     }
   }

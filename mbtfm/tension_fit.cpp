@@ -1,0 +1,40 @@
+#include "mbtfm/tension_fit.h"
+
+#include <numeric>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::inverse {
+
+void declare(ParameterList& list, FitParameters& p) {
+  list.table("fit");
+  list.add("method", p.method, "how the tensions are found", {"gauss-newton", "blockwise-cg", "plain-cg"});
+  list.add("gradients", p.gradients, "of the conjugate gradient methods", {"exact", "finite-difference"});
+  list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
+           "networks to fit on; tensions are their mean, and their spread is part of the error bars");
+  list.add("tolerance", p.tolerance, Range::positive(), "relative change of the tensions at which the fit stops");
+  list.add("max_iterations", p.max_iterations, Range::between(1, 100000), "steps of Gauss-Newton at most");
+  list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),
+           "equilibria solved by a conjugate gradient method at most");
+  list.add("far_distance_um", p.far_distance_um, Range::not_negative(),
+           "beads this far outside the outline tell the noise level (um)");
+}
+
+TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
+                        const Eigen::VectorXd& start_nN) {
+  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start_nN);
+  std::vector<int> all(problem.n_tensions());
+  std::iota(all.begin(), all.end(), 0);
+  if (parameters.method == "plain-cg") {
+    return fit_conjugate_gradients(problem, parameters, threads, start_nN, {{.tensions = all, .n_steps = 10}});
+  }
+  if (parameters.method == "blockwise-cg") {  // thesis 3.2.5: one step on the network, ten on the fibres
+    const std::vector<int> fibres(all.begin() + 1, all.end());
+    std::vector<Block> blocks = {{.tensions = {0}, .n_steps = 1}};
+    if (!fibres.empty()) blocks.push_back({.tensions = fibres, .n_steps = 10});
+    return fit_conjugate_gradients(problem, parameters, threads, start_nN, blocks);
+  }
+  throw UsageError("fit: unknown method '" + parameters.method + "'");
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,74 @@
+#include "mbtfm/tension_problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+std::vector<double> to_vector(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
+}  // namespace
+
+TensionProblem::TensionProblem(const network::CableNetwork& cables, const LinearData& data,
+                               const std::vector<int>& adhesion_ids)
+    : cables_(cables), data_(data) {
+  MBTFM_ASSERT(data.compliance_um_per_nN.cols() == 2 * static_cast<Eigen::Index>(adhesion_ids.size()));
+  for (const int id : cables.adhesion_ids()) {
+    const auto at = std::find(adhesion_ids.begin(), adhesion_ids.end(), id);
+    if (at == adhesion_ids.end()) {
+      throw InvalidData("adhesion " + std::to_string(id) + " of the network", "an adhesion of the cell", "none of that label");
+    }
+    pair_of_.push_back(at - adhesion_ids.begin());
+  }
+}
+
+Eigen::MatrixXd TensionProblem::to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(data_.compliance_um_per_nN.cols(), by_network_adhesion.cols());
+  for (std::size_t i = 0; i < pair_of_.size(); ++i) {
+    rows.middleRows<2>(2 * pair_of_[i]) = by_network_adhesion.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+  }
+  return rows;
+}
+
+Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby) const {
+  const std::vector<double> tensions = to_vector(tensions_nN);
+  Trial trial{.tensions_nN = tensions_nN, .equilibrium = {}, .forces_nN = {}, .residual = {}};
+  trial.equilibrium = cables_.equilibrium(tensions, nearby ? nearby->equilibrium.positions_um : std::vector<Vec2>{});
+  if (!trial.equilibrium.report.converged) throw NotSolved(trial.equilibrium.report);
+  trial.forces_nN = to_data_rows(cables_.adhesion_forces_nN(tensions, trial.equilibrium));
+  trial.residual = data_.reduced * trial.forces_nN - data_.target;
+  trial.objective = 0.5 * trial.residual.squaredNorm();
+  return trial;
+}
+
+Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
+  return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium));
+}
+
+Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, int threads) const {
+  const double largest = trial.tensions_nN.maxCoeff();
+  Eigen::VectorXd gradient(n_tensions());
+  parallel_for(n_tensions(), threads, [&](int i) {
+    // half the digits of a double go into the step, which stays on the allowed side of zero
+    const double step = 1e-6 * std::max(trial.tensions_nN[i], 1e-3 * std::max(largest, 1e-12));
+    Eigen::VectorXd above = trial.tensions_nN, below = trial.tensions_nN;
+    above[i] += step;
+    below[i] = std::max(0.0, below[i] - step);
+    const double difference = evaluate(above, &trial).objective - evaluate(below, &trial).objective;
+    gradient[i] = difference / (above[i] - below[i]);
+  });
+  return gradient;
+}
+
+Eigen::VectorXd uniform_start_nN(const TensionProblem& problem) {
+  const Trial trial = problem.evaluate(Eigen::VectorXd::Ones(problem.n_tensions()));
+  const Eigen::VectorXd response = problem.data().reduced * trial.forces_nN;
+  const double scale = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
+  // Where the cell seems to push (noise only), any small positive value serves.
+  return Eigen::VectorXd::Constant(problem.n_tensions(), scale > 0 ? scale : 1e-3);
+}
+
+}  // namespace mbtfm::inverse

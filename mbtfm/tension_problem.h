@@ -1,0 +1,54 @@
+/// The objective of the tension fit: Phi(t) = ½ |C R(t) − y|², R(t) the adhesion forces of the cable network.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <vector>
+
+#include "mbtfm/linear_data.h"
+#include "network/cables.h"
+
+namespace mbtfm::inverse {
+
+/// One trial of the tensions. Knows its equilibrium, so that the next trial can start there.
+struct Trial {
+  Eigen::VectorXd tensions_nN;
+  network::Equilibrium equilibrium;
+  Eigen::VectorXd forces_nN;  ///< by adhesion of the data: fx, fy
+  Eigen::VectorXd residual;   ///< C R − y
+  double objective = 0;
+};
+
+class TensionProblem {
+ public:
+  /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance; every adhesion that holds the
+  ///                      network must be among them
+  TensionProblem(const network::CableNetwork& cables, const LinearData& data, const std::vector<int>& adhesion_ids);
+
+  int n_tensions() const { return static_cast<int>(cables_.fibre_ids().size()); }
+  const network::CableNetwork& cables() const { return cables_; }
+  const LinearData& data() const { return data_; }
+
+  /// @param nearby  a trial whose equilibrium is a good place to start, or none
+  Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr) const;
+  /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
+  Eigen::MatrixXd force_derivatives(const Trial& trial) const;
+  /// d(C R)/dt
+  Eigen::MatrixXd jacobian(const Trial& trial) const { return data_.reduced * force_derivatives(trial); }
+  /// dPhi/dt, exact.
+  Eigen::VectorXd gradient(const Trial& trial) const { return jacobian(trial).transpose() * trial.residual; }
+  /// dPhi/dt by central differences over threads, as the thesis does (3.2.5); for comparison.
+  Eigen::VectorXd finite_difference_gradient(const Trial& trial, int threads) const;
+
+ private:
+  Eigen::MatrixXd to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const;
+  const network::CableNetwork& cables_;
+  const LinearData& data_;
+  std::vector<Eigen::Index> pair_of_;  ///< of the network's i-th adhesion in the data
+};
+
+/// Tensions all equal that fit best: forces grow in proportion to them, so one trial and one division. Where the fit
+/// starts.
+Eigen::VectorXd uniform_start_nN(const TensionProblem& problem);
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,220 @@
+#include "network/cables.h"
+
+#include <algorithm>
+#include <set>
+#include <string>
+
+#include "network/cable_energy.h"
+#include "network/minimise.h"
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::network {
+namespace {
+
+// A tension of zero stands for the limit t -> 0 from above: its cables are given this part of the largest tension. So
+// slack directions have an equilibrium and derivatives; the forces change by less than 1e-7 of the largest.
+constexpr double kSlackTension = 1e-7;
+// A cold start rounds the kinks off over this part of an edge at first.
+constexpr double kFirstSmoothing = 0.1;
+
+int index_of(const std::vector<int>& sorted, int value) {
+  return static_cast<int>(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin());
+}
+
+double mean_rest_length_um(const Network& network) {
+  double sum = 0;
+  for (const Link& link : network.links) sum += link.rest_length_um;
+  return sum / static_cast<double>(network.links.size());
+}
+
+FreeVertices free_vertices(const Network& network) {
+  std::vector<int> unknown(network.vertices_um.size(), -1);
+  int n_free = 0;
+  for (std::size_t v = 0; v < unknown.size(); ++v)
+    if (network.adhesion_id[v] == 0) unknown[v] = n_free++;
+  std::vector<int> pair(network.links.size(), -1);
+  std::vector<std::array<int, 2>> pairs;
+  for (std::size_t k = 0; k < pair.size(); ++k) {
+    const int a = unknown[network.links[k].vertex_a], b = unknown[network.links[k].vertex_b];
+    if (a < 0 || b < 0) continue;
+    pair[k] = static_cast<int>(pairs.size());
+    pairs.push_back({a, b});
+  }
+  return {std::move(unknown), std::move(pair), BlockCholesky(n_free, pairs)};
+}
+
+}  // namespace
+
+void declare(ParameterList& list, CableParameters& p) {
+  list.table("network");
+  list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::positive(),
+           "force of a cable per strain beyond its rest length (nN)");
+  list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2},
+           "length over which the kink of a collapsed cable is rounded off (mean edge lengths)");
+  list.add("force_tolerance", p.force_tolerance, Range{.low = 1e-13, .high = 1e-3},
+           "largest net force on a free vertex at equilibrium (of the largest tension)");
+  list.add("max_iterations", p.max_iterations, Range::between(1, 100000), "Newton steps at most");
+}
+
+struct CableNetwork::Impl {
+  Network network;
+  CableParameters parameters;
+  std::vector<int> fibre_ids, adhesion_ids;
+  std::vector<int> group;     // by link
+  std::vector<int> adhesion;  // by vertex: index of the adhesion that holds it, or −1
+  double mean_rest_length_um = 0;
+  FreeVertices free;
+
+  double smoothing_um() const { return parameters.smoothing * mean_rest_length_um; }
+  std::vector<Cable> cables(const std::vector<double>& tensions_nN) const;
+};
+
+// What is given is checked here; from here on indices are in range, lengths positive, tensions not negative.
+std::vector<Cable> CableNetwork::Impl::cables(const std::vector<double>& tensions_nN) const {
+  if (tensions_nN.size() != fibre_ids.size())
+    throw InvalidData("tensions", std::to_string(fibre_ids.size()) + " values", std::to_string(tensions_nN.size()));
+  for (std::size_t g = 0; g < tensions_nN.size(); ++g)
+    if (!(tensions_nN[g] >= 0 && std::isfinite(tensions_nN[g])))
+      throw InvalidData("tension of fibre " + std::to_string(fibre_ids[g]), "a number >= 0 (nN)",
+                        std::to_string(tensions_nN[g]));
+  const double least = kSlackTension * *std::max_element(tensions_nN.begin(), tensions_nN.end());
+  std::vector<Cable> result;
+  result.reserve(network.links.size());
+  for (std::size_t k = 0; k < network.links.size(); ++k) {
+    const Link& link = network.links[k];
+    result.push_back({.vertex_a = link.vertex_a,
+                      .vertex_b = link.vertex_b,
+                      .rest_length_um = link.rest_length_um,
+                      .tension_nN = link.share * std::max(tensions_nN[group[k]], least),
+                      .stiffness_nN_per_um = link.share * parameters.axial_stiffness_nN / link.rest_length_um});
+  }
+  return result;
+}
+
+CableNetwork::CableNetwork(Network network, CableParameters parameters) {
+  check(network);
+  std::set<int> fibres{0}, adhesions;
+  for (const Link& link : network.links) fibres.insert(link.fibre_id);
+  for (const int id : network.adhesion_id)
+    if (id != 0) adhesions.insert(id);
+  if (adhesions.size() < 2)
+    throw InvalidData("network", "at least two adhesions that hold it: with fewer it contracts to a point",
+                      std::to_string(adhesions.size()));
+  std::vector<int> fibre_ids(fibres.begin(), fibres.end()), adhesion_ids(adhesions.begin(), adhesions.end());
+  std::vector<int> group, adhesion;
+  for (const Link& link : network.links) group.push_back(index_of(fibre_ids, link.fibre_id));
+  for (const int id : network.adhesion_id) adhesion.push_back(id == 0 ? -1 : index_of(adhesion_ids, id));
+  const double mean_rest = mean_rest_length_um(network);
+  FreeVertices free = free_vertices(network);
+  impl_ = std::make_unique<Impl>(Impl{std::move(network), parameters, std::move(fibre_ids), std::move(adhesion_ids),
+                                      std::move(group), std::move(adhesion), mean_rest, std::move(free)});
+}
+CableNetwork::~CableNetwork() = default;
+CableNetwork::CableNetwork(CableNetwork&&) noexcept = default;
+CableNetwork& CableNetwork::operator=(CableNetwork&&) noexcept = default;
+
+const Network& CableNetwork::network() const { return impl_->network; }
+const std::vector<int>& CableNetwork::fibre_ids() const { return impl_->fibre_ids; }
+const std::vector<int>& CableNetwork::adhesion_ids() const { return impl_->adhesion_ids; }
+
+Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start) const {
+  const std::vector<Cable> cables = impl_->cables(tensions_nN);
+  std::vector<Vec2> positions = start.empty() ? impl_->network.vertices_um : start;
+  if (positions.size() != impl_->network.vertices_um.size())
+    throw InvalidData("start", std::to_string(impl_->network.vertices_um.size()) + " positions",
+                      std::to_string(positions.size()));
+  for (std::size_t v = 0; v < positions.size(); ++v)
+    if (impl_->adhesion[v] >= 0) positions[v] = impl_->network.vertices_um[v];
+
+  double largest_tension = 0, largest_share = 0;
+  for (const Cable& cable : cables) largest_tension = std::max(largest_tension, cable.tension_nN);
+  for (const Link& link : impl_->network.links) largest_share = std::max(largest_share, link.share);
+  // A stretch is known to the rounding of the length, a force therefore to that part of EA.
+  const double rounding =
+      8 * std::numeric_limits<double>::epsilon() * impl_->parameters.axial_stiffness_nN * largest_share;
+  const double smoothing = impl_->smoothing_um();
+  Minimum minimum =
+      minimise(impl_->free, cables, std::move(positions),
+               {.first_smoothing_um = start.empty() ? kFirstSmoothing * impl_->mean_rest_length_um : smoothing,
+                .smoothing_um = smoothing,
+                .largest_tension_nN = largest_tension,
+                .force_tolerance_nN = std::max(impl_->parameters.force_tolerance * largest_tension, rounding),
+                .max_iterations = impl_->parameters.max_iterations});
+  Equilibrium result;
+  for (std::size_t k = 0; k < cables.size(); ++k) {
+    const Pull p = pull(cables[k], minimum.spans_um[k], smoothing);
+    result.link_force_nN.push_back(p.force_nN * norm(minimum.spans_um[k]) / p.length_um);
+    result.energy_fJ += energy_fJ(cables[k], p.length_um, smoothing);
+  }
+  result.positions_um = std::move(minimum.positions_um);
+  result.spans_um = std::move(minimum.spans_um);
+  result.report = std::move(minimum.report);
+  return result;
+}
+
+std::vector<Vec2> CableNetwork::reactions_nN(const std::vector<double>& tensions_nN,
+                                             const Equilibrium& equilibrium) const {
+  const std::vector<Cable> cables = impl_->cables(tensions_nN);
+  std::vector<Vec2> result(equilibrium.positions_um.size());
+  for (std::size_t k = 0; k < cables.size(); ++k) {
+    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->smoothing_um());
+    const Vec2 force = (p.force_nN / p.length_um) * equilibrium.spans_um[k];
+    result[cables[k].vertex_a] += force;
+    result[cables[k].vertex_b] += -1.0 * force;
+  }
+  for (std::size_t v = 0; v < result.size(); ++v)
+    if (impl_->adhesion[v] < 0) result[v] = {};
+  return result;
+}
+
+Eigen::VectorXd CableNetwork::adhesion_forces_nN(const std::vector<double>& tensions_nN,
+                                                 const Equilibrium& equilibrium) const {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()));
+  const std::vector<Vec2> reactions = reactions_nN(tensions_nN, equilibrium);
+  for (std::size_t v = 0; v < reactions.size(); ++v) {
+    const int i = impl_->adhesion[v];
+    if (i >= 0) result.segment<2>(2 * i) += Eigen::Vector2d(reactions[v].x, reactions[v].y);
+  }
+  return result;
+}
+
+// Held rows are summed by adhesion as they arise: H_xf and B_x have two rows an adhesion.
+Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<double>& tensions_nN,
+                                                         const Equilibrium& equilibrium) const {
+  const std::vector<Cable> cables = impl_->cables(tensions_nN);
+  const Eigen::Index n_groups = static_cast<Eigen::Index>(impl_->fibre_ids.size());
+  BlockCholesky h_ff = impl_->free.matrix;
+  h_ff.set_zero();
+  BlockCholesky::Columns b_f = BlockCholesky::Columns::Zero(2 * h_ff.n_blocks(), n_groups);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()), n_groups);
+  struct Coupling {
+    int adhesion, unknown;
+    BlockCholesky::Block stiffness;
+  };
+  std::vector<Coupling> couplings;  // the blocks of −H_xf
+
+  for (std::size_t k = 0; k < cables.size(); ++k) {
+    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->smoothing_um());
+    const Vec2 n = (1 / p.length_um) * equilibrium.spans_um[k];
+    const BlockCholesky::Block block = stiffness(p, equilibrium.spans_um[k], n);
+    impl_->free.add(h_ff, k, cables[k], block);
+    const Eigen::Vector2d pull_of_unit_tension = impl_->network.links[k].share * Eigen::Vector2d(n.x, n.y);
+    const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};
+    for (int e = 0; e < 2; ++e) {
+      const Eigen::Vector2d b = (e == 0 ? -1 : 1) * pull_of_unit_tension;
+      const int unknown = impl_->free.unknown[ends[e]], other = impl_->free.unknown[ends[1 - e]];
+      if (unknown >= 0)
+        b_f.block<2, 1>(2 * unknown, impl_->group[k]) += b;
+      else
+        result.block<2, 1>(2 * impl_->adhesion[ends[e]], impl_->group[k]) -= b;
+      if (unknown < 0 && other >= 0) couplings.push_back({impl_->adhesion[ends[e]], other, block});
+    }
+  }
+  h_ff.factorise();
+  h_ff.solve(b_f);  // now −dx_f/dt
+  for (const Coupling& c : couplings)
+    result.middleRows<2>(2 * c.adhesion) -= c.stiffness * b_f.middleRows<2>(2 * c.unknown);
+  return result;
+}
+
+}  // namespace mbtfm::network

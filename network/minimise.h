@@ -1,0 +1,44 @@
+/// The minimum of a set of cables' energy over the free vertices.
+#pragma once
+
+#include <vector>
+
+#include "network/block_cholesky.h"
+#include "network/cable_energy.h"
+#include "pipeline/contract/report.h"
+
+namespace mbtfm::network {
+
+/// Which vertices move, and where the cables' stiffness goes in the matrix over them.
+struct FreeVertices {
+  std::vector<int> unknown;  ///< by vertex: its block in the matrix, or −1 where it is held
+  std::vector<int> pair;     ///< by cable: its pair of blocks, or −1 where an end is held
+  BlockCholesky matrix;      ///< analysed
+
+  void add(BlockCholesky& to, std::size_t cable_index, const Cable& cable, const BlockCholesky::Block& block) const {
+    const int a = unknown[cable.vertex_a], b = unknown[cable.vertex_b];
+    if (pair[cable_index] >= 0)
+      to.add_spring(pair[cable_index], block);
+    else if (a >= 0 || b >= 0)
+      to.add_diagonal(std::max(a, b), block);
+  }
+};
+
+struct MinimiseOptions {
+  double first_smoothing_um = 0;  ///< eps to begin with
+  double smoothing_um = 0;        ///< eps to end with
+  double largest_tension_nN = 0;
+  double force_tolerance_nN = 0;
+  int max_iterations = 0;
+};
+
+struct Minimum {
+  std::vector<Vec2> positions_um;
+  std::vector<Vec2> spans_um;  ///< by cable, x_b − x_a to the last digit
+  Report report;               ///< last_change: the largest net force on a free vertex (nN)
+};
+
+Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> start,
+                 const MinimiseOptions& options);
+
+}  // namespace mbtfm::network

@@ -1,0 +1,22 @@
+#include "pipeline/contract/json.h"
+
+namespace mbtfm {
+
+nlohmann::ordered_json json_of(const Value& value) {
+  return std::visit([](const auto& v) { return nlohmann::ordered_json(v); }, value);
+}
+
+nlohmann::ordered_json json_of(const Figures& figures) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const auto& [name, value] : figures) json[name] = json_of(value);
+  return json;
+}
+
+Value value_of(const nlohmann::ordered_json& json) {
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_number_integer()) return json.get<std::int64_t>();
+  if (json.is_number()) return json.get<double>();
+  return json.get<std::string>();
+}
+
+}  // namespace mbtfm

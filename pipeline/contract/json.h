@@ -1,0 +1,15 @@
+/// Figures as JSON. Inside pipeline/ only.
+#pragma once
+
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/report.h"
+
+namespace mbtfm {
+
+nlohmann::ordered_json json_of(const Value& value);
+nlohmann::ordered_json json_of(const Figures& figures);
+/// @throws nlohmann::json::exception where it is not a boolean, number or string
+Value value_of(const nlohmann::ordered_json& json);
+
+}  // namespace mbtfm

@@ -1,0 +1,301 @@
+#include "pipeline/contract/stage.h"
+
+#include <signal.h>
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/hash.h"
+#include "pipeline/contract/json.h"
+#include "pipeline/contract/parallel.h"
+#include "pipeline/contract/version.h"
+
+namespace mbtfm {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int kDone = 0, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70, kInterrupted = 130;
+
+struct Interrupted : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+std::atomic<bool> was_interrupted = false;
+extern "C" void note_signal(int) { was_interrupted = true; }
+
+/// The first Ctrl-C asks the work to stop; the second ends it.
+void watch_signals() {
+  struct sigaction action {};
+  action.sa_handler = note_signal;
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+/// What the command line says, before any of it is believed.
+struct CommandLine {
+  std::map<std::string, std::string> files, values;
+  std::string config, record;
+  int threads = available_threads();
+  bool is_quiet = false, only_check = false, only_parameters = false, only_version = false;
+};
+
+void add_options(CLI::App& app, CommandLine& line, const StageDescription& description, const ParameterList& list) {
+  for (const FileArgument& file : description.files) {
+    const bool is_output = file.kind == FileArgument::Kind::output || file.kind == FileArgument::Kind::output_folder;
+    std::string meaning = file.meaning;
+    if (file.kind == FileArgument::Kind::optional_input) meaning += " (optional)";
+    app.add_option("--" + file.name, line.files[file.name], meaning)
+        ->type_name(file.kind == FileArgument::Kind::output_folder ? "FOLDER" : "FILE")
+        ->group(is_output ? "Outputs" : "Inputs");
+  }
+  app.add_option("--config,--gel", line.config, "cell.toml with the parameters")->type_name("FILE")->group("Inputs");
+  app.add_option("--record", line.record, "write the run's provenance here (JSON)")
+      ->type_name("FILE")
+      ->group("Outputs");
+  app.add_option("--threads", line.threads, "processors to use")->check(CLI::Range(1, 1024))->capture_default_str();
+  app.add_flag("--quiet", line.is_quiet, "print errors only");
+  app.add_flag("--check", line.only_check, "read the parameters, run nothing");
+  app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
+  app.add_flag("--version", line.only_version, "print the version");
+  for (const Parameter& p : list.all()) {
+    std::string meaning = p.meaning;
+    if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
+    const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
+    if (std::holds_alternative<bool*>(p.member)) {
+      app.add_flag("--" + p.name + "{true}", line.values[p.name], meaning)->group(group);
+    } else {
+      app.add_option("--" + p.name, line.values[p.name], meaning)->type_name("")->group(group);
+    }
+  }
+}
+
+void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
+  if (!line.config.empty()) read_toml(list, fs::path(line.config));
+  for (Parameter& p : list.all()) {
+    if (app.count("--" + p.name) > 0) set_from_text(p, line.values.at(p.name));
+  }
+  check_complete(list);
+}
+
+void set_files(StageContext& context, const StageDescription& description, const CommandLine& line) {
+  using Kind = FileArgument::Kind;
+  for (const FileArgument& file : description.files) {
+    const std::string& path = line.files.at(file.name);
+    const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
+    if (path.empty() && file.kind != Kind::optional_input) {
+      throw UsageError("--" + file.name + " is missing: " + file.meaning);
+    }
+    if (path.empty()) continue;
+    (is_output ? context.outputs_ : context.inputs_)[file.name] = path;
+  }
+}
+
+/// A line that is overwritten as the work goes on, on a terminal only.
+Progress terminal_progress(const std::string& stage, bool is_quiet) {
+  const bool is_shown = !is_quiet && isatty(STDERR_FILENO);
+  return [stage, is_shown, last = -1](double fraction, std::string_view what) mutable {
+    if (was_interrupted) throw Interrupted("interrupted");
+    const int percent = static_cast<int>(100 * fraction);
+    if (!is_shown || percent == last) return;
+    last = percent;
+    std::fprintf(stderr, "\r\033[K%s %3d %% %.*s", stage.c_str(), percent, static_cast<int>(what.size()), what.data());
+    if (percent >= 100) std::fprintf(stderr, "\r\033[K");
+  };
+}
+
+nlohmann::ordered_json hashes_of(const std::vector<fs::path>& files, const fs::path& folder) {
+  auto list = nlohmann::ordered_json::array();
+  for (const fs::path& file : files) {
+    if (!fs::is_regular_file(file)) continue;
+    list.push_back({{"file", fs::proximate(file, folder).generic_string()}, {"sha256", sha256_of_file(file)}});
+  }
+  return list;
+}
+
+nlohmann::ordered_json parameters_of(const ParameterList& list) {
+  auto json = nlohmann::ordered_json::object();
+  for (const Parameter& p : list.all()) {
+    auto& table = p.table.empty() ? json : json[p.table];
+    table[p.name] = std::visit(
+        [](auto* member) -> nlohmann::ordered_json {
+          if constexpr (std::is_same_v<decltype(member), std::optional<double>*>) {
+            return *member ? nlohmann::ordered_json(**member) : nlohmann::ordered_json();
+          } else {
+            return *member;
+          }
+        },
+        p.member);
+  }
+  return json;
+}
+
+double peak_memory_MB() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+void write_record(const fs::path& file, const StageDescription& description, const ParameterList& list,
+                  const StageContext& context, const StageReport& report, double seconds) {
+  const fs::path folder = fs::absolute(file).parent_path();
+  std::vector<fs::path> outputs;
+  for (const auto& pending : context.pending_) outputs.push_back(pending.destination);
+  nlohmann::ordered_json effects = nlohmann::ordered_json::array();
+  for (const Effect& e : report.effects) {
+    effects.push_back({{"name", e.name}, {"on", e.is_on}, {"why", e.why}, {"seconds", e.seconds}});
+  }
+  const nlohmann::ordered_json record = {{"stage", description.name},
+                                         {"version", kVersion},
+                                         {"parameters", parameters_of(list)},
+                                         {"inputs", hashes_of(context.read_, folder)},
+                                         {"outputs", hashes_of(outputs, folder)},
+                                         {"threads", context.threads},
+                                         {"seconds", seconds},
+                                         {"peak_memory_MB", peak_memory_MB()},
+                                         {"converged", report.converged},
+                                         {"summary", report.summary},
+                                         {"figures", json_of(report.figures)},
+                                         {"effects", effects}};
+  write_whole(file, record.dump(2) + "\n");
+}
+
+/// Remove what an unfinished run has left: temporary files, and folders made for them that are still empty.
+void discard(const StageContext& context) {
+  std::error_code ignored;
+  for (const auto& pending : context.pending_) fs::remove(pending.temporary, ignored);
+  for (auto folder = context.made_.rbegin(); folder != context.made_.rend(); ++folder) fs::remove(*folder, ignored);
+}
+
+void commit(const StageContext& context) {
+  for (const auto& [temporary, destination] : context.pending_) {
+    if (!fs::exists(temporary)) throw InternalError(destination.string() + " was announced and not written");
+  }
+  for (const auto& [temporary, destination] : context.pending_) {
+    std::error_code error;
+    fs::rename(temporary, destination, error);
+    if (error) throw OutputError("cannot put " + destination.string() + " in place: " + error.message());
+  }
+}
+
+void say(const std::string& stage, const std::string& kind, const std::string& message, const std::string& hint = {}) {
+  std::fprintf(stderr, "mbtfm-%s: %s: %s\n", stage.c_str(), kind.c_str(), message.c_str());
+  if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
+}
+
+int run(const StageDescription& description, ParameterList& list, const CommandLine& line,
+        const std::function<StageReport(StageContext&)>& body) {
+  const auto begin = std::chrono::steady_clock::now();
+  StageContext context;
+  set_files(context, description, line);
+  context.threads = line.threads;
+  context.progress = terminal_progress(description.name, line.is_quiet);
+  try {
+    const StageReport report = body(context);
+    commit(context);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    if (!line.record.empty()) write_record(line.record, description, list, context, report, seconds.count());
+    if (!report.converged) {
+      say(description.name, "error", "not converged: " + report.summary);
+      return kNotSolved;
+    }
+    if (!line.is_quiet) std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
+    return kDone;
+  } catch (...) {
+    discard(context);
+    throw;
+  }
+}
+
+}  // namespace
+
+bool StageContext::was_interrupted() const { return mbtfm::was_interrupted; }
+
+fs::path StageContext::input(const std::string& name, const std::string& file) {
+  MBTFM_ASSERT(inputs_.contains(name));
+  const fs::path path = file.empty() ? inputs_.at(name) : inputs_.at(name) / file;
+  read_.push_back(path);
+  return path;
+}
+
+fs::path StageContext::output(const std::string& name) { return output(name, {}); }
+
+fs::path StageContext::output(const std::string& name, const std::string& file) {
+  MBTFM_ASSERT(outputs_.contains(name));
+  const fs::path destination = file.empty() ? outputs_.at(name) : outputs_.at(name) / file;
+  make_folder(destination.parent_path());
+  pending_.push_back({.temporary = temporary_name(destination), .destination = destination});
+  return pending_.back().temporary;
+}
+
+void StageContext::make_folder(const fs::path& folder) {
+  if (folder.empty() || fs::exists(folder)) return;
+  make_folder(folder.parent_path());
+  std::error_code error;
+  fs::create_directory(folder, error);
+  if (error) throw OutputError("cannot make the folder " + folder.string() + ": " + error.message());
+  made_.push_back(folder);
+}
+
+int run_stage(const StageDescription& description, int argc, char** argv,
+              const std::function<void(ParameterList&)>& declare_parameters,
+              const std::function<StageReport(StageContext&)>& body) {
+  const std::string& stage = description.name;
+  watch_signals();
+  try {
+    ParameterList list;
+    declare_parameters(list);
+    CommandLine line;
+    CLI::App app(description.purpose, "mbtfm-" + stage);
+    add_options(app, line, description, list);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::CallForHelp& help) {
+      return app.exit(help);
+    } catch (const CLI::ParseError& error) {
+      throw UsageError(std::string(error.what()) + " (see mbtfm-" + stage + " --help)");
+    }
+    if (line.only_version) return std::printf("mbtfm-%s %s\n", stage.c_str(), kVersion) < 0 ? kOutput : kDone;
+    if (line.only_parameters) return std::printf("%s", to_markdown(list).c_str()) < 0 ? kOutput : kDone;
+    set_parameters(list, line, app);
+    if (line.only_check) return kDone;
+    return run(description, list, line, body);
+  } catch (const UsageError& error) {
+    say(stage, "error", error.what());
+    return kUsage;
+  } catch (const InputError& error) {
+    say(stage, "error", error.what(), error.hint);
+    return kInput;
+  } catch (const InvalidData& error) {
+    say(stage, "error", error.what());
+    return kInput;
+  } catch (const NotSolved& error) {
+    say(stage, "error", std::string("not solved: ") + error.what());
+    return kNotSolved;
+  } catch (const OutputError& error) {
+    say(stage, "error", error.what());
+    return kOutput;
+  } catch (const fs::filesystem_error& error) {
+    say(stage, "error", error.what());
+    return kOutput;
+  } catch (const Interrupted&) {
+    say(stage, "error", "interrupted; nothing was written");
+    return kInterrupted;
+  } catch (const std::bad_alloc&) {
+    say(stage, "error", "out of memory", "fewer threads, a coarser mesh or fewer beads need less");
+    return kNotSolved;
+  } catch (const std::exception& error) {
+    say(stage, "internal error", error.what(), "please report this with the command and its inputs");
+    return kBug;
+  }
+}
+
+}  // namespace mbtfm

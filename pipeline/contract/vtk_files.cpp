@@ -1,0 +1,289 @@
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkCommand.h>
+#include <vtkDoubleArray.h>
+#include <vtkIntArray.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLPolyDataWriter.h>
+#include <vtkXMLUnstructuredGridReader.h>
+#include <vtkXMLUnstructuredGridWriter.h>
+
+#include <numbers>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/vtk_errors.h"
+
+namespace mbtfm {
+
+namespace {
+
+template <class Writer, class Data>
+void write_xml(const Path& file, Data* data) {
+  vtkNew<Writer> writer;
+  const VtkErrors errors;
+  writer->SetInputData(data);
+  writer->SetWriteToOutputString(true);
+  writer->SetDataModeToAppended();
+  writer->EncodeAppendedDataOff();
+  writer->SetCompressorTypeToZLib();
+  if (writer->Write() != 1) throw OutputError("cannot write " + file.string() + ": " + errors.text());
+  write_text(file, writer->GetOutputString());
+}
+
+vtkNew<vtkPoints> points_of(const std::vector<Vec2>& positions_um) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const Vec2 p : positions_um) points->InsertNextPoint(p.x, p.y, 0);
+  return points;
+}
+
+vtkNew<vtkIntArray> int_array(const char* name) {
+  vtkNew<vtkIntArray> array;
+  array->SetName(name);
+  return array;
+}
+
+vtkNew<vtkDoubleArray> double_array(const PointArray& values) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(values.name.c_str());
+  for (const double v : values.scalars) array->InsertNextValue(v);
+  if (!values.vectors.empty()) {
+    array->SetNumberOfComponents(3);  // ParaView draws arrows of vectors in space only
+    for (const Vec2 v : values.vectors) array->InsertNextTuple3(v.x, v.y, 0);
+  }
+  return array;
+}
+
+Polygon ellipse_corners(const Adhesion& a) {
+  constexpr int kCorners = 32;  // enough to look smooth
+  Polygon corners;
+  const Vec2 along{std::cos(a.angle_rad), std::sin(a.angle_rad)};
+  const Vec2 across{-along.y, along.x};
+  for (int i = 0; i < kCorners; ++i) {
+    const double phi = 2 * std::numbers::pi * i / kCorners;
+    corners.push_back(a.position_um + 0.5 * a.major_axis_um * std::cos(phi) * along +
+                      0.5 * a.minor_axis_um * std::sin(phi) * across);
+  }
+  return corners;
+}
+
+/// Points and cells of a vtkPolyData in the making. VTK numbers the cells: vertices, lines, polygons.
+class Shapes {
+ public:
+  void add_line(const Polyline& line) { add(line, lines_); }
+  void add_polygon(const Polygon& polygon) { add(polygon, polygons_); }
+  vtkNew<vtkPolyData> data() const {
+    vtkNew<vtkPolyData> poly;
+    const vtkNew<vtkPoints> points = points_of(points_um_);
+    poly->SetPoints(points);
+    poly->SetLines(lines_);
+    poly->SetPolys(polygons_);
+    return poly;
+  }
+
+ private:
+  void add(const std::vector<Vec2>& corners, vtkCellArray* cells) {
+    cells->InsertNextCell(static_cast<int>(corners.size()));
+    for (const Vec2 p : corners) {
+      cells->InsertCellPoint(static_cast<vtkIdType>(points_um_.size()));
+      points_um_.push_back(p);
+    }
+  }
+  std::vector<Vec2> points_um_;
+  vtkNew<vtkCellArray> lines_, polygons_;
+};
+
+vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Vec2>& positions_um) {
+  vtkNew<vtkUnstructuredGrid> grid;
+  const vtkNew<vtkPoints> points = points_of(positions_um);
+  grid->SetPoints(points);
+  const auto adhesion = int_array("adhesion_id");
+  for (const int id : network.adhesion_id) adhesion->InsertNextValue(id);
+  grid->GetPointData()->AddArray(adhesion);
+  grid->Allocate(static_cast<vtkIdType>(network.links.size()));
+  const auto fibre = int_array("fibre_id");
+  PointArray rest{.name = "rest_length_um", .scalars = {}, .vectors = {}};
+  PointArray share{.name = "share", .scalars = {}, .vectors = {}};
+  for (const Link& link : network.links) {
+    const vtkIdType ends[2] = {link.vertex_a, link.vertex_b};
+    grid->InsertNextCell(VTK_LINE, 2, ends);
+    fibre->InsertNextValue(link.fibre_id);
+    rest.scalars.push_back(link.rest_length_um);
+    share.scalars.push_back(link.share);
+  }
+  grid->GetCellData()->AddArray(fibre);
+  grid->GetCellData()->AddArray(double_array(rest));
+  grid->GetCellData()->AddArray(double_array(share));
+  return grid;
+}
+
+vtkDataArray* array_of(vtkDataSetAttributes* attributes, const char* name, vtkIdType n, const Path& file,
+                       const char* kind) {
+  vtkDataArray* array = attributes->GetArray(name);
+  if (array == nullptr)
+    throw InputError(file.string(), std::string(kind) + " array '" + name + "'", "none of that name");
+  if (array->GetNumberOfTuples() != n || array->GetNumberOfComponents() != 1) {
+    throw InputError(file.string() + ": array '" + name + "'", std::to_string(n) + " single values",
+                     std::to_string(array->GetNumberOfTuples()) + " of " +
+                         std::to_string(array->GetNumberOfComponents()) + " components");
+  }
+  return array;
+}
+
+vtkNew<vtkUnstructuredGrid> read_grid(const Path& file) {
+  const std::string text = read_text(file);
+  if (text.find("</VTKFile>") == std::string::npos) {
+    throw InputError(file.string(), "a VTK XML file that ends with </VTKFile>", "an early end or another format");
+  }
+  vtkNew<vtkXMLUnstructuredGridReader> reader;
+  const VtkErrors errors;
+  reader->SetReadFromInputString(true);
+  reader->SetInputString(text);
+  reader->Update();
+  if (reader->GetErrorCode() != 0 || !errors.text().empty()) {
+    throw InputError(file.string(), "an unstructured grid (.vtu)", errors.text());
+  }
+  vtkNew<vtkUnstructuredGrid> grid;
+  grid->ShallowCopy(reader->GetOutput());
+  if (grid->GetPoints() == nullptr) throw InputError(file.string(), "an unstructured grid (.vtu)", "no points");
+  return grid;
+}
+
+Network network_of(vtkUnstructuredGrid* grid, const Path& file) {
+  const vtkIdType n_points = grid->GetNumberOfPoints();
+  const vtkIdType n_cells = grid->GetNumberOfCells();
+  vtkDataArray* adhesion = array_of(grid->GetPointData(), "adhesion_id", n_points, file, "point");
+  vtkDataArray* fibre = array_of(grid->GetCellData(), "fibre_id", n_cells, file, "cell");
+  vtkDataArray* rest = array_of(grid->GetCellData(), "rest_length_um", n_cells, file, "cell");
+  const bool has_share = grid->GetCellData()->GetArray("share") != nullptr;
+  vtkDataArray* share = has_share ? array_of(grid->GetCellData(), "share", n_cells, file, "cell") : nullptr;
+  Network network;
+  for (vtkIdType v = 0; v < n_points; ++v) {
+    const double* p = grid->GetPoint(v);
+    network.vertices_um.push_back({p[0], p[1]});
+    network.adhesion_id.push_back(static_cast<int>(adhesion->GetTuple1(v)));
+  }
+  for (vtkIdType k = 0; k < n_cells; ++k) {
+    vtkIdType n_ends = 0;
+    const vtkIdType* ends = nullptr;
+    grid->GetCellPoints(k, n_ends, ends);
+    if (grid->GetCellType(k) != VTK_LINE || n_ends != 2) {
+      throw InputError(file.string() + ": cell " + std::to_string(k), "a line of two points",
+                       "cell type " + std::to_string(grid->GetCellType(k)));
+    }
+    network.links.push_back({.vertex_a = static_cast<int>(ends[0]),
+                             .vertex_b = static_cast<int>(ends[1]),
+                             .fibre_id = static_cast<int>(fibre->GetTuple1(k)),
+                             .rest_length_um = rest->GetTuple1(k),
+                             .share = share ? share->GetTuple1(k) : 1.0});
+  }
+  try {
+    check(network);
+  } catch (const InvalidData& error) {
+    throw InputError(file.string() + ": " + error.element, error.expected, error.found);
+  }
+  return network;
+}
+
+}  // namespace
+
+Network read_network(const Path& file) {
+  const vtkNew<vtkUnstructuredGrid> grid = read_grid(file);
+  return network_of(grid, file);
+}
+
+void write_network(const Path& file, const Network& network) {
+  check(network);
+  const auto grid = grid_of(network, network.vertices_um);
+  write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
+}
+
+ContractedNetwork read_contracted_network(const Path& file) {
+  const vtkNew<vtkUnstructuredGrid> grid = read_grid(file);
+  ContractedNetwork contracted{.network = network_of(grid, file), .link_force_nN = {}};
+  const vtkIdType n_cells = grid->GetNumberOfCells();
+  vtkDataArray* force = array_of(grid->GetCellData(), "force_nN", n_cells, file, "cell");
+  for (vtkIdType k = 0; k < n_cells; ++k) contracted.link_force_nN.push_back(force->GetTuple1(k));
+  return contracted;
+}
+
+void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
+                              const std::vector<double>& link_force_nN) {
+  check(network);
+  MBTFM_ASSERT(positions_um.size() == network.vertices_um.size() && link_force_nN.size() == network.links.size());
+  const auto grid = grid_of(network, positions_um);
+  grid->GetCellData()->AddArray(double_array({.name = "force_nN", .scalars = link_force_nN, .vectors = {}}));
+  std::vector<Vec2> moves_um;
+  for (std::size_t v = 0; v < positions_um.size(); ++v) moves_um.push_back(positions_um[v] - network.vertices_um[v]);
+  grid->GetPointData()->AddArray(double_array({.name = "contraction_um", .scalars = {}, .vectors = moves_um}));
+  write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
+}
+
+void write_cell_vtp(const Path& file, const Cell& cell) {
+  check(cell);
+  Shapes shapes;
+  const auto fibre = int_array("fibre_id");
+  const auto type = int_array("fibre_type");  // 1 dorsal, 2 arc, 3 ventral; 0: no fibre
+  const auto adhesion = int_array("adhesion_id");
+  const auto label = [&](int fibre_id, int fibre_type, int adhesion_id) {
+    fibre->InsertNextValue(fibre_id);
+    type->InsertNextValue(fibre_type);
+    adhesion->InsertNextValue(adhesion_id);
+  };
+  Polyline closed = cell.outline_um;
+  closed.push_back(closed.front());
+  shapes.add_line(closed);
+  label(0, 0, 0);
+  for (const Fibre& f : cell.fibres) {
+    shapes.add_line(f.points_um);
+    label(f.fibre_id, 1 + static_cast<int>(f.type), 0);
+  }
+  for (const Adhesion& a : cell.adhesions) {
+    shapes.add_polygon(ellipse_corners(a));
+    label(0, 0, a.adhesion_id);
+  }
+  const auto poly = shapes.data();
+  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get()}) poly->GetCellData()->AddArray(array);
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays) {
+  vtkNew<vtkPolyData> poly;
+  const vtkNew<vtkPoints> points = points_of(points_um);
+  poly->SetPoints(points);
+  vtkNew<vtkCellArray> vertices;
+  for (vtkIdType i = 0; i < points->GetNumberOfPoints(); ++i) vertices->InsertNextCell(1, &i);
+  poly->SetVerts(vertices);
+  for (const PointArray& array : arrays) {
+    MBTFM_ASSERT(array.scalars.size() + array.vectors.size() == points_um.size());
+    poly->GetPointData()->AddArray(double_array(array));
+  }
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
+                        const std::vector<PointArray>& arrays) {
+  check(adhesions);
+  Shapes shapes;
+  const auto label = int_array("adhesion_id");
+  for (const Adhesion& a : adhesions) {
+    shapes.add_polygon(ellipse_corners(a));
+    label->InsertNextValue(a.adhesion_id);
+  }
+  const auto poly = shapes.data();
+  poly->GetCellData()->AddArray(label);
+  for (const PointArray& array : arrays) {
+    MBTFM_ASSERT(array.scalars.size() + array.vectors.size() == adhesions.size());
+    poly->GetCellData()->AddArray(double_array(array));
+  }
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+}  // namespace mbtfm

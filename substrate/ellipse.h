@@ -1,0 +1,34 @@
+/// Ellipses that carry an evenly spread load: checks, and rules that average a smooth function over one.
+#pragma once
+
+#include <vector>
+
+#include "substrate/compliance.h"
+
+namespace mbtfm::substrate {
+
+/// @throws InvalidData where an axis is not positive, the axes are swapped or a number is not finite
+void check(const std::vector<Ellipse>& ellipses);
+/// @throws InvalidData where a coordinate is not finite
+void check_points(const std::vector<Vec2>& points_um);
+
+/// A point of a quadrature rule on the unit disc; the weights of a rule sum to 1.
+struct DiscPoint {
+  Vec2 position;
+  double weight = 0;
+};
+
+/// A rule that averages polynomials over the unit disc exactly up to `degree`: 4 points for 3, 7 for 5, else rings at
+/// the square roots of Gauss points. Source: Stroud, Approximate Calculation of Multiple Integrals (1971), S2.
+std::vector<DiscPoint> disc_rule(int degree);
+
+/// The rule's points on the ellipse, relative to its centre.
+std::vector<DiscPoint> ellipse_rule(const Ellipse& ellipse, int degree);
+
+/// Nodes on (-1, 1) and weights of Gauss and Legendre.
+struct GaussRule {
+  std::vector<double> nodes, weights;
+};
+GaussRule gauss_legendre(int n);
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,37 @@
+/// What `half-space` and `layer` share: columns from a function of the ellipse and the point.
+#pragma once
+
+#include <chrono>
+
+#include "pipeline/contract/parallel.h"
+#include "substrate/half_space.h"
+
+namespace mbtfm::substrate {
+
+inline double seconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+}
+
+/// Fill the matrix column pair by column pair: field_of(ellipse) gives a function from a point to its 2 x 2 compliance.
+template <class FieldOf>
+Eigen::MatrixXd compliance_by_columns(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                      int threads, const FieldOf& field_of) {
+  check_points(points_um);
+  check(ellipses);
+  Eigen::MatrixXd matrix(2 * points_um.size(), 2 * ellipses.size());
+  parallel_for(static_cast<int>(ellipses.size()), threads, [&](int j) {
+    const auto field = field_of(ellipses[j]);
+    double* along_x = matrix.col(2 * j).data();
+    double* along_y = matrix.col(2 * j + 1).data();
+    for (std::size_t i = 0; i < points_um.size(); ++i) {
+      const Sym2 g = field(points_um[i]);
+      along_x[2 * i] = g.xx;
+      along_x[2 * i + 1] = g.xy;
+      along_y[2 * i] = g.xy;
+      along_y[2 * i + 1] = g.yy;
+    }
+  });
+  return matrix;
+}
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,37 @@
+#include "substrate/greens_model.h"
+#include "substrate/models.h"
+
+namespace mbtfm::substrate {
+namespace {
+
+class HalfSpace final : public Substrate {
+ public:
+  HalfSpace(const Gel& gel, int threads) : gel_(gel), threads_(threads) {}
+
+  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
+                                       const std::vector<Ellipse>& ellipses) const override {
+    return compliance_by_columns(points_um, ellipses, threads_, [this](const Ellipse& ellipse) {
+      return [this, &ellipse](Vec2 point) { return half_space_compliance_um_per_nN(gel_, ellipse, point); };
+    });
+  }
+  std::vector<Effect> effects() const override {
+    return {{.name = "finite thickness",
+             .is_on = false,
+             .why = "half-space: valid where the gel is far thicker than the cell is wide"},
+            {.name = "finite sides", .is_on = false, .why = "half-space: the gel reaches far beyond the cell"},
+            vertical_displacement_off()};
+  }
+  Figures figures() const override { return {{"substrate_model", "half-space"}}; }
+
+ private:
+  Gel gel_;
+  int threads_;
+};
+
+}  // namespace
+
+std::unique_ptr<Substrate> make_half_space(const Gel& gel, const SubstrateParameters&, int threads) {
+  return std::make_unique<HalfSpace>(gel, threads);
+}
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,31 @@
+/// The models by name: each in its own file, listed once in a table.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "substrate/compliance.h"
+
+namespace mbtfm::substrate {
+
+struct Model {
+  std::string name;
+  std::unique_ptr<Substrate> (*make)(const Gel& gel, const SubstrateParameters& parameters, int threads);
+};
+
+std::unique_ptr<Substrate> make_half_space(const Gel& gel, const SubstrateParameters& parameters, int threads);
+std::unique_ptr<Substrate> make_layer(const Gel& gel, const SubstrateParameters& parameters, int threads);
+std::unique_ptr<Substrate> make_split(const Gel& gel, const SubstrateParameters& parameters, int threads);
+std::unique_ptr<Substrate> make_refined(const Gel& gel, const SubstrateParameters& parameters, int threads);
+
+/// @throws UsageError where no model of the table has the name, InvalidData as check(gel)
+std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,
+                                     const SubstrateParameters& parameters, int threads);
+
+/// @throws InvalidData where a force is not finite or their number is not that of the ellipses
+void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
+
+/// What the models that hold no finite elements leave out, and why.
+Effect vertical_displacement_off();
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,158 @@
+#include "pipeline/contract/files.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm {
+namespace {
+
+using test::TemporaryFolder;
+
+Adhesion adhesion(int id) {
+  return {.adhesion_id = id,
+          .position_um = {1.0 / 3, 2},
+          .area_um2 = 0.5,
+          .major_axis_um = 1.2,
+          .minor_axis_um = 0.5,
+          .angle_rad = 0.25,
+          .eccentricity = 0.9,
+          .mean_intensity = 100};
+}
+
+Fibre fibre(int id) {
+  return {.fibre_id = id,
+          .type = FibreType::dorsal,
+          .width_um = 0.6,
+          .start_adhesion_id = 7,
+          .end_adhesion_id = {},
+          .mean_intensity = 3,
+          .confidence = 0.5,
+          .points_um = {{0, 0}, {1, 0.5}, {2, 0.7}}};
+}
+
+Network network() {
+  return {.vertices_um = {{0, 0}, {1, 0}, {0, 1}},
+          .adhesion_id = {7, 0, 8},
+          .links = {{.vertex_a = 0, .vertex_b = 1, .fibre_id = 0, .rest_length_um = 1, .share = 0.75},
+                    {.vertex_a = 1, .vertex_b = 2, .fibre_id = 3, .rest_length_um = 1.25, .share = 1}}};
+}
+
+std::string message_of(const std::function<void()>& action) {
+  try {
+    action();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no InputError";
+}
+
+TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
+  const TemporaryFolder folder;
+  write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(9)});
+  const auto adhesions = read_adhesions(folder / "adhesions.csv");
+  ASSERT_EQ(adhesions.size(), 2u);
+  EXPECT_EQ(adhesions[1].adhesion_id, 9);
+  EXPECT_EQ(adhesions[0].position_um.x, 1.0 / 3) << "shortest round-trip numbers lose nothing";
+  EXPECT_NEAR(adhesions[0].angle_rad, 0.25, 1e-15) << "one rounding each way through degrees";
+
+  write_fibres(folder / "fibres.csv", folder / "fibre_points.csv", {fibre(1), fibre(4)});
+  const auto fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv");
+  ASSERT_EQ(fibres.size(), 2u);
+  EXPECT_EQ(fibres[1].type, FibreType::dorsal);
+  EXPECT_EQ(fibres[1].start_adhesion_id, 7);
+  EXPECT_EQ(fibres[1].end_adhesion_id, std::nullopt);
+  EXPECT_TRUE(fibres[1].points_um == fibre(4).points_um);
+}
+
+TEST(Files, a_network_comes_back_as_it_was_written) {
+  const TemporaryFolder folder;
+  write_network(folder / "network.vtu", network());
+  const Network read = read_network(folder / "network.vtu");
+  EXPECT_TRUE(read.vertices_um == network().vertices_um);
+  EXPECT_EQ(read.adhesion_id, network().adhesion_id);
+  ASSERT_EQ(read.links.size(), 2u);
+  EXPECT_EQ(read.links[1].fibre_id, 3);
+  EXPECT_EQ(read.links[1].rest_length_um, 1.25);
+  EXPECT_EQ(read.links[0].share, 0.75);
+
+  write_contracted_network(folder / "contracted.vtu", network(), {{0, 0}, {0.5, 0.5}, {0, 1}}, {0.1, 2});
+  const ContractedNetwork contracted = read_contracted_network(folder / "contracted.vtu");
+  EXPECT_EQ(contracted.network.vertices_um[1].y, 0.5);
+  EXPECT_EQ(contracted.link_force_nN[1], 2);
+}
+
+TEST(Files, a_vtk_file_cut_anywhere_is_an_input_error) {
+  const TemporaryFolder folder;
+  write_network(folder / "network.vtu", network());
+  const std::string whole = read_text(folder / "network.vtu");
+  for (std::size_t n = 0; n < whole.size() - 1; n += 7) {
+    write_text(folder / "cut.vtu", whole.substr(0, n));
+    EXPECT_THROW(read_network(folder / "cut.vtu"), InputError) << "cut after " << n << " bytes";
+  }
+}
+
+TEST(Files, an_error_names_file_line_column_label_expectation_and_finding) {
+  const TemporaryFolder folder;
+  write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(11)});
+  std::string text = read_text(folder / "adhesions.csv");
+  text.replace(text.rfind(",0.5,1.2"), 4, ",-3.2");
+  write_text(folder / "adhesions.csv", text);
+  EXPECT_EQ(message_of([&] { read_adhesions(folder / "adhesions.csv"); }),
+            (folder / "adhesions.csv").string() +
+                ":3: column 'area_um2' of adhesion 11: expected a number > 0, found '-3.2'");
+}
+
+TEST(Files, not_a_number_is_refused_where_a_number_is_due) {
+  const TemporaryFolder folder;
+  for (const char* bad : {"nan", "inf", "", "1e", "1.5x", " 1"}) {
+    write_text(folder / "displacement.csv", std::string("x_um,y_um,ux_um,uy_um,sigma_um\n1,2,") + bad + ",0,0.02\n");
+    const std::string message = message_of([&] { read_displacement(folder / "displacement.csv"); });
+    EXPECT_NE(message.find(":2: column 'ux_um': expected a number, found '" + std::string(bad) + "'"),
+              std::string::npos)
+        << message;
+  }
+}
+
+TEST(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused) {
+  EXPECT_THROW(CsvTable("a,b\n1,2,3\n", "t"), InputError);
+  EXPECT_THROW(CsvTable("a,b\n1\n", "t"), InputError);
+  EXPECT_THROW(CsvTable("a,b\n1,2", "t"), InputError);
+  EXPECT_THROW(CsvTable("a,b\n\"1,2\n", "t"), InputError);
+  EXPECT_THROW(CsvTable("a,a\n1,2\n", "t"), InputError);
+  EXPECT_THROW(CsvTable("", "t"), InputError);
+  EXPECT_THROW(CsvTable("a\n1\n", "t").require({"b"}), InputError);
+}
+
+TEST(Files, quoted_fields_and_carriage_returns_are_read) {
+  const CsvTable table(
+      "\xEF\xBB\xBF"
+      "a,b\r\n\"x, \"\"y\"\"\",2\r\n",
+      "t");
+  EXPECT_EQ(table.text(0, "a"), "x, \"y\"");
+  EXPECT_EQ(table.integer(0, "b", 0), 2);
+  CsvText text({"a"});
+  text.add("x, \"y\"").end_row();
+  EXPECT_EQ(CsvTable(text.str(), "t").text(0, "a"), "x, \"y\"");
+}
+
+TEST(Files, a_full_disk_is_an_output_error) {
+  if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
+  EXPECT_THROW(write_text("/dev/full", std::string(100000, 'x')), OutputError);
+  EXPECT_THROW(write_network("/dev/full", network()), OutputError);
+}
+
+TEST(Files, writers_check_what_they_write) {
+  const TemporaryFolder folder;
+  Adhesion bad = adhesion(1);
+  bad.area_um2 = -1;
+  EXPECT_THROW(write_adhesions(folder / "a.csv", {bad}), InvalidData);
+  Network torn = network();
+  torn.links[0].vertex_b = 17;
+  EXPECT_THROW(write_network(folder / "n.vtu", torn), InvalidData);
+}
+
+}  // namespace
+}  // namespace mbtfm

@@ -1,0 +1,90 @@
+#include "pipeline/contract/parameters.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm {
+namespace {
+
+struct Example {
+  double length_um = 1.5;
+  std::optional<double> pixel_size_um;
+  int count = 3;
+  bool is_on = false;
+  std::string method = "fast";
+  std::uint64_t seed = 1;
+};
+
+void declare(ParameterList& list, Example& e) {
+  list.table("");
+  list.add("pixel_size_um", e.pixel_size_um, Range::positive(), "pixel size (um)");
+  list.table("network");
+  list.add("length_um", e.length_um, Range::positive(), "length (um)");
+  list.add("count", e.count, Range::between(1, 10), "how many");
+  list.add("is_on", e.is_on, "whether");
+  list.add("method", e.method, "which way", {"fast", "exact"});
+  list.add("seed", e.seed, "seed");
+}
+
+std::string message_of(std::string_view toml) {
+  Example e;
+  ParameterList list;
+  declare(list, e);
+  try {
+    read_toml(list, toml, "cell.toml");
+  } catch (const InputError& error) {
+    return std::string(error.what()) + " | " + error.hint;
+  }
+  return "read";
+}
+
+TEST(Parameters, values_are_read_from_their_table) {
+  Example e;
+  ParameterList list;
+  declare(list, e);
+  read_toml(list, "pixel_size_um = 0.1\n[network]\nlength_um = 2\nmethod = 'exact'\nis_on = true\nseed = 7\n", "t");
+  EXPECT_EQ(e.pixel_size_um, 0.1);
+  EXPECT_EQ(e.length_um, 2);
+  EXPECT_EQ(e.method, "exact");
+  EXPECT_TRUE(e.is_on);
+  EXPECT_EQ(e.seed, 7u);
+  EXPECT_EQ(e.count, 3) << "what is not given keeps its default";
+}
+
+TEST(Parameters, an_unknown_key_names_the_line_and_the_nearest_known_one) {
+  EXPECT_EQ(message_of("[network]\n\nlenght_um = 2\n"),
+            "cell.toml:3: expected a known key of [network], found 'lenght_um' | did you mean 'length_um'?");
+  EXPECT_EQ(message_of("[netwrk]\na = 2\n"),
+            "cell.toml:1: expected a known table, found [netwrk] | did you mean 'network'?");
+  EXPECT_EQ(message_of("pixelsize_um = 2\n"),
+            "cell.toml:1: expected a known key above the first table, found 'pixelsize_um' | did you mean "
+            "'pixel_size_um'?");
+}
+
+TEST(Parameters, keys_of_other_stages_are_left_to_them) { EXPECT_EQ(message_of("[fit]\nwhatever = 2\n"), "read"); }
+
+TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refused) {
+  EXPECT_NE(message_of("[network]\ncount = 2\ncount = 3\n").find("cell.toml:3"), std::string::npos);
+  EXPECT_NE(message_of("[network]\ncount = 'two'\n").find("expected an integer >= 1 and <= 10, found 'two'"),
+            std::string::npos);
+  EXPECT_NE(message_of("[network]\nlength_um = -2\n").find("expected a number > 0, found '-2'"), std::string::npos);
+  EXPECT_NE(message_of("[network]\nlength_um = nan\n").find("expected a number > 0"), std::string::npos);
+  EXPECT_NE(message_of("[network]\nmethod = 'slow'\n").find("expected one of fast, exact, found 'slow'"),
+            std::string::npos);
+  EXPECT_NE(message_of("[network]\ncount = [1, 2]\n").find("array"), std::string::npos);
+}
+
+TEST(Parameters, a_gel_needs_its_modulus_and_a_poisson_ratio_below_one_half) {
+  Gel gel;
+  ParameterList list;
+  declare(list, gel);
+  EXPECT_THROW(check_complete(list), UsageError);
+  EXPECT_THROW(read_toml(list, "[gel]\nyoungs_modulus_kPa = -8\n", "t"), InputError);
+  EXPECT_THROW(read_toml(list, "[gel]\npoisson_ratio = 0.5\n", "t"), InputError);
+  read_toml(list, "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.4999\n", "t");
+  EXPECT_NO_THROW(check_complete(list));
+}
+
+}  // namespace
+}  // namespace mbtfm
