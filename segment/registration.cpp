@@ -47,10 +47,10 @@ float interpolated(const Plane& plane, float x, float y) {
 /// Everything of a window that does not change from step to step.
 struct Patch {
   std::vector<float> x, y;                  ///< of its pixels, from the bead
+  std::vector<float> target;                ///< the target's values under the window, as moved last
   std::vector<float> weight, value;         ///< value: less the weighted mean
   std::vector<std::array<float, 6>> slope;  ///< by u and G, less what gain and offset can do
   Mat6 normal;
-  Mat6 spread;  ///< Σ w² s sᵀ
   double total_weight = 0, total_squared = 0, variance = 0;
 };
 
@@ -92,6 +92,7 @@ void complete(Patch& patch) {
       by_value[a] += patch.weight[k] * patch.slope[k][a] * patch.value[k];
     }
   }
+  patch.target.resize(n);
   patch.variance = power / patch.total_weight;
   for (std::size_t k = 0; k < n; ++k) {
     for (int a = 0; a < 6; ++a) {
@@ -99,14 +100,12 @@ void complete(Patch& patch) {
     }
     for (int a = 0; a < 6; ++a) {
       for (int b = 0; b <= a; ++b) {
-        const double product = patch.weight[k] * patch.slope[k][a] * patch.slope[k][b];
-        patch.normal(a, b) += product;
-        patch.spread(a, b) += patch.weight[k] * product;
+        patch.normal(a, b) += patch.weight[k] * patch.slope[k][a] * patch.slope[k][b];
       }
     }
   }
   for (int a = 0; a < 6; ++a) {
-    for (int b = a + 1; b < 6; ++b) patch.normal(a, b) = patch.normal(b, a), patch.spread(a, b) = patch.spread(b, a);
+    for (int b = a + 1; b < 6; ++b) patch.normal(a, b) = patch.normal(b, a);
   }
 }
 
@@ -115,10 +114,10 @@ struct Compared {
   Vec6 mismatch;    ///< Σ w s target
   double gain = 0;  ///< of the target over the reference
   double similarity = 0;
-  double residual = 0;  ///< mean squared difference, in the reference's units
+  double mean = 0;  ///< of the target
 };
 
-Compared compared(const Patch& patch, const Plane& target, Vec2 place, const Motion& motion) {
+Compared compared(Patch& patch, const Plane& target, Vec2 place, const Motion& motion) {
   Compared result;
   std::array<float, 6> mismatch{};
   double sum = 0, squares = 0, products = 0;
@@ -128,6 +127,7 @@ Compared compared(const Patch& patch, const Plane& target, Vec2 place, const Mot
   for (std::size_t k = 0; k < patch.value.size(); ++k) {
     const float x = patch.x[k], y = patch.y[k];
     const float value = interpolated(target, ux + xx * x + xy * y, uy + yx * x + yy * y);
+    patch.target[k] = value;
     const float weighted = patch.weight[k] * value;
     sum += weighted;
     squares += weighted * value;
@@ -140,9 +140,35 @@ Compared compared(const Patch& patch, const Plane& target, Vec2 place, const Mot
   const double covariance = products / patch.total_weight;
   result.gain = covariance / patch.variance;
   result.similarity = variance > 0 ? covariance / std::sqrt(patch.variance * variance) : 0;
-  if (result.gain > 0)
-    result.residual = std::max(0.0, variance - covariance * result.gain) / (result.gain * result.gain);
+  result.mean = mean;
   return result;
+}
+
+/// Σ w² s sᵀ r² / (1 − h): what the residual's scatter, pixel by pixel as it is (shot noise is largest on the beads,
+/// where the slopes are), does to the mismatch. h is the share of a pixel's own noise that the fit follows
+/// (MacKinnon & White, J Econometrics 29:305, 1985, estimator HC2).
+Mat6 spread_of_residual(const Patch& patch, const Mat6& inverse, const Compared& now) {
+  // Interpolation at a random place leaves 0.64 of the target's noise variance in the residual, but takes nothing from
+  // its slow part, which moves the answer: with equal noise in both images the residual shows (1 + 0.64) / 2 of it.
+  constexpr double kInterpolation = 2 / 1.64;
+  Mat6 spread;
+  for (std::size_t k = 0; k < patch.value.size(); ++k) {
+    const auto& slope = patch.slope[k];
+    double followed = 1 / patch.total_weight + patch.value[k] * patch.value[k] / (patch.variance * patch.total_weight);
+    for (int a = 0; a < 6; ++a) {
+      for (int b = 0; b < 6; ++b) followed += slope[a] * inverse(a, b) * slope[b];
+    }
+    const double own = std::min(0.9, patch.weight[k] * followed);
+    const double residual = (patch.target[k] - now.mean) / now.gain - patch.value[k];
+    const double factor = kInterpolation * std::pow(patch.weight[k] * residual, 2) / (1 - own);
+    for (int a = 0; a < 6; ++a) {
+      for (int b = 0; b <= a; ++b) spread(a, b) += factor * slope[a] * slope[b];
+    }
+  }
+  for (int a = 0; a < 6; ++a) {
+    for (int b = a + 1; b < 6; ++b) spread(a, b) = spread(b, a);
+  }
+  return spread;
 }
 
 /// x → W(V⁻¹(x)), with V(x) = x + step(x).
@@ -203,10 +229,8 @@ Registered registered(const Reference& reference, const Plane& target, Vec2 plac
   }
   now = compared(patch, target, place, result.motion);
   result.similarity = now.similarity;
-  // Two of the window's effective number of pixels went into gain and offset, two into the displacement.
-  const double n_effective = patch.total_weight * patch.total_weight / patch.total_squared;
-  const double residual = now.residual * n_effective / std::max(1.0, n_effective - 4);
-  const Mat6 covariance = inverse * (patch.spread * residual + prior * (window.noise * window.noise)) * inverse;
+  const Mat6 covariance =
+      inverse * (spread_of_residual(patch, inverse, now) + prior * (window.noise * window.noise)) * inverse;
   result.sigma_px = std::sqrt(std::max(0.0, 0.5 * (covariance(0, 0) + covariance(1, 1))));
   return result;
 }

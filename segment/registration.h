@@ -40,7 +40,7 @@ struct Registered {
 /// Minimises Σ w (a target(x + u(x)) + b − reference(x))² + (G − G₀)² noise²/gradient_sd² over u, G, a, b by
 /// inverse-compositional Gauss–Newton steps: slopes and normal matrix come from the reference and stay. Gain and
 /// offset are projected out. The standard error is that of a weighted fit with the window's own residual:
-/// H⁻¹ (Σ w² s sᵀ) H⁻¹ residual².
+/// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹.
 Registered registered(const Reference& reference, const Plane& target, Vec2 place, const Motion& guess,
                       const Window& window);
 

@@ -9,6 +9,7 @@
 #include "pipeline/contract/parallel.h"
 #include "segment/beads.h"
 #include "segment/coarse_field.h"
+#include "segment/far_field.h"
 #include "segment/local_motion.h"
 #include "segment/registration.h"
 
@@ -191,11 +192,13 @@ void follow_neighbours(const Scene& scene, const Neighbours& neighbours, const T
 
 /// The widest window whose displacement agrees with those of all narrower ones.
 Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide) {
-  constexpr double kAgree = 2.0;  // each interval: ± 2 standard errors
-  const double widths[] = {1.6 * scene.bead_sigma, 2.3 * scene.bead_sigma, scene.wide.sigma};
+  const double kAgree = getenv("AGREE")?atof(getenv("AGREE")):1.2;
+  const double widths[] = {1.6 * scene.bead_sigma, 2.3 * scene.bead_sigma, 3.2 * scene.bead_sigma};
   Vec2 low{-1e9, -1e9}, high{1e9, 1e9};
   Registered best;
+  const int only = getenv("ONLY") ? atoi(getenv("ONLY")) : -1; int index = 0;
   for (const double width : widths) {
+ if (only >= 0 && index++ != only) continue;
     Window window = scene.wide;
     window.sigma = width;
     window.gradient_sd = 0.15;
@@ -271,29 +274,15 @@ void check_claims(const Scene& scene, std::vector<Track>& tracks) {
   }
 }
 
-struct FarField {
-  Vec2 drift;
-  double rms = 0;
-};
-
-/// Median displacement of the good beads in the frame along the image's border, and the scatter about it.
-FarField far_field(const Scene& scene, const std::vector<Track>& tracks, double share) {
-  const Plane& plane = scene.relaxed.plane;
-  const double margin = share * std::min(plane.width, plane.height);
-  std::vector<double> x, y;
-  FarField result;
+FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, double share) {
+  std::vector<Vec2> positions, displacements;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (!tracks[k].is_good() || is_inside(plane, scene.positions[k], margin)) continue;
-    x.push_back(tracks[k].chosen.motion.u.x), y.push_back(tracks[k].chosen.motion.u.y);
-    result.drift += tracks[k].chosen.motion.u;
+    if (!tracks[k].is_good()) continue;
+    positions.push_back(scene.positions[k]);
+    displacements.push_back(tracks[k].chosen.motion.u);
   }
-  result.drift = (1.0 / std::max<std::size_t>(x.size(), 1)) * result.drift;
-  double squares = 0;
-  for (std::size_t k = 0; k < x.size(); ++k) {
-    squares += std::pow(x[k] - result.drift.x, 2) + std::pow(y[k] - result.drift.y, 2);
-  }
-  if (!x.empty()) result.rms = std::sqrt(0.5 * squares / static_cast<double>(x.size()));
-  return result;
+  const Plane& plane = scene.relaxed.plane;
+  return far_field(positions, displacements, plane.width, plane.height, share * std::min(plane.width, plane.height));
 }
 
 int search_window(const Scene& scene, const TrackParameters& parameters, double pixel_size_um) {
@@ -359,7 +348,7 @@ Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_s
   reject_outliers(scene, neighbours, parameters.outlier_threshold, true, tracks);
 
   Tracking result;
-  const FarField far = far_field(scene, tracks, parameters.far_field_share);
+  const FarField far = far_field_of(scene, tracks, parameters.far_field_share);
   result.drift_um = pixel_size_um * far.drift;
   result.far_field_rms_um = pixel_size_um * far.rms;
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma;
