@@ -7,9 +7,17 @@
 namespace mbtfm::segment {
 namespace {
 
+/// Sources a side: a twelfth of the inner field (2 to 8 um in an ordinary picture) is about the size of an adhesion,
+/// and half of it the patch that the force is spread over.
+constexpr int kSide = 12;
+constexpr double kSoftening = 0.5;
+/// Beads beyond this number are left out evenly: 1500 give the drift to a fortieth of a bead's own error.
+constexpr std::size_t kMostBeads = 1500;
+/// Of a force's mean diagonal: holds back the patterns of forces that the frame does not see.
+constexpr double kRidge = 3e-4;
+
 /// Sources on a grid inside the frame.
 std::vector<Vec2> sources(double width, double height, double margin) {
-  const int kSide = getenv("SIDE")?atoi(getenv("SIDE")):6;
   std::vector<Vec2> result;
   for (int j = 0; j < kSide; ++j) {
     for (int i = 0; i < kSide; ++i) {
@@ -44,37 +52,35 @@ void fill_rows(cv::Mat& rows, Vec2 place, const std::vector<Vec2>& at, double so
 
 FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
                    double height, double margin) {
-  const std::vector<Vec2> at = sources(width, height, margin);
-  const double softening = (getenv("SOFT")?atof(getenv("SOFT")):1.0)*(width - 2 * margin) / (getenv("SIDE")?atoi(getenv("SIDE")):6);
-  const int n = static_cast<int>(2 * at.size());
-  cv::Mat normal = cv::Mat::zeros(n, n, CV_64F), right = cv::Mat::zeros(n, 1, CV_64F), rows(2, n, CV_64F);
   std::vector<int> frame;
   for (std::size_t k = 0; k < positions.size(); ++k) {
     const Vec2 p = positions[k];
-    if (std::min({p.x, p.y, width - 1 - p.x, height - 1 - p.y}) >= margin) continue;
-    frame.push_back(static_cast<int>(k));
-    fill_rows(rows, p, at, softening);
-    const cv::Mat u = (cv::Mat_<double>(2, 1) << displacements[k].x, displacements[k].y);
-    normal += rows.t() * rows;
-    right += rows.t() * u;
+    if (std::min({p.x, p.y, width - 1 - p.x, height - 1 - p.y}) < margin) frame.push_back(static_cast<int>(k));
   }
   FarField result;
-  result.n_beads = static_cast<int>(frame.size());
   if (frame.empty()) return result;
-  const double kRidge =
-      getenv("RIDGE") ? atof(getenv("RIDGE")) : 1e-3;  // of a force's own diagonal: below it forces fit noise
-  for (int k = 2; k < n; ++k) normal.at<double>(k, k) += kRidge * cv::trace(normal)[0] / n;
-  cv::Mat solution;
-  cv::solve(normal, right, solution, cv::DECOMP_CHOLESKY);
-  result.drift = {solution.at<double>(0), solution.at<double>(1)};
-  double squares = 0;
-  for (const int k : frame) {
-    fill_rows(rows, positions[k], at, softening);
-    const cv::Mat fitted = rows * solution;
-    squares += std::pow(displacements[k].x - fitted.at<double>(0), 2);
-    squares += std::pow(displacements[k].y - fitted.at<double>(1), 2);
+  const std::size_t stride = 1 + frame.size() / kMostBeads;
+  std::vector<int> used;
+  for (std::size_t k = 0; k < frame.size(); k += stride) used.push_back(frame[k]);
+  result.n_beads = static_cast<int>(used.size());
+
+  const std::vector<Vec2> at = sources(width, height, margin);
+  const double softening = kSoftening * std::min(width - 2 * margin, height - 2 * margin) / kSide;
+  const int n = static_cast<int>(2 * at.size());
+  cv::Mat design = cv::Mat::zeros(2 * result.n_beads, n, CV_64F), u(2 * result.n_beads, 1, CV_64F);
+  for (int k = 0; k < result.n_beads; ++k) {
+    cv::Mat rows = design.rowRange(2 * k, 2 * k + 2);
+    fill_rows(rows, positions[used[k]], at, softening);
+    u.at<double>(2 * k) = displacements[used[k]].x;
+    u.at<double>(2 * k + 1) = displacements[used[k]].y;
   }
-  result.rms = std::sqrt(0.5 * squares / result.n_beads);
+  cv::Mat normal, solution;
+  cv::mulTransposed(design, normal, true);
+  const double ridge = kRidge * cv::trace(normal)[0] / n;
+  for (int k = 2; k < n; ++k) normal.at<double>(k, k) += ridge;
+  cv::solve(normal, design.t() * u, solution, cv::DECOMP_CHOLESKY);
+  result.drift = {solution.at<double>(0), solution.at<double>(1)};
+  result.rms = cv::norm(u - design * solution) / std::sqrt(2.0 * result.n_beads);
   return result;
 }
 

@@ -20,7 +20,7 @@ struct FarField {
 ///
 ///   u(x) = d + Σ_k K(x − x_k) f_k,   Σ f_k = 0,   K = [ (1−nu) 1 + nu e eᵀ ] / r  (Cerruti, nu = 1/2)
 ///
-/// with the x_k on a grid of a sixth of the inner field. Ridge regression; forces hold back to where noise begins.
+/// with the x_k on a grid of a twelfth of the inner field, 1/r softened within a patch; ridge regression.
 FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
                    double height, double margin);
 

@@ -192,13 +192,14 @@ void follow_neighbours(const Scene& scene, const Neighbours& neighbours, const T
 
 /// The widest window whose displacement agrees with those of all narrower ones.
 Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide) {
-  const double kAgree = getenv("AGREE")?atof(getenv("AGREE")):1.2;
+  const double kAgree = getenv("AGREE") ? atof(getenv("AGREE")) : 1.0;
   const double widths[] = {1.6 * scene.bead_sigma, 2.3 * scene.bead_sigma, 3.2 * scene.bead_sigma};
   Vec2 low{-1e9, -1e9}, high{1e9, 1e9};
   Registered best;
-  const int only = getenv("ONLY") ? atoi(getenv("ONLY")) : -1; int index = 0;
+  const int only = getenv("ONLY") ? atoi(getenv("ONLY")) : -1;
+  int index = 0;
   for (const double width : widths) {
- if (only >= 0 && index++ != only) continue;
+    if (only >= 0 && index++ != only) continue;
     Window window = scene.wide;
     window.sigma = width;
     window.gradient_sd = 0.15;
@@ -300,13 +301,15 @@ int search_window(const Scene& scene, const TrackParameters& parameters, double 
 
 void declare(ParameterList& list, TrackParameters& p) {
   list.table("");
-  list.add("pixel_size_um", p.pixel_size_um, Range::not_negative(),
-           "side of a pixel (um); 0: from the image's calibration");
+  list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
+           "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("track");
+  list.add("stressed_page", p.stressed_page, {.low = 1}, "page of the stressed bead image to read, from 1");
+  list.add("relaxed_page", p.relaxed_page, {.low = 1}, "page of the relaxed bead image to read, from 1");
   list.add("detection_snr", p.detection_snr, Range::positive(),
            "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::not_negative(),
-           "how far to look for a bead, after the drift (um); 0: 32 pixels");
+           "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
   list.add(
       "far_field_share", p.far_field_share, Range::between(0.01, 0.5),
       "width of the frame along the border that is taken for far from the cell, for the drift (share of the side)");

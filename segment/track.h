@@ -1,6 +1,7 @@
 /// Displacement of the substrate from two images of its beads: pulled by the cell, and relaxed.
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "pipeline/contract/parameters.h"
@@ -11,7 +12,9 @@
 namespace mbtfm::segment {
 
 struct TrackParameters {
-  double pixel_size_um = 0;            ///< 0: from the images' own calibration
+  std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
+  int stressed_page = 1;                ///< counted from 1, as ImageJ shows them
+  int relaxed_page = 1;
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
   double far_field_share = 0.12;       ///< of the image's side: the frame that is taken for far from the cell
