@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <opencv2/core.hpp>
 
 namespace mbtfm::segment {
@@ -11,10 +12,24 @@ namespace {
 /// and half of it the patch that the force is spread over.
 constexpr int kSide = 12;
 constexpr double kSoftening = 0.5;
+/// A frame that moves by more than this share of what the whole picture does is not far from the cell.
+constexpr double kQuieter = 0.7;
 /// Beads beyond this number are left out evenly: 1500 give the drift to a fortieth of a bead's own error.
 constexpr std::size_t kMostBeads = 1500;
 /// Of a force's mean diagonal: holds back the patterns of forces that the frame does not see.
 constexpr double kRidge = 3e-4;
+
+double rms_about(const std::vector<Vec2>& u, const std::vector<int>& used, Vec2 mean) {
+  double squares = 0;
+  for (const int k : used) squares += dot(u[k] - mean, u[k] - mean);
+  return std::sqrt(0.5 * squares / static_cast<double>(used.size()));
+}
+
+Vec2 mean_of(const std::vector<Vec2>& u, const std::vector<int>& used) {
+  Vec2 sum;
+  for (const int k : used) sum += u[k];
+  return (1.0 / static_cast<double>(used.size())) * sum;
+}
 
 /// Sources on a grid inside the frame.
 std::vector<Vec2> sources(double width, double height, double margin) {
@@ -58,7 +73,18 @@ FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& 
     if (std::min({p.x, p.y, width - 1 - p.x, height - 1 - p.y}) < margin) frame.push_back(static_cast<int>(k));
   }
   FarField result;
-  if (frame.empty()) return result;
+  if (positions.empty()) return result;
+  std::vector<int> all(positions.size());
+  std::iota(all.begin(), all.end(), 0);
+  const double everywhere = rms_about(displacements, all, mean_of(displacements, all));
+  result.is_at_rest =
+      !frame.empty() && rms_about(displacements, frame, mean_of(displacements, frame)) < kQuieter * everywhere;
+  if (!result.is_at_rest) {
+    result.drift = mean_of(displacements, all);
+    result.rms = everywhere;
+    result.n_beads = static_cast<int>(all.size());
+    return result;
+  }
   const std::size_t stride = 1 + frame.size() / kMostBeads;
   std::vector<int> used;
   for (std::size_t k = 0; k < frame.size(); k += stride) used.push_back(frame[k]);

@@ -67,7 +67,7 @@ Scene prepare(const Image& relaxed, const Image& stressed, const TrackParameters
   scene.spacing = std::sqrt(relaxed.width * static_cast<double>(relaxed.height) / n_beads);
   // A Gaussian weight of sigma s weighs the area 4 pi s²: four beads in it.
   const double four_beads = scene.spacing / std::sqrt(std::numbers::pi);
-  scene.wide = {.sigma = std::clamp(four_beads, 2.5 * scene.bead_sigma, 6.5 * scene.bead_sigma),
+  scene.wide = {.sigma = std::clamp(four_beads, 3.5 * scene.bead_sigma, 6.5 * scene.bead_sigma),
                 .gradient_sd = 0.3,
                 .noise = 2 * scene.noise,
                 .max_steps = 15};
@@ -190,26 +190,28 @@ void follow_neighbours(const Scene& scene, const Neighbours& neighbours, const T
   }
 }
 
-/// The widest window whose displacement agrees with those of all narrower ones.
+/// The widest window whose displacement agrees with those of all narrower ones; no wider than needed for a standard
+/// error that is small against what a field is used for, so that beads keep errors of their own.
 Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide) {
-  const double kAgree = getenv("AGREE") ? atof(getenv("AGREE")) : 1.0;
-  const double widths[] = {1.6 * scene.bead_sigma, 2.3 * scene.bead_sigma, 3.2 * scene.bead_sigma};
+  constexpr double kAgree = 1.0;        // each interval: ± 1 standard error; more lets a window's bias pass for noise
+  constexpr double kFineEnough = 0.02;  // px
+  constexpr double kNarrowest = 1.6, kGrowth = 1.45;  // of a bead's sigma
+  constexpr int kWindows = 6;
   Vec2 low{-1e9, -1e9}, high{1e9, 1e9};
   Registered best;
-  const int only = getenv("ONLY") ? atoi(getenv("ONLY")) : -1;
-  int index = 0;
-  for (const double width : widths) {
-    if (only >= 0 && index++ != only) continue;
-    Window window = scene.wide;
-    window.sigma = width;
-    window.gradient_sd = 0.15;
-    Registered next = registered(scene.relaxed, scene.stressed.plane, place, wide.motion, window);
+  Window window = scene.wide;
+  window.gradient_sd = 0.15;
+  window.sigma = kNarrowest * scene.bead_sigma;
+  for (int k = 0; k < kWindows; ++k, window.sigma *= kGrowth) {
+    const Motion& guess = best.is_converged ? best.motion : wide.motion;
+    const Registered next = registered(scene.relaxed, scene.stressed.plane, place, guess, window);
     if (!next.is_converged || norm(next.motion.u - wide.motion.u) > 2 * scene.bead_sigma) continue;
     const double half = kAgree * next.sigma_px;
     low = {std::max(low.x, next.motion.u.x - half), std::max(low.y, next.motion.u.y - half)};
     high = {std::min(high.x, next.motion.u.x + half), std::min(high.y, next.motion.u.y + half)};
     if (best.is_converged && (low.x > high.x || low.y > high.y)) break;
     best = next;
+    if (best.sigma_px < kFineEnough) break;
   }
   return best;
 }
@@ -354,6 +356,7 @@ Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_s
   const FarField far = far_field_of(scene, tracks, parameters.far_field_share);
   result.drift_um = pixel_size_um * far.drift;
   result.far_field_rms_um = pixel_size_um * far.rms;
+  result.has_far_field = far.is_at_rest;
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma;
   result.n_beads_stressed = static_cast<int>(scene.beads_stressed.size());
   for (std::size_t k = 0; k < tracks.size(); ++k) {

@@ -41,6 +41,7 @@ struct Tracking {
   Vec2 drift_um;                ///< of the stressed image as a whole; taken off the field
   double far_field_rms_um = 0;  ///< of a displacement component in the frame, after the drift is taken off
   double bead_sigma_um = 0;     ///< of a bead's picture
+  bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is the mean of all beads
   int n_good = 0;
   int n_beads_stressed = 0;  ///< found in the stressed image
 };

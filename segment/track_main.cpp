@@ -69,6 +69,7 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
                     {"bead_sigma_um", tracking.bead_sigma_um},
                     {"drift_x_um", tracking.drift_um.x},
                     {"drift_y_um", tracking.drift_um.y},
+                    {"has_far_field", tracking.has_far_field},
                     {"far_field_residual_um", tracking.far_field_rms_um},
                     {"largest_displacement_um", largest_um},
                     {"sigma_um", std::sqrt(squares / std::max(1, tracking.n_good))}};
