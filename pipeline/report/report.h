@@ -1,0 +1,14 @@
+/// report.html of a cell: one file that needs nothing else.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace mbtfm::report {
+
+/// The page, from the files of a cell folder whose stages are done. @throws InputError
+std::string report_html(const std::filesystem::path& cell);
+/// Write it as report.html into the cell folder. @throws InputError, OutputError
+void write_report(const std::filesystem::path& cell);
+
+}  // namespace mbtfm::report
