@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <string>
+#include <tuple>
 
 #include "network/frame.h"
 #include "network/relax.h"
@@ -114,6 +116,8 @@ void measure_quality(const RelaxedMesh& mesh, GeneratedNetwork& result) {
     const double q = quality(mesh.points_um[t[0]], mesh.points_um[t[1]], mesh.points_um[t[2]]);
     result.mean_quality += q / static_cast<double>(mesh.triangulation.triangles.size());
     result.worst_quality = std::min(result.worst_quality, q);
+    result.area_um2 +=
+        0.5 * std::abs(cross(mesh.points_um[t[1]] - mesh.points_um[t[0]], mesh.points_um[t[2]] - mesh.points_um[t[0]]));
   }
   result.n_triangles = static_cast<int>(mesh.triangulation.triangles.size());
 }
