@@ -111,20 +111,21 @@ TEST(Beads, keep_their_distance_or_say_that_they_cannot) {
   EXPECT_THROW(place_beads(p), UsageError);
 }
 
-TEST(TwoAdhesions, feel_at_least_the_tension_of_the_fibre_between_them) {
+TEST(TwoAdhesions, feel_the_tension_of_the_fibre_between_them_where_the_network_is_weak) {
   ScenarioParameters p = small_scenario();
   p.cell.layout = "line";
   p.cell.n_adhesions = 2;
   p.cell.elongation = 8;
   p.cell.adhesion_area_um2 = 1;
-  p.tension.surface_tension_nN_per_um = 0;
+  p.tension.surface_tension_nN_per_um = 1e-5;
   const Experiment e = simulate(p, 1);
   ASSERT_EQ(e.forces.size(), 2u);
-  // with a slack network each adhesion feels the fibre's tension and nothing else (links that bear nothing are kept
-  // at a small positive tension by the solver)
-  EXPECT_NEAR(e.forces[0].force_nN.x, p.tension.ventral_median_nN, 1e-3);
-  EXPECT_NEAR(e.forces[1].force_nN.x, -p.tension.ventral_median_nN, 1e-3);
-  EXPECT_NEAR(e.forces[0].force_nN.y, 0, 1e-3);
+  // the network adds its tension by width over the 4 um of the spindle, 4e-5 nN, some times that where its cables
+  // have lined up with the fibre
+  const double tension = p.tension.ventral_median_nN;
+  EXPECT_NEAR(e.forces[0].force_nN.x, tension, 4e-4);
+  EXPECT_NEAR(e.forces[1].force_nN.x, -tension, 4e-4);
+  EXPECT_NEAR(e.forces[0].force_nN.y, 0, 4e-4);
 }
 
 }  // namespace
