@@ -81,6 +81,15 @@ TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
   EXPECT_FALSE(fs::exists(cell / "2_track"));
 }
 
+TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
+  const test::TemporaryFolder folder;
+  const std::string out = "--out " + (folder / "cell").string();
+  ASSERT_EQ(simulate(kSmall + out).code, 0);
+  EXPECT_EQ(simulate(kSmall + out).code, 0) << "the same again is no matter";
+  EXPECT_EQ(simulate(kSmall + "--images " + out).code, 2);
+  EXPECT_FALSE(fs::exists(folder / "cell" / "actin.tif"));
+}
+
 TEST(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
   const test::TemporaryFolder folder;
   ASSERT_EQ(simulate(kSmall + "--images --threads 1 --out " + (folder / "a").string()).code, 0);

@@ -171,6 +171,8 @@ TEST(Ring, turns_into_itself) {
     sum += a.position_um - centre;
   }
   EXPECT_LT(norm(sum), 1e-12);
+  p.n_adhesions = 500;
+  EXPECT_THROW(draw_cell(p, {}, kField_um, 1), UsageError);
 }
 
 TEST(LogNormal, with_mean_has_that_mean) {
