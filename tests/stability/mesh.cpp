@@ -156,7 +156,7 @@ TEST(HardMesh, adhesions_outside_are_included_up_to_an_edge_length) {
 TEST(HardMesh, adhesions_at_one_place_each_hold_a_vertex) {
   Cell cell = square_cell();
   for (int i = 0; i < 4; ++i) cell.adhesions.push_back(adhesion_at(5 + i, {10, 10}));
-  for (int i = 0; i < 6; ++i) cell.adhesions.push_back(adhesion_at(9 + i, {5 + 0.3 * i, 15}));
+  for (int i = 0; i < 6; ++i) cell.adhesions.push_back(adhesion_at(9 + i, {5 + 0.35 * i, 15}));
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
   EXPECT_EQ(generated.separated_adhesion_ids, (std::vector<int>{5, 6, 7, 8}));

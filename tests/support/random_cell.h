@@ -14,12 +14,13 @@ namespace mbtfm::testing {
 
 struct RandomCellOptions {
   double radius_um = 20;
-  int n_adhesions = 60;
+  int n_adhesions = 60;  ///< at most, where a least distance is wanted
   int n_fibres = 12;
   double roughness = 0.25;  ///< of the outline: relative deviation from a circle; above 0.3 with deep bays
   int n_outline_points = 200;
-  double pixel_um = 0;     ///< > 0: the outline takes the steps of pixels of this size
-  double curvature = 0.1;  ///< of fibres: sagitta over length
+  double pixel_um = 0;           ///< > 0: the outline takes the steps of pixels of this size
+  double curvature = 0.1;        ///< of fibres: sagitta over length
+  double least_distance_um = 0;  ///< between adhesions
 };
 
 inline double uniform(std::mt19937_64& engine, double low, double high) {
@@ -84,12 +85,16 @@ inline Cell random_cell(std::uint64_t seed, const RandomCellOptions& options = {
   const double reach = 2 * options.radius_um;
   for (int i = 0; i < options.n_adhesions; ++i) {
     Adhesion a;
-    a.adhesion_id = i + 1;
+    a.adhesion_id = static_cast<int>(cell.adhesions.size()) + 1;
     a.position_um = random_inside(engine, cell.outline_um, reach);
     if (uniform(engine, 0, 1) < 0.7) {  // most are peripheral
       const Vec2 edge = nearest_on_boundary_um(cell.outline_um, a.position_um);
       a.position_um = edge + uniform(engine, 0, 0.4) * (a.position_um - edge);
     }
+    const bool is_crowded = std::any_of(cell.adhesions.begin(), cell.adhesions.end(), [&](const Adhesion& other) {
+      return norm(other.position_um - a.position_um) < options.least_distance_um;
+    });
+    if (is_crowded) continue;
     a.area_um2 = 0.15 * std::pow(10.0, uniform(engine, 0, 1));
     const double ratio = uniform(engine, 1, 4);
     a.minor_axis_um = std::sqrt(4 * a.area_um2 / (std::numbers::pi * ratio));
