@@ -21,18 +21,21 @@ namespace {
 std::string optional_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
 
 std::string type_cell(FibreType type) {
-  return fmt::format("<span class=\"type\" style=\"background:{}\"></span>{}", colour_of(type), full_name_of(type));
+  return fmt::format("<span class=\"keep\"><span class=\"type\" style=\"background:{}\"></span>{}</span>",
+                     colour_of(type), full_name_of(type));
 }
 
 std::string findings_section(const CellResults& results, const Provenance& provenance) {
   std::vector<std::string> not_converged, by_hand;
+  std::string given;
   for (const StageLine& stage : provenance.stages) {
     if (!stage.converged) not_converged.push_back(stage.name);
-    if (stage.state == "given" || stage.state == "replaced") {
-      by_hand.push_back("The outputs of the stage " + stage.name + " were not made by this program (" + stage.state +
-                        ": " + stage.why + ").");
-    }
+    if (stage.state == "given") given += (given.empty() ? "" : ", ") + stage.name;
+    if (stage.state == "replaced")
+      by_hand.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
   }
+  if (!given.empty())
+    by_hand.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
   std::string html = "<ul class=\"findings\">\n";
   for (const Finding& finding : findings_of(results, not_converged, by_hand)) {
     static constexpr const char* kClass[] = {"fact", "good", "caution", "bad"};
@@ -105,11 +108,11 @@ std::string tension_section(const CellResults& results) {
   html += figure("Tension of each fibre", tension_plot(results),
                  "By type, the strongest first. The interval holds the bead noise and, where several meshes were "
                  "fitted, the spread between them.");
-  html += "<div>" + html_of(tension_table(results));
+  html += "</div>\n" + html_of(tension_table(results));
   if (results.comparison) html += missed_fibres(*results.comparison);
   html += fmt::format(
       "<p class=\"sub\">Actin network: t = {} nN a cable; as a surface tension {} nN/µm, which does not "
-      "depend on the mesh.</p></div></div>\n",
+      "depend on the mesh.</p>\n",
       results.tensions.contains(0) ? readable(results.tensions.at(0).tension_nN) : "–",
       readable(results.fit.network_surface_tension_nN_per_um));
   return section("Tensions", html);
