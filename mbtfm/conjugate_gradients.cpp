@@ -11,7 +11,8 @@ namespace {
 /// The state of a minimisation, and its account of evaluations.
 class Minimisation {
  public:
-  Minimisation(const TensionProblem& problem, const FitParameters& parameters, int threads, const Eigen::VectorXd& start)
+  Minimisation(const TensionProblem& problem, const FitParameters& parameters, int threads,
+               const Eigen::VectorXd& start)
       : problem_(problem), parameters_(parameters), threads_(threads) {
     fit_.trial = problem.evaluate(start);
     note(fit_.trial);

@@ -2,8 +2,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <optional>
 
 #include "mbtfm/tension_fit.h"
+#include "pipeline/contract/errors.h"
 
 namespace mbtfm::inverse {
 
@@ -15,6 +17,16 @@ std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
     if (is_held[i] == wanted) indices.push_back(static_cast<int>(i));
   }
   return indices;
+}
+
+/// None where these tensions have no equilibrium that can be found: a step too far, to be shortened.
+std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, TensionFit& fit) {
+  ++fit.n_evaluations;
+  try {
+    return problem.evaluate(tensions_nN, &fit.trial);
+  } catch (const NotSolved&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -92,10 +104,9 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
       break;
     }
     const Eigen::VectorXd moved = (fit.trial.tensions_nN + step).cwiseMax(0.0);
-    Trial next = problem.evaluate(moved, &fit.trial);
-    ++fit.n_evaluations;
-    const double gain = (fit.trial.objective - next.objective) / predicted;
-    if (gain > 0) fit.trial = std::move(next);
+    const std::optional<Trial> next = try_evaluate(problem, moved, fit);
+    const double gain = next ? (fit.trial.objective - next->objective) / predicted : -1;
+    if (gain > 0) fit.trial = *next;
     // A step that is short because it is damped says nothing of convergence.
     if (fit.report.last_change < parameters.tolerance && damping <= 1e-2) {
       fit.report.converged = true;

@@ -1,0 +1,159 @@
+#include "network/mesh.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <string>
+
+#include "network/frame.h"
+#include "network/relax.h"
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::network {
+namespace {
+
+/// Width of material that an edge stands for: its length between the circumcentres of its two triangles. With a
+/// tension in proportion to it, the links pull as a sheet of even surface tension does, on any triangulation:
+/// t_ab = sigma (cot alpha + cot beta) l_ab / 2 is minus the gradient of the sheet's area. A triangle that is obtuse
+/// there would count negative.
+/// Source: Pinkall & Polthier, Exp. Math. 2:15 (1993), eq. 2.
+double dual_width_um(const std::vector<Vec2>& points, const Triangulation::Edge& edge) {
+  const Vec2 a = points[edge.vertex_a];
+  const Vec2 b = points[edge.vertex_b];
+  double cotangents = 0;
+  for (const int apex : edge.apexes) {
+    if (apex < 0) continue;
+    const Vec2 to_a = a - points[apex];
+    const Vec2 to_b = b - points[apex];
+    const double doubled_area = std::abs(cross(to_a, to_b));
+    if (doubled_area > 0) cotangents += dot(to_a, to_b) / doubled_area;
+  }
+  return 0.5 * cotangents * norm(b - a);
+}
+
+/// Links of all edges: one of each fibre that runs along it, else one of the actin network.
+std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const NetworkParameters& parameters) {
+  std::map<std::pair<int, int>, const FrameSegment*> fibre_segments;
+  for (const FrameSegment& s : frame.segments) {
+    if (!s.fibre_ids.empty()) fibre_segments[{s.vertex_a, s.vertex_b}] = &s;
+  }
+  // in a regular triangulation an edge of length h has the dual width h / sqrt(3)
+  const double regular_width = parameters.edge_length_um / std::sqrt(3.0);
+  constexpr double kSmallestShare = 0.02;  // of an edge across from an obtuse angle: a cable cannot push
+  std::vector<Link> links;
+  for (const Triangulation::Edge& e : mesh.triangulation.edges) {
+    Link link{.vertex_a = e.vertex_a, .vertex_b = e.vertex_b};
+    link.rest_length_um = norm(mesh.points_um[e.vertex_b] - mesh.points_um[e.vertex_a]);
+    const auto segment = fibre_segments.find({e.vertex_a, e.vertex_b});
+    if (segment != fibre_segments.end()) {
+      for (const int id : segment->second->fibre_ids) {
+        link.fibre_id = id;
+        links.push_back(link);
+      }
+      fibre_segments.erase(segment);
+    } else {
+      if (parameters.link_weights == "width") {
+        link.share = std::max(kSmallestShare, dual_width_um(mesh.points_um, e) / regular_width);
+      }
+      links.push_back(link);
+    }
+  }
+  // a fibre in a neck so thin that no triangle is left there
+  for (const auto& [ends, segment] : fibre_segments) {
+    for (const int id : segment->fibre_ids) {
+      links.push_back({.vertex_a = ends.first,
+                       .vertex_b = ends.second,
+                       .fibre_id = id,
+                       .rest_length_um = norm(mesh.points_um[ends.second] - mesh.points_um[ends.first])});
+    }
+  }
+  std::sort(links.begin(), links.end(), [](const Link& a, const Link& b) {
+    return std::tie(a.vertex_a, a.vertex_b, a.fibre_id) < std::tie(b.vertex_a, b.vertex_b, b.fibre_id);
+  });
+  return links;
+}
+
+/// Each vertex belongs to the adhesion whose ellipse it lies in, the nearest where several overlap.
+void hold_within_ellipses(const Cell& cell, Network& network) {
+  std::vector<double> nearest(network.vertices_um.size(), std::numeric_limits<double>::infinity());
+  for (std::size_t v = 0; v < nearest.size(); ++v) {
+    if (network.adhesion_id[v] != 0) nearest[v] = -1;  // an adhesion's own
+  }
+  for (const Adhesion& adhesion : cell.adhesions) {
+    for (std::size_t v = 0; v < nearest.size(); ++v) {
+      const double distance = norm(network.vertices_um[v] - adhesion.position_um);
+      if (distance >= nearest[v] || !covers(adhesion, network.vertices_um[v])) continue;
+      nearest[v] = distance;
+      network.adhesion_id[v] = adhesion.adhesion_id;
+    }
+  }
+}
+
+int count_parts(const Network& network) {
+  std::vector<int> root(network.vertices_um.size());
+  std::iota(root.begin(), root.end(), 0);
+  const auto find = [&](int v) {
+    while (root[v] != v) v = root[v] = root[root[v]];
+    return v;
+  };
+  int n_parts = static_cast<int>(root.size());
+  for (const Link& link : network.links) {
+    const int a = find(link.vertex_a);
+    const int b = find(link.vertex_b);
+    if (a == b) continue;
+    root[a] = b;
+    --n_parts;
+  }
+  return n_parts;
+}
+
+void measure_quality(const RelaxedMesh& mesh, GeneratedNetwork& result) {
+  result.worst_quality = 1;
+  for (const auto& t : mesh.triangulation.triangles) {
+    const double q = quality(mesh.points_um[t[0]], mesh.points_um[t[1]], mesh.points_um[t[2]]);
+    result.mean_quality += q / static_cast<double>(mesh.triangulation.triangles.size());
+    result.worst_quality = std::min(result.worst_quality, q);
+  }
+  result.n_triangles = static_cast<int>(mesh.triangulation.triangles.size());
+}
+
+}  // namespace
+
+void declare(ParameterList& list, NetworkParameters& parameters) {
+  list.table("network");
+  list.add("edge_length_um", parameters.edge_length_um, Range::positive(), "mean cable length (um)");
+  list.add("seed", parameters.seed, "of the first placement of the vertices");
+  list.add("link_weights", parameters.link_weights,
+           "tension and stiffness of the actin network's links: the same for all, or by the width of material each "
+           "stands for",
+           {"equal", "width"});
+  list.add("adhesion_anchor", parameters.adhesion_anchor,
+           "what an adhesion holds: every vertex in its ellipse, or the one at its centre", {"ellipse", "centre"});
+}
+
+GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {
+  check(cell);
+  Random random(parameters.seed);
+  const OutlineCurve outline(cell.outline_um, parameters.edge_length_um);
+  const Frame frame = build_frame(cell, outline, parameters.edge_length_um, random);
+  const RelaxedMesh mesh = fill_and_relax(frame, outline, parameters.edge_length_um, random);
+
+  GeneratedNetwork result;
+  result.report = mesh.report;
+  result.clipped_fibre_ids = frame.clipped_fibre_ids;
+  result.snapped_adhesion_ids = frame.snapped_adhesion_ids;
+  result.separated_adhesion_ids = frame.separated_adhesion_ids;
+  result.n_shared_segments = frame.n_shared_segments;
+  result.network.vertices_um = mesh.points_um;
+  result.network.adhesion_id = frame.adhesion_id;
+  result.network.adhesion_id.resize(mesh.points_um.size(), 0);
+  if (parameters.adhesion_anchor == "ellipse") hold_within_ellipses(cell, result.network);
+  result.network.links = links_of(frame, mesh, parameters);
+  result.n_parts = count_parts(result.network);
+  measure_quality(mesh, result);
+  check(result.network);
+  return result;
+}
+
+}  // namespace mbtfm::network

@@ -1,0 +1,69 @@
+#include <algorithm>
+#include <string>
+
+#include "network/mesh.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/stage.h"
+
+namespace mbtfm {
+namespace {
+
+std::string counted(std::size_t n, const std::string& what) {
+  return n == 0 ? "" : ", " + std::to_string(n) + " " + what;
+}
+
+std::string listed(const std::vector<int>& ids) {
+  std::string list;
+  for (const int id : ids) list += (list.empty() ? "" : " ") + std::to_string(id);
+  return list;
+}
+
+StageReport report_of(const network::GeneratedNetwork& generated) {
+  const Network& net = generated.network;
+  double sum_um = 0;
+  for (const Link& link : net.links) sum_um += link.rest_length_um;
+  const double mean_edge_um = sum_um / static_cast<double>(net.links.size());
+  const int n_held = static_cast<int>(net.vertices_um.size()) -
+                     static_cast<int>(std::count(net.adhesion_id.begin(), net.adhesion_id.end(), 0));
+  StageReport report;
+  report.converged = generated.n_parts == 1;
+  report.summary = std::to_string(net.vertices_um.size()) + " vertices, " + std::to_string(net.links.size()) +
+                   " links" + counted(generated.clipped_fibre_ids.size(), "fibres cut at the outline") +
+                   counted(generated.snapped_adhesion_ids.size(), "adhesions outside the outline drawn in") +
+                   counted(generated.separated_adhesion_ids.size(), "adhesions at one place moved apart") +
+                   (generated.n_parts > 1 ? counted(generated.n_parts, "parts that no link joins") : "");
+  report.figures = {{"n_vertices", static_cast<std::int64_t>(net.vertices_um.size())},
+                    {"n_links", static_cast<std::int64_t>(net.links.size())},
+                    {"n_triangles", static_cast<std::int64_t>(generated.n_triangles)},
+                    {"n_held_vertices", static_cast<std::int64_t>(n_held)},
+                    {"n_parts", static_cast<std::int64_t>(generated.n_parts)},
+                    {"n_shared_segments", static_cast<std::int64_t>(generated.n_shared_segments)},
+                    {"mean_edge_um", mean_edge_um},
+                    {"mean_quality", generated.mean_quality},
+                    {"worst_quality", generated.worst_quality},
+                    {"relaxation_steps", static_cast<std::int64_t>(generated.report.iterations)},
+                    {"last_move_edges", generated.report.last_change},
+                    {"clipped_fibre_ids", listed(generated.clipped_fibre_ids)},
+                    {"snapped_adhesion_ids", listed(generated.snapped_adhesion_ids)},
+                    {"separated_adhesion_ids", listed(generated.separated_adhesion_ids)}};
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm
+
+int main(int argc, char** argv) {
+  using namespace mbtfm;
+  return run_stage<network::NetworkParameters>(
+      {.name = "network",
+       .purpose = "span a contractile cable network over a segmented cell",
+       .files = {{"cell", FileArgument::Kind::input,
+                  "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
+                 {"out", FileArgument::Kind::output, "network.vtu"}}},
+      argc, argv, [](const network::NetworkParameters& parameters, StageContext& context) {
+        const Cell cell = read_cell(context.input("cell"));
+        const network::GeneratedNetwork generated = network::generate_network(cell, parameters);
+        write_network(context.output("out"), generated.network);
+        return report_of(generated);
+      });
+}

@@ -1,0 +1,32 @@
+/// The cell's outline as a smooth closed curve by arc length: pixel steps averaged away, sharp corners kept.
+#pragma once
+
+#include <vector>
+
+#include "pipeline/contract/types.h"
+
+namespace mbtfm::network {
+
+class OutlineCurve {
+ public:
+  /// Averages the outline over half an edge length, so that steps finer than that vanish while the curve keeps its
+  /// place (a circle of radius R shrinks by edge² / (96 R)); a turn by more than 50° within an edge is a corner.
+  OutlineCurve(const Polygon& outline_um, double edge_um);
+
+  double length_um() const { return start_um_.back(); }
+  Vec2 at(double s_um) const;
+  /// Arc length of the point of the curve nearest to `point_um`.
+  double nearest(Vec2 point_um) const;
+  /// Arc lengths of the corners, rising.
+  const std::vector<double>& corners() const { return corners_um_; }
+  const Polygon& polygon() const { return points_um_; }
+  /// Brings an arc length into [0, length).
+  double wrapped(double s_um) const;
+
+ private:
+  Polygon points_um_;             ///< positively oriented
+  std::vector<double> start_um_;  ///< arc length at each point, and the whole length at the end
+  std::vector<double> corners_um_;
+};
+
+}  // namespace mbtfm::network
