@@ -36,7 +36,7 @@ th,td{padding:.28em .7em;border-bottom:1px solid #e6e8eb;text-align:left;vertica
 th{cursor:pointer;white-space:nowrap;background:#f6f7f8}
 th:hover{background:#e9ecef}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-td.hash{font:.8rem monospace;overflow-wrap:anywhere}
+td:last-child:not(.n){min-width:9em}
 details{margin:.6em 0}
 summary{cursor:pointer;font-weight:600}
 .keep{white-space:nowrap}

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/hash.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/report/base64.h"
 #include "pipeline/report/findings.h"
@@ -228,6 +229,24 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
   return section("How it was computed", html);
 }
 
+/// Of the program's version and all that the report shows: the outputs of the stages, the truth and cell.toml.
+std::string fingerprint(const std::filesystem::path& cell) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> files = {cell / "cell.toml"};
+  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) {
+    if (!fs::is_directory(cell / folder)) continue;
+    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::string all = kVersion;
+  for (const fs::path& file : files) {
+    all += "\n" + file.lexically_relative(cell).generic_string() + " " + sha256_of_file(file);
+  }
+  return sha256(all);
+}
+
 }  // namespace
 
 std::string report_html(const std::filesystem::path& cell) {
@@ -244,6 +263,11 @@ std::string report_html(const std::filesystem::path& cell) {
   return page(results.name + " – mbtfm", body);
 }
 
-void write_report(const std::filesystem::path& cell) { write_whole(cell / "report.html", report_html(cell)); }
+void update_report(const std::filesystem::path& cell) {
+  const std::filesystem::path file = cell / "report.html";
+  const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
+  if (std::filesystem::is_regular_file(file) && read_text(file).ends_with(signature)) return;
+  write_whole(file, report_html(cell) + signature);
+}
 
 }  // namespace mbtfm::report

@@ -53,6 +53,19 @@ TEST(Report, writes_the_same_bytes_twice) {
   EXPECT_EQ(report_html(cell.folder.path()), report_html(cell.folder.path()));
 }
 
+TEST(Report, is_written_again_only_where_something_has_changed) {
+  const FakeCell cell;
+  const auto file = cell.folder / "report.html";
+  update_report(cell.folder.path());
+  const auto first = std::filesystem::last_write_time(file);
+  update_report(cell.folder.path());
+  EXPECT_EQ(std::filesystem::last_write_time(file), first);
+  test::write_invented_fit(cell.folder.path(), 2);
+  const std::string before = read_text(file);
+  update_report(cell.folder.path());
+  EXPECT_NE(read_text(file), before);
+}
+
 TEST(Report, rejects_a_fitted_field_of_other_beads) {
   const FakeCell cell;
   const auto file = cell.folder / "4_fit/fitted_displacement.csv";
