@@ -31,8 +31,8 @@ svg .tick{stroke:#444;fill:none}
 svg .grid{stroke:#e3e5e8;fill:none}
 svg path{fill:none}
 .scroll{overflow-x:auto;max-width:100%}
-table{border-collapse:collapse;font-size:.88rem;width:auto}
-th,td{padding:.28em .7em;border-bottom:1px solid #e6e8eb;text-align:left;vertical-align:top}
+table{border-collapse:collapse;font-size:.86rem;width:auto}
+th,td{padding:.28em .55em;border-bottom:1px solid #e6e8eb;text-align:left;vertical-align:top}
 th{cursor:pointer;white-space:nowrap;background:#f6f7f8}
 th:hover{background:#e9ecef}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}

@@ -109,7 +109,8 @@ std::string tension_section(const CellResults& results) {
   html += figure("Tension of each fibre", tension_plot(results),
                  "By type, the strongest first. The interval holds the bead noise and, where several meshes were "
                  "fitted, the spread between them.");
-  html += "</div>\n" + html_of(tension_table(results));
+  const Figure network = network_map(results, NetworkForm::original);
+  html += figure(network.title, network.svg, network.caption) + "</div>\n" + html_of(tension_table(results));
   if (results.comparison) html += missed_fibres(*results.comparison);
   html += fmt::format(
       "<p class=\"sub\">Actin network: t = {} nN a cable; as a surface tension {} nN/µm, which does not "
@@ -131,7 +132,6 @@ std::string map_section(const CellResults& results) {
   add(adhesion_map(results));
   add(displacement_map(results));
   if (results.residual) add(residual_map(results));
-  add(network_map(results, NetworkForm::original));
   add(network_map(results, NetworkForm::contracted));
   return section("Maps", html +
                              "</div>\n<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
