@@ -248,9 +248,15 @@ Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std
       rounding.eps_um = std::max(kSharpening * rounding.eps_um, options.eps_um);
     }
     minimiser.set_rounding(sharp);
-    while (!has_converged() && may_step(options.max_iterations)) step();
   }
-  if (minimiser.residual_nN() > kPolished * options.force_nN && may_step(options.max_iterations)) step();
+  const auto converge = [&] {
+    while (!has_converged() && may_step(options.max_iterations)) step();
+  };
+  converge();
+  if (minimiser.residual_nN() > kPolished * options.force_nN && may_step(options.max_iterations)) {
+    step();
+    converge();  // where a cable was still to begin or to cease to stretch, that step showed it
+  }
 
   report.last_change = minimiser.residual_nN();
   report.converged = has_converged();

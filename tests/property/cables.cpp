@@ -16,9 +16,9 @@ class Cables : public testing::TestWithParam<unsigned> {
  protected:
   Eigen::VectorXd forces(const Network& of, const std::vector<double>& t, network::CableParameters p = {}) const {
     const CableNetwork other(of, p);
-    const Equilibrium equilibrium = other.equilibrium(t);
-    test::expect_equilibrium(other, t, equilibrium);
-    return other.adhesion_forces_nN(t, equilibrium);
+    const Equilibrium result = other.equilibrium(t);
+    test::expect_equilibrium(other, t, result);
+    return other.adhesion_forces_nN(t, result);
   }
   Network net = test::lattice({.seed = GetParam()});
   CableNetwork cables{net};
