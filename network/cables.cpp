@@ -47,7 +47,7 @@ FreeVertices free_vertices(const Network& network) {
 }  // namespace
 
 void declare(ParameterList& list, CableParameters& p) {
-  list.table("network");
+  list.table("cables");
   list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::positive(),
            "force of a cable per strain beyond its rest length (nN)");
   list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2},

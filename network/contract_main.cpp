@@ -3,23 +3,11 @@
 #include <string>
 
 #include "network/cables.h"
-#include "network/mesh.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
 
 namespace mbtfm {
 namespace {
-
-/// Table [network] of cell.toml belongs to the mesh and the cables together; both are declared, so that the same file
-/// serves every stage.
-struct ContractParameters {
-  network::NetworkParameters mesh;
-  network::CableParameters cables;
-};
-void declare(ParameterList& list, ContractParameters& parameters) {
-  declare(list, parameters.mesh);
-  declare(list, parameters.cables);
-}
 
 /// @throws InputError naming the fibres of the network without a tension
 std::vector<double> tensions_by_group(const std::vector<int>& fibre_ids, const std::vector<Tension>& rows,
@@ -61,16 +49,16 @@ StageReport report_of(const network::CableNetwork& cables, const network::Equili
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using Kind = FileArgument::Kind;
-  return run_stage<ContractParameters>(
+  return run_stage<network::CableParameters>(
       {.name = "contract",
        .purpose = "contract a cable network with given tensions",
        .files = {{"network", Kind::input, "network.vtu"},
                  {"tensions", Kind::input, "tensions.csv: fibre_id, tension_nN; fibre_id 0 is the actin network"},
                  {"out", Kind::output, "the contracted network (.vtu), with the force each cable carries"},
                  {"reactions", Kind::output, "force on the substrate at each held vertex (.csv)"}}},
-      argc, argv, [](const ContractParameters& parameters, StageContext& context) {
+      argc, argv, [](const network::CableParameters& parameters, StageContext& context) {
         const Path tensions_file = context.input("tensions");
-        const network::CableNetwork cables(read_network(context.input("network")), parameters.cables);
+        const network::CableNetwork cables(read_network(context.input("network")), parameters);
         const auto tensions = tensions_by_group(cables.fibre_ids(), read_tensions(tensions_file), tensions_file);
         const network::Equilibrium equilibrium = cables.equilibrium(tensions);
         const std::vector<Vec2> by_vertex = cables.reactions_nN(tensions, equilibrium);

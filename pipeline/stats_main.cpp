@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
         const Path folder = context.input("cells");
         const Study study = read_study(folder);
         for (const StudyCell& cell : study.cells) {
-          for (const std::string& file : files_of_a_cell()) context.input("cells", cell.name + "/" + file);
+          for (const std::string& file : files_of_a_cell()) context.input("cells", {cell.name + "/" + file});
         }
         write_text(context.output("out", "cells.csv"), cells_csv(study));
         write_text(context.output("out", "adhesions.csv"), adhesions_csv(study));
