@@ -211,11 +211,11 @@ std::string effects_table(const Provenance& provenance) {
 }
 
 std::string provenance_section(const CellResults& results, const Provenance& provenance) {
-  Table stages{{{"stage"}, {"state"}, {"seconds", true}, {"memory (MB)", true}, {"version"}, {"result"}}, {}};
+  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}};
   for (const StageLine& stage : provenance.stages) {
-    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state), stage.seconds, stage.peak_memory_MB,
-                           html_escaped(stage.version),
-                           html_escaped(stage.summary.empty() ? stage.why : stage.summary)});
+    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
+                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           stage.peak_memory_MB, html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
