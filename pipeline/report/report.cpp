@@ -51,7 +51,7 @@ Table tension_table(const CellResults& results) {
   Table table{{{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % low", true}, {"95 % high", true}}, {}};
   const bool has_truth = results.comparison.has_value();
   if (has_truth) {
-    for (const char* title : {"truth (nN)", "deviation (nN)", "deviation (%)", "true fibre"}) {
+    for (const char* title : {"truth (nN)", "− truth (nN)", "− truth (%)", "true fibre"}) {
       table.columns.push_back({title, true});
     }
     table.columns.push_back({"true type"});
