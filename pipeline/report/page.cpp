@@ -36,7 +36,6 @@ th,td{padding:.28em .55em;border-bottom:1px solid #e6e8eb;text-align:left;vertic
 th{cursor:pointer;white-space:nowrap;background:#f6f7f8}
 th:hover{background:#e9ecef}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-td:last-child:not(.n){min-width:9em}
 details{margin:.6em 0}
 summary{cursor:pointer;font-weight:600}
 .keep{white-space:nowrap}

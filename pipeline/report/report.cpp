@@ -51,7 +51,7 @@ Table tension_table(const CellResults& results) {
   Table table{{{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % low", true}, {"95 % high", true}}, {}};
   const bool has_truth = results.comparison.has_value();
   if (has_truth) {
-    for (const char* title : {"truth (nN)", "deviation (nN)", "deviation (%)", "true fibre"}) {
+    for (const char* title : {"truth (nN)", "− truth (nN)", "− truth (%)", "true fibre"}) {
       table.columns.push_back({title, true});
     }
     table.columns.push_back({"true type"});
@@ -211,11 +211,11 @@ std::string effects_table(const Provenance& provenance) {
 }
 
 std::string provenance_section(const CellResults& results, const Provenance& provenance) {
-  Table stages{{{"stage"}, {"state"}, {"seconds", true}, {"memory (MB)", true}, {"version"}, {"result"}}, {}};
+  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}};
   for (const StageLine& stage : provenance.stages) {
-    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state), stage.seconds, stage.peak_memory_MB,
-                           html_escaped(stage.version),
-                           html_escaped(stage.summary.empty() ? stage.why : stage.summary)});
+    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
+                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           stage.peak_memory_MB, html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
