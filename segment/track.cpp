@@ -198,7 +198,7 @@ Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide)
   constexpr double kNarrowest = 1.6, kGrowth = 1.45;  // of a bead's sigma
   constexpr int kWindows = 6;
   Vec2 low{-1e9, -1e9}, high{1e9, 1e9};
-  Registered best;
+  Registered best, narrowest;
   Window window = scene.wide;
   window.gradient_sd = 0.15;
   window.sigma = kNarrowest * scene.bead_sigma;
@@ -211,8 +211,13 @@ Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide)
     high = {std::min(high.x, next.motion.u.x + half), std::min(high.y, next.motion.u.y + half)};
     if (best.is_converged && (low.x > high.x || low.y > high.y)) break;
     best = next;
+    if (!narrowest.is_converged) narrowest = next;
     if (best.sigma_px < kFineEnough) break;
   }
+  // What the chosen window differs from the narrowest by, beyond what noise explains, is its bias: part of its error.
+  const Vec2 apart = best.motion.u - narrowest.motion.u;
+  const double by_noise = narrowest.sigma_px * narrowest.sigma_px - best.sigma_px * best.sigma_px;
+  best.sigma_px = std::sqrt(best.sigma_px * best.sigma_px + std::max(0.0, 0.5 * dot(apart, apart) - by_noise));
   return best;
 }
 
