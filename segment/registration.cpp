@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <opencv2/core.hpp>
+#include <opencv2/core/hal/intrin.hpp>
 
 namespace mbtfm::segment {
 namespace {
@@ -29,14 +30,14 @@ float interpolated(const Plane& plane, float x, float y) {
   y = std::clamp(y, 0.0f, static_cast<float>(plane.height - 1));
   const int i = std::min(static_cast<int>(x), plane.width - 2), j = std::min(static_cast<int>(y), plane.height - 2);
   const Weights wx(x - static_cast<float>(i)), wy(y - static_cast<float>(j));
-  float sum = 0;
   if (i >= 1 && j >= 1 && i + 2 < plane.width && j + 2 < plane.height) {
     const float* row = plane.row(j - 1) + i - 1;
-    for (int b = 0; b < 4; ++b, row += plane.width) {
-      sum += wy.w[b] * (wx.w[0] * row[0] + wx.w[1] * row[1] + wx.w[2] * row[2] + wx.w[3] * row[3]);
-    }
-    return sum;
+    cv::v_float32x4 column = cv::v_load(row) * cv::v_setall_f32(wy.w[0]);
+    for (int b = 1; b < 4; ++b)
+      column = cv::v_muladd(cv::v_load(row + b * plane.width), cv::v_setall_f32(wy.w[b]), column);
+    return cv::v_reduce_sum(column * cv::v_load(wx.w));
   }
+  float sum = 0;
   for (int b = 0; b < 4; ++b) {
     const float* row = plane.row(std::clamp(j - 1 + b, 0, plane.height - 1));
     for (int a = 0; a < 4; ++a) sum += wy.w[b] * wx.w[a] * row[std::clamp(i - 1 + a, 0, plane.width - 1)];
@@ -44,12 +45,33 @@ float interpolated(const Plane& plane, float x, float y) {
   return sum;
 }
 
+/// Of the value at a pixel by u and G; two zeros fill it up to what the processor adds at once.
+using Slope = std::array<float, 8>;
+
+/// Σ factor s sᵀ, in single precision: a window has at most some 1 500 pixels.
+struct Products {
+  std::array<Slope, 6> sum{};
+  void add(float factor, const Slope& slope) {
+    for (int a = 0; a < 6; ++a) {
+      const float scaled = factor * slope[a];
+      for (int b = 0; b < 8; ++b) sum[a][b] += scaled * slope[b];
+    }
+  }
+  Mat6 matrix() const {
+    Mat6 result;
+    for (int a = 0; a < 6; ++a) {
+      for (int b = 0; b < 6; ++b) result(a, b) = sum[std::min(a, b)][std::max(a, b)];
+    }
+    return result;
+  }
+};
+
 /// Everything of a window that does not change from step to step.
 struct Patch {
-  std::vector<float> x, y;                  ///< of its pixels, from the bead
-  std::vector<float> target;                ///< the target's values under the window, as moved last
-  std::vector<float> weight, value;         ///< value: less the weighted mean
-  std::vector<std::array<float, 6>> slope;  ///< by u and G, less what gain and offset can do
+  std::vector<float> x, y;           ///< of its pixels, from the bead
+  std::vector<float> target;         ///< the target's values under the window, as moved last
+  std::vector<float> weight, value;  ///< value: less the weighted mean
+  std::vector<Slope> slope;          ///< by u and G, less what gain and offset can do
   Mat6 normal;
   double total_weight = 0, total_squared = 0, variance = 0;
 };
@@ -71,7 +93,7 @@ Patch patch_around(const Reference& reference, Vec2 place, double sigma) {
       const float gx = reference.slope_x.at(i, j), gy = reference.slope_y.at(i, j);
       patch.x.push_back(x), patch.y.push_back(y), patch.weight.push_back(weight);
       patch.value.push_back(reference.plane.at(i, j));
-      patch.slope.push_back({gx, gy, gx * x, gx * y, gy * x, gy * y});
+      patch.slope.push_back({gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0});
       patch.total_weight += weight, patch.total_squared += weight * weight;
       mean += weight * patch.value.back();
     }
@@ -82,31 +104,29 @@ Patch patch_around(const Reference& reference, Vec2 place, double sigma) {
 
 /// Project the slopes onto what neither an offset nor a gain can do, and sum their products.
 void complete(Patch& patch) {
-  Vec6 by_one, by_value;
+  Slope by_one{}, by_value{};
   double power = 0;
   const std::size_t n = patch.value.size();
   for (std::size_t k = 0; k < n; ++k) {
-    power += patch.weight[k] * patch.value[k] * patch.value[k];
-    for (int a = 0; a < 6; ++a) {
-      by_one[a] += patch.weight[k] * patch.slope[k][a];
-      by_value[a] += patch.weight[k] * patch.slope[k][a] * patch.value[k];
+    const float weight = patch.weight[k], weighted = weight * patch.value[k];
+    power += weighted * patch.value[k];
+    for (int a = 0; a < 8; ++a) {
+      by_one[a] += weight * patch.slope[k][a];
+      by_value[a] += weighted * patch.slope[k][a];
     }
   }
   patch.target.resize(n);
   patch.variance = power / patch.total_weight;
+  for (int a = 0; a < 8; ++a) {
+    by_one[a] /= static_cast<float>(patch.total_weight);
+    by_value[a] = power > 0 ? by_value[a] / static_cast<float>(power) : 0.0f;
+  }
+  Products products;
   for (std::size_t k = 0; k < n; ++k) {
-    for (int a = 0; a < 6; ++a) {
-      patch.slope[k][a] -= static_cast<float>(by_one[a] / patch.total_weight + by_value[a] / power * patch.value[k]);
-    }
-    for (int a = 0; a < 6; ++a) {
-      for (int b = 0; b <= a; ++b) {
-        patch.normal(a, b) += patch.weight[k] * patch.slope[k][a] * patch.slope[k][b];
-      }
-    }
+    for (int a = 0; a < 8; ++a) patch.slope[k][a] -= by_one[a] + by_value[a] * patch.value[k];
+    products.add(patch.weight[k], patch.slope[k]);
   }
-  for (int a = 0; a < 6; ++a) {
-    for (int b = a + 1; b < 6; ++b) patch.normal(a, b) = patch.normal(b, a);
-  }
+  patch.normal = products.matrix();
 }
 
 /// What the target shows under the window moved by a motion.
@@ -119,7 +139,7 @@ struct Compared {
 
 Compared compared(Patch& patch, const Plane& target, Vec2 place, const Motion& motion) {
   Compared result;
-  std::array<float, 6> mismatch{};
+  Slope mismatch{};
   double sum = 0, squares = 0, products = 0;
   const float ux = static_cast<float>(place.x + motion.u.x), uy = static_cast<float>(place.y + motion.u.y);
   const float xx = static_cast<float>(1 + motion.ux_x), xy = static_cast<float>(motion.ux_y);
@@ -132,7 +152,7 @@ Compared compared(Patch& patch, const Plane& target, Vec2 place, const Motion& m
     sum += weighted;
     squares += weighted * value;
     products += weighted * patch.value[k];
-    for (int a = 0; a < 6; ++a) mismatch[a] += weighted * patch.slope[k][a];
+    for (int a = 0; a < 8; ++a) mismatch[a] += weighted * patch.slope[k][a];
   }
   for (int a = 0; a < 6; ++a) result.mismatch[a] = mismatch[a];
   const double mean = sum / patch.total_weight;
@@ -151,24 +171,27 @@ Mat6 spread_of_residual(const Patch& patch, const Mat6& inverse, const Compared&
   // Interpolation at a random place leaves 0.64 of the target's noise variance in the residual, but takes nothing from
   // its slow part, which moves the answer: with equal noise in both images the residual shows (1 + 0.64) / 2 of it.
   constexpr double kInterpolation = 2 / 1.64;
-  Mat6 spread;
-  for (std::size_t k = 0; k < patch.value.size(); ++k) {
-    const auto& slope = patch.slope[k];
-    double followed = 1 / patch.total_weight + patch.value[k] * patch.value[k] / (patch.variance * patch.total_weight);
-    for (int a = 0; a < 6; ++a) {
-      for (int b = 0; b < 6; ++b) followed += slope[a] * inverse(a, b) * slope[b];
-    }
-    const double own = std::min(0.9, patch.weight[k] * followed);
-    const double residual = (patch.target[k] - now.mean) / now.gain - patch.value[k];
-    const double factor = kInterpolation * std::pow(patch.weight[k] * residual, 2) / (1 - own);
-    for (int a = 0; a < 6; ++a) {
-      for (int b = 0; b <= a; ++b) spread(a, b) += factor * slope[a] * slope[b];
-    }
-  }
+  std::array<Slope, 6> single{};
   for (int a = 0; a < 6; ++a) {
-    for (int b = a + 1; b < 6; ++b) spread(a, b) = spread(b, a);
+    for (int b = 0; b < 6; ++b) single[a][b] = static_cast<float>(inverse(a, b));
   }
-  return spread;
+  const float per_weight = static_cast<float>(1 / patch.total_weight);
+  const float per_power = static_cast<float>(1 / (patch.variance * patch.total_weight));
+  Products spread;
+  for (std::size_t k = 0; k < patch.value.size(); ++k) {
+    const Slope& slope = patch.slope[k];
+    Slope solved{};
+    for (int a = 0; a < 6; ++a) {
+      for (int b = 0; b < 8; ++b) solved[b] += single[a][b] * slope[a];
+    }
+    float followed = per_weight + per_power * patch.value[k] * patch.value[k];
+    for (int a = 0; a < 6; ++a) followed += slope[a] * solved[a];
+    const float own = std::min(0.9f, patch.weight[k] * followed);
+    const float residual = static_cast<float>((patch.target[k] - now.mean) / now.gain) - patch.value[k];
+    const float weighted = patch.weight[k] * residual;
+    spread.add(static_cast<float>(kInterpolation) * weighted * weighted / (1 - own), slope);
+  }
+  return spread.matrix();
 }
 
 /// x → W(V⁻¹(x)), with V(x) = x + step(x).

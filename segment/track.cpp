@@ -24,7 +24,7 @@ struct Scene {
   double spacing = 0;  ///< mean distance of beads: 1/sqrt(density)
   std::vector<DetectedBead> beads, beads_stressed;
   std::vector<Vec2> positions, positions_stressed;
-  Window wide;  ///< the window that finds a bead: about four beads weigh in it
+  Window wide;  ///< the window that finds a bead: about three beads weigh in it
   int threads = 1;
 };
 
@@ -65,9 +65,9 @@ Scene prepare(const Image& relaxed, const Image& stressed, const TrackParameters
   scene.positions_stressed = positions_of(scene.beads_stressed);
   const double n_beads = static_cast<double>(scene.beads.size());
   scene.spacing = std::sqrt(relaxed.width * static_cast<double>(relaxed.height) / n_beads);
-  // A Gaussian weight of sigma s weighs the area 4 pi s²: four beads in it.
-  const double four_beads = scene.spacing / std::sqrt(std::numbers::pi);
-  scene.wide = {.sigma = std::clamp(four_beads, 3.5 * scene.bead_sigma, 6.5 * scene.bead_sigma),
+  // A Gaussian weight of sigma s weighs the area 4 pi s²: three beads in it.
+  const double three_beads = scene.spacing * std::sqrt(0.75 / std::numbers::pi);
+  scene.wide = {.sigma = std::clamp(three_beads, 3.5 * scene.bead_sigma, 5 * scene.bead_sigma),
                 .gradient_sd = 0.3,
                 .noise = 2 * scene.noise,
                 .max_steps = 15};
@@ -92,7 +92,7 @@ bool is_inside(const Plane& plane, Vec2 place, double margin) {
 std::vector<int> good_around(const Scene& scene, const Neighbours& neighbours, const std::vector<Track>& tracks,
                              int bead, int n) {
   std::vector<int> result;
-  for (const int k : neighbours.within(scene.positions[bead], 5 * scene.spacing, 3 * n)) {
+  for (const int k : neighbours.within(scene.positions[bead], 3.5 * scene.spacing, 3 * n)) {
     if (k != bead && tracks[k].is_good() && static_cast<int>(result.size()) < n) result.push_back(k);
   }
   return result;
@@ -198,7 +198,7 @@ Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide)
   constexpr double kNarrowest = 1.6, kGrowth = 1.45;  // of a bead's sigma
   constexpr int kWindows = 6;
   Vec2 low{-1e9, -1e9}, high{1e9, 1e9};
-  Registered best;
+  Registered best, narrowest;
   Window window = scene.wide;
   window.gradient_sd = 0.15;
   window.sigma = kNarrowest * scene.bead_sigma;
@@ -211,8 +211,13 @@ Registered chosen_window(const Scene& scene, Vec2 place, const Registered& wide)
     high = {std::min(high.x, next.motion.u.x + half), std::min(high.y, next.motion.u.y + half)};
     if (best.is_converged && (low.x > high.x || low.y > high.y)) break;
     best = next;
+    if (!narrowest.is_converged) narrowest = next;
     if (best.sigma_px < kFineEnough) break;
   }
+  // What the chosen window differs from the narrowest by, beyond what noise explains, is its bias: part of its error.
+  const Vec2 apart = best.motion.u - narrowest.motion.u;
+  const double by_noise = narrowest.sigma_px * narrowest.sigma_px - best.sigma_px * best.sigma_px;
+  best.sigma_px = std::sqrt(best.sigma_px * best.sigma_px + std::max(0.0, 0.5 * dot(apart, apart) - by_noise));
   return best;
 }
 

@@ -67,7 +67,7 @@ struct BeadScene {
   double uneven_light = 0;  ///< relative fall of the light towards a corner, another one in each image
   double gain = 1;          ///< of the stressed image over the relaxed one
   double offset = 0;
-  Vec2 drift;
+  Vec2 drift{};
   std::uint64_t seed = 1;
 };
 
