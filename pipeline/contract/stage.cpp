@@ -174,8 +174,8 @@ void write_record(const fs::path& file, const StageDescription& description, con
                                          {"figures", json_of(report.figures)},
                                          {"effects", effects}};
   context.make_folder(file.parent_path());
-  write_text(temporary_name(file), record.dump(2) + "\n");
   context.pending_.push_back({.temporary = temporary_name(file), .destination = file});
+  write_text(temporary_name(file), record.dump(2) + "\n");
 }
 
 /// Remove what an unfinished run has left: temporary files, and folders made for them that are still empty.
