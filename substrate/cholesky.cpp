@@ -89,7 +89,7 @@ struct SparseCholesky::Impl {
   ~Impl() { cholmod_free_factor(&factor, &common.c); }
 };
 
-SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB)
+SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, int blas_threads, double memory_limit_GB)
     : impl_(std::make_unique<Impl>()) {
   cholmod_common& c = impl_->common.c;
   impl_->n = 3 * matrix.n;
@@ -117,7 +117,7 @@ SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, double me
                                      ": allow more (memory_limit_GB), ask for a coarser mesh, or take the model "
                                      "'layer'"});
   }
-  set_blas_threads(threads);
+  set_blas_threads(blas_threads);
   cholmod_factorize(a, impl_->factor, &c);
   set_blas_threads(1);
   cholmod_free_sparse(&a, &c);

@@ -17,15 +17,17 @@ struct BlockMatrix {
 
 class SparseCholesky {
  public:
+  /// @param blas_threads  of the factorisation; another number rounds differently, so only 1 gives the same bits for
+  ///                      any `threads`
   /// @throws NotSolved where the factor would take more than `memory_limit_GB` (known before it is allocated), or the
   ///         matrix is not positive definite
-  SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB);
+  SparseCholesky(const BlockMatrix& matrix, int threads, int blas_threads, double memory_limit_GB);
   ~SparseCholesky();
   SparseCholesky(const SparseCholesky&) = delete;
   SparseCholesky& operator=(const SparseCholesky&) = delete;
 
   /// For each column: fill(column, b) sets the right-hand side (3 n values, zero before), take(column, x) uses the
-  /// solution. Both run concurrently for different columns. Same results for any number of threads.
+  /// solution. Both run concurrently for different columns.
   void solve(int n_columns, const std::function<void(int, double*)>& fill,
              const std::function<void(int, const double*)>& take) const;
   double factor_GB() const;

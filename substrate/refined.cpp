@@ -142,7 +142,8 @@ class Refined final : public Substrate {
     if (columns.size() == 0 || ellipses.empty()) return;
     const auto start = std::chrono::steady_clock::now();
     const Extent scene = extent_of(points_um, ellipses);
-    const ElasticSystem system(gel_, mesh_for(scene, ellipses), threads_, parameters_.memory_limit_GB);
+    // the factorisation is most of the work: worth the BLAS' threads, at the price of the last bits
+    const ElasticSystem system(gel_, mesh_for(scene, ellipses), threads_, threads_, parameters_.memory_limit_GB);
     const double setup_s = seconds_since(start);
     std::vector<std::vector<NodeWeight>> samples(points_um.size()), loads(ellipses.size());
     parallel_for(static_cast<int>(samples.size()), threads_,

@@ -204,7 +204,7 @@ class Split final : public Substrate {
     BlockMesh mesh = make_block_mesh(
         lines, 2, [](const Box&) { return false; }, most, threads_);
     block_ = std::unique_ptr<Block>(
-        new Block{squares, ElasticSystem(gel_, std::move(mesh), threads_, parameters_.memory_limit_GB), {}});
+        new Block{squares, ElasticSystem(gel_, std::move(mesh), threads_, 1, parameters_.memory_limit_GB), {}});
     block_->side_points = side_points_of(block_->system);
     setup_s_ = seconds_since(start);
     return *block_;

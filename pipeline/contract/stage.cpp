@@ -219,11 +219,16 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
 
 bool StageContext::was_interrupted() const { return mbtfm::was_interrupted; }
 
-fs::path StageContext::input(const std::string& name, const std::string& file) {
+fs::path StageContext::input(const std::string& name) {
   MBTFM_ASSERT(inputs_.contains(name));
-  const fs::path path = file.empty() ? inputs_.at(name) : inputs_.at(name) / file;
-  read_.push_back(path);
-  return path;
+  read_.push_back(inputs_.at(name));
+  return inputs_.at(name);
+}
+
+fs::path StageContext::input(const std::string& name, const std::vector<std::string>& files) {
+  MBTFM_ASSERT(inputs_.contains(name));
+  for (const std::string& file : files) read_.push_back(inputs_.at(name) / file);
+  return inputs_.at(name);
 }
 
 fs::path StageContext::output(const std::string& name) { return output(name, {}); }
