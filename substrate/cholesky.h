@@ -1,6 +1,7 @@
 /// Sparse Cholesky factorisation of 3 x 3 block matrices (CHOLMOD, supernodal, nested dissection of the nodes).
 #pragma once
 
+#include <algorithm>
 #include <functional>
 #include <memory>
 #include <vector>
@@ -13,6 +14,11 @@ struct BlockMatrix {
   std::vector<int> start;     ///< by column, n + 1
   std::vector<int> row;       ///< block rows, rising, the first of a column its diagonal
   std::vector<double> value;  ///< 9 a block, row by row
+  /// The block of the pattern at row >= column.
+  double* block(int at_row, int column) {
+    const auto found = std::lower_bound(row.begin() + start[column], row.begin() + start[column + 1], at_row);
+    return &value[9 * static_cast<std::size_t>(found - row.begin())];
+  }
 };
 
 class SparseCholesky {

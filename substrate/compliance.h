@@ -35,7 +35,7 @@ struct SubstrateParameters {
   int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
   double growth = 2;                      ///< their side over the distance to the adhesion: what halving gives anyway
 
-  double memory_limit_GB = 0;  ///< of split and refined; 0: what the machine has free
+  double memory_limit_GB = 0;  ///< of split and refined; 0: four fifths of what the machine has
 };
 void declare(ParameterList& list, SubstrateParameters& parameters);
 
@@ -58,7 +58,8 @@ class Substrate {
   virtual Figures figures() const = 0;
 };
 
-/// The model named in the parameters. @throws UsageError, InvalidData
+/// The model named in the parameters. The same bits for any number of threads, but for `refined`: its factorisation
+/// uses the threads of the BLAS and differs in the last digits. @throws UsageError, InvalidData
 std::unique_ptr<Substrate> make_substrate(const Gel& gel, const SubstrateParameters& parameters, int threads);
 
 /// The same for `half-space` and `layer` alone, which need no finite elements: links without deal.II.

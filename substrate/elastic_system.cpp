@@ -14,14 +14,6 @@ namespace mbtfm::substrate {
 
 namespace {
 
-/// The nodes that carry a cell's node: itself, or what it hangs on.
-struct Carriers {
-  const NodeWeight* begin_;
-  const NodeWeight* end_;
-  const NodeWeight* begin() const { return begin_; }
-  const NodeWeight* end() const { return end_; }
-};
-
 /// Stiffness by shape of box: similar boxes have the same but for their length.
 class StiffnessOfBox {
  public:
@@ -76,6 +68,7 @@ ElasticSystem::ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, int bl
 
 void ElasticSystem::number_nodes() {
   const std::size_t n_nodes = mesh_.position_um.size();
+  for (std::size_t node = 0; node < n_nodes; ++node) own_.push_back({static_cast<int>(node), 1});
   free_of_node_.assign(n_nodes, -1);
   bottom_of_node_.assign(n_nodes, -1);
   for (std::size_t node = 0; node < n_nodes; ++node) {
@@ -90,76 +83,73 @@ void ElasticSystem::number_nodes() {
   }
 }
 
-BlockMatrix ElasticSystem::assemble(const Gel& gel) {
-  const int n_local = mesh_.nodes_per_cell();
-  const int n_cells = static_cast<int>(mesh_.cells.size());
-  std::vector<NodeWeight> own(mesh_.position_um.size());
-  for (std::size_t node = 0; node < own.size(); ++node) own[node] = {static_cast<int>(node), 1};
-  const auto carriers = [&](int node) {
-    const auto& list = mesh_.hanging[node];
-    return list.empty() ? Carriers{&own[node], &own[node] + 1} : Carriers{list.data(), list.data() + list.size()};
-  };
+std::span<const NodeWeight> ElasticSystem::carriers(int node) const {
+  const std::vector<NodeWeight>& hanging = mesh_.hanging[node];
+  return hanging.empty() ? std::span(&own_[node], 1) : std::span(hanging);
+}
 
-  // free nodes by cell, and cells by free node
-  std::vector<std::vector<int>> free_nodes(n_cells);
-  std::vector<std::vector<int>> cells_of(n_free_);
-  for (int cell = 0; cell < n_cells; ++cell) {
-    auto& nodes = free_nodes[cell];
-    for (int k = 0; k < n_local; ++k) {
-      for (const NodeWeight& carrier : carriers(mesh_.nodes_of(cell)[k])) {
+BlockMatrix ElasticSystem::pattern() const {
+  std::vector<std::vector<int>> nodes_of_cell(mesh_.cells.size());
+  std::vector<std::vector<int>> cells_of_node(n_free_);
+  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
+    std::vector<int>& nodes = nodes_of_cell[cell];
+    for (int k = 0; k < mesh_.nodes_per_cell(); ++k) {
+      for (const NodeWeight& carrier : carriers(mesh_.nodes_of(static_cast<int>(cell))[k])) {
         if (free_of_node_[carrier.node] >= 0) nodes.push_back(free_of_node_[carrier.node]);
       }
     }
     std::sort(nodes.begin(), nodes.end());
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    for (const int node : nodes) cells_of[node].push_back(cell);
+    for (const int node : nodes) cells_of_node[node].push_back(static_cast<int>(cell));
   }
-
   BlockMatrix matrix;
   matrix.n = n_free_;
   matrix.start = {0};
   std::vector<int> seen(n_free_, -1);
   for (int column = 0; column < n_free_; ++column) {
-    const std::size_t first = matrix.row.size();
-    for (const int cell : cells_of[column]) {
-      for (const int row : free_nodes[cell]) {
+    const auto first = static_cast<std::ptrdiff_t>(matrix.row.size());
+    for (const int cell : cells_of_node[column]) {
+      for (const int row : nodes_of_cell[cell]) {
         if (row < column || seen[row] == column) continue;
         seen[row] = column;
         matrix.row.push_back(row);
       }
     }
-    std::sort(matrix.row.begin() + static_cast<std::ptrdiff_t>(first), matrix.row.end());
+    std::sort(matrix.row.begin() + first, matrix.row.end());
     matrix.start.push_back(static_cast<int>(matrix.row.size()));
   }
   matrix.value.assign(9 * matrix.row.size(), 0.0);
+  return matrix;
+}
 
-  StiffnessOfBox stiffness_of(gel, mesh_.order);
+BlockMatrix ElasticSystem::assemble(const Gel& gel) {
+  BlockMatrix matrix = pattern();
   std::vector<Eigen::Triplet<double>> bottom;
-  for (int cell = 0; cell < n_cells; ++cell) {
+  const auto add = [&](const NodeWeight& at_a, const NodeWeight& at_b, const auto& block) {
+    const int row = free_of_node_[at_a.node];
+    const int column = free_of_node_[at_b.node];
+    const int fixed = bottom_of_node_[at_b.node];
+    if (row < 0 || (column >= 0 && row < column)) return;  // the lower triangle is kept
+    const double weight = at_a.weight * at_b.weight;
+    double* value = column >= 0 ? matrix.block(row, column) : nullptr;
+    for (int p = 0; p < 3; ++p) {
+      for (int q = 0; q < 3; ++q) {
+        if (value) {
+          value[3 * p + q] += weight * block(p, q);
+        } else {
+          bottom.emplace_back(3 * row + p, 3 * fixed + q, weight * block(p, q));
+        }
+      }
+    }
+  };
+  StiffnessOfBox stiffness_of(gel, mesh_.order);
+  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
     const Eigen::MatrixXd stiffness = stiffness_of(mesh_.cells[cell].size_um);
-    for (int b = 0; b < n_local; ++b) {
-      for (const NodeWeight& at_b : carriers(mesh_.nodes_of(cell)[b])) {
-        const int column = free_of_node_[at_b.node];
-        const int fixed = bottom_of_node_[at_b.node];
-        for (int a = 0; a < n_local; ++a) {
-          for (const NodeWeight& at_a : carriers(mesh_.nodes_of(cell)[a])) {
-            const int row = free_of_node_[at_a.node];
-            if (row < 0 || (column >= 0 && row < column)) continue;
-            const double weight = at_a.weight * at_b.weight;
-            const auto block = stiffness.block<3, 3>(3 * a, 3 * b);
-            if (fixed >= 0) {
-              for (int p = 0; p < 3; ++p) {
-                for (int q = 0; q < 3; ++q) bottom.emplace_back(3 * row + p, 3 * fixed + q, weight * block(p, q));
-              }
-              continue;
-            }
-            const auto begin = matrix.row.begin() + matrix.start[column];
-            const auto end = matrix.row.begin() + matrix.start[column + 1];
-            double* value = &matrix.value[9 * (std::lower_bound(begin, end, row) - matrix.row.begin())];
-            for (int p = 0; p < 3; ++p) {
-              for (int q = 0; q < 3; ++q) value[3 * p + q] += weight * block(p, q);
-            }
-          }
+    const int* nodes = mesh_.nodes_of(static_cast<int>(cell));
+    for (int b = 0; b < mesh_.nodes_per_cell(); ++b) {
+      for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
+        for (const NodeWeight& at_b : carriers(nodes[b])) {
+          for (const NodeWeight& at_a : carriers(nodes[a])) add(at_a, at_b, stiffness.block<3, 3>(3 * a, 3 * b));
         }
       }
     }
@@ -174,15 +164,13 @@ std::vector<NodeWeight> ElasticSystem::cell_weights(int cell, std::array<double,
   std::array<std::array<double, 3>, 3> value;
   for (int axis = 0; axis < 3; ++axis) value[axis] = shape_values(mesh_.order, unit[axis]);
   std::vector<NodeWeight> weights;
-  const auto carry = [&](int node, double weight) {
-    if (free_of_node_[node] >= 0) weights.push_back({free_of_node_[node], weight});
-  };
   for (int k = 0; k < mesh_.nodes_per_cell(); ++k) {
     const double shape = value[0][k % n] * value[1][k / n % n] * value[2][k / (n * n)];
     if (shape == 0) continue;
-    const int node = mesh_.nodes_of(cell)[k];
-    if (mesh_.hanging[node].empty()) carry(node, shape);
-    for (const NodeWeight& carrier : mesh_.hanging[node]) carry(carrier.node, shape * carrier.weight);
+    for (const NodeWeight& carrier : carriers(mesh_.nodes_of(cell)[k])) {
+      const int node = free_of_node_[carrier.node];
+      if (node >= 0) weights.push_back({node, shape * carrier.weight});
+    }
   }
   merge(weights);
   return weights;

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <Eigen/SparseCore>
+#include <span>
 
 #include "substrate/block_mesh.h"
 #include "substrate/cholesky.h"
@@ -42,6 +43,9 @@ class ElasticSystem {
 
  private:
   void number_nodes();
+  /// The nodes that carry a node: itself, or what it hangs on.
+  std::span<const NodeWeight> carriers(int node) const;
+  BlockMatrix pattern() const;
   BlockMatrix assemble(const Gel& gel);
 
   BlockMesh mesh_;
@@ -49,6 +53,7 @@ class ElasticSystem {
   std::vector<int> free_of_node_;    ///< -1: on the bottom, or hanging
   std::vector<int> bottom_of_node_;  ///< -1: not on the bottom
   std::vector<int> bottom_nodes_;
+  std::vector<NodeWeight> own_;  ///< by node: itself, with weight 1
   Eigen::SparseMatrix<double> bottom_stiffness_;
   SparseCholesky factor_;
 };

@@ -21,7 +21,7 @@ void declare(ParameterList& list, SubstrateParameters& p) {
   list.add("growth", p.growth, Range::between(0.1, 10),
            "refined: largest side of an element over its distance to the nearest adhesion");
   list.add("memory_limit_GB", p.memory_limit_GB, Range::not_negative(),
-           "split, refined: memory the solution may take (GB); 0: what is free");
+           "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
 }
 
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {

@@ -2,12 +2,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <mutex>
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "substrate/elastic_system.h"
 #include "substrate/ellipse_load.h"
 #include "substrate/greens_model.h"
+#include "substrate/load_cases.h"
 #include "substrate/models.h"
 #include "substrate/scene.h"
 
@@ -81,24 +83,18 @@ class Refined final : public Substrate {
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<Ellipse>& ellipses) const override {
     Eigen::MatrixXd matrix = Eigen::MatrixXd::Zero(2 * points_um.size(), 2 * ellipses.size());
-    const auto force_of = [](int column) {
-      return std::vector<std::pair<int, Vec2>>{{column / 2, column % 2 == 0 ? Vec2{1, 0} : Vec2{0, 1}}};
-    };
-    solve(points_um, ellipses, force_of, matrix);
+    solve(points_um, ellipses, unit_case, matrix);
     return matrix;
   }
 
   std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                      const std::vector<Vec2>& forces_nN) const override {
     check_forces(ellipses, forces_nN);
-    std::vector<std::pair<int, Vec2>> all;
-    for (std::size_t j = 0; j < forces_nN.size(); ++j) all.emplace_back(static_cast<int>(j), forces_nN[j]);
     Eigen::MatrixXd field = Eigen::MatrixXd::Zero(2 * points_um.size(), 1);
+    const LoadCase all = case_of(forces_nN);
     solve(
         points_um, ellipses, [&all](int) { return all; }, field);
-    std::vector<Vec2> displacements(points_um.size());
-    for (std::size_t i = 0; i < points_um.size(); ++i) displacements[i] = {field(2 * i, 0), field(2 * i + 1, 0)};
-    return displacements;
+    return vectors_of(field);
   }
 
   std::vector<Effect> effects() const override {
@@ -110,10 +106,17 @@ class Refined final : public Substrate {
             vertical_displacement_off()};
   }
 
-  Figures figures() const override { return figures_; }
+  Figures figures() const override {
+    const std::lock_guard lock(mutex_);
+    return figures_;
+  }
 
  private:
   BlockMesh mesh_for(const Extent& scene, const std::vector<Ellipse>& ellipses) const {
+    // too few for any mesh of the kind (measured: 250 kB an element of Q2, 25 of Q1); the factor is weighed exactly
+    const double bytes = order_ == 2 ? 1e5 : 1e4;
+    const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / bytes);
+    check_size(scene, gel_.thickness_um, most);
     const GridLines lines = cubes_around(scene, gel_, parameters_.margin_thicknesses);
     std::vector<Target> targets;
     for (const Ellipse& ellipse : ellipses) targets.push_back(target_of(ellipse, lines, parameters_));
@@ -128,14 +131,11 @@ class Refined final : public Substrate {
       }
       return false;
     };
-    // too few for any mesh of the kind (measured: 250 kB an element of Q2, 25 of Q1); the factor is weighed exactly
-    const double bytes = order_ == 2 ? 1e5 : 1e4;
-    const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / bytes);
     return make_block_mesh(lines, order_, is_too_large, most, threads_);
   }
 
-  template <class ForcesOf>
-  void solve(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses, const ForcesOf& forces_of,
+  template <class CaseOf>
+  void solve(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses, const CaseOf& case_of_column,
              Eigen::MatrixXd& columns) const {
     check_points(points_um);
     check(ellipses);
@@ -152,7 +152,7 @@ class Refined final : public Substrate {
     system.factor().solve(
         static_cast<int>(columns.cols()),
         [&](int column, double* b) {
-          for (const auto& [j, force] : forces_of(column)) {
+          for (const auto& [j, force] : case_of_column(column)) {
             for (const auto& [node, weight] : loads[j]) {
               b[3 * node] += weight * force.x;
               b[3 * node + 1] += weight * force.y;
@@ -174,6 +174,7 @@ class Refined final : public Substrate {
     std::size_t fewest = system.mesh().cells.size();
     for (const Ellipse& ellipse : ellipses) fewest = std::min(fewest, system.touched_cells(ellipse).size());
     const GridLines& lines = system.mesh().lines;
+    const std::lock_guard lock(mutex_);
     figures_ = {{"substrate_model", "refined"},
                 {"substrate_element", parameters_.element},
                 {"substrate_thickness_um", gel_.thickness_um},
@@ -191,6 +192,7 @@ class Refined final : public Substrate {
   SubstrateParameters parameters_;
   int threads_;
   int order_;
+  mutable std::mutex mutex_;
   mutable Figures figures_ = {{"substrate_model", "refined"}};  // of the last call
 };
 
