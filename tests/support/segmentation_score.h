@@ -88,11 +88,11 @@ inline AdhesionScore score_adhesions(const std::vector<Adhesion>& truth, const s
 }
 
 struct FibreScore {
-  int n_true = 0;     ///< longer than 4 um
-  int n_traced = 0;   ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
-  int n_typed = 0;    ///< … and has the type, and is held by the very adhesions
+  int n_true = 0;    ///< longer than 4 um
+  int n_traced = 0;  ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
+  int n_typed = 0;   ///< … and has the type, and is held by the very adhesions
   int n_found = 0;
-  int n_false = 0;    ///< found, and less than half of it near any true fibre
+  int n_false = 0;            ///< found, and less than half of it near any true fibre
   std::vector<int> found_id;  ///< by true fibre; 0: none
 };
 
