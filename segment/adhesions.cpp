@@ -30,13 +30,17 @@ Contrast contrast_of(const cv::Mat& image, double pixel_um, const AdhesionParame
   c.height = smooth - local_median(smooth, radius_px);
   c.noise = cv::max(local_noise(image, kNoiseRadius * radius_px) * noise_gain(smoothing_px),
                     local_spread(c.height, kNoiseRadius * radius_px));
-  // "bright": the median height of what stands clearly out of the noise
-  std::vector<float> bright;
+  // "bright": the mean height of what stands clearly out of the noise, weighted by the height itself, so that many
+  // faint pixels do not outvote the adhesions
+  double sum = 0, sum_of_squares = 0;
   for (int y = 0; y < image.rows; ++y)
-    for (int x = 0; x < image.cols; ++x)
-      if (c.height.at<float>(y, x) > 2 * p.adhesion_seed_noise * c.noise.at<float>(y, x))
-        bright.push_back(c.height.at<float>(y, x));
-  const double typical = bright.empty() ? 0 : quantile(cv::Mat(bright), 0.5);
+    for (int x = 0; x < image.cols; ++x) {
+      const double height = c.height.at<float>(y, x);
+      if (height <= 2 * p.adhesion_seed_noise * c.noise.at<float>(y, x)) continue;
+      sum += height;
+      sum_of_squares += height * height;
+    }
+  const double typical = sum > 0 ? sum_of_squares / sum : 0;
   // an image without noise still has the rounding of float arithmetic: 1e-5 of its brightest value
   double darkest = 0, brightest = 0;
   cv::minMaxLoc(image, &darkest, &brightest);
@@ -158,7 +162,7 @@ void declare(ParameterList& list, AdhesionParameters& p) {
   list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::positive(), "smallest area (um²)");
   list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::positive(), "largest area (um²)");
   list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1),
-           "least height as a share of the median height of bright pixels");
+           "least height as a share of the mean height of bright pixels");
 }
 
 std::vector<Adhesion> find_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& p) {

@@ -14,12 +14,13 @@ struct AdhesionParameters {
   double adhesion_smoothing_um = 0.08;  ///< below the resolution of light (0.2 um), so that it costs no detail
   double adhesion_seed_noise = 5;       ///< five standard deviations: less than one false seed in 10^6 pixels
   double adhesion_rim_noise = 2.5;      ///< the rim may be fainter than the seed, but still out of the noise
-  double adhesion_rim_level = 0.5;      ///< a blurred edge passes half of the height where the true edge is
+  double adhesion_rim_level =
+      0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
   double adhesion_level_radius_um = 0.6;  ///< height is taken this near: a long adhesion may fade along its length
-  double adhesion_split_depth = 0.2;      ///< two maxima are two adhesions where the dip between is this deep
+  double adhesion_split_depth = 0.3;      ///< two maxima are two adhesions where the dip between is this deep
   double adhesion_smallest_um2 = 0.08;    ///< about one resolution element
   double adhesion_largest_um2 = 25;       ///< beyond any focal adhesion; larger is a bright cell body
-  double adhesion_faintest = 0.12;        ///< relative to the bright ones: what is fainter is texture of the cytosol
+  double adhesion_faintest = 0.25;        ///< relative to the bright ones: what is fainter is texture of the cytosol
 };
 
 void declare(ParameterList& list, AdhesionParameters& parameters);

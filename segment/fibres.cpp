@@ -131,7 +131,7 @@ void declare(ParameterList& list, FibreParameters& p) {
   list.add("fibre_follow_noise", p.fibre_follow_noise, Range::positive(),
            "height it may fall to (standard deviations of the filtered noise)");
   list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
-           "least height as a share of the median height of clear fibres");
+           "least height as a share of the height of bright fibres");
   list.add("fibre_contrast", p.fibre_contrast, Range::not_negative(),
            "least height as a share of the brightness beside the fibre");
   list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::positive(),

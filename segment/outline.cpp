@@ -54,13 +54,24 @@ cv::Mat mean_nearby(const cv::Mat& values, const cv::Mat& mask, double sigma_px)
   return gaussian(weighted, sigma_px) / (gaussian(weight, sigma_px) + 1e-6);
 }
 
-/// One round of comparing points near the edge with both sides.
+/// Median of the values where the mask is not 0.
+double median_within(const cv::Mat& values, const cv::Mat& mask) {
+  std::vector<float> within;
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (mask.at<uchar>(y, x)) within.push_back(values.at<float>(y, x));
+  return within.empty() ? 0 : quantile(cv::Mat(within), 0.5);
+}
+
+/// One round of comparing points near the edge with both sides. "Inside" is what the cell looks like along its edge:
+/// brighter things, its thick middle, fibres and adhesions, count no more than that.
 cv::Mat moved_edge(const cv::Mat& values, const cv::Mat& mask, double band_px) {
   cv::Mat grown, core, result = mask.clone(), smooth;
   cv::dilate(mask, grown, disc_of(band_px));
   cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
-  const cv::Mat middle = (mean_nearby(values, mask, band_px) + mean_nearby(values, ~mask, band_px)) / 2;
-  const cv::Mat brighter = values > middle, band = grown & ~core;
+  const cv::Mat clipped = cv::min(values, median_within(values, mask & ~core));
+  const cv::Mat middle = (mean_nearby(clipped, mask, band_px) + mean_nearby(clipped, ~mask, band_px)) / 2;
+  const cv::Mat brighter = clipped > middle, band = grown & ~core;
   brighter.copyTo(result, band);
   cv::GaussianBlur(result, smooth, cv::Size(0, 0), kSigma_px);
   return largest_filled(smooth > 127);
@@ -168,14 +179,8 @@ Polygon find_outline(const Image& image, const std::vector<Adhesion>& adhesions,
   if (cv::countNonZero(mask) < needed_px || cv::countNonZero(~mask) == 0) return {};
   // two halves of pure noise differ by 1.6 standard deviations
   if (cv::mean(smooth, mask)[0] - cv::mean(smooth, ~mask)[0] < 4 * noise) return {};
-  std::vector<float> interior;
-  for (int y = 0; y < mask.rows; ++y)
-    for (int x = 0; x < mask.cols; ++x)
-      if (mask.at<uchar>(y, x)) interior.push_back(smooth.at<float>(y, x));
-  // fibres and adhesions at the edge must not raise the level of "inside"
-  const cv::Mat clipped = cv::min(smooth, quantile(cv::Mat(interior), 0.5));
   constexpr int kRounds = 12;  // the edge moves by up to a band in the first few and then stays
-  for (int round = 0; round < kRounds; ++round) mask = moved_edge(clipped, mask, band_px);
+  for (int round = 0; round < kRounds; ++round) mask = moved_edge(smooth, mask, band_px);
   if (cv::countNonZero(mask) < needed_px) return {};
   add_adhesions(mask, adhesions, pixel_um, p.outline_reach_um);
   mask = largest_filled(mask);

@@ -10,7 +10,7 @@
 namespace mbtfm::segment {
 
 struct OutlineParameters {
-  double outline_smoothing_um = 0.5;  ///< features of the edge narrower than this are not the cell's shape
+  double outline_smoothing_um = 0.3;  ///< just above the resolution of light: more would round the cell's corners
   double outline_band_um = 3;         ///< brightness inside and outside is compared within this distance
   double outline_reach_um = 3;        ///< an adhesion up to this far outside is still this cell's
   double outline_spacing_um = 0.5;    ///< of the polygon's points
