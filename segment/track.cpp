@@ -226,11 +226,20 @@ void choose_windows(const Scene& scene, const TrackParameters& parameters, std::
     Track& track = tracks[k];
     if (!track.is_good()) return;
     track.chosen = chosen_window(scene, scene.positions[k], track.wide);
-    if (!track.chosen.is_converged || track.chosen.similarity < parameters.least_similarity) {
-      track.flag = "poor match";
-      track.chosen = track.wide;
-    }
+    if (track.chosen.is_converged) return;
+    track.flag = "poor match";
+    track.chosen = track.wide;
   });
+  // What similarity a right match has depends on the noise, so the picture itself tells: a bead that is less similar
+  // by eight times the median lack of it shows another bead. Steep places cost similarity too: a tenth is granted.
+  std::vector<double> lacks;
+  for (const Track& track : tracks) {
+    if (track.is_good()) lacks.push_back(1 - track.chosen.similarity);
+  }
+  const double most = std::min(std::max(0.1, 8 * quantile(std::move(lacks), 0.5)), 1 - parameters.least_similarity);
+  for (Track& track : tracks) {
+    if (track.is_good() && 1 - track.chosen.similarity > most) track.flag = "poor match";
+  }
 }
 
 /// Registered from where it went, a bead must come back to where it was.
