@@ -13,6 +13,7 @@
 #include "pipeline/contract/parallel.h"
 #include "pipeline/contract/stage.h"
 #include "substrate/compliance.h"
+#include "substrate/surface_vtu.h"
 
 namespace mbtfm::inverse {
 namespace {
@@ -41,8 +42,7 @@ struct Inputs {
 };
 
 Inputs read_inputs(StageContext& context) {
-  for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv"}) context.input("cell", file);
-  Inputs inputs{.cell = read_cell(context.input("cell", "outline.csv").parent_path()),
+  Inputs inputs{.cell = read_cell(context.input("cell", kCellFiles)),
                 .network = read_network(context.input("network")),
                 .beads = {}};
   const Path field = context.input("displacement");
@@ -69,12 +69,16 @@ std::vector<int> adhesion_ids_of(const Cell& cell) {
   return ids;
 }
 
+std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return ellipses;
+}
+
 Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const Inputs& inputs) {
   std::vector<Vec2> points;
   for (const Bead& b : inputs.beads) points.push_back(b.position_um);
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : inputs.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  return substrate.compliance_um_per_nN(points, ellipses);
+  return substrate.compliance_um_per_nN(points, ellipses_of(inputs.cell));
 }
 
 /// The given network first, then further ones over the same cell from other seeds.
@@ -231,6 +235,13 @@ void write_contracted(const Path& file, const network::CableNetwork& network, co
   write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN);
 }
 
+void write_surface(const Path& file, const substrate::Substrate& substrate, const Cell& cell,
+                   const std::vector<AdhesionForce>& forces) {
+  std::vector<Vec2> forces_nN;
+  for (const AdhesionForce& f : forces) forces_nN.push_back(f.force_nN);
+  substrate::write_substrate_vtu(file, substrate, ellipses_of(cell), forces_nN);
+}
+
 std::vector<Effect> effects_of(const substrate::Substrate& substrate, const Inputs& inputs, const FitParameters& p) {
   std::vector<Effect> effects = substrate.effects();
   const std::string n_fibres = std::to_string(inputs.cell.fibres.size());
@@ -267,6 +278,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted);
+  context.progress(0.95, "surface of the gel");
+  write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
   context.progress(1, "done");
 
   const auto n_unidentifiable =

@@ -15,7 +15,7 @@ struct FitParameters {
   std::string gradients = "exact";      ///< finite-difference: as in the thesis, one equilibrium a tension and side
   int n_meshes = 8;         ///< the spread between meshes is the largest error; its mean over eight is close to settled
   double tolerance = 1e-6;  ///< relative change of the tensions at which the fit stops: far below any error bar
-  int max_iterations = 100;     ///< of Gauss–Newton: every loop ends
+  int max_steps = 100;      ///< of Gauss–Newton: every loop ends
   int max_evaluations = 5000;   ///< of the conjugate gradients
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
 };

@@ -2,9 +2,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <numeric>
 #include <string>
+#include <tuple>
 
 #include "network/frame.h"
 #include "network/relax.h"
@@ -68,9 +70,6 @@ std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const Ne
                        .rest_length_um = norm(mesh.points_um[ends.second] - mesh.points_um[ends.first])});
     }
   }
-  std::sort(links.begin(), links.end(), [](const Link& a, const Link& b) {
-    return std::tie(a.vertex_a, a.vertex_b, a.fibre_id) < std::tie(b.vertex_a, b.vertex_b, b.fibre_id);
-  });
   return links;
 }
 
@@ -87,6 +86,42 @@ void hold_within_ellipses(const Cell& cell, Network& network) {
       nearest[v] = distance;
       network.adhesion_id[v] = adhesion.adhesion_id;
     }
+  }
+}
+
+/// Leave out vertices that no link joins, as the tip of a whisker of the outline; an adhesion's is joined to the
+/// nearest vertex that stays.
+void leave_out_loose_vertices(Network& network) {
+  const std::size_t n = network.vertices_um.size();
+  std::vector<char> is_joined(n, 0);
+  for (const Link& link : network.links) is_joined[link.vertex_a] = is_joined[link.vertex_b] = 1;
+  for (std::size_t v = 0; v < n; ++v) {
+    if (is_joined[v] || network.adhesion_id[v] == 0) continue;
+    std::size_t nearest = n;
+    for (std::size_t w = 0; w < n; ++w) {
+      if (w == v || !is_joined[w]) continue;
+      const double distance = norm(network.vertices_um[w] - network.vertices_um[v]);
+      if (nearest == n || distance < norm(network.vertices_um[nearest] - network.vertices_um[v])) nearest = w;
+    }
+    if (nearest == n) continue;
+    Link link{.vertex_a = static_cast<int>(std::min(v, nearest)), .vertex_b = static_cast<int>(std::max(v, nearest))};
+    link.rest_length_um = norm(network.vertices_um[nearest] - network.vertices_um[v]);
+    network.links.push_back(link);
+    is_joined[v] = 1;
+  }
+  std::vector<int> number(n, -1);
+  int next = 0;
+  for (std::size_t v = 0; v < n; ++v) {
+    if (!is_joined[v]) continue;
+    network.vertices_um[next] = network.vertices_um[v];
+    network.adhesion_id[next] = network.adhesion_id[v];
+    number[v] = next++;
+  }
+  network.vertices_um.resize(next);
+  network.adhesion_id.resize(next);
+  for (Link& link : network.links) {
+    link.vertex_a = number[link.vertex_a];
+    link.vertex_b = number[link.vertex_b];
   }
 }
 
@@ -114,6 +149,8 @@ void measure_quality(const RelaxedMesh& mesh, GeneratedNetwork& result) {
     const double q = quality(mesh.points_um[t[0]], mesh.points_um[t[1]], mesh.points_um[t[2]]);
     result.mean_quality += q / static_cast<double>(mesh.triangulation.triangles.size());
     result.worst_quality = std::min(result.worst_quality, q);
+    result.area_um2 +=
+        0.5 * std::abs(cross(mesh.points_um[t[1]] - mesh.points_um[t[0]], mesh.points_um[t[2]] - mesh.points_um[t[0]]));
   }
   result.n_triangles = static_cast<int>(mesh.triangulation.triangles.size());
 }
@@ -150,6 +187,10 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   result.network.adhesion_id.resize(mesh.points_um.size(), 0);
   if (parameters.adhesion_anchor == "ellipse") hold_within_ellipses(cell, result.network);
   result.network.links = links_of(frame, mesh, parameters);
+  leave_out_loose_vertices(result.network);
+  std::sort(result.network.links.begin(), result.network.links.end(), [](const Link& a, const Link& b) {
+    return std::tie(a.vertex_a, a.vertex_b, a.fibre_id) < std::tie(b.vertex_a, b.vertex_b, b.fibre_id);
+  });
   result.n_parts = count_parts(result.network);
   measure_quality(mesh, result);
   check(result.network);

@@ -25,6 +25,7 @@ struct GeneratedNetwork {
   double mean_quality = 0;  ///< of the triangles: 2 · inradius / circumradius
   double worst_quality = 0;
   int n_triangles = 0;
+  double area_um2 = 0;        ///< of the triangles
   int n_parts = 1;            ///< that no link joins: more than one where a neck is thinner than a tenth of an edge
   int n_shared_segments = 0;  ///< where several fibres run along one edge, each with a link of its own
   std::vector<int> clipped_fibre_ids;     ///< cut at the outline

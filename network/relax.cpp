@@ -22,10 +22,11 @@ constexpr int kMaxSteps = 160;
 constexpr int kLastDensityStep = 90;  // later the number of vertices stays
 constexpr int kDensityInterval = 15;
 
+constexpr double kSpacing = 0.98;
 constexpr double kJitter = 0.15;    // of the seeds, in edge lengths: enough for meshes that differ everywhere
-constexpr double kClearance = 0.6;  // of the seeds from the frame
+constexpr double kClearance = 0.5;  // of the seeds from the frame
 constexpr double kTooShort = 0.5;   // a vertex this near another is taken out …
-constexpr double kTooLong = 1.55;   // … and one put into an edge this long
+constexpr double kTooLong = 1.45;   // … and one put into an edge this long
 constexpr double kWall = 0.75;      // a vertex nearer to a segment of the frame than this is pushed away
 constexpr double kFinest = 0.4;     // edge length where the frame is finer than that
 constexpr double kGrading = 0.3;    // growth of the edge length with distance from there
@@ -129,8 +130,9 @@ class Relaxation {
     }
     const Vec2 middle = 0.5 * (low + high);
     const double angle = random.uniform(0, std::numbers::pi / 3);
-    const Vec2 along = edge_ * Vec2{std::cos(angle), std::sin(angle)};
-    const Vec2 up = edge_ * Vec2{std::cos(angle + std::numbers::pi / 3), std::sin(angle + std::numbers::pi / 3)};
+    const Vec2 along = kSpacing * edge_ * Vec2{std::cos(angle), std::sin(angle)};
+    const Vec2 up =
+        kSpacing * edge_ * Vec2{std::cos(angle + std::numbers::pi / 3), std::sin(angle + std::numbers::pi / 3)};
     const Vec2 origin = middle + random.uniform() * along + random.uniform() * up;
     const int reach = static_cast<int>(norm(high - low) / edge_) + 2;  // of the half diagonal, times 2/sqrt(3)
     for (int j = -reach; j <= reach; ++j) {

@@ -88,9 +88,13 @@ std::optional<Triangulation> triangulate(const std::vector<Vec2>& points_um,
   mark_inside(delaunay, bounds);
 
   Triangulation result;
+  result.triangles.reserve(2 * points_um.size());
+  result.edges.reserve(3 * points_um.size());
   for (const auto& face : delaunay.finite_face_handles()) {
     if (face->info() != kInside) continue;
-    result.triangles.push_back({face->vertex(0)->info(), face->vertex(1)->info(), face->vertex(2)->info()});
+    std::array<int, 3> t = {face->vertex(0)->info(), face->vertex(1)->info(), face->vertex(2)->info()};
+    std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+    result.triangles.push_back(t);
   }
   for (const auto& [face, i] : delaunay.finite_edges()) {
     const Delaunay::Face_handle other = face->neighbor(i);
@@ -99,8 +103,14 @@ std::optional<Triangulation> triangulate(const std::vector<Vec2>& points_um,
     Triangulation::Edge edge{.vertex_a = ends.first, .vertex_b = ends.second, .is_of_frame = face->is_constrained(i)};
     if (face->info() == kInside) edge.apexes[0] = face->vertex(i)->info();
     if (other->info() == kInside) edge.apexes[1] = other->vertex(other->index(face))->info();
+    if (edge.apexes[0] < edge.apexes[1]) std::swap(edge.apexes[0], edge.apexes[1]);
     result.edges.push_back(edge);
   }
+  // CGAL's own order goes by addresses; sums over edges must not
+  std::sort(result.triangles.begin(), result.triangles.end());
+  std::sort(result.edges.begin(), result.edges.end(), [](const auto& a, const auto& b) {
+    return std::pair(a.vertex_a, a.vertex_b) < std::pair(b.vertex_a, b.vertex_b);
+  });
   return result;
 }
 

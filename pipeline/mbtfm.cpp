@@ -18,7 +18,8 @@ namespace {
 namespace fs = std::filesystem;
 using namespace mbtfm;
 
-constexpr int kDone = 0, kFailed = 1, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70;
+constexpr int kDone = 0, kFailed = 1, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70,
+              kInterrupted = 130;
 
 struct CommandLine {
   fs::path folder;
@@ -41,7 +42,7 @@ int run(const CommandLine& line) {
                                    .say = line.is_quiet ? nullptr : say};
   const runner::CellOutcome outcome = runner::run_cell(line.folder, options);
   if (fs::is_regular_file(line.folder / "4_fit/fit.json")) {
-    report::write_report(line.folder);
+    report::update_report(line.folder);
     if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
   }
   if (outcome.converged()) return kDone;
@@ -67,7 +68,7 @@ int batch(const CommandLine& line) {
   for (const runner::BatchCell& cell : outcomes) {
     if (cell.exit_code == 0) continue;
     ++n_failed;
-    std::fprintf(stderr, "%s: exit code %d: %s\n", cell.cell.c_str(), cell.exit_code, cell.message.c_str());
+    std::fprintf(stderr, "mbtfm: %s: exit code %d: %s\n", cell.cell.c_str(), cell.exit_code, cell.message.c_str());
   }
   std::fprintf(stderr, "mbtfm: %zu cells done, %d failed\n", outcomes.size() - n_failed, n_failed);
   return n_failed == 0 ? kDone : kFailed;
@@ -138,8 +139,8 @@ int start(int argc, char** argv) {
   return compare(line);
 }
 
-int fail(int code, const char* message, const std::string& hint = {}) {
-  std::fprintf(stderr, "mbtfm: %s: %s\n", code == kBug ? "internal error" : "error", message);
+int fail(int code, const char* kind, const char* message, const std::string& hint = {}) {
+  std::fprintf(stderr, "mbtfm: %s: %s\n", kind, message);
   if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
   return code;
 }
@@ -147,21 +148,24 @@ int fail(int code, const char* message, const std::string& hint = {}) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  runner::watch_interrupts();
   try {
     return start(argc, argv);
   } catch (const UsageError& error) {
-    return fail(kUsage, error.what());
+    return fail(kUsage, "error", error.what());
   } catch (const InputError& error) {
-    return fail(kInput, error.what(), error.hint);
+    return fail(kInput, "error", error.what(), error.hint);
   } catch (const InvalidData& error) {
-    return fail(kInput, error.what());
+    return fail(kInput, "error", error.what());
   } catch (const runner::StageFailed& error) {
-    return fail(error.exit_code, error.what());
+    return fail(error.exit_code, "error", error.what());
+  } catch (const runner::Interrupted& error) {
+    return fail(kInterrupted, "error", error.what());
   } catch (const OutputError& error) {
-    return fail(kOutput, error.what());
+    return fail(kOutput, "error", error.what());
   } catch (const fs::filesystem_error& error) {
-    return fail(kOutput, error.what());
+    return fail(kOutput, "error", error.what());
   } catch (const std::exception& error) {
-    return fail(kBug, error.what(), "please report this with the command and its inputs");
+    return fail(kBug, "internal error", error.what(), "please report this with the command and its inputs");
   }
 }

@@ -172,10 +172,11 @@ Image blurred(const Image& image, double sigma_um, int threads) {
     for (int i = 0; i < static_cast<int>(padded.size()); ++i) {
       padded[i] = image.at(std::clamp(i - reach, 0, image.width - 1), row);
     }
-    for (int column = 0; column < image.width; ++column) {
-      float sum = 0;
-      for (std::size_t k = 0; k < kernel.size(); ++k) sum += kernel[k] * padded[column + k];
-      across.at(column, row) = sum;
+    // weight by weight over the whole row: the compiler turns this order into vector instructions
+    float* sum = &across.at(0, row);
+    std::fill_n(sum, image.width, 0.0f);
+    for (std::size_t k = 0; k < kernel.size(); ++k) {
+      for (int column = 0; column < image.width; ++column) sum[column] += kernel[k] * padded[column + k];
     }
   });
   parallel_for(image.height, threads, [&](int row) {

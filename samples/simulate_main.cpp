@@ -21,7 +21,15 @@ std::string scenario_named(int argc, char** argv, const std::string& otherwise) 
   return name;
 }
 
+/// Images beside the true segmentation of an earlier experiment would never be looked at: it would pass for the user's.
+void refuse_given_segmentation(const std::filesystem::path& cell) {
+  if (std::filesystem::exists(cell / "1_segment") && !std::filesystem::exists(cell / "run.json")) {
+    throw UsageError(cell.string() + " holds an experiment without images: choose another folder or remove it");
+  }
+}
+
 StageReport run(const ScenarioParameters& parameters, StageContext& context) {
+  if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
   const Experiment experiment = simulate(parameters, context.threads, context.progress);
   const auto file = [&](const std::string& name) { return context.output("out", name); };
   write_cell_folder(experiment, parameters, file);

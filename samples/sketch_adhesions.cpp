@@ -75,9 +75,6 @@ Adhesion propose_central(const Sketch& sketch, double area, double aspect, Rando
 }  // namespace
 
 bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
-  for (const Vec2 point : ellipse_points(adhesion, kRim_um)) {
-    if (!contains(sketch.outline_um, point)) return false;
-  }
   const CellParameters& p = sketch.parameters;
   for (const Adhesion& other : sketch.adhesions) {
     if (too_near(adhesion, other, p.adhesion_clearance_um)) return false;
@@ -88,6 +85,9 @@ bool has_room(const Sketch& sketch, const Adhesion& adhesion) {
     const double end_margin = p.free_end_clearance_um;
     if (!f.start_adhesion_id && covers(adhesion, end_margin, f.points_um.front())) return false;
     if (!f.end_adhesion_id && covers(adhesion, end_margin, f.points_um.back())) return false;
+  }
+  for (const Vec2 point : ellipse_points(adhesion, kRim_um)) {
+    if (!contains(sketch.outline_um, point)) return false;
   }
   return true;
 }

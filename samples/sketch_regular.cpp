@@ -1,6 +1,8 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/errors.h"
 #include "samples/geometry.h"
 #include "samples/sketch.h"
 
@@ -42,6 +44,9 @@ void draw_ring(Sketch& sketch) {
   for (int i = 0; i < p.n_adhesions; ++i) {
     const Vec2 outward = direction(2 * std::numbers::pi * i / p.n_adhesions);
     Adhesion adhesion = regular_adhesion(p, sketch.centre_um + radius * outward, std::atan2(outward.y, outward.x));
+    const bool is_crowded = std::ranges::any_of(
+        sketch.adhesions, [&](const Adhesion& a) { return too_near(a, adhesion, p.adhesion_clearance_um); });
+    if (is_crowded) throw UsageError("the adhesions of the ring touch: ask for fewer, or a larger diameter_um");
     // fibre k starts at adhesion k·n/n_dorsal: evenly spread where n_dorsal divides n
     if (i * p.n_dorsal / p.n_adhesions != (i - 1) * p.n_dorsal / p.n_adhesions || (i == 0 && p.n_dorsal > 0)) {
       const Vec2 inner = sketch.centre_um + (0.5 * radius) * outward;

@@ -14,9 +14,9 @@ constexpr double kAdhesionSlope = 0.2;      ///< brighter towards the cell's edg
 constexpr double kNucleusRadius_um = 9;     ///< around which the cell is thick
 constexpr double kLamella_um = 3;           ///< over which it thins towards its edge
 constexpr double kCytosolicPaxillin = 0.3;  ///< where the cell is thickest
-constexpr int kPaxillinSpecks = 600;        ///< nascent adhesions and vesicles, too small to count
+constexpr double kSpecks_per_um2 = 0.2;     ///< nascent adhesions and vesicles, too small to count
 constexpr double kCytosolicActin = 0.16;
-constexpr int kThinFilaments = 2200;           ///< of the cortical mesh
+constexpr double kFilaments_per_um2 = 0.8;     ///< thin ones, of the cortical mesh
 constexpr double kThinFilament_um = 0.1;       ///< standard deviation of its cross-section
 constexpr double kEdgeActin = 0.18;            ///< of the cell's edge
 constexpr double kEdgeActin_um = 0.25;         ///< standard deviation of its cross-section
@@ -60,6 +60,10 @@ Vec2 point_inside(const Polygon& outline, Random& random) {
   }
 }
 
+int number_of(double density_per_um2, const Cell& cell) {
+  return static_cast<int>(density_per_um2 * std::abs(signed_area_um2(cell.outline_um)));
+}
+
 /// A smooth function of the arc length of mean 1: waves of the given standard deviation, from a length up to five of
 /// it.
 std::function<double(double)> modulation(double strength, double wavelength_um, Random& random) {
@@ -92,7 +96,7 @@ void add_fibre_image(Image& image, const Fibre& fibre, Random& random) {
 
 void add_thin_filaments(Image& image, const Cell& cell, Random& random) {
   const Vec2 centre = centroid_of(cell.outline_um);
-  for (int i = 0; i < kThinFilaments; ++i) {
+  for (int i = 0; i < number_of(kFilaments_per_um2, cell); ++i) {
     const Vec2 start = point_inside(cell.outline_um, random);
     const Vec2 outward = start - centre;
     const double turn = random.uniform() < 0.5 ? 0.0 : 0.5 * std::numbers::pi;
@@ -111,7 +115,7 @@ Image paxillin_specimen(const Cell& cell, const MicroscopeParameters& m, std::ui
   Random random(seed, Stream::optics, 0);
   Image image = thickness_of(cell, m, random, threads);
   for (float& value : image.pixels) value *= static_cast<float>(kCytosolicPaxillin);
-  for (int i = 0; i < kPaxillinSpecks; ++i) {
+  for (int i = 0; i < number_of(kSpecks_per_um2, cell); ++i) {
     const Vec2 at = point_inside(cell.outline_um, random);
     const double peak = 0.15 * std::pow(random.uniform(), 2);
     const double sigma = random.uniform(0.08, 0.15);

@@ -68,6 +68,7 @@ Profile profile_across(const cv::Mat& image, const std::vector<cv::Point2d>& poi
   p.lower_drop = std::max(0.0, top - std::max(left.level, right.level));
   p.upper_drop = std::max(0.0, top - std::min(left.level, right.level));
   p.height = (p.lower_drop + p.upper_drop) / 2;
+  p.side = top - p.height;
   p.noise = std::hypot(columns[static_cast<std::size_t>(peak)].error, std::max(left.error, right.error));
   p.width_px = kStep * (half_width(columns, peak, -1, top - (top - right.level) / 2) +
                         half_width(columns, peak, +1, top - (top - left.level) / 2));

@@ -10,6 +10,7 @@ struct Profile {
   double height = 0;      ///< of the middle over the mean of both sides, in grey levels
   double lower_drop = 0;  ///< from the middle to the brighter side
   double upper_drop = 0;  ///< to the darker side
+  double side = 0;        ///< grey level of the sides, their mean
   double width_px = 0;    ///< full width at half of `height`
   double noise = 0;       ///< standard error of a drop
 };

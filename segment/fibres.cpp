@@ -28,21 +28,28 @@ Working working_image(const cv::Mat& image, double pixel_size_um, double narrowe
   return {shrink(image, factor), pixel_size_um * factor};
 }
 
-TraceRule rule_of(const FibreParameters& p, const Ridges& ridges, double pixel_um) {
+/// Height that only a tenth of the clear ridge points exceed; 0 without any.
+double bright_height(const Ridges& ridges, double start_noise) {
+  std::vector<float> heights;
+  for (int y = 0; y < ridges.noise.rows; ++y)
+    for (int x = 0; x < ridges.noise.cols; ++x)
+      if (ridges.strongest.at<float>(y, x) > 2 * start_noise * ridges.noise.at<float>(y, x))
+        heights.push_back(ridges.strongest.at<float>(y, x));
+  return heights.empty() ? 0 : quantile(cv::Mat(heights), 0.9);
+}
+
+TraceRule rule_of(const FibreParameters& p, double bright, double pixel_um) {
   TraceRule rule;
   rule.start_noise = p.fibre_start_noise;
   rule.follow_noise = p.fibre_follow_noise;
+  rule.floor = p.fibre_faintest * bright;
+  rule.memory_px = 4 * p.fibre_averaging_um / pixel_um;
   rule.gap_px = p.fibre_gap_um / pixel_um;
-  rule.join_gap_px = 1.5 * p.fibre_gap_um / pixel_um;
+  rule.smallest_radius_px = p.fibre_smallest_radius_um / pixel_um;
   rule.line_radius_px = 0.75 * p.fibre_width_um / pixel_um;
   rule.shortest_px = p.fibre_shortest_um / pixel_um;
   rule.end_window_px = 4 * p.fibre_averaging_um / pixel_um;
-  std::vector<float> bright;
-  for (int y = 0; y < ridges.noise.rows; ++y)
-    for (int x = 0; x < ridges.noise.cols; ++x)
-      if (ridges.strongest.at<float>(y, x) > 2 * p.fibre_start_noise * ridges.noise.at<float>(y, x))
-        bright.push_back(ridges.strongest.at<float>(y, x));
-  if (!bright.empty()) rule.floor = p.fibre_faintest * quantile(cv::Mat(bright), 0.5);
+  rule.join_gap_px = 1.5 * p.fibre_gap_um / pixel_um;
   return rule;
 }
 
@@ -88,6 +95,29 @@ bool falls_on_both_sides(const Profile& profile, double ratio) {
   return profile.lower_drop >= ratio * profile.upper_drop && profile.lower_drop > 3 * profile.noise;
 }
 
+/// Does the line run along the outline at this point?
+bool hugs(const Polygon& outline_um, Vec2 point, Vec2 along, double distance_um) {
+  if (outline_um.empty()) return false;
+  const Vec2 nearest = nearest_on_boundary_um(outline_um, point);
+  if (!contains(outline_um, point)) return true;
+  const Vec2 away = point - nearest;
+  constexpr double kParallel = 0.5;  // sine of 30°
+  return norm(away) < distance_um && std::abs(dot(away, along)) <= kParallel * norm(away) * norm(along);
+}
+
+/// The longest piece of the line that does not run along the outline.
+Polyline without_edge(const Polyline& line, const Polygon& outline_um, double distance_um) {
+  std::size_t best_first = 0, best_n = 0, first = 0;
+  for (std::size_t i = 0; i <= line.size(); ++i) {
+    const std::size_t a = i > 2 ? i - 3 : 0, b = std::min(i + 3, line.size() - 1);
+    if (i < line.size() && !hugs(outline_um, line[i], line[b] - line[a], distance_um)) continue;
+    if (i - first > best_n) best_first = first, best_n = i - first;
+    first = i + 1;
+  }
+  return {line.begin() + static_cast<std::ptrdiff_t>(best_first),
+          line.begin() + static_cast<std::ptrdiff_t>(best_first + best_n)};
+}
+
 }  // namespace
 
 void declare(ParameterList& list, FibreParameters& p) {
@@ -102,6 +132,14 @@ void declare(ParameterList& list, FibreParameters& p) {
            "height it may fall to (standard deviations of the filtered noise)");
   list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
            "least height as a share of the median height of clear fibres");
+  list.add("fibre_contrast", p.fibre_contrast, Range::not_negative(),
+           "least height as a share of the brightness beside the fibre");
+  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::positive(),
+           "smallest radius of curvature (um)");
+  list.add("fibre_edge_um", p.fibre_edge_um, Range::not_negative(),
+           "a line along the outline this near to it is the cell's edge, not a fibre (um)");
+  list.add("fibre_edge_height", p.fibre_edge_height, Range::not_negative(),
+           "unless it reaches this share of the height of bright fibres");
   list.add("fibre_gap_um", p.fibre_gap_um, Range::not_negative(), "length over which a fibre may be invisible (um)");
   list.add("fibre_shortest_um", p.fibre_shortest_um, Range::positive(), "shortest fibre (um)");
   list.add("fibre_side_ratio", p.fibre_side_ratio, Range::between(0, 1),
@@ -122,14 +160,19 @@ std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, co
   scales.length_sigma_px = p.fibre_averaging_um / working.pixel_um;
   scales.noise_radius_px = std::max(6.0, 8 * p.fibre_width_um / working.pixel_um);
   const Ridges ridges = find_ridges(working.image, scales);
+  const double bright = bright_height(ridges, p.fibre_start_noise), dark = quantile(working.image, 0.01);
+  const int window = static_cast<int>(std::lround(p.fibre_averaging_um / working.pixel_um));
   std::vector<Fibre> fibres;
-  for (const Trace& trace : trace_lines(ridges, rule_of(p, ridges, working.pixel_um))) {
-    const auto points = smoothed(trace.points, static_cast<int>(std::lround(p.fibre_averaging_um / working.pixel_um)));
+  for (const Trace& trace : trace_lines(ridges, rule_of(p, bright, working.pixel_um))) {
+    const auto points = smoothed(trace.points, window);
     const Profile profile = profile_across(working.image, points, 1.5 * p.fibre_width_um / working.pixel_um);
     if (!falls_on_both_sides(profile, p.fibre_side_ratio)) continue;
-    if (!outline_um.empty() && !contains(outline_um, to_um(points[points.size() / 2], working.pixel_um))) continue;
+    if (profile.height < p.fibre_contrast * (profile.side - dark)) continue;
     Fibre fibre;
     for (const cv::Point2d& point : points) fibre.points_um.push_back(to_um(point, working.pixel_um));
+    const bool is_bright = profile.height >= p.fibre_edge_height * bright;
+    fibre.points_um = without_edge(fibre.points_um, outline_um, is_bright ? 0 : p.fibre_edge_um);
+    if (fibre.points_um.size() < 2) continue;
     fibre.points_um = simplified(fibre.points_um, p.fibre_simplify_um);
     fibre.width_um = profile.width_px * working.pixel_um;
     fibre.mean_intensity = profile.height;

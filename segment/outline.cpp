@@ -77,11 +77,11 @@ void add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double
     const cv::Point2d centre = to_pixels(adhesion.position_um, pixel_um);
     const cv::Point c(std::clamp(cvRound(centre.x), 0, mask.cols - 1), std::clamp(cvRound(centre.y), 0, mask.rows - 1));
     if (distance.at<float>(c) * pixel_um > reach_um) continue;
-    // a margin of two pixels outlives the smoothing of the polygon
-    const cv::Size axes(cvCeil(adhesion.major_axis_um / 2 / pixel_um) + 2,
-                        cvCeil(adhesion.minor_axis_um / 2 / pixel_um) + 2);
+    const cv::Size axes(cvRound(adhesion.major_axis_um / 2 / pixel_um), cvRound(adhesion.minor_axis_um / 2 / pixel_um));
     cv::ellipse(mask, c, axes, adhesion.angle_rad * 180 / CV_PI, 0, 360, cv::Scalar(255), cv::FILLED);
-    cv::line(mask, c, cell_pixel[static_cast<std::size_t>(labels.at<int>(c))], cv::Scalar(255), 5);
+    // a bridge of five pixels outlives the smoothing of the polygon
+    if (distance.at<float>(c) > 0)
+      cv::line(mask, c, cell_pixel[static_cast<std::size_t>(labels.at<int>(c))], cv::Scalar(255), 5);
   }
 }
 

@@ -61,12 +61,13 @@ struct Step {
 };
 
 /// Best direction within one filter direction of the present one, then the ridge's centre across it.
-Step settle(const Ridges& ridges, Step s) {
+Step settle(const Ridges& ridges, const TraceRule& rule, Step s) {
   const double turn = pi / ridges.n_directions();
   const double before = ridges.at(s.point, s.angle - turn), at = ridges.at(s.point, s.angle),
                after = ridges.at(s.point, s.angle + turn);
-  // a third of the way a step: noise in the direction averages out, a curve of three filter widths' radius is followed
-  s.angle += turn / 3 * peak_offset(before, at, after);
+  // a third of the way a step, so that noise in the direction averages out
+  const double limit = 1 / rule.smallest_radius_px;
+  s.angle += std::clamp(turn / 3 * peak_offset(before, at, after), -limit, limit);
   const cv::Point2d across = left_of(unit(s.angle));
   const double offset = peak_offset(ridges.at(s.point - across, s.angle), ridges.at(s.point, s.angle),
                                     ridges.at(s.point + across, s.angle));
@@ -85,13 +86,18 @@ std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const Trace
   std::size_t last_seen = 0, last_free = 0;
   const int longest = 4 * (ridges.noise.rows + ridges.noise.cols);  // a closed ring ends
   Step now = start;
+  double height_so_far = start.height;
   for (int i = 0; i < longest; ++i) {
     now.point += unit(now.angle);
     if (!is_inside(ridges.noise, now.point)) break;
-    now = settle(ridges, now);
+    now = settle(ridges, rule, now);
     steps.push_back(now);
-    const double level = std::max<double>(rule.follow_noise * sample(ridges.noise, now.point), rule.floor);
-    if (now.height >= level) last_seen = steps.size();
+    const double level = std::max<double>(
+        {rule.follow_noise * sample(ridges.noise, now.point), rule.floor, rule.follow_share * height_so_far});
+    if (now.height >= level) {
+      last_seen = steps.size();
+      height_so_far += (now.height - height_so_far) / rule.memory_px;
+    }
     if (!claims.has(now.point, now.angle)) last_free = steps.size();
     if (static_cast<double>(steps.size() - last_seen) > rule.gap_px) break;
     if (static_cast<double>(steps.size() - last_free) > 2 * rule.line_radius_px) break;
@@ -101,7 +107,7 @@ std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const Trace
 }
 
 Trace trace_from(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step seed) {
-  seed = settle(ridges, settle(ridges, seed));
+  seed = settle(ridges, rule, settle(ridges, rule, seed));
   Step back = seed;
   back.angle += pi;
   const std::vector<Step> ahead = follow(ridges, claims, rule, seed), behind = follow(ridges, claims, rule, back);

@@ -15,11 +15,14 @@ struct Trace {
 };
 
 struct TraceRule {
-  double start_noise = 6;     ///< standard deviations a line must reach somewhere
-  double follow_noise = 2.5;  ///< and those it may fall to
-  double floor = 0;           ///< least height
-  double gap_px = 10;         ///< a line may be invisible for this long
-  double line_radius_px = 3;  ///< a second line of the same direction within it is the same
+  double start_noise = 6;          ///< standard deviations a line must reach somewhere
+  double follow_noise = 2.5;       ///< and those it may fall to
+  double floor = 0;                ///< least height
+  double follow_share = 0.4;       ///< and the share of its height so far that it may fall to
+  double memory_px = 20;           ///< "so far": over about this length
+  double gap_px = 10;              ///< a line may be invisible for this long
+  double smallest_radius_px = 30;  ///< of curvature
+  double line_radius_px = 3;       ///< a second line of the same direction within it is the same
   double shortest_px = 15;
   double end_level = 0.5;     ///< a line ends where its height falls to this share of what it is before
   double end_window_px = 20;  ///< over this length

@@ -27,12 +27,13 @@ struct SubstrateParameters {
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
   // split: the grid of the smooth correction
-  double cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
+  int cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
 
   // refined
-  std::string element = "q2-p1disc";  ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
-  double elements_per_adhesion = 10;  ///< elements that cross each adhesion (area over element face); 20 for 1 %
-  double growth = 2;                  ///< element side over distance to the adhesion: what 2:1 balance gives anyway
+  std::string element = "q2-p1disc";      ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
+  double elements_across_adhesion = 1.4;  ///< square root of its area over their side: 2 % of a column; 1 % at 2
+  int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
+  double growth = 2;                      ///< their side over the distance to the adhesion: what halving gives anyway
 
   double memory_limit_GB = 0;  ///< of split and refined; 0: what the machine has free
 };

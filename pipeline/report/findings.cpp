@@ -55,8 +55,8 @@ Finding quality(const FitSummary& fit) {
       percent(fit.relative_l2), readable(1000 * fit.noise_um), percent(fit.expected_relative_l2));
   if (excess2 <= 0) return {Level::good, text + " The fit is as good as the noise allows."};
   const double excess = std::sqrt(excess2);
-  // Where the model's error is below the noise it cannot be seen in a single bead.
-  const Level level = excess < fit.expected_relative_l2 ? Level::good : Level::caution;
+  // Up to half of the noise, the model's error adds less than an eighth to what is left.
+  const Level level = excess < 0.5 * fit.expected_relative_l2 ? Level::good : Level::caution;
   return {level,
           text + fmt::format(" The rest, {}, is the error of the model: mesh, segmentation, gel.", percent(excess))};
 }

@@ -24,22 +24,21 @@ ul.findings li.bad{border-color:#c4320a;background:#fdf0ec}
 ul.findings b{margin-right:.3em}
 .grid{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,460px),1fr));gap:18px}
 figure{margin:0}
-figure svg,figure img{display:block;width:100%;height:auto;max-width:680px}
+figure>svg,figure>img{display:block;width:100%;height:auto;max-width:680px}
 svg{font:14px system-ui,"DejaVu Sans",sans-serif}
 svg .frame{fill:#fff;stroke:#444}
 svg .tick{stroke:#444;fill:none}
 svg .grid{stroke:#e3e5e8;fill:none}
 svg path{fill:none}
-svg .onmap{paint-order:stroke;stroke:#fff;stroke-width:3px}
 .scroll{overflow-x:auto;max-width:100%}
-table{border-collapse:collapse;font-size:.88rem;width:auto}
-th,td{padding:.28em .7em;border-bottom:1px solid #e6e8eb;text-align:left;vertical-align:top}
+table{border-collapse:collapse;font-size:.86rem;width:auto}
+th,td{padding:.28em .55em;border-bottom:1px solid #e6e8eb;text-align:left;vertical-align:top}
 th{cursor:pointer;white-space:nowrap;background:#f6f7f8}
 th:hover{background:#e9ecef}
 td.n,th.n{text-align:right;font-variant-numeric:tabular-nums;white-space:nowrap}
-td.hash{font:.8rem monospace;overflow-wrap:anywhere}
 details{margin:.6em 0}
 summary{cursor:pointer;font-weight:600}
+.keep{white-space:nowrap}
 .type{display:inline-block;width:.75em;height:.75em;border-radius:50%;margin-right:.4em}
 @media print{body{background:#fff}section{break-inside:avoid;border:0}}
 )css";

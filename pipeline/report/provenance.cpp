@@ -70,7 +70,7 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
       provenance.effects.push_back({.name = effect.at("name"),
                                     .stage = effect.value("stage", ""),
                                     .why = effect.value("why", ""),
-                                    .seconds = number_of(effect, "seconds"),
+                                    .seconds = effect.value("seconds", 0.0) > 0 ? number_of(effect, "seconds") : "",
                                     .is_on = effect.at("on")});
     }
     provenance.error_budget = flat(run, "error_budget");

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/hash.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/report/base64.h"
 #include "pipeline/report/findings.h"
@@ -21,18 +22,21 @@ namespace {
 std::string optional_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
 
 std::string type_cell(FibreType type) {
-  return fmt::format("<span class=\"type\" style=\"background:{}\"></span>{}", colour_of(type), full_name_of(type));
+  return fmt::format("<span class=\"keep\"><span class=\"type\" style=\"background:{}\"></span>{}</span>",
+                     colour_of(type), full_name_of(type));
 }
 
 std::string findings_section(const CellResults& results, const Provenance& provenance) {
   std::vector<std::string> not_converged, by_hand;
+  std::string given;
   for (const StageLine& stage : provenance.stages) {
     if (!stage.converged) not_converged.push_back(stage.name);
-    if (stage.state == "given" || stage.state == "replaced") {
-      by_hand.push_back("The outputs of the stage " + stage.name + " were not made by this program (" + stage.state +
-                        ": " + stage.why + ").");
-    }
+    if (stage.state == "given") given += (given.empty() ? "" : ", ") + stage.name;
+    if (stage.state == "replaced")
+      by_hand.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
   }
+  if (!given.empty())
+    by_hand.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
   std::string html = "<ul class=\"findings\">\n";
   for (const Finding& finding : findings_of(results, not_converged, by_hand)) {
     static constexpr const char* kClass[] = {"fact", "good", "caution", "bad"};
@@ -47,7 +51,7 @@ Table tension_table(const CellResults& results) {
   Table table{{{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % low", true}, {"95 % high", true}}, {}};
   const bool has_truth = results.comparison.has_value();
   if (has_truth) {
-    for (const char* title : {"truth (nN)", "deviation (nN)", "deviation (%)", "true fibre"}) {
+    for (const char* title : {"truth (nN)", "− truth (nN)", "− truth (%)", "true fibre"}) {
       table.columns.push_back({title, true});
     }
     table.columns.push_back({"true type"});
@@ -105,11 +109,12 @@ std::string tension_section(const CellResults& results) {
   html += figure("Tension of each fibre", tension_plot(results),
                  "By type, the strongest first. The interval holds the bead noise and, where several meshes were "
                  "fitted, the spread between them.");
-  html += "<div>" + html_of(tension_table(results));
+  const Figure network = network_map(results, NetworkForm::original);
+  html += figure(network.title, network.svg, network.caption) + "</div>\n" + html_of(tension_table(results));
   if (results.comparison) html += missed_fibres(*results.comparison);
   html += fmt::format(
       "<p class=\"sub\">Actin network: t = {} nN a cable; as a surface tension {} nN/µm, which does not "
-      "depend on the mesh.</p></div></div>\n",
+      "depend on the mesh.</p>\n",
       results.tensions.contains(0) ? readable(results.tensions.at(0).tension_nN) : "–",
       readable(results.fit.network_surface_tension_nN_per_um));
   return section("Tensions", html);
@@ -127,7 +132,6 @@ std::string map_section(const CellResults& results) {
   add(adhesion_map(results));
   add(displacement_map(results));
   if (results.residual) add(residual_map(results));
-  add(network_map(results, NetworkForm::original));
   add(network_map(results, NetworkForm::contracted));
   return section("Maps", html +
                              "</div>\n<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
@@ -207,11 +211,11 @@ std::string effects_table(const Provenance& provenance) {
 }
 
 std::string provenance_section(const CellResults& results, const Provenance& provenance) {
-  Table stages{{{"stage"}, {"state"}, {"seconds", true}, {"memory (MB)", true}, {"version"}, {"result"}}, {}};
+  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}};
   for (const StageLine& stage : provenance.stages) {
-    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state), stage.seconds, stage.peak_memory_MB,
-                           html_escaped(stage.version),
-                           html_escaped(stage.summary.empty() ? stage.why : stage.summary)});
+    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
+                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           stage.peak_memory_MB, html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
@@ -223,6 +227,24 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
     if (!stage.inputs.empty()) html += folded("Inputs of " + stage.name + " (SHA-256)", html_of_pairs(stage.inputs));
   }
   return section("How it was computed", html);
+}
+
+/// Of the program's version and all that the report shows: the outputs of the stages, the truth and cell.toml.
+std::string fingerprint(const std::filesystem::path& cell) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> files = {cell / "cell.toml"};
+  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) {
+    if (!fs::is_directory(cell / folder)) continue;
+    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::string all = kVersion;
+  for (const fs::path& file : files) {
+    all += "\n" + file.lexically_relative(cell).generic_string() + " " + sha256_of_file(file);
+  }
+  return sha256(all);
 }
 
 }  // namespace
@@ -241,6 +263,11 @@ std::string report_html(const std::filesystem::path& cell) {
   return page(results.name + " – mbtfm", body);
 }
 
-void write_report(const std::filesystem::path& cell) { write_whole(cell / "report.html", report_html(cell)); }
+void update_report(const std::filesystem::path& cell) {
+  const std::filesystem::path file = cell / "report.html";
+  const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
+  if (std::filesystem::is_regular_file(file) && read_text(file).ends_with(signature)) return;
+  write_whole(file, report_html(cell) + signature);
+}
 
 }  // namespace mbtfm::report

@@ -31,9 +31,10 @@ std::string element(const std::string& tag, const std::string& attributes, const
   return "<" + tag + " " + attributes + hover_element(hover) + (hover.empty() ? "" : "</" + tag + ">") + "\n";
 }
 
-/// Multiples of a round step between two numbers, about five of them.
+/// Multiples of the smallest step of 1, 2 or 5 times a power of ten that gives no more than six of them.
 std::vector<double> ticks(double low, double high) {
-  const double step = round_below((high - low) / 4);
+  const double fine = round_below((high - low) / 5);
+  const double step = (high - low) / fine <= 5 ? fine : round_below(2.5 * fine);
   std::vector<double> list;
   for (double t = std::ceil(low / step) * step; t <= high; t += step) list.push_back(std::abs(t) < step / 2 ? 0 : t);
   return list;
@@ -202,7 +203,11 @@ std::string MapDrawing::str(const std::string& description) const {
       "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">"
       "<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" class=\"frame\"/>\n",
       kWidth_px, total, html_escaped(description), kLeft_px, kTop_px, kInk_px, height_px_);
-  svg += body_;
+  // an inner <svg> cuts off what reaches beyond the frame
+  svg +=
+      fmt::format("<svg x=\"{0}\" y=\"{1}\" width=\"{2:.1f}\" height=\"{3:.1f}\" viewBox=\"{0} {1} {2:.1f} {3:.1f}\">",
+                  kLeft_px, kTop_px, kInk_px, height_px_);
+  svg += body_ + "</svg>\n";
   for (const double tick : ticks(box_um_.low.x, box_um_.high.x)) {
     svg += fmt::format(
         "<path d=\"M{0:.1f},{1:.1f}v4\" class=\"tick\"/><text x=\"{0:.1f}\" y=\"{2:.1f}\" "
@@ -223,8 +228,11 @@ std::string MapDrawing::str(const std::string& description) const {
   const double bar_x = kLeft_px + kInk_px - 12 - bar_um * px_per_um_;
   const double bar_y = kTop_px + height_px_ - 12;
   svg += fmt::format(
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"32\" style=\"fill:#fff;fill-opacity:.85\"/>",
+      bar_x - 6, bar_y - 25, bar_um * px_per_um_ + 12);
+  svg += fmt::format(
       "<path d=\"M{:.1f},{:.1f}h{:.1f}\" style=\"stroke:#111;stroke-width:4\"/><text x=\"{:.1f}\" "
-      "y=\"{:.1f}\" text-anchor=\"middle\" class=\"onmap\">{} µm</text>\n",
+      "y=\"{:.1f}\" text-anchor=\"middle\">{} µm</text>\n",
       bar_x, bar_y, bar_um * px_per_um_, bar_x + bar_um * px_per_um_ / 2, bar_y - 7, readable(bar_um));
   return svg + legend_ + "</svg>\n";
 }

@@ -80,7 +80,7 @@ std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const Batch
     ++n_done;
     if (!options.say) return;
     std::ostringstream line;
-    line << '[' << n_done << '/' << cells.size() << "] " << cells[i].filename().string() << ": "
+    line << '[' << n_done << '/' << cells.size() << "] " << cells[i].string() << ": "
          << (outcomes[i].exit_code == 0 ? "done" : "FAILED") << ", " << std::fixed << std::setprecision(1)
          << outcomes[i].seconds << " s";
     options.say(line.str());

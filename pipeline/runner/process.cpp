@@ -6,6 +6,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <csignal>
@@ -18,6 +19,9 @@ namespace {
 
 // The shell's code for a command that cannot be executed.
 constexpr int kCannotExecute = 127;
+
+std::atomic<bool> was_interrupted = false;
+extern "C" void note_interrupt(int) { was_interrupted = true; }
 
 /// The child, between fork and exec: only async-signal-safe calls, as other threads of the parent may hold locks.
 [[noreturn]] void become(char* const* arguments, int log_descriptor) {
@@ -32,8 +36,15 @@ constexpr int kCannotExecute = 127;
 
 }  // namespace
 
+void watch_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = note_interrupt;
+  sigaction(SIGINT, &action, nullptr);
+}
+
 ProcessResult run_process(const std::vector<std::string>& command,
                           const std::optional<std::filesystem::path>& log_file) {
+  if (was_interrupted) throw Interrupted();
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
@@ -57,6 +68,7 @@ ProcessResult run_process(const std::vector<std::string>& command,
   rusage usage{};
   while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
   }
+  if (was_interrupted) throw Interrupted();
   ProcessResult result;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   constexpr double kMegabytePerKibibyte = 1024e-6;  // ru_maxrss is in KiB

@@ -153,7 +153,7 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
     throw InputError(stage.folder, "all outputs of the stage, or none", "no " + missing.front(),
                      "add the missing files, or remove the others and let mbtfm make them");
   }
-  if (!record->finished) return {StageState::must_run, "was interrupted"};
+  if (!record->finished) return {StageState::must_run, "was begun and not finished"};
   if (!missing.empty()) return {StageState::must_run, missing.front() + " is gone"};
   for (const auto& [name, hash] : now.outputs) {
     const auto ours = record->outputs.find(name);

@@ -39,7 +39,7 @@ const std::vector<Stage>& stages() {
        .output = {"out", "4_fit"},
        .reads = {cell_files[0], cell_files[1], cell_files[2], cell_files[3], displacement, network},
        .writes = {"4_fit/tensions.csv", "4_fit/adhesion_forces.csv", "4_fit/fit.json", "4_fit/contracted.vtu"},
-       .tables = {"", "gel", "network", "substrate", "fit"}},
+       .tables = {"", "gel", "network", "cables", "substrate", "fit"}},
   };
   return list;
 }

@@ -1,0 +1,121 @@
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "network/mesh.h"
+#include "network/triangulation.h"
+#include "tests/support/valid_network.h"
+
+namespace mbtfm::network {
+namespace {
+
+Cell disc(int n_points) {
+  Cell cell;
+  for (int i = 0; i < n_points; ++i) {
+    const double angle = 2 * std::numbers::pi * i / n_points;
+    cell.outline_um.push_back({std::cos(angle), std::sin(angle)});
+  }
+  return cell;
+}
+
+Cell square(double side) {
+  Cell cell;
+  cell.outline_um = {{0, 0}, {side, 0}, {side, side}, {0, side}};
+  return cell;
+}
+
+TEST(Mesh, quality_is_one_for_an_equilateral_and_zero_for_a_flat_triangle) {
+  EXPECT_NEAR(quality({0, 0}, {1, 0}, {0.5, std::sqrt(3.0) / 2}), 1, 1e-12);
+  EXPECT_EQ(quality({0, 0}, {1, 0}, {2, 0}), 0);
+  // 3-4-5: inradius 1, circumradius 2.5
+  EXPECT_NEAR(quality({0, 0}, {3, 0}, {0, 4}), 0.8, 1e-12);
+}
+
+TEST(Mesh, unit_circle_is_as_good_as_distmesh_makes_it) {
+  for (const auto& [edge, mean] : {std::pair{0.1, 0.985}, std::pair{0.05, 0.985}}) {
+    for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
+      const GeneratedNetwork generated = generate_network(disc(400), {.edge_length_um = edge, .seed = seed});
+      EXPECT_GE(generated.mean_quality, mean) << "edge " << edge << " seed " << seed;
+      EXPECT_GE(generated.worst_quality, 0.5) << "edge " << edge << " seed " << seed;
+    }
+  }
+}
+
+TEST(Mesh, disc_and_square_obey_eulers_formula) {
+  for (const Cell& cell : {disc(100), square(2)}) {
+    const GeneratedNetwork generated = generate_network(cell, {.edge_length_um = 0.15});
+    const int n_vertices = static_cast<int>(generated.network.vertices_um.size());
+    const int n_edges = static_cast<int>(generated.network.links.size());
+    EXPECT_EQ(n_vertices - n_edges + generated.n_triangles, 1);
+  }
+}
+
+TEST(Mesh, area_is_that_of_the_outline) {
+  // The vertices of a square lie on its sides and corners: the area is exact to rounding.
+  EXPECT_NEAR(generate_network(square(2), {.edge_length_um = 0.15}).area_um2, 4, 1e-9);
+  // Chords of length c cut c³ / 12R off a circle: with about 2 pi R / h of them a fraction h² / 6R², at most 1.5² of
+  // that where chords are 1.5 h long; averaging the outline takes another h² / 48.
+  constexpr double kEdge = 0.1;
+  const double area = generate_network(disc(2000), {.edge_length_um = kEdge}).area_um2;
+  EXPECT_LE(area, std::numbers::pi);
+  EXPECT_GE(area, std::numbers::pi * (1 - kEdge * kEdge * (1.5 * 1.5 / 6 + 1.0 / 48)));
+}
+
+TEST(Mesh, sheet_of_even_surface_tension_is_at_rest_inside) {
+  // Links weighted by width are minus the gradient of the area, which inner vertices do not change; so the forces on
+  // them cancel to rounding.
+  const GeneratedNetwork generated = generate_network(disc(400), {.edge_length_um = 0.1, .link_weights = "width"});
+  const Network& net = generated.network;
+  std::vector<Vec2> force(net.vertices_um.size());
+  for (const Link& link : net.links) {
+    const Vec2 gap = net.vertices_um[link.vertex_b] - net.vertices_um[link.vertex_a];
+    force[link.vertex_a] += (link.share / norm(gap)) * gap;
+    force[link.vertex_b] += (-link.share / norm(gap)) * gap;
+  }
+  int n_inner = 0;
+  for (std::size_t v = 0; v < force.size(); ++v) {
+    if (norm(net.vertices_um[v]) > 0.85) continue;
+    EXPECT_NEAR(norm(force[v]), 0, 1e-12) << "vertex " << v;
+    ++n_inner;
+  }
+  EXPECT_GT(n_inner, 100);
+}
+
+TEST(Mesh, mean_width_is_that_of_a_regular_triangulation) {
+  // Widths times lengths of all links fill twice the area: the sheet's tension does not depend on the edge length.
+  for (const double edge : {0.05, 0.1, 0.2}) {
+    const GeneratedNetwork generated = generate_network(disc(400), {.edge_length_um = edge, .link_weights = "width"});
+    double sum = 0;
+    for (const Link& link : generated.network.links) sum += link.share * link.rest_length_um * edge / std::sqrt(3.0);
+    EXPECT_NEAR(sum, 2 * generated.area_um2, 1e-3 * generated.area_um2) << "edge " << edge;
+  }
+}
+
+TEST(Mesh, straight_fibre_between_two_adhesions_keeps_its_length) {
+  Cell cell = square(20);
+  for (int i = 0; i < 2; ++i) {
+    Adhesion a;
+    a.adhesion_id = i + 1;
+    a.position_um = {3 + 14.0 * i, 5 + 7.0 * i};
+    a.area_um2 = 0.5;
+    a.major_axis_um = 1.2;
+    a.minor_axis_um = 0.5;
+    cell.adhesions.push_back(a);
+  }
+  Fibre fibre;
+  fibre.fibre_id = 7;
+  fibre.width_um = 0.6;
+  fibre.start_adhesion_id = 1;
+  fibre.end_adhesion_id = 2;
+  fibre.points_um = {{3.2, 5.1}, {10, 8.5}, {16.9, 11.95}};
+  cell.fibres.push_back(fibre);
+  const GeneratedNetwork generated = generate_network(cell, {});
+  testing::expect_valid(generated, cell, 1.5);
+  // it is drawn to the adhesions' centres, and straight: its points are off by less than the 0.05 edges that matter
+  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 7), std::hypot(14.0, 7.0), 1e-9);
+  EXPECT_EQ(testing::n_ends_of_fibre(generated.network, 7), 2);
+}
+
+}  // namespace
+}  // namespace mbtfm::network
