@@ -226,11 +226,20 @@ void choose_windows(const Scene& scene, const TrackParameters& parameters, std::
     Track& track = tracks[k];
     if (!track.is_good()) return;
     track.chosen = chosen_window(scene, scene.positions[k], track.wide);
-    if (!track.chosen.is_converged || track.chosen.similarity < parameters.least_similarity) {
-      track.flag = "poor match";
-      track.chosen = track.wide;
-    }
+    if (track.chosen.is_converged) return;
+    track.flag = "poor match";
+    track.chosen = track.wide;
   });
+  // What similarity a right match has depends on the noise, so the picture itself tells: a bead that is less similar
+  // by eight times the median lack of it shows another bead. Steep places cost similarity too: a tenth is granted.
+  std::vector<double> lacks;
+  for (const Track& track : tracks) {
+    if (track.is_good()) lacks.push_back(1 - track.chosen.similarity);
+  }
+  const double most = std::min(std::max(0.1, 8 * quantile(std::move(lacks), 0.5)), 1 - parameters.least_similarity);
+  for (Track& track : tracks) {
+    if (track.is_good() && 1 - track.chosen.similarity > most) track.flag = "poor match";
+  }
 }
 
 /// Registered from where it went, a bead must come back to where it was.
@@ -280,6 +289,39 @@ void check_claims(const Scene& scene, std::vector<Track>& tracks) {
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (is_taken[k]) tracks[k].flag = "goes where another bead goes";
   }
+}
+
+/// Standard deviation (px) that single beads have beyond the errors of their registration: beads that sit loose, at
+/// other depths or on others' flanks. From each bead's misfit to the affine motion of its neighbours: the s for which
+/// the median of misfit² / (sigma² + s²) is that of a two-dimensional normal variable, ln 2 a component pair's mean
+/// square.
+double scatter_beyond_noise(const Scene& scene, const Neighbours& neighbours, const std::vector<Track>& tracks) {
+  const std::vector<Motion> motions = motions_of(tracks, true);
+  std::vector<double> misfits(tracks.size(), -1);
+  for_each_bead(scene, [&](int k) {
+    if (!tracks[k].is_good()) return;
+    const auto local =
+        local_motion(scene.positions[k], good_around(scene, neighbours, tracks, k, 12), scene.positions, motions);
+    if (!local || local->n_beads < 8) return;
+    const Vec2 misfit = motions[k].u - local->motion.u;
+    misfits[k] = 0.5 * dot(misfit, misfit);
+  });
+  constexpr double kNeighbours = 1 + 1.0 / 8;  // the fit's own variance: its weights leave eight beads of twelve
+  const auto median_ratio = [&](double scatter) {
+    std::vector<double> ratios;
+    for (std::size_t k = 0; k < tracks.size(); ++k) {
+      const double variance = tracks[k].chosen.sigma_px * tracks[k].chosen.sigma_px + scatter * scatter;
+      if (misfits[k] >= 0 && variance > 0) ratios.push_back(misfits[k] / (kNeighbours * variance));
+    }
+    return quantile(std::move(ratios), 0.5);
+  };
+  double low = 0, high = 10;
+  if (median_ratio(low) <= std::numbers::ln2) return 0;
+  for (int step = 0; step < 30; ++step) {
+    const double middle = 0.5 * (low + high);
+    (median_ratio(middle) > std::numbers::ln2 ? low : high) = middle;
+  }
+  return high;
 }
 
 FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, double share) {
@@ -361,6 +403,8 @@ Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_s
   const FarField far = far_field_of(scene, tracks, parameters.far_field_share);
   result.drift_um = pixel_size_um * far.drift;
   result.far_field_rms_um = pixel_size_um * far.rms;
+  const double scatter = scatter_beyond_noise(scene, neighbours, tracks);
+  result.scatter_um = pixel_size_um * scatter;
   result.has_far_field = far.is_at_rest;
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma;
   result.n_beads_stressed = static_cast<int>(scene.beads_stressed.size());
@@ -369,7 +413,7 @@ Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_s
     Bead bead;
     bead.position_um = pixel_size_um * (scene.positions[k] + Vec2{0.5, 0.5});
     bead.displacement_um = pixel_size_um * (found.motion.u - far.drift);
-    bead.sigma_um = pixel_size_um * found.sigma_px;
+    bead.sigma_um = pixel_size_um * std::hypot(found.sigma_px, scatter);
     bead.flag = tracks[k].flag;
     if (bead.flag.empty()) ++result.n_good;
     result.field.push_back(bead);

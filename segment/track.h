@@ -42,6 +42,7 @@ struct Tracking {
   double far_field_rms_um = 0;  ///< of a displacement component in the frame, after the drift is taken off
   double bead_sigma_um = 0;     ///< of a bead's picture
   bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is the mean of all beads
+  double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   int n_good = 0;
   int n_beads_stressed = 0;  ///< found in the stressed image
 };

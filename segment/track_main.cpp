@@ -71,6 +71,7 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
                     {"drift_y_um", tracking.drift_um.y},
                     {"has_far_field", tracking.has_far_field},
                     {"far_field_residual_um", tracking.far_field_rms_um},
+                    {"scatter_um", tracking.scatter_um},
                     {"largest_displacement_um", largest_um},
                     {"sigma_um", std::sqrt(squares / std::max(1, tracking.n_good))}};
   report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(n_beads) + " beads tracked";
