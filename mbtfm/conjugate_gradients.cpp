@@ -119,7 +119,7 @@ TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParam
   }
   fit.report.reason = fit.report.converged
                           ? "the tensions change by less than the tolerance"
-                          : "the tensions still change by " + std::to_string(fit.report.last_change) +
+                          : "the tensions still change by " + scientific(fit.report.last_change) +
                                 " of the largest after " + std::to_string(fit.n_evaluations) + " evaluations";
   return fit;
 }

@@ -104,7 +104,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, con
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   all.chi_squared_per_degree = chi_squared_per_degree(data, all.forces_nN, n_tensions);
   // A misfit beyond the stated noise is the model's; it widens the error bars as if it were noise.
-  const double widening = std::max(1.0, all.chi_squared_per_degree);
+  const double widening = data.has_errors ? std::max(1.0, all.chi_squared_per_degree) : all.chi_squared_per_degree;
 
   for (Eigen::Index i = 0; i < n_tensions; ++i) {
     std::vector<double> values;

@@ -2,7 +2,6 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <numbers>
 #include <set>
 
 #include "mbtfm/ensemble.h"
@@ -144,15 +143,14 @@ double imbalance(const Eigen::VectorXd& forces_nN) {
   return net.norm() / std::max(sum_of_magnitudes(forces_nN), 1e-300);
 }
 
-double mean_network_edge_um(const Network& network) {
-  double sum = 0;
-  int n = 0;
+/// Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
+/// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
+double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
+  double sum_um = 0;
   for (const Link& link : network.links) {
-    if (link.fibre_id != 0) continue;
-    sum += link.rest_length_um;
-    ++n;
+    if (link.fibre_id == 0) sum_um += link.share * link.rest_length_um;
   }
-  return n > 0 ? sum / n : 0;
+  return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
 }
 
 FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const Inputs& inputs,
@@ -160,7 +158,6 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const Inpu
   const NoiseLevel noise =
       noise_level(inputs.beads, data, fit.forces_nN, inputs.cell.outline_um, parameters.far_distance_um);
   const double measured_um = data.displacement_um.norm();
-  const double edge_um = mean_network_edge_um(networks.front().network());
   FitSummary s;
   s.relative_l2 = relative_l2(data, fit.forces_nN);
   s.noise_um = noise.sigma_um;
@@ -169,8 +166,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const Inpu
   s.total_force_nN = sum_of_magnitudes(fit.forces_nN);
   s.network_force_nN = sum_of_magnitudes(fit.network_forces_nN);
   s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
-  // of a regular triangulation (DESIGN of the model: docs/theory.md)
-  s.network_surface_tension_nN_per_um = edge_um > 0 ? std::numbers::sqrt3 * fit.tensions_nN[0].value / edge_um : 0;
+  s.network_surface_tension_nN_per_um =
+      surface_tension_nN_per_um(networks.front().network(), inputs.cell.outline_um, fit.tensions_nN[0].value);
   s.n_meshes = static_cast<int>(fit.fits.size());
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
@@ -186,7 +183,6 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const Inpu
             {"tension_error_from_mesh_nN", std::sqrt(mesh_part)},
             {"n_beads", std::int64_t(inputs.beads.size())},
             {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
-            {"mean_network_edge_um", edge_um},
             {"method", parameters.method},
             {"reason", fit.report.reason}};
   return s;

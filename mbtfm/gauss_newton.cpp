@@ -130,7 +130,7 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     fit.objective_by_evaluation.push_back(fit.trial.objective);
   }
   if (!fit.report.converged) {
-    fit.report.reason = "the tensions still change by " + std::to_string(fit.report.last_change) +
+    fit.report.reason = "the tensions still change by " + scientific(fit.report.last_change) +
                         " of the largest after " + std::to_string(fit.report.iterations) + " steps";
   }
   return fit;
