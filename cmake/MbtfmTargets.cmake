@@ -12,8 +12,12 @@ function(mbtfm_library name)
   target_link_libraries(${name} PUBLIC mbtfm_options ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
 endfunction()
 
+# All programs, without the tests.
+add_custom_target(executables)
+
 function(mbtfm_executable name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PRIVATE")
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE mbtfm_options ${arg_PRIVATE})
+  add_dependencies(executables ${name})
 endfunction()

@@ -11,7 +11,8 @@ namespace {
 /// The state of a minimisation, and its account of evaluations.
 class Minimisation {
  public:
-  Minimisation(const TensionProblem& problem, const FitParameters& parameters, int threads, const Eigen::VectorXd& start)
+  Minimisation(const TensionProblem& problem, const FitParameters& parameters, int threads,
+               const Eigen::VectorXd& start)
       : problem_(problem), parameters_(parameters), threads_(threads) {
     fit_.trial = problem.evaluate(start);
     note(fit_.trial);
@@ -118,7 +119,7 @@ TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParam
   }
   fit.report.reason = fit.report.converged
                           ? "the tensions change by less than the tolerance"
-                          : "the tensions still change by " + std::to_string(fit.report.last_change) +
+                          : "the tensions still change by " + scientific(fit.report.last_change) +
                                 " of the largest after " + std::to_string(fit.n_evaluations) + " evaluations";
   return fit;
 }

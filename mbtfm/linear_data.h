@@ -16,6 +16,7 @@ struct LinearData {
   Eigen::MatrixXd reduced;               ///< C
   Eigen::VectorXd target;                ///< y
   double floor_squared = 0;              ///< what no force can explain
+  bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
 };
 
 /// @param beads  the ones to use; all with sigma_um > 0, or weights are the same for all

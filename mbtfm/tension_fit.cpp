@@ -1,5 +1,6 @@
 #include "mbtfm/tension_fit.h"
 
+#include <cstdio>
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
@@ -13,11 +14,17 @@ void declare(ParameterList& list, FitParameters& p) {
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
            "networks to fit on; tensions are their mean, and their spread is part of the error bars");
   list.add("tolerance", p.tolerance, Range::positive(), "relative change of the tensions at which the fit stops");
-  list.add("max_iterations", p.max_iterations, Range::between(1, 100000), "steps of Gauss-Newton at most");
+  list.add("max_steps", p.max_steps, Range::between(1, 100000), "steps of Gauss-Newton at most");
   list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),
            "equilibria solved by a conjugate gradient method at most");
   list.add("far_distance_um", p.far_distance_um, Range::not_negative(),
            "beads this far outside the outline tell the noise level (um)");
+}
+
+std::string scientific(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.1e", value);
+  return text;
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,

@@ -13,10 +13,10 @@ namespace mbtfm::inverse {
 struct FitParameters {
   std::string method = "gauss-newton";  ///< converges in about ten steps; the others are kept for comparison
   std::string gradients = "exact";      ///< finite-difference: as in the thesis, one equilibrium a tension and side
-  int n_meshes = 8;           ///< the spread between meshes is the largest error; its mean over eight is close to settled
-  double tolerance = 1e-6;    ///< relative change of the tensions at which the fit stops: far below any error bar
-  int max_iterations = 100;   ///< of Gauss–Newton: every loop ends
-  int max_evaluations = 5000; ///< of the conjugate gradients
+  int n_meshes = 8;         ///< the spread between meshes is the largest error; its mean over eight is close to settled
+  double tolerance = 1e-6;  ///< relative change of the tensions at which the fit stops: far below any error bar
+  int max_steps = 100;      ///< of Gauss–Newton: every loop ends
+  int max_evaluations = 5000;   ///< of the conjugate gradients
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
 };
 void declare(ParameterList& list, FitParameters& parameters);
@@ -24,7 +24,7 @@ void declare(ParameterList& list, FitParameters& parameters);
 struct TensionFit {
   Trial trial;  ///< the best one
   Report report;
-  int n_evaluations = 0;  ///< equilibria solved, those of finite differences included
+  int n_evaluations = 0;                        ///< equilibria solved, those of finite differences included
   std::vector<double> objective_by_evaluation;  ///< the smallest so far
 };
 
@@ -45,7 +45,11 @@ struct Block {
 TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParameters& parameters, int threads,
                                    const Eigen::VectorXd& start_nN, const std::vector<Block>& blocks);
 
+/// "1.2e-05", for messages.
+std::string scientific(double value);
+
 /// The minimiser of ½ xᵀ H x + gᵀ x over x >= low, for symmetric positive definite H, by an active set.
-Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g, const Eigen::VectorXd& low);
+Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
+                                          const Eigen::VectorXd& low);
 
 }  // namespace mbtfm::inverse

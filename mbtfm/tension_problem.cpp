@@ -19,7 +19,8 @@ TensionProblem::TensionProblem(const network::CableNetwork& cables, const Linear
   for (const int id : cables.adhesion_ids()) {
     const auto at = std::find(adhesion_ids.begin(), adhesion_ids.end(), id);
     if (at == adhesion_ids.end()) {
-      throw InvalidData("adhesion " + std::to_string(id) + " of the network", "an adhesion of the cell", "none of that label");
+      throw InvalidData("adhesion " + std::to_string(id) + " of the network", "an adhesion of the cell",
+                        "none of that label");
     }
     pair_of_.push_back(at - adhesion_ids.begin());
   }

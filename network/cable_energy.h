@@ -1,6 +1,8 @@
-/// The energy of a set of cables, its slope and its stiffness, as functions of the cables' spans (x_b − x_a).
-/// Spans are state of their own beside the positions: a collapsed cable is 1e-5 of an edge long and carries a force
-/// that depends on its direction, which the difference of two rounded positions does not tell.
+/// The energy of one cable, its force and its stiffness, as functions of its span x_b − x_a.
+///
+/// Two kinks are rounded off: the one at zero length, over eps, and the one at the rest length, where the cable turns
+/// stiff. There the force q of the stretch e = l − l0 is q = k max(0, e) in the end, and on the way to it the positive
+/// root of q (q/k − e) = mu, the central path of interior-point methods; q = k/2 (e + sqrt(e² + 4 mu / k)).
 #pragma once
 
 #include <algorithm>
@@ -11,55 +13,65 @@
 
 namespace mbtfm::network {
 
-/// One cable in one equilibrium: everything its force depends on.
+/// Everything the force of a cable depends on.
 struct Cable {
   int vertex_a = 0;
   int vertex_b = 0;
   double rest_length_um = 0;
   double tension_nN = 0;           ///< share · t of its group
-  double stiffness_nN_per_um = 0;  ///< share · EA / l0 beyond the rest length
+  double stiffness_nN_per_um = 0;  ///< k = share · EA / l0, beyond the rest length
 };
 
-/// A cable's scalar state at smoothing eps.
+struct Rounding {
+  double eps_um = 0;  ///< l = sqrt(d² + eps²)
+  double mu_fJ = 0;   ///< 0: the stretch force is k max(0, e) exactly
+};
+
 struct Pull {
-  double length_um = 0;            ///< sqrt(d² + eps²)
-  double force_nN = 0;             ///< dU/dl
-  double stiffness_nN_per_um = 0;  ///< d²U/dl²
+  double length_um = 0;            ///< l
+  double stretch_um = 0;           ///< e = l − l0, negative where the cable is shorter
+  double stretch_force_nN = 0;     ///< q
+  double force_nN = 0;             ///< dU/dl = t + q
+  double stiffness_nN_per_um = 0;  ///< dq/dl
 };
 
-inline double smoothed_um(Vec2 span_um, double smoothing_um) {
-  return std::sqrt(dot(span_um, span_um) + smoothing_um * smoothing_um);
+inline double smoothed_um(double distance_um, double eps_um) {
+  return std::sqrt(distance_um * distance_um + eps_um * eps_um);
 }
 
-/// The stretch beyond the rest length. Smoothed like the length itself, so that it begins at d = l0 exactly.
-inline double stretch_um(const Cable& cable, double length_um, double smoothing_um) {
-  return length_um - std::sqrt(cable.rest_length_um * cable.rest_length_um + smoothing_um * smoothing_um);
+inline Pull pull(const Cable& cable, Vec2 span_um, const Rounding& rounding) {
+  const double k = cable.stiffness_nN_per_um;
+  const double length = std::sqrt(dot(span_um, span_um) + rounding.eps_um * rounding.eps_um);
+  // The rest length is smoothed like the length, so that the stretch begins at d = l0 exactly.
+  const double e = length - smoothed_um(cable.rest_length_um, rounding.eps_um);
+  if (rounding.mu_fJ > 0) {
+    const double root = std::sqrt(e * e + 4 * rounding.mu_fJ / k);
+    const double sum = e > 0 ? e + root : 4 * rounding.mu_fJ / k / (root - e);  // e + root without cancellation
+    const double q = k / 2 * sum;
+    return {length, e, q, cable.tension_nN + q, q / root};
+  }
+  // A cable at its rest length counts as stiff: a network at rest can move only by stretching. 1e-12: rounding of l.
+  if (e < -1e-12 * cable.rest_length_um) return {length, e, 0, cable.tension_nN, 0};
+  const double q = k * std::max(0.0, e);
+  return {length, e, q, cable.tension_nN + q, k};
 }
 
-inline Pull pull(const Cable& cable, Vec2 span_um, double smoothing_um) {
-  const double length = smoothed_um(span_um, smoothing_um);
-  const double stretch = stretch_um(cable, length, smoothing_um);
-  // At the rest length itself the stiff side counts: a network at rest that is to move stretches somewhere.
-  if (stretch < -1e-12 * cable.rest_length_um) return {length, cable.tension_nN, 0};
-  return {length, cable.tension_nN + cable.stiffness_nN_per_um * std::max(0.0, stretch), cable.stiffness_nN_per_um};
+inline double energy_fJ(const Cable& cable, const Pull& pull, const Rounding& rounding) {
+  const double q = pull.stretch_force_nN;
+  // The integral of q over e; (log q: of the barrier, up to a constant).
+  const double barrier = rounding.mu_fJ > 0 ? rounding.mu_fJ * std::log(q) : 0;
+  return cable.tension_nN * pull.length_um + q * q / (2 * cable.stiffness_nN_per_um) + barrier;
 }
 
-inline double energy_fJ(const Cable& cable, double length_um, double smoothing_um) {
-  const double stretch = std::max(0.0, stretch_um(cable, length_um, smoothing_um));
-  return cable.tension_nN * length_um + cable.stiffness_nN_per_um / 2 * stretch * stretch;
-}
-
-/// d²U of one cable with respect to its span: along the cable its own stiffness, across it force / length. Where the
-/// cable collapses, its direction d/l changes faster than any step; `direction`, followed as an unknown of its own
-/// (Chan, Golub & Mulet, SIAM J. Sci. Comput. 20 (1999) 1964), keeps Newton's method convergent for any smoothing.
-inline BlockCholesky::Block stiffness(const Pull& pull, Vec2 span_um, Vec2 direction) {
+/// d²U of one cable with respect to its span: `along_nN_per_um` along the cable and force / length across it.
+/// `direction` is span / length, or an estimate of it no longer than 1.
+inline BlockCholesky::Block stiffness(const Pull& pull, Vec2 span_um, double along_nN_per_um, Vec2 direction) {
   const Vec2 n = (1 / pull.length_um) * span_um;
   const double across = pull.force_nN / pull.length_um;
-  const double nxx = pull.stiffness_nN_per_um * n.x * n.x - across * direction.x * n.x;
-  const double nyy = pull.stiffness_nN_per_um * n.y * n.y - across * direction.y * n.y;
-  const double nxy = pull.stiffness_nN_per_um * n.x * n.y - across * (direction.x * n.y + direction.y * n.x) / 2;
+  const double xy = along_nN_per_um * n.x * n.y - across * (direction.x * n.y + direction.y * n.x) / 2;
   BlockCholesky::Block block;
-  block << across + nxx, nxy, nxy, across + nyy;
+  block << along_nN_per_um * n.x * n.x + across * (1 - direction.x * n.x), xy,  //
+      xy, along_nN_per_um * n.y * n.y + across * (1 - direction.y * n.y);
   return block;
 }
 

@@ -1,6 +1,7 @@
 #include "network/cables.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 #include <string>
 
@@ -14,8 +15,8 @@ namespace {
 // A tension of zero stands for the limit t -> 0 from above: its cables are given this part of the largest tension. So
 // slack directions have an equilibrium and derivatives; the forces change by less than 1e-7 of the largest.
 constexpr double kSlackTension = 1e-7;
-// A cold start rounds the kinks off over this part of an edge at first.
-constexpr double kFirstSmoothing = 0.1;
+// A stretch is known to the rounding of two lengths, at a vertex of some six cables; its force to that part of EA.
+constexpr double kStretchRounding = 8 * std::numeric_limits<double>::epsilon();
 
 int index_of(const std::vector<int>& sorted, int value) {
   return static_cast<int>(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin());
@@ -46,7 +47,7 @@ FreeVertices free_vertices(const Network& network) {
 }  // namespace
 
 void declare(ParameterList& list, CableParameters& p) {
-  list.table("network");
+  list.table("cables");
   list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::positive(),
            "force of a cable per strain beyond its rest length (nN)");
   list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2},
@@ -65,7 +66,7 @@ struct CableNetwork::Impl {
   double mean_rest_length_um = 0;
   FreeVertices free;
 
-  double smoothing_um() const { return parameters.smoothing * mean_rest_length_um; }
+  Rounding rounding() const { return {.eps_um = parameters.smoothing * mean_rest_length_um, .mu_fJ = 0}; }
   std::vector<Cable> cables(const std::vector<double>& tensions_nN) const;
 };
 
@@ -126,25 +127,22 @@ Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, co
   for (std::size_t v = 0; v < positions.size(); ++v)
     if (impl_->adhesion[v] >= 0) positions[v] = impl_->network.vertices_um[v];
 
-  double largest_tension = 0, largest_share = 0;
-  for (const Cable& cable : cables) largest_tension = std::max(largest_tension, cable.tension_nN);
+  double force = 0, largest_share = 0;
+  for (const Cable& cable : cables) force = std::max(force, cable.tension_nN);
   for (const Link& link : impl_->network.links) largest_share = std::max(largest_share, link.share);
-  // A stretch is known to the rounding of the length, a force therefore to that part of EA.
-  const double rounding =
-      8 * std::numeric_limits<double>::epsilon() * impl_->parameters.axial_stiffness_nN * largest_share;
-  const double smoothing = impl_->smoothing_um();
-  Minimum minimum =
-      minimise(impl_->free, cables, std::move(positions),
-               {.first_smoothing_um = start.empty() ? kFirstSmoothing * impl_->mean_rest_length_um : smoothing,
-                .smoothing_um = smoothing,
-                .largest_tension_nN = largest_tension,
-                .force_tolerance_nN = std::max(impl_->parameters.force_tolerance * largest_tension, rounding),
-                .max_iterations = impl_->parameters.max_iterations});
+  const double axial_stiffness = largest_share * impl_->parameters.axial_stiffness_nN;
+  Minimum minimum = minimise(
+      impl_->free, cables, std::move(positions), start.empty() ? Start::cold : Start::warm,
+      {.eps_um = impl_->rounding().eps_um,
+       .edge_length_um = impl_->mean_rest_length_um,
+       .force_nN = force > 0 ? force : axial_stiffness,
+       .force_tolerance_nN = std::max(impl_->parameters.force_tolerance * force, kStretchRounding * axial_stiffness),
+       .max_iterations = impl_->parameters.max_iterations});
   Equilibrium result;
   for (std::size_t k = 0; k < cables.size(); ++k) {
-    const Pull p = pull(cables[k], minimum.spans_um[k], smoothing);
+    const Pull p = pull(cables[k], minimum.spans_um[k], impl_->rounding());
     result.link_force_nN.push_back(p.force_nN * norm(minimum.spans_um[k]) / p.length_um);
-    result.energy_fJ += energy_fJ(cables[k], p.length_um, smoothing);
+    result.energy_fJ += energy_fJ(cables[k], p, impl_->rounding());
   }
   result.positions_um = std::move(minimum.positions_um);
   result.spans_um = std::move(minimum.spans_um);
@@ -157,7 +155,7 @@ std::vector<Vec2> CableNetwork::reactions_nN(const std::vector<double>& tensions
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
   std::vector<Vec2> result(equilibrium.positions_um.size());
   for (std::size_t k = 0; k < cables.size(); ++k) {
-    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->smoothing_um());
+    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->rounding());
     const Vec2 force = (p.force_nN / p.length_um) * equilibrium.spans_um[k];
     result[cables[k].vertex_a] += force;
     result[cables[k].vertex_b] += -1.0 * force;
@@ -194,9 +192,9 @@ Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<doubl
   std::vector<Coupling> couplings;  // the blocks of −H_xf
 
   for (std::size_t k = 0; k < cables.size(); ++k) {
-    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->smoothing_um());
+    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->rounding());
     const Vec2 n = (1 / p.length_um) * equilibrium.spans_um[k];
-    const BlockCholesky::Block block = stiffness(p, equilibrium.spans_um[k], n);
+    const BlockCholesky::Block block = stiffness(p, equilibrium.spans_um[k], p.stiffness_nN_per_um, n);
     impl_->free.add(h_ff, k, cables[k], block);
     const Eigen::Vector2d pull_of_unit_tension = impl_->network.links[k].share * Eigen::Vector2d(n.x, n.y);
     const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};

@@ -2,7 +2,9 @@
 ///
 ///   U(x) = sum_k share_k [ t_g(k) l_k + EA / (2 l0_k) max(0, l_k − l0_k)² ],   l_k = sqrt(|x_a − x_b|² + eps²)
 ///
-/// Convex in x, so the equilibrium for given tensions is the minimiser of U over the free vertices.
+/// Convex in x, so the equilibrium for given tensions is the minimiser of U over the free vertices. (In the code the
+/// rest length is smoothed like the length, so that the stretch begins at |x_a − x_b| = l0 exactly.)
+/// A tension of zero stands for its limit from above: where others pull, it counts as 1e-7 of the largest.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,7 +21,7 @@ struct CableParameters {
   double axial_stiffness_nN = 50;  ///< EA: force at 100 % strain beyond the rest length (thesis 3.2.3)
   double smoothing = 1e-5;         ///< eps in mean rest lengths: far below what the forces can tell
   double force_tolerance = 1e-9;   ///< largest net force on a free vertex, relative to the largest tension
-  int max_iterations = 500;        ///< of Newton's method: every loop ends
+  int max_iterations = 500;        ///< Newton steps; ordinary cells take 20 to 30, EA / t of 1e6 some 70
 };
 void declare(ParameterList& list, CableParameters& parameters);
 
@@ -29,13 +31,13 @@ struct Equilibrium {
                                ///< difference of the rounded positions is not; the forces follow from these
   std::vector<double> link_force_nN;  ///< by link; of a collapsed cable anything up to its tension
   double energy_fJ = 0;               ///< nN·um
-  Report report;
+  Report report;                      ///< last_change: the largest net force on a free vertex (nN)
 };
 
 /// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix.
 class CableNetwork {
  public:
-  /// @throws InvalidData where nothing holds the network
+  /// @throws InvalidData where fewer than two adhesions hold the network: its equilibrium is a point
   explicit CableNetwork(Network network, CableParameters parameters = {});
   ~CableNetwork();
   CableNetwork(CableNetwork&&) noexcept;
@@ -48,7 +50,10 @@ class CableNetwork {
   const std::vector<int>& adhesion_ids() const;
 
   /// @param tensions_nN  by group, >= 0
+  /// Not converged: the report says so, nothing is thrown. A part of the network that nothing holds collapses to a
+  /// point; without any tension nothing moves. May be called from several threads at once.
   /// @param start  vertex positions to start from (a previous equilibrium), or empty: the network's own
+  /// @throws InvalidData where a tension is negative, not finite or missing
   Equilibrium equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start = {}) const;
 
   /// Force of the network on each held vertex, by vertex (zero for the free ones).
@@ -56,7 +61,8 @@ class CableNetwork {
   /// Force on the substrate by adhesion: (fx, fy) of adhesion_ids()[i] at 2i, 2i+1.
   Eigen::VectorXd adhesion_forces_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
   /// dR/dt of the adhesion forces: 2·adhesions × groups, by the implicit function theorem (thesis has none):
-  /// dR/dt = −(B_x − H_xf H_ff⁻¹ B_f), H = d²U/dx², B = d²U/dx dt.
+  /// dR/dt = −(B_x − H_xf H_ff⁻¹ B_f), H = d²U/dx², B = d²U/dx dt. At a tension of zero: the derivative from above;
+  /// with all tensions zero: the elastic response of the network at rest.
   Eigen::MatrixXd adhesion_force_derivatives(const std::vector<double>& tensions_nN,
                                              const Equilibrium& equilibrium) const;
 

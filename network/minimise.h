@@ -25,12 +25,14 @@ struct FreeVertices {
 };
 
 struct MinimiseOptions {
-  double first_smoothing_um = 0;  ///< eps to begin with
-  double smoothing_um = 0;        ///< eps to end with
-  double largest_tension_nN = 0;
-  double force_tolerance_nN = 0;
+  double eps_um = 0;              ///< of the length
+  double edge_length_um = 0;      ///< what lengths compare with
+  double force_nN = 0;            ///< what forces compare with
+  double force_tolerance_nN = 0;  ///< largest net force on a free vertex at the end
   int max_iterations = 0;
 };
+
+enum class Start { cold, warm };
 
 struct Minimum {
   std::vector<Vec2> positions_um;
@@ -38,7 +40,9 @@ struct Minimum {
   Report report;               ///< last_change: the largest net force on a free vertex (nN)
 };
 
-Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> start,
-                 const MinimiseOptions& options);
+/// Newton's method with line search on a path of ever less rounded energies; a warm start tries the exact energy first.
+/// Each step lowers the energy (of the present rounding).
+Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> positions_um,
+                 Start start, const MinimiseOptions& options);
 
 }  // namespace mbtfm::network

@@ -63,7 +63,7 @@ int main(int argc, char** argv) {
                   "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
                  {"out", FileArgument::Kind::output, "network.vtu"}}},
       argc, argv, [](const network::NetworkParameters& parameters, StageContext& context) {
-        const Cell cell = read_cell(context.input("cell"));
+        const Cell cell = read_cell(context.input("cell", kCellFiles));
         const network::GeneratedNetwork generated = network::generate_network(cell, parameters);
         write_network(context.output("out"), generated.network);
         return report_of(generated);

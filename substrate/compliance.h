@@ -27,14 +27,15 @@ struct SubstrateParameters {
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
   // split: the grid of the smooth correction
-  double cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
+  int cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
 
   // refined
-  std::string element = "q2-p1disc";  ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
-  double elements_per_adhesion = 10;  ///< elements that cross each adhesion (area over element face); 20 for 1 %
-  double growth = 2;                  ///< element side over distance to the adhesion: what 2:1 balance gives anyway
+  std::string element = "q2-p1disc";      ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
+  double elements_across_adhesion = 1.4;  ///< square root of its area over their side: 2 % of a column; 1 % at 2
+  int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
+  double growth = 2;                      ///< their side over the distance to the adhesion: what halving gives anyway
 
-  double memory_limit_GB = 0;  ///< of split and refined; 0: what the machine has free
+  double memory_limit_GB = 0;  ///< of split and refined; 0: four fifths of what the machine has
 };
 void declare(ParameterList& list, SubstrateParameters& parameters);
 
@@ -57,7 +58,8 @@ class Substrate {
   virtual Figures figures() const = 0;
 };
 
-/// The model named in the parameters. @throws UsageError, InvalidData
+/// The model named in the parameters. The same bits for any number of threads, but for `refined`: its factorisation
+/// uses the threads of the BLAS and differs in the last digits. @throws UsageError, InvalidData
 std::unique_ptr<Substrate> make_substrate(const Gel& gel, const SubstrateParameters& parameters, int threads);
 
 /// The same for `half-space` and `layer` alone, which need no finite elements: links without deal.II.

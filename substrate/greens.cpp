@@ -14,13 +14,14 @@ void declare(ParameterList& list, SubstrateParameters& p) {
   list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
            "split: cells of the correction's grid over the gel's thickness");
   list.add("element", p.element, "refined: finite element", {"q2-p1disc", "q1-p0"});
-  list.add(
-      "elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
-      "refined: elements that cross each adhesion, as its area over that of an element's face; 4 at least are wise");
+  list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
+           "refined: square root of an adhesion's area over the side of the elements that carry it");
+  list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
+           "refined: elements that touch each adhesion, at least");
   list.add("growth", p.growth, Range::between(0.1, 10),
            "refined: largest side of an element over its distance to the nearest adhesion");
   list.add("memory_limit_GB", p.memory_limit_GB, Range::not_negative(),
-           "split, refined: memory the solution may take (GB); 0: what is free");
+           "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
 }
 
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {

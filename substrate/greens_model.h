@@ -12,7 +12,7 @@ inline double seconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 }
 
-/// Fill the matrix column pair by column pair: field_of(ellipse) gives a function from a point to its 2 x 2 compliance.
+/// Fill the matrix column pair by column pair: field_of(ellipse) has the compliance at a point.
 template <class FieldOf>
 Eigen::MatrixXd compliance_by_columns(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                       int threads, const FieldOf& field_of) {
@@ -24,7 +24,7 @@ Eigen::MatrixXd compliance_by_columns(const std::vector<Vec2>& points_um, const 
     double* along_x = matrix.col(2 * j).data();
     double* along_y = matrix.col(2 * j + 1).data();
     for (std::size_t i = 0; i < points_um.size(); ++i) {
-      const Sym2 g = field(points_um[i]);
+      const Sym2 g = field.compliance_um_per_nN(points_um[i]);
       along_x[2 * i] = g.xx;
       along_x[2 * i + 1] = g.xy;
       along_y[2 * i] = g.xy;

@@ -23,6 +23,7 @@ namespace {
 // ellipse (m = 0). Where n would be too large the interval is cut below those and each part drawn out by tanh.
 
 constexpr double kDigits = 29.9;    // -log(1e-13)
+constexpr double kRound = 1e6;      // exp(d) of a circle's tip: none
 constexpr int kMostMidpoints = 96;  // beyond it the tanh rule is cheaper
 constexpr double kTanhStep = 0.17;  // singularities at height pi/4: exp(-2 pi (pi/4) / 0.17) = 2e-13
 constexpr int kTanhPoints = 88;     // on either side: exp(-2 · 0.17 · 88) = 1e-13
@@ -86,15 +87,24 @@ const Rules& rules() {
   return instance;
 }
 
-double height_of_singularities(const Scene& s) {
-  const double tip = std::atanh(std::min(s.b / s.a, 1 - 1e-12));
-  if (s.r < 1) return std::min(tip, s.r > 0 ? std::acosh(1 / s.r) : tip);
-  // the tip psi = pi/2 - f0 + i tip, carried over to chi by sin chi = R sin psi = z; |Im asin z| = acosh of the
-  // semi-axis of the ellipse with foci -1, 1 through z
-  const double re = s.r * s.cos_0 * std::cosh(tip);
-  const double im = s.r * s.sin_0 * std::sinh(tip);
-  const double semi_axis = 0.5 * (std::hypot(re - 1, im) + std::hypot(re + 1, im));
-  return std::min(std::acosh(s.r), std::acosh(std::max(1.0, semi_axis)));
+/// exp(d), d the height of the nearest singularity.
+double exp_of_height(const Scene& s) {
+  if (s.r < 1) {
+    // rim: cosh d = 1/R; tip: tanh d = b/a, so exp(2d) = (a + b) / (a - b)
+    const double tip = s.a > s.b ? std::sqrt((s.a + s.b) / (s.a - s.b)) : kRound;
+    return s.r > 0 ? std::min(tip, (1 + std::sqrt((1 - s.r) * (1 + s.r))) / s.r) : tip;
+  }
+  // the tip psi = pi/2 - f0 + i d is carried over to chi by sin chi = R sin psi = z; cosh |Im asin z| is the
+  // semi-axis of the ellipse with foci -1, 1 through z. The rim lies at cosh d = R.
+  double semi_axis = s.r;
+  if (s.a > s.b) {
+    const double scale = s.r / std::sqrt((s.a + s.b) * (s.a - s.b));  // cosh d = a, sinh d = b over sqrt(a² - b²)
+    const double re = scale * s.a * s.cos_0;
+    const double im2 = scale * scale * s.b * s.b * s.sin_0 * s.sin_0;
+    const double sum = std::sqrt((re - 1) * (re - 1) + im2) + std::sqrt((re + 1) * (re + 1) + im2);
+    semi_axis = std::max(1.0, std::min(semi_axis, 0.5 * sum));
+  }
+  return semi_axis + std::sqrt((semi_axis - 1) * (semi_axis + 1));
 }
 
 /// Integrate over [low, high], graded towards both ends.
@@ -140,30 +150,35 @@ Sym2 midpoint_moments(const Scene& s, int n) {
 Sym2 chord_moments_um(Vec2 point_um, double semi_major_um, double semi_minor_um) {
   Scene s{.a = semi_major_um, .b = semi_minor_um, .r = 0, .cos_0 = 1, .sin_0 = 0};
   const Vec2 scaled = {std::abs(point_um.x) / s.a, std::abs(point_um.y) / s.b};
-  s.r = norm(scaled);
+  s.r = std::sqrt(dot(scaled, scaled));
   if (s.r > 0) {
     s.cos_0 = scaled.x / s.r;
     s.sin_0 = scaled.y / s.r;
   }
-  const double n = std::ceil(kDigits / (2 * height_of_singularities(s))) + 1;
+  const double n = std::ceil(kDigits / (2 * std::log(exp_of_height(s)))) + 1;
   Sym2 moments = n <= kMostMidpoints ? midpoint_moments(s, static_cast<int>(n)) : graded_moments(s);
   if ((point_um.x < 0) != (point_um.y < 0)) moments.xy = -moments.xy;
   return 2 * s.a * s.b * moments;
 }
 
-Sym2 half_space_compliance_um_per_nN(const Gel& gel, const Ellipse& ellipse, Vec2 point_um) {
-  const double c = std::cos(ellipse.angle_rad);
-  const double s = std::sin(ellipse.angle_rad);
-  const Vec2 offset = point_um - ellipse.centre_um;
-  const Sym2 m = chord_moments_um({c * offset.x + s * offset.y, c * offset.y - s * offset.x}, ellipse.semi_major_um,
-                                  ellipse.semi_minor_um);
-  const Sym2 turned = {c * c * m.xx - 2 * c * s * m.xy + s * s * m.yy, c * s * (m.xx - m.yy) + (c * c - s * s) * m.xy,
-                       s * s * m.xx + 2 * c * s * m.xy + c * c * m.yy};
-  const double nu = gel.poisson_ratio;
-  const double area = pi * ellipse.semi_major_um * ellipse.semi_minor_um;
+HalfSpaceEllipse::HalfSpaceEllipse(const Gel& gel, const Ellipse& ellipse)
+    : ellipse_(ellipse),
+      poisson_ratio_(gel.poisson_ratio),
+      cos_(std::cos(ellipse.angle_rad)),
+      sin_(std::sin(ellipse.angle_rad)),
+      scale_(1 / (2 * pi * pi * shear_modulus_kPa(gel) * ellipse.semi_major_um * ellipse.semi_minor_um)) {}
+
+Sym2 HalfSpaceEllipse::compliance_um_per_nN(Vec2 point_um) const {
+  const double c = cos_;
+  const double s = sin_;
+  const Vec2 offset = point_um - ellipse_.centre_um;
+  const Sym2 m = chord_moments_um({c * offset.x + s * offset.y, c * offset.y - s * offset.x}, ellipse_.semi_major_um,
+                                  ellipse_.semi_minor_um);
+  const double nu = poisson_ratio_;
   const double even = (1 - nu) * (m.xx + m.yy);
-  return 1 / (2 * pi * shear_modulus_kPa(gel) * area) *
-         Sym2{even + nu * turned.xx, nu * turned.xy, even + nu * turned.yy};
+  return scale_ * Sym2{even + nu * (c * c * m.xx - 2 * c * s * m.xy + s * s * m.yy),
+                       nu * (c * s * (m.xx - m.yy) + (c * c - s * s) * m.xy),
+                       even + nu * (s * s * m.xx + 2 * c * s * m.xy + c * c * m.yy)};
 }
 
 PointForceField cerruti_field(const Gel& gel, double x_um, double y_um, double z_um) {

@@ -29,13 +29,22 @@ inline double shear_modulus_kPa(const Gel& gel) { return gel.youngs_modulus_kPa 
 /// ellipses too. Source: polar coordinates about the observer, dA = s ds dt, cancel the 1/s of Cerruti's kernel.
 Sym2 chord_moments_um(Vec2 point_um, double semi_major_um, double semi_minor_um);
 
-/// Displacement (um) of a point of the surface by a unit force (1 nN) spread evenly over an ellipse; the half-space's
+/// Displacement (um) of points of the surface by a unit force (1 nN) spread evenly over an ellipse; the half-space's
 /// exact field, inside and outside:
 ///
 ///   g = 1 / (2 pi mu A) [ (1-nu) tr(M) I + nu M ],   A the ellipse's area, M its chord moments at the point
 ///
 /// Source: Landau & Lifshitz, Theory of Elasticity, §8, integrated.
-Sym2 half_space_compliance_um_per_nN(const Gel& gel, const Ellipse& ellipse, Vec2 point_um);
+class HalfSpaceEllipse {
+ public:
+  HalfSpaceEllipse(const Gel& gel, const Ellipse& ellipse);
+  Sym2 compliance_um_per_nN(Vec2 point_um) const;
+
+ private:
+  Ellipse ellipse_;
+  double poisson_ratio_, cos_, sin_;
+  double scale_;  ///< 1 / (2 pi mu A)
+};
 
 /// Displacement of the half-space below its surface by unit point forces at the origin of its surface.
 /// Index [f]: force along x (0) or y (1).

@@ -10,9 +10,8 @@ class HalfSpace final : public Substrate {
 
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<Ellipse>& ellipses) const override {
-    return compliance_by_columns(points_um, ellipses, threads_, [this](const Ellipse& ellipse) {
-      return [this, &ellipse](Vec2 point) { return half_space_compliance_um_per_nN(gel_, ellipse, point); };
-    });
+    return compliance_by_columns(points_um, ellipses, threads_,
+                                 [this](const Ellipse& ellipse) { return HalfSpaceEllipse(gel_, ellipse); });
   }
   std::vector<Effect> effects() const override {
     return {{.name = "finite thickness",

@@ -12,9 +12,10 @@ using std::numbers::pi;
 
 namespace {
 
-constexpr int kPieces = static_cast<int>(LayerTable::kReach);
-constexpr int kOrder = LayerTable::kOrder;  // the nearest singularity, r = 2i, is 4 half pieces away: 8^-16 = 4e-15
-constexpr double kAverageTolerance = 1e-9;
+using Value = LayerTable::Value;
+constexpr int kOrder = LayerTable::kOrder;
+constexpr int kUnitOrder = 16;  // over one thickness the singularity r = 2i is 4 half lengths away: 8^-16 = 4e-15
+constexpr double kAverageTolerance = 1e-8;  // of the leading term left out, whose factor is 0.1 or less
 
 /// Nodes and weights of the transforms' integral over x = k h, the integrands' factors included.
 struct Transform {
@@ -46,8 +47,8 @@ Transform transform(double nu) {
   return result;
 }
 
-LayerTable::Value integrate(const Transform& transform, double r) {
-  LayerTable::Value value;
+Value integrate(const Transform& transform, double r) {
+  Value value;
   for (std::size_t i = 0; i < transform.x.size(); ++i) {
     const double xr = transform.x[i] * r;
     const double bessel_0 = ::j0(xr);
@@ -59,8 +60,57 @@ LayerTable::Value integrate(const Transform& transform, double r) {
   return value;
 }
 
+double chebyshev_node(int n, int k) { return std::cos(pi * (k + 0.5) / n); }
+
+/// sum of c_k T_k(t) on [-1, 1]
+struct ChebyshevSeries {
+  std::vector<Value> c;
+  Value at(double t) const {
+    Value next, after;
+    for (std::size_t k = c.size() - 1; k > 0; --k) {  // Clenshaw
+      const Value now = {2 * t * next.s - after.s + c[k].s, 2 * t * next.d - after.d + c[k].d};
+      after = next;
+      next = now;
+    }
+    return {t * next.s - after.s + c[0].s, t * next.d - after.d + c[0].d};
+  }
+};
+
+/// Through values at the Chebyshev nodes.
+ChebyshevSeries chebyshev_series(const std::vector<Value>& values) {
+  const int n = static_cast<int>(values.size());
+  ChebyshevSeries series;
+  for (int k = 0; k < n; ++k) {
+    Value sum;
+    for (int node = 0; node < n; ++node) {
+      const double weight = (k == 0 ? 1.0 : 2.0) / n * std::cos(k * pi * (node + 0.5) / n);
+      sum = {sum.s + weight * values[node].s, sum.d + weight * values[node].d};
+    }
+    series.c.push_back(sum);
+  }
+  return series;
+}
+
+/// The same polynomial in powers of t.
+LayerTable::Piece monomials(const ChebyshevSeries& series) {
+  LayerTable::Piece powers{};
+  std::array<double, kOrder> before{}, now{};  // coefficients of T_(k-1), T_k
+  now[0] = 1;
+  for (int k = 0; k < kOrder; ++k) {
+    std::array<double, kOrder> next{};
+    for (int i = 0; i < kOrder; ++i) {
+      powers[i] = {powers[i].s + series.c[k].s * now[i], powers[i].d + series.c[k].d * now[i]};
+      if (i + 1 < kOrder) next[i + 1] += (k == 0 ? 1 : 2) * now[i];
+      next[i] -= before[i];
+    }
+    before = now;
+    now = next;
+  }
+  return powers;
+}
+
 /// S I + D (2 e e^T - I)
-Sym2 tensor(LayerTable::Value value, Vec2 offset, double squared) {
+Sym2 tensor(Value value, Vec2 offset, double squared) {
   const double twice = squared > 0 ? 2 * value.d / squared : 0;
   const double even = value.s - (squared > 0 ? value.d : 0);
   return {even + twice * offset.x * offset.x, twice * offset.x * offset.y, even + twice * offset.y * offset.y};
@@ -68,19 +118,21 @@ Sym2 tensor(LayerTable::Value value, Vec2 offset, double squared) {
 
 }  // namespace
 
-LayerTable::LayerTable(double poisson_ratio) : poisson_ratio_(poisson_ratio), coefficients_(2 * kPieces * kOrder) {
+LayerTable::LayerTable(double poisson_ratio) : poisson_ratio_(poisson_ratio) {
   const Transform factors = transform(poisson_ratio);
-  for (int piece = 0; piece < kPieces; ++piece) {
-    double* s = &coefficients_[2 * piece * kOrder];
-    double* d = s + kOrder;
-    for (int node = 0; node < kOrder; ++node) {
-      const double angle = pi * (node + 0.5) / kOrder;
-      const Value value = integrate(factors, piece + 0.5 * (1 + std::cos(angle)));
-      for (int k = 0; k < kOrder; ++k) {
-        const double weight = (k == 0 ? 1.0 : 2.0) / kOrder * std::cos(k * angle);
-        s[k] += weight * value.s;
-        d[k] += weight * value.d;
+  pieces_.reserve(static_cast<std::size_t>(kReach) * kPiecesPerUnit);
+  for (int unit = 0; unit < static_cast<int>(kReach); ++unit) {
+    std::vector<Value> values;
+    for (int node = 0; node < kUnitOrder; ++node) {
+      values.push_back(integrate(factors, unit + 0.5 * (1 + chebyshev_node(kUnitOrder, node))));
+    }
+    const ChebyshevSeries whole = chebyshev_series(values);
+    for (int k = 0; k < kPiecesPerUnit; ++k) {
+      values.clear();
+      for (int node = 0; node < kOrder; ++node) {
+        values.push_back(whole.at((2 * k + 1 + chebyshev_node(kOrder, node)) / kPiecesPerUnit - 1));
       }
+      pieces_.push_back(monomials(chebyshev_series(values)));
     }
   }
 }
@@ -88,20 +140,13 @@ LayerTable::LayerTable(double poisson_ratio) : poisson_ratio_(poisson_ratio), co
 LayerTable::Value LayerTable::correction(double r) const {
   // beyond the reach: what cancels the half-space's
   if (r >= kReach) return {-(2 - poisson_ratio_) / (2 * r), -poisson_ratio_ / (2 * r)};
-  const int piece = static_cast<int>(r);
-  const double* s = &coefficients_[2 * piece * kOrder];
-  const double* d = s + kOrder;
-  const double twice = 4 * (r - piece) - 2;
-  double s_next = 0, s_after = 0, d_next = 0, d_after = 0;
-  for (int k = kOrder - 1; k > 0; --k) {  // Clenshaw
-    const double s_now = twice * s_next - s_after + s[k];
-    const double d_now = twice * d_next - d_after + d[k];
-    s_after = s_next;
-    d_after = d_next;
-    s_next = s_now;
-    d_next = d_now;
-  }
-  return {0.5 * twice * s_next - s_after + s[0], 0.5 * twice * d_next - d_after + d[0]};
+  const double scaled = kPiecesPerUnit * r;
+  const int index = static_cast<int>(scaled);
+  const Piece& piece = pieces_[index];
+  const double t = 2 * (scaled - index) - 1;
+  Value sum;
+  for (int k = kOrder - 1; k >= 0; --k) sum = {sum.s * t + piece[k].s, sum.d * t + piece[k].d};
+  return sum;
 }
 
 Layer::Layer(const Gel& gel)
@@ -125,7 +170,8 @@ Sym2 Layer::point_compliance_um_per_nN(Vec2 offset_um) const {
   return scale_ * tensor(value, offset_um, squared);
 }
 
-LayerEllipse::LayerEllipse(const Layer& layer, const Ellipse& ellipse) : layer_(layer), ellipse_(ellipse) {
+LayerEllipse::LayerEllipse(const Layer& layer, const Ellipse& ellipse)
+    : layer_(layer), ellipse_(ellipse), half_space_(layer.gel(), ellipse) {
   // A function whose nearest singularity lies at z semi-axes beside the ellipse is averaged by a rule of degree n to
   // about q^(n+1), q = 1/(z + sqrt(z² + 1)); the correction has its own at z = 2 h / a, up or down.
   const double z = 2 * layer.gel().thickness_um / ellipse.semi_major_um;
@@ -154,7 +200,7 @@ Sym2 LayerEllipse::compliance_um_per_nN(Vec2 point_um) const {
     for (const DiscPoint& p : rule.points) sum += p.weight * layer_.point_compliance_um_per_nN(offset - p.position);
     return sum;
   }
-  sum = half_space_compliance_um_per_nN(layer_.gel(), ellipse_, point_um);
+  sum = half_space_.compliance_um_per_nN(point_um);
   for (const DiscPoint& p : correction_rule_) {
     sum += p.weight * layer_.point_correction_um_per_nN(offset - p.position);
   }

@@ -10,13 +10,14 @@
 /// Source: Hannah (1951), Q. J. Mech. Appl. Math. 4, 94 (tangential load); del Alamo et al., PNAS 110, 16361 (2013).
 #pragma once
 
+#include <array>
 #include <vector>
 
 #include "substrate/half_space.h"
 
 namespace mbtfm::substrate {
 
-/// S and D of the layer less those of the half-space, times 2 pi mu h, as functions of r/h: piecewise Chebyshev series.
+/// S and D of the layer less those of the half-space, times 2 pi mu h, as functions of r/h: piecewise polynomials.
 class LayerTable {
  public:
   explicit LayerTable(double poisson_ratio);
@@ -29,11 +30,13 @@ class LayerTable {
   /// Beyond this many thicknesses the layer's own displacement is taken as zero: it falls as exp(-0.739 r/h) for
   /// nu = 1/2 (first zero of cos y = y, a pole of L) and faster below: 2e-13 of a half-space's there.
   static constexpr double kReach = 40;
-  static constexpr int kOrder = 16;  ///< coefficients a piece
+  static constexpr int kPiecesPerUnit = 8;
+  static constexpr int kOrder = 8;  ///< coefficients a piece: r = 2i is 32 half pieces away, 64^-8 = 4e-15
+  using Piece = std::array<Value, kOrder>;
 
  private:
   double poisson_ratio_;
-  std::vector<double> coefficients_;  ///< [piece][s or d][order]
+  std::vector<Piece> pieces_;  ///< polynomials in t in [-1, 1] over 1/8 of a thickness each
 };
 
 /// The layer with its table: displacements of its surface.
@@ -54,7 +57,7 @@ class Layer {
 };
 
 /// Averages a layer's point field over one ellipse: exact half-space field + averaged correction near it, the average
-/// of the whole field far from it, to about 1e-9 of the field.
+/// of the whole field far from it, to about 1e-8 of the field.
 class LayerEllipse {
  public:
   LayerEllipse(const Layer& layer, const Ellipse& ellipse);
@@ -63,6 +66,7 @@ class LayerEllipse {
  private:
   const Layer& layer_;
   Ellipse ellipse_;
+  HalfSpaceEllipse half_space_;
   std::vector<DiscPoint> correction_rule_;
   struct FarRule {
     double from_um;

@@ -11,9 +11,8 @@ class LayerModel final : public Substrate {
 
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<Ellipse>& ellipses) const override {
-    return compliance_by_columns(points_um, ellipses, threads_, [this](const Ellipse& ellipse) {
-      return [field = LayerEllipse(layer_, ellipse)](Vec2 point) { return field.compliance_um_per_nN(point); };
-    });
+    return compliance_by_columns(points_um, ellipses, threads_,
+                                 [this](const Ellipse& ellipse) { return LayerEllipse(layer_, ellipse); });
   }
   std::vector<Effect> effects() const override {
     return {{.name = "finite thickness", .is_on = true, .why = "layer on a rigid base, to 1e-6 of the field"},

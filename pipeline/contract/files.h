@@ -25,7 +25,9 @@ void write_fibres(const Path& fibres_file, const Path& points_file, const std::v
 Polygon read_outline(const Path& file);
 void write_outline(const Path& file, const Polygon& outline_um);
 
-/// adhesions.csv, fibres.csv, fibre_points.csv, outline.csv of a folder, checked against each other
+/// What a segmented cell consists of.
+inline const std::vector<std::string> kCellFiles = {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"};
+/// kCellFiles of a folder, checked against each other
 Cell read_cell(const Path& folder);
 
 DisplacementField read_displacement(const Path& file);

@@ -112,11 +112,16 @@ Progress terminal_progress(const std::string& stage, bool is_quiet) {
   };
 }
 
-nlohmann::ordered_json hashes_of(const std::vector<fs::path>& files, const fs::path& folder) {
+/// Content hashes of files that lie at `at` now and are called `name` when all is in place.
+struct HashedFile {
+  fs::path at, name;
+};
+
+nlohmann::ordered_json hashes_of(const std::vector<HashedFile>& files, const fs::path& folder) {
   auto list = nlohmann::ordered_json::array();
-  for (const fs::path& file : files) {
-    if (!fs::is_regular_file(file)) continue;
-    list.push_back({{"file", fs::proximate(file, folder).generic_string()}, {"sha256", sha256_of_file(file)}});
+  for (const HashedFile& file : files) {
+    if (!fs::is_regular_file(file.at)) continue;
+    list.push_back({{"file", fs::proximate(file.name, folder).generic_string()}, {"sha256", sha256_of_file(file.at)}});
   }
   return list;
 }
@@ -145,10 +150,13 @@ double peak_memory_MB() {
 }
 
 void write_record(const fs::path& file, const StageDescription& description, const ParameterList& list,
-                  const StageContext& context, const StageReport& report, double seconds) {
+                  StageContext& context, const StageReport& report, double seconds) {
   const fs::path folder = fs::absolute(file).parent_path();
-  std::vector<fs::path> outputs;
-  for (const auto& pending : context.pending_) outputs.push_back(pending.destination);
+  std::vector<HashedFile> inputs, outputs;
+  for (const fs::path& read : context.read_) inputs.push_back({.at = read, .name = read});
+  for (const auto& pending : context.pending_) {
+    outputs.push_back({.at = pending.temporary, .name = pending.destination});
+  }
   nlohmann::ordered_json effects = nlohmann::ordered_json::array();
   for (const Effect& e : report.effects) {
     effects.push_back({{"name", e.name}, {"on", e.is_on}, {"why", e.why}, {"seconds", e.seconds}});
@@ -156,7 +164,7 @@ void write_record(const fs::path& file, const StageDescription& description, con
   const nlohmann::ordered_json record = {{"stage", description.name},
                                          {"version", kVersion},
                                          {"parameters", parameters_of(list)},
-                                         {"inputs", hashes_of(context.read_, folder)},
+                                         {"inputs", hashes_of(inputs, folder)},
                                          {"outputs", hashes_of(outputs, folder)},
                                          {"threads", context.threads},
                                          {"seconds", seconds},
@@ -165,7 +173,9 @@ void write_record(const fs::path& file, const StageDescription& description, con
                                          {"summary", report.summary},
                                          {"figures", json_of(report.figures)},
                                          {"effects", effects}};
-  write_whole(file, record.dump(2) + "\n");
+  context.make_folder(file.parent_path());
+  context.pending_.push_back({.temporary = temporary_name(file), .destination = file});
+  write_text(temporary_name(file), record.dump(2) + "\n");
 }
 
 /// Remove what an unfinished run has left: temporary files, and folders made for them that are still empty.
@@ -175,10 +185,13 @@ void discard(const StageContext& context) {
   for (auto folder = context.made_.rbegin(); folder != context.made_.rend(); ++folder) fs::remove(*folder, ignored);
 }
 
-void commit(const StageContext& context) {
+void expect_all_written(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) {
     if (!fs::exists(temporary)) throw InternalError(destination.string() + " was announced and not written");
   }
+}
+
+void commit(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) {
     std::error_code error;
     fs::rename(temporary, destination, error);
@@ -200,9 +213,11 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
   context.progress = terminal_progress(description.name, line.is_quiet);
   try {
     const StageReport report = body(context);
-    commit(context);
+    expect_all_written(context);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    // The record takes its place last: where it is, all that it speaks of is.
     if (!line.record.empty()) write_record(line.record, description, list, context, report, seconds.count());
+    commit(context);
     if (!report.converged) {
       say(description.name, "error", "not converged: " + report.summary);
       return kNotSolved;
@@ -219,11 +234,16 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
 
 bool StageContext::was_interrupted() const { return mbtfm::was_interrupted; }
 
-fs::path StageContext::input(const std::string& name, const std::string& file) {
+fs::path StageContext::input(const std::string& name) {
   MBTFM_ASSERT(inputs_.contains(name));
-  const fs::path path = file.empty() ? inputs_.at(name) : inputs_.at(name) / file;
-  read_.push_back(path);
-  return path;
+  read_.push_back(inputs_.at(name));
+  return inputs_.at(name);
+}
+
+fs::path StageContext::input(const std::string& name, const std::vector<std::string>& files) {
+  MBTFM_ASSERT(inputs_.contains(name));
+  for (const std::string& file : files) read_.push_back(inputs_.at(name) / file);
+  return inputs_.at(name);
 }
 
 fs::path StageContext::output(const std::string& name) { return output(name, {}); }

@@ -34,8 +34,10 @@ class StageContext {
   Progress progress;
   bool was_interrupted() const;
 
-  /// Path of an input that was given. An input that is a folder: path of `file` in it.
-  std::filesystem::path input(const std::string& name, const std::string& file = {});
+  /// Path of an input that was given.
+  std::filesystem::path input(const std::string& name);
+  /// An input that is a folder, of which these files are read.
+  std::filesystem::path input(const std::string& name, const std::vector<std::string>& files);
   bool has_input(const std::string& name) const { return inputs_.contains(name); }
   /// Temporary path to write an output to.
   std::filesystem::path output(const std::string& name);

@@ -43,7 +43,6 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"vtk", {"pipeline/contract"}},
     {"CLI/", {"pipeline", "pipeline/contract"}},
     {"nlohmann/", {"pipeline", "pipeline/contract"}},
-    {"spdlog/", {"pipeline", "pipeline/contract"}},
     {"fmt/", {"pipeline", "pipeline/contract"}},
     {"toml++/", {"pipeline", "pipeline/contract"}},
     {"openssl/", {"pipeline/contract"}},

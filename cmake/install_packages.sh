@@ -1,0 +1,40 @@
+#!/usr/bin/env bash
+# Install the Debian packages that mbtfm builds with, those that lack only. As root or through sudo; says what lacks
+# where it can do neither.
+set -euo pipefail
+
+packages=(
+  g++ cmake ninja-build ccache mold
+  libopencv-dev libvtk9-dev libeigen3-dev libdeal.ii-dev libboost-dev libboost-thread-dev libcgal-dev
+  libsuitesparse-dev libopenblas0-pthread libopenblas-pthread-dev
+  libtiff-dev libpng-dev libssl-dev
+  libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
+  libgtest-dev libgmock-dev libbenchmark-dev
+)
+
+missing=()
+for package in "${packages[@]}"; do
+  status=$(dpkg-query -W -f '${db:Status-Status}' "$package" 2>/dev/null || true)
+  [ "$status" = installed ] || missing+=("$package")
+done
+if [ ${#missing[@]} -eq 0 ]; then exit 0; fi
+
+echo "mbtfm: installing ${#missing[@]} Debian packages: ${missing[*]}"
+as_root=()
+if [ "$(id -u)" -ne 0 ]; then
+  if ! command -v sudo >/dev/null; then
+    echo "mbtfm: error: these packages lack, and this is neither root nor is there sudo. Ask for:" >&2
+    echo "  apt-get install --no-install-recommends ${missing[*]}" >&2
+    exit 1
+  fi
+  as_root=(sudo)
+fi
+install() {
+  "${as_root[@]}" env DEBIAN_FRONTEND=noninteractive apt-get install -y -q --no-install-recommends "${missing[@]}"
+}
+if ! { "${as_root[@]}" apt-get update -q && install; } >/tmp/mbtfm-packages-$$.log 2>&1; then
+  tail -n 20 "/tmp/mbtfm-packages-$$.log" >&2
+  echo "mbtfm: error: the packages could not be installed (log: /tmp/mbtfm-packages-$$.log). Lacking: ${missing[*]}" >&2
+  exit 1
+fi
+rm -f "/tmp/mbtfm-packages-$$.log"

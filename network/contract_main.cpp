@@ -1,0 +1,77 @@
+#include <algorithm>
+#include <map>
+#include <string>
+
+#include "network/cables.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/stage.h"
+
+namespace mbtfm {
+namespace {
+
+/// @throws InputError naming the fibres of the network without a tension
+std::vector<double> tensions_by_group(const std::vector<int>& fibre_ids, const std::vector<Tension>& rows,
+                                      const Path& file) {
+  std::map<int, double> given;
+  for (const Tension& row : rows) given[row.fibre_id] = row.tension_nN;
+  std::vector<double> result;
+  std::string missing;
+  for (const int id : fibre_ids) {
+    if (given.contains(id))
+      result.push_back(given[id]);
+    else
+      missing += (missing.empty() ? "" : ", ") + std::to_string(id);
+  }
+  if (!missing.empty())
+    throw InputError(file.string(), "a row for each fibre of the network", "none for fibre_id " + missing,
+                     "fibre_id 0 is the actin network");
+  return result;
+}
+
+StageReport report_of(const network::CableNetwork& cables, const network::Equilibrium& equilibrium,
+                      const Eigen::VectorXd& forces) {
+  double total = 0;
+  for (Eigen::Index i = 0; i < forces.size(); i += 2) total += forces.segment<2>(i).norm();
+  StageReport report;
+  report.converged = equilibrium.report.converged;
+  report.summary = equilibrium.report.reason;
+  report.figures = {{"newton_steps", std::int64_t{equilibrium.report.iterations}},
+                    {"largest_net_force_nN", equilibrium.report.last_change},
+                    {"energy_fJ", equilibrium.energy_fJ},
+                    {"n_adhesions", static_cast<std::int64_t>(cables.adhesion_ids().size())},
+                    {"total_force_nN", total}};
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm
+
+int main(int argc, char** argv) {
+  using namespace mbtfm;
+  using Kind = FileArgument::Kind;
+  return run_stage<network::CableParameters>(
+      {.name = "contract",
+       .purpose = "contract a cable network with given tensions",
+       .files = {{"network", Kind::input, "network.vtu"},
+                 {"tensions", Kind::input, "tensions.csv: fibre_id, tension_nN; fibre_id 0 is the actin network"},
+                 {"out", Kind::output, "the contracted network (.vtu), with the force each cable carries"},
+                 {"reactions", Kind::output, "force on the substrate at each held vertex (.csv)"}}},
+      argc, argv, [](const network::CableParameters& parameters, StageContext& context) {
+        const Path tensions_file = context.input("tensions");
+        const network::CableNetwork cables(read_network(context.input("network")), parameters);
+        const auto tensions = tensions_by_group(cables.fibre_ids(), read_tensions(tensions_file), tensions_file);
+        const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+        const std::vector<Vec2> by_vertex = cables.reactions_nN(tensions, equilibrium);
+        std::vector<int> vertices;
+        std::vector<Vec2> forces;
+        for (std::size_t v = 0; v < by_vertex.size(); ++v)
+          if (cables.network().adhesion_id[v] != 0) {
+            vertices.push_back(static_cast<int>(v));
+            forces.push_back(by_vertex[v]);
+          }
+        write_contracted_network(context.output("out"), cables.network(), equilibrium.positions_um,
+                                 equilibrium.link_force_nN);
+        write_reactions(context.output("reactions"), vertices, forces);
+        return report_of(cables, equilibrium, cables.adhesion_forces_nN(tensions, equilibrium));
+      });
+}

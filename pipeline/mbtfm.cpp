@@ -1,0 +1,171 @@
+/// mbtfm: starts the stages. It links none of them.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <cstdio>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
+#include "pipeline/contract/version.h"
+#include "pipeline/report/compare.h"
+#include "pipeline/report/report.h"
+#include "pipeline/runner/batch.h"
+#include "pipeline/runner/process.h"
+#include "pipeline/runner/run_cell.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace mbtfm;
+
+constexpr int kDone = 0, kFailed = 1, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70,
+              kInterrupted = 130;
+
+struct CommandLine {
+  fs::path folder;
+  fs::path stage_folder = runner::executable_folder();
+  int threads = available_threads();
+  int jobs = 1;
+  bool is_quiet = false;
+  std::vector<std::string> only, redo;
+};
+
+void say(const std::string& line) { std::fprintf(stderr, "mbtfm: %s\n", line.c_str()); }
+
+int run(const CommandLine& line) {
+  const runner::RunOptions options{.stage_folder = line.stage_folder,
+                                   .threads = line.threads,
+                                   .is_quiet = line.is_quiet,
+                                   .only = line.only,
+                                   .redo = line.redo,
+                                   .version = kVersion,
+                                   .say = line.is_quiet ? nullptr : say};
+  const runner::CellOutcome outcome = runner::run_cell(line.folder, options);
+  if (fs::is_regular_file(line.folder / "4_fit/fit.json")) {
+    report::update_report(line.folder);
+    if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
+  }
+  if (outcome.converged()) return kDone;
+  std::string names;
+  for (const auto& stage : outcome.stages) {
+    if (!stage.converged) names += (names.empty() ? "" : ", ") + stage.stage;
+  }
+  std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", names.c_str());
+  return kNotSolved;
+}
+
+int batch(const CommandLine& line) {
+  const std::vector<fs::path> cells = runner::find_cells(line.folder);
+  std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
+                                        "--stages-dir", line.stage_folder.string()};
+  for (const std::string& stage : line.only) arguments.insert(arguments.end(), {"--only", stage});
+  for (const std::string& stage : line.redo) arguments.insert(arguments.end(), {"--redo", stage});
+  const auto outcomes = runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
+                                                  .arguments = arguments,
+                                                  .jobs = line.jobs,
+                                                  .say = line.is_quiet ? nullptr : say});
+  int n_failed = 0;
+  for (const runner::BatchCell& cell : outcomes) {
+    if (cell.exit_code == 0) continue;
+    ++n_failed;
+    std::fprintf(stderr, "mbtfm: %s: exit code %d: %s\n", cell.cell.c_str(), cell.exit_code, cell.message.c_str());
+  }
+  std::fprintf(stderr, "mbtfm: %zu cells done, %d failed\n", outcomes.size() - n_failed, n_failed);
+  return n_failed == 0 ? kDone : kFailed;
+}
+
+/// Become mbtfm-stats.
+int stats(const CommandLine& line, const std::vector<std::string>& further) {
+  const std::string program = (runner::executable_folder() / "mbtfm-stats").string();
+  std::vector<std::string> arguments = {program,
+                                        "--cells",
+                                        line.folder.string(),
+                                        "--out",
+                                        (line.folder / "statistics").string(),
+                                        "--threads",
+                                        std::to_string(line.threads)};
+  if (line.is_quiet) arguments.emplace_back("--quiet");
+  arguments.insert(arguments.end(), further.begin(), further.end());
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  execv(pointers[0], pointers.data());
+  throw OutputError("cannot start " + program);
+}
+
+int compare(const CommandLine& line) {
+  std::fputs(report::comparison_text(line.folder).c_str(), stdout);
+  return kDone;
+}
+
+CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name, const std::string& purpose,
+                      const std::string& folder) {
+  CLI::App* command = app.add_subcommand(name, purpose);
+  command->add_option(folder, line.folder, folder == "CELL" ? "a cell folder" : "a folder of cell folders")->required();
+  command->add_option("--threads", line.threads, "processors to use")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command->add_flag("--quiet", line.is_quiet, "print errors only");
+  return command;
+}
+
+void add_stage_options(CLI::App* command, CommandLine& line) {
+  command->add_option("--only", line.only, "run these stages only: segment, track, network, fit");
+  command->add_option("--redo", line.redo, "run these stages even if up to date or changed by hand");
+  command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
+}
+
+int start(int argc, char** argv) {
+  CommandLine line;
+  CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
+  app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
+  app.require_subcommand(1);
+  CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
+  add_stage_options(run_command, line);
+  CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
+  add_stage_options(batch_command, line);
+  batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
+  CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
+  stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
+  add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", "CELL");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? kDone : kUsage;
+  }
+  if (run_command->parsed()) return run(line);
+  if (batch_command->parsed()) return batch(line);
+  if (stats_command->parsed()) return stats(line, stats_command->remaining());
+  return compare(line);
+}
+
+int fail(int code, const char* kind, const char* message, const std::string& hint = {}) {
+  std::fprintf(stderr, "mbtfm: %s: %s\n", kind, message);
+  if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
+  return code;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  runner::watch_interrupts();
+  try {
+    return start(argc, argv);
+  } catch (const UsageError& error) {
+    return fail(kUsage, "error", error.what());
+  } catch (const InputError& error) {
+    return fail(kInput, "error", error.what(), error.hint);
+  } catch (const InvalidData& error) {
+    return fail(kInput, "error", error.what());
+  } catch (const runner::StageFailed& error) {
+    return fail(error.exit_code, "error", error.what());
+  } catch (const runner::Interrupted& error) {
+    return fail(kInterrupted, "error", error.what());
+  } catch (const OutputError& error) {
+    return fail(kOutput, "error", error.what());
+  } catch (const fs::filesystem_error& error) {
+    return fail(kOutput, "error", error.what());
+  } catch (const std::exception& error) {
+    return fail(kBug, "internal error", error.what(), "please report this with the command and its inputs");
+  }
+}

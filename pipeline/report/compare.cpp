@@ -1,0 +1,136 @@
+#include "pipeline/report/compare.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/report/match_fibres.h"
+
+namespace mbtfm::report {
+namespace fs = std::filesystem;
+namespace {
+
+double sum_of_magnitudes(const std::vector<AdhesionForce>& forces) {
+  double sum = 0;
+  for (const AdhesionForce& force : forces) sum += norm(force.force_nN);
+  return sum;
+}
+
+/// Index of the true fibre by found fibre.
+std::map<int, int> partners(const std::vector<Fibre>& found, const std::vector<Fibre>& truth, bool by_place) {
+  std::map<int, int> partner;
+  if (by_place) {
+    for (const FibreMatch& match : match_fibres(found, truth)) partner[match.found_index] = match.true_index;
+  } else {
+    for (std::size_t i = 0; i < found.size(); ++i) partner[static_cast<int>(i)] = static_cast<int>(i);
+  }
+  return partner;
+}
+
+void add_figures(Comparison& comparison) {
+  double error2 = 0, truth2 = 0;
+  for (const ComparedFibre& fibre : comparison.fibres) {
+    if (fibre.truth && length_um(fibre.truth->points_um) > kLongFibre_um) {
+      ++comparison.n_long;
+      if (fibre.found && fibre.found->type == fibre.truth->type) ++comparison.n_long_found_and_typed;
+    }
+    if (!fibre.tension || !fibre.true_tension_nN) continue;
+    ++comparison.n_matched;
+    error2 += std::pow(fibre.tension->tension_nN - *fibre.true_tension_nN, 2);
+    truth2 += std::pow(*fibre.true_tension_nN, 2);
+  }
+  comparison.relative_error = truth2 > 0 ? std::sqrt(error2 / truth2) : 0;
+}
+
+std::string number(const std::optional<double>& value) { return value ? fmt::format("{:.3g}", *value) : "–"; }
+std::string label(const std::optional<Fibre>& fibre) { return fibre ? std::to_string(fibre->fibre_id) : "–"; }
+
+}  // namespace
+
+bool has_truth(const fs::path& cell) { return fs::is_regular_file(cell / "truth/tensions.csv"); }
+
+Comparison compare_with_truth(const fs::path& cell) {
+  if (!has_truth(cell)) {
+    throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none");
+  }
+  const std::vector<Fibre> found = read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
+  const bool by_place = fs::is_regular_file(cell / "truth/fibres.csv");
+  const std::vector<Fibre> truth =
+      by_place ? read_fibres(cell / "truth/fibres.csv", cell / "truth/fibre_points.csv") : found;
+
+  std::map<int, Tension> tension;
+  for (const Tension& t : read_tensions(cell / "4_fit/tensions.csv")) tension[t.fibre_id] = t;
+  std::map<int, double> true_tension_nN;
+  for (const Tension& t : read_tensions(cell / "truth/tensions.csv")) true_tension_nN[t.fibre_id] = t.tension_nN;
+
+  Comparison comparison;
+  comparison.network = tension[0];
+  if (true_tension_nN.contains(0)) comparison.true_network_nN = true_tension_nN[0];
+  const std::map<int, int> partner = partners(found, truth, by_place);
+  std::vector<bool> is_true_found(truth.size());
+  for (int i = 0; i < static_cast<int>(found.size()); ++i) {
+    ComparedFibre fibre;
+    fibre.found = found[i];
+    if (const auto t = tension.find(found[i].fibre_id); t != tension.end()) fibre.tension = t->second;
+    if (const auto p = partner.find(i); p != partner.end()) {
+      is_true_found[p->second] = true;
+      fibre.truth = truth[p->second];
+      if (const auto t = true_tension_nN.find(fibre.truth->fibre_id); t != true_tension_nN.end()) {
+        fibre.true_tension_nN = t->second;
+      }
+    }
+    comparison.fibres.push_back(std::move(fibre));
+  }
+  for (std::size_t k = 0; k < truth.size(); ++k) {
+    if (is_true_found[k]) continue;
+    ComparedFibre missed;
+    missed.truth = truth[k];
+    if (const auto t = true_tension_nN.find(truth[k].fibre_id); t != true_tension_nN.end()) {
+      missed.true_tension_nN = t->second;
+    }
+    comparison.fibres.push_back(std::move(missed));
+  }
+  add_figures(comparison);
+  comparison.total_force_nN = sum_of_magnitudes(read_adhesion_forces(cell / "4_fit/adhesion_forces.csv"));
+  if (fs::is_regular_file(cell / "truth/adhesion_forces.csv")) {
+    comparison.true_total_force_nN = sum_of_magnitudes(read_adhesion_forces(cell / "truth/adhesion_forces.csv"));
+  }
+  return comparison;
+}
+
+std::string comparison_text(const fs::path& cell) {
+  const Comparison comparison = compare_with_truth(cell);
+  constexpr const char* kRow = "{:>5}  {:>5}  {:<8} {:<8} {:>9} {:>9} {:>9} {:>9}\n";
+  std::string text =
+      fmt::format(fmt::runtime(kRow), "fibre", "true", "type", "true", "tension", "low", "high", "truth");
+  text += fmt::format(fmt::runtime(kRow), "id", "id", "", "type", "nN", "nN", "nN", "nN");
+  text += fmt::format(fmt::runtime(kRow), 0, 0, "network", "network", number(comparison.network.tension_nN),
+                      number(comparison.network.low_nN), number(comparison.network.high_nN),
+                      number(comparison.true_network_nN));
+  for (const ComparedFibre& fibre : comparison.fibres) {
+    const Tension none;
+    const Tension& t = fibre.tension ? *fibre.tension : none;
+    text += fmt::format(fmt::runtime(kRow), label(fibre.found), label(fibre.truth),
+                        fibre.found ? name_of(fibre.found->type) : "–", fibre.truth ? name_of(fibre.truth->type) : "–",
+                        fibre.tension ? number(t.tension_nN) : "–", number(t.low_nN), number(t.high_nN),
+                        number(fibre.true_tension_nN));
+  }
+  text += fmt::format("\ntensions of the {} fibres found: |t - truth| / |truth| = {:.3f}\n", comparison.n_matched,
+                      comparison.relative_error);
+  if (comparison.n_long > 0) {
+    text += fmt::format("true fibres longer than {:g} um: {} of {} found and typed right ({:.0f} %)\n", kLongFibre_um,
+                        comparison.n_long_found_and_typed, comparison.n_long,
+                        100.0 * comparison.n_long_found_and_typed / comparison.n_long);
+  }
+  text += fmt::format("total force: {:.1f} nN", comparison.total_force_nN);
+  if (comparison.true_total_force_nN) {
+    text += fmt::format(", truth {:.1f} nN ({:+.1f} %)", *comparison.true_total_force_nN,
+                        100 * (comparison.total_force_nN / *comparison.true_total_force_nN - 1));
+  }
+  return text + "\nreport: " + (cell / "report.html").string() + "\n";
+}
+
+}  // namespace mbtfm::report

@@ -1,0 +1,45 @@
+/// A simulated cell's fitted tensions beside the truth.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/types.h"
+
+namespace mbtfm::report {
+
+/// A found fibre, a true one, or both.
+struct ComparedFibre {
+  std::optional<Fibre> found;
+  std::optional<Tension> tension;  ///< of the found one
+  std::optional<Fibre> truth;
+  std::optional<double> true_tension_nN;
+};
+
+struct Comparison {
+  std::vector<ComparedFibre> fibres;  ///< the found ones in order of id, then the missed ones
+  Tension network;
+  std::optional<double> true_network_nN;
+  double relative_error = 0;  ///< |t − truth| / |truth| over the fibres that are found
+  int n_matched = 0;
+  int n_long = 0;                  ///< true fibres longer than kLongFibre_um
+  int n_long_found_and_typed = 0;  ///< of those, found, and of the right type
+  double total_force_nN = 0;
+  std::optional<double> true_total_force_nN;
+};
+
+/// Shorter fibres hold less than three links of a network of the default edge length: not asked for.
+inline constexpr double kLongFibre_um = 4;
+
+bool has_truth(const std::filesystem::path& cell);
+
+/// Fibres are matched by where they lie; without truth/fibres.csv the segmentation is the truth, and ids are the same.
+/// @throws InputError where the cell has no truth or no fit
+Comparison compare_with_truth(const std::filesystem::path& cell);
+
+/// The comparison as a table for a terminal.
+std::string comparison_text(const std::filesystem::path& cell);
+
+}  // namespace mbtfm::report

@@ -1,0 +1,36 @@
+/// What run.json tells of how a cell's results came about.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace mbtfm::report {
+
+struct StageLine {
+  std::string name, state, why, version, summary;
+  std::string seconds, peak_memory_MB;  ///< for people; empty where not known
+  bool converged = true;
+  /// name, value
+  std::vector<std::pair<std::string, std::string>> parameters, figures;
+  /// file, SHA-256
+  std::vector<std::pair<std::string, std::string>> inputs;
+};
+
+struct EffectLine {
+  std::string name, stage, why, seconds;
+  bool is_on = false;
+};
+
+struct Provenance {
+  std::string version;
+  std::vector<StageLine> stages;
+  std::vector<EffectLine> effects;
+  /// name, value
+  std::vector<std::pair<std::string, std::string>> error_budget;
+};
+
+/// Of run.json; empty where there is none. @throws InputError where it is malformed
+Provenance read_provenance(const std::filesystem::path& run_file);
+
+}  // namespace mbtfm::report

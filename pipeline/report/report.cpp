@@ -1,0 +1,273 @@
+#include "pipeline/report/report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/hash.h"
+#include "pipeline/contract/version.h"
+#include "pipeline/report/base64.h"
+#include "pipeline/report/findings.h"
+#include "pipeline/report/maps.h"
+#include "pipeline/report/page.h"
+#include "pipeline/report/provenance.h"
+#include "pipeline/report/results.h"
+#include "pipeline/report/svg.h"
+#include "pipeline/report/tension_plot.h"
+
+namespace mbtfm::report {
+namespace {
+
+std::string optional_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
+
+std::string type_cell(FibreType type) {
+  return fmt::format("<span class=\"keep\"><span class=\"type\" style=\"background:{}\"></span>{}</span>",
+                     colour_of(type), full_name_of(type));
+}
+
+std::string findings_section(const CellResults& results, const Provenance& provenance) {
+  std::vector<std::string> not_converged, by_hand;
+  std::string given;
+  for (const StageLine& stage : provenance.stages) {
+    if (!stage.converged) not_converged.push_back(stage.name);
+    if (stage.state == "given") given += (given.empty() ? "" : ", ") + stage.name;
+    if (stage.state == "replaced")
+      by_hand.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
+  }
+  if (!given.empty())
+    by_hand.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
+  std::string html = "<ul class=\"findings\">\n";
+  for (const Finding& finding : findings_of(results, not_converged, by_hand)) {
+    static constexpr const char* kClass[] = {"fact", "good", "caution", "bad"};
+    static constexpr const char* kMark[] = {"", "<b>✓</b>", "<b>Caution:</b>", "<b>Distrust:</b>"};
+    const auto level = static_cast<std::size_t>(finding.level);
+    html += fmt::format("<li class=\"{}\">{}{}</li>\n", kClass[level], kMark[level], html_escaped(finding.text));
+  }
+  return section("In short", html + "</ul>\n");
+}
+
+Table tension_table(const CellResults& results) {
+  Table table{{{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % low", true}, {"95 % high", true}}, {}};
+  const bool has_truth = results.comparison.has_value();
+  if (has_truth) {
+    for (const char* title : {"truth (nN)", "− truth (nN)", "− truth (%)", "true fibre"}) {
+      table.columns.push_back({title, true});
+    }
+    table.columns.push_back({"true type"});
+  }
+  for (const auto& [title, is_number] :
+       {std::pair{"length (µm)", true}, {"width (µm)", true}, {"identifiable", false}}) {
+    table.columns.push_back({title, is_number});
+  }
+  const auto truth_cells = [](double tension_nN, const std::optional<double>& truth_nN) {
+    if (!truth_nN) return std::vector<std::string>{"–", "–", "–"};
+    const double deviation = tension_nN - *truth_nN;
+    return std::vector<std::string>{readable(*truth_nN), readable(deviation),
+                                    *truth_nN > 0 ? readable(100 * deviation / *truth_nN) : "–"};
+  };
+  if (const auto t = results.tensions.find(0); t != results.tensions.end()) {
+    std::vector<std::string> row = {"0", "actin network", readable(t->second.tension_nN),
+                                    optional_number(t->second.low_nN), optional_number(t->second.high_nN)};
+    if (has_truth) {
+      for (auto& cell : truth_cells(t->second.tension_nN, results.comparison->true_network_nN)) row.push_back(cell);
+      row.insert(row.end(), {"–", "actin network"});
+    }
+    row.insert(row.end(), {"–", "–", t->second.identifiable ? "yes" : "<b>no</b>"});
+    table.rows.push_back(row);
+  }
+  for (const FibreRow& fibre : fibre_rows(results)) {
+    const Tension& t = fibre.tension;
+    std::vector<std::string> row = {std::to_string(fibre.fibre->fibre_id), type_cell(fibre.fibre->type),
+                                    readable(t.tension_nN), optional_number(t.low_nN), optional_number(t.high_nN)};
+    if (has_truth) {
+      for (auto& cell : truth_cells(t.tension_nN, fibre.true_tension_nN)) row.push_back(cell);
+      row.push_back(fibre.true_fibre_id ? std::to_string(*fibre.true_fibre_id) : "none");
+      row.push_back(fibre.true_type ? type_cell(*fibre.true_type) : "–");
+    }
+    row.insert(row.end(), {readable(length_um(fibre.fibre->points_um)), readable(fibre.fibre->width_um),
+                           t.identifiable ? "yes" : "<b>no</b>"});
+    table.rows.push_back(row);
+  }
+  return table;
+}
+
+/// The true fibres that no found one stands for, as a sentence.
+std::string missed_fibres(const Comparison& comparison) {
+  std::string list;
+  for (const ComparedFibre& fibre : comparison.fibres) {
+    if (fibre.found) continue;
+    list += fmt::format("{}{} ({}, {} nN, {} µm)", list.empty() ? "" : ", ", fibre.truth->fibre_id,
+                        full_name_of(fibre.truth->type), optional_number(fibre.true_tension_nN),
+                        readable(length_um(fibre.truth->points_um)));
+  }
+  return list.empty() ? "" : "<p class=\"sub\">True fibres that were not found: " + list + ".</p>\n";
+}
+
+std::string tension_section(const CellResults& results) {
+  std::string html = "<div class=\"grid\">\n";
+  html += figure("Tension of each fibre", tension_plot(results),
+                 "By type, the strongest first. The interval holds the bead noise and, where several meshes were "
+                 "fitted, the spread between them.");
+  const Figure network = network_map(results, NetworkForm::original);
+  html += figure(network.title, network.svg, network.caption) + "</div>\n" + html_of(tension_table(results));
+  if (results.comparison) html += missed_fibres(*results.comparison);
+  html += fmt::format(
+      "<p class=\"sub\">Actin network: t = {} nN a cable; as a surface tension {} nN/µm, which does not "
+      "depend on the mesh.</p>\n",
+      results.tensions.contains(0) ? readable(results.tensions.at(0).tension_nN) : "–",
+      readable(results.fit.network_surface_tension_nN_per_um));
+  return section("Tensions", html);
+}
+
+std::string map_section(const CellResults& results) {
+  std::string html = "<div class=\"grid\">\n";
+  const auto add = [&](const Figure& f) { html += figure(f.title, f.svg, f.caption); };
+  if (results.overlay) {
+    html += figure("Segmentation",
+                   "<img alt=\"segmentation over the images\" src=\"data:image/png;base64," +
+                       base64(read_text(*results.overlay)) + "\">",
+                   "Adhesions, fibres and outline over the images they were found in.");
+  }
+  add(adhesion_map(results));
+  add(displacement_map(results));
+  if (results.residual) add(residual_map(results));
+  add(network_map(results, NetworkForm::contracted));
+  return section("Maps", html +
+                             "</div>\n<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
+                             "outer corner of its top left pixel.</p>");
+}
+
+std::string adhesion_section(const CellResults& results) {
+  const auto by_id = adhesions_by_id(results.cell);
+  std::vector<AdhesionForce> forces = results.forces;
+  std::stable_sort(forces.begin(), forces.end(),
+                   [](const AdhesionForce& a, const AdhesionForce& b) { return norm(a.force_nN) > norm(b.force_nN); });
+  Table all{{{"adhesion", true},
+             {"force (nN)", true},
+             {"± (nN)", true},
+             {"Fx (nN)", true},
+             {"Fy (nN)", true},
+             {"traction (kPa)", true},
+             {"area (µm²)", true},
+             {"x (µm)", true},
+             {"y (µm)", true},
+             {"fibre ends on it"}},
+            {}};
+  for (const AdhesionForce& force : forces) {
+    const Adhesion& adhesion = *by_id.at(force.adhesion_id);
+    const double magnitude = norm(force.force_nN);
+    all.rows.push_back({std::to_string(force.adhesion_id), readable(magnitude), optional_number(force.sigma_nN),
+                        readable(force.force_nN.x), readable(force.force_nN.y), readable(magnitude / adhesion.area_um2),
+                        readable(adhesion.area_um2), readable(adhesion.position_um.x), readable(adhesion.position_um.y),
+                        force.connected ? "yes" : "no"});
+  }
+  constexpr std::size_t kTop = 12;  // fits a screen
+  Table top{all.columns, {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
+  const Balance balance = balance_of(results);
+  std::string html = fmt::format(
+      "<p>The {} strongest of {}. Net force {:.1e} and net torque {:.1e} of what they would be "
+      "if all pulled the same way{}.</p>\n",
+      top.rows.size(), all.rows.size(), balance.net_force, balance.net_torque,
+      " (the moments inside single adhesions, which the table lacks, not counted)");
+  html += html_of(top);
+  if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
+  return section("Forces of the adhesions", html);
+}
+
+std::string figure_pairs(const CellResults& results) {
+  const FitSummary& fit = results.fit;
+  std::vector<std::pair<std::string, std::string>> pairs = {
+      {"relative L2", readable(fit.relative_l2)},
+      {"relative L2 expected of the noise", readable(fit.expected_relative_l2)},
+      {"noise of a displacement component (nm)", readable(1000 * fit.noise_um)},
+      {"total force (nN)", readable(fit.total_force_nN)},
+      {"force of the network (nN)", readable(fit.network_force_nN)},
+      {"force of the fibres (nN)", readable(fit.fibre_force_nN)},
+      {"meshes", std::to_string(fit.n_meshes)},
+      {"iterations", std::to_string(fit.iterations)},
+      {"converged", fit.converged ? "yes" : "no"}};
+  for (const auto& [name, value] : fit.more) {
+    pairs.emplace_back(name, std::visit(
+                                 [](const auto& v) -> std::string {
+                                   using V = std::decay_t<decltype(v)>;
+                                   if constexpr (std::is_same_v<V, std::string>) return v;
+                                   if constexpr (std::is_same_v<V, bool>) return v ? "yes" : "no";
+                                   if constexpr (std::is_same_v<V, double>) return readable(v);
+                                   if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
+                                 },
+                                 value));
+  }
+  return html_of_pairs(pairs);
+}
+
+std::string effects_table(const Provenance& provenance) {
+  Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}, {"s", true}}, {}};
+  for (const EffectLine& effect : provenance.effects) {
+    table.rows.push_back({html_escaped(effect.name), html_escaped(effect.stage), effect.is_on ? "on" : "off",
+                          html_escaped(effect.why), effect.seconds});
+  }
+  return html_of(table);
+}
+
+std::string provenance_section(const CellResults& results, const Provenance& provenance) {
+  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}};
+  for (const StageLine& stage : provenance.stages) {
+    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
+                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           stage.peak_memory_MB, html_escaped(stage.version)});
+  }
+  std::string html = html_of(stages);
+  if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
+  if (!provenance.error_budget.empty()) html += "<h3>Error budget</h3>\n" + html_of_pairs(provenance.error_budget);
+  html += folded("Figures of the fit", figure_pairs(results));
+  for (const StageLine& stage : provenance.stages) {
+    if (!stage.parameters.empty()) html += folded("Parameters of " + stage.name, html_of_pairs(stage.parameters));
+    if (!stage.figures.empty()) html += folded("Figures of " + stage.name, html_of_pairs(stage.figures));
+    if (!stage.inputs.empty()) html += folded("Inputs of " + stage.name + " (SHA-256)", html_of_pairs(stage.inputs));
+  }
+  return section("How it was computed", html);
+}
+
+/// Of the program's version and all that the report shows: the outputs of the stages, the truth and cell.toml.
+std::string fingerprint(const std::filesystem::path& cell) {
+  namespace fs = std::filesystem;
+  std::vector<fs::path> files = {cell / "cell.toml"};
+  for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) {
+    if (!fs::is_directory(cell / folder)) continue;
+    for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
+      if (entry.is_regular_file()) files.push_back(entry.path());
+    }
+  }
+  std::sort(files.begin(), files.end());
+  std::string all = kVersion;
+  for (const fs::path& file : files) {
+    all += "\n" + file.lexically_relative(cell).generic_string() + " " + sha256_of_file(file);
+  }
+  return sha256(all);
+}
+
+}  // namespace
+
+std::string report_html(const std::filesystem::path& cell) {
+  const CellResults results = read_results(cell);
+  const Provenance provenance = read_provenance(cell / "run.json");
+  std::string body = fmt::format(
+      "<h1>{}</h1><p class=\"sub\">Model-based traction force microscopy, mbtfm {} · gel: E = {} kPa, ν = {}, {} µm "
+      "thick</p>\n",
+      html_escaped(results.name), kVersion, readable(results.gel.youngs_modulus_kPa),
+      readable(results.gel.poisson_ratio), readable(results.gel.thickness_um));
+  body += findings_section(results, provenance);
+  if (!results.cell.fibres.empty()) body += tension_section(results);
+  body += map_section(results) + adhesion_section(results) + provenance_section(results, provenance);
+  return page(results.name + " – mbtfm", body);
+}
+
+void update_report(const std::filesystem::path& cell) {
+  const std::filesystem::path file = cell / "report.html";
+  const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
+  if (std::filesystem::is_regular_file(file) && read_text(file).ends_with(signature)) return;
+  write_whole(file, report_html(cell) + signature);
+}
+
+}  // namespace mbtfm::report

@@ -1,0 +1,41 @@
+/// What is in a finished cell folder.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+#include "pipeline/report/compare.h"
+
+namespace mbtfm::report {
+
+/// What the fitted model leaves of the measured displacement, at the beads.
+struct Residual {
+  std::vector<Vec2> positions_um, residual_um;
+};
+
+struct CellResults {
+  Path folder;
+  std::string name;
+  Gel gel;
+  Cell cell;
+  DisplacementField displacement;
+  Network network;
+  ContractedNetwork contracted;
+  std::map<int, Tension> tensions;  ///< by fibre id; 0: the actin network
+  std::vector<AdhesionForce> forces;
+  FitSummary fit;
+  std::optional<Residual> residual;
+  std::optional<Comparison> comparison;  ///< of a simulated cell
+  std::optional<Path> overlay;           ///< picture of the segmentation
+};
+
+/// @throws InputError where a file that the stages write lacks or is malformed
+CellResults read_results(const Path& cell);
+
+/// Adhesion by id.
+std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell);
+
+}  // namespace mbtfm::report

@@ -1,0 +1,29 @@
+/// Every fibre's tension with its interval, beside the truth where it is known.
+#pragma once
+
+#include <string>
+
+#include "pipeline/report/results.h"
+
+namespace mbtfm::report {
+
+/// One row a fibre, by type, the strongest first; an <svg> element.
+std::string tension_plot(const CellResults& results);
+
+/// Colour of a fibre type (Okabe & Ito: told apart by colour-blind eyes).
+const char* colour_of(FibreType type);
+/// "dorsal", "transverse arc", "ventral"
+const char* full_name_of(FibreType type);
+
+/// A fibre with what is known of its tension.
+struct FibreRow {
+  const Fibre* fibre = nullptr;
+  Tension tension;
+  std::optional<double> true_tension_nN;
+  std::optional<int> true_fibre_id;
+  std::optional<FibreType> true_type;
+};
+/// The fitted fibres, by type, the strongest first.
+std::vector<FibreRow> fibre_rows(const CellResults& results);
+
+}  // namespace mbtfm::report

@@ -1,0 +1,34 @@
+/// Which image files belong to a cell: the [images] table of cell.toml.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "pipeline/contract/parameters.h"
+
+namespace mbtfm::runner {
+
+/// File names or globs, relative to the cell folder.
+struct ImageNames {
+  std::string adhesion = "paxillin.tif";  ///< paxillin is the adhesion protein most often tagged
+  std::string actin = "actin.tif";
+  std::string beads_stressed = "beads_stressed.tif";
+  std::string beads_relaxed = "beads_relaxed.tif";
+};
+void declare(ParameterList& list, ImageNames& names);
+
+/// The name or glob of a key of [images]. @throws InternalError for any other key
+const std::string& name_of_image(const ImageNames& names, const std::string& key);
+
+struct ImageMatch {
+  std::vector<std::filesystem::path> files;  ///< in alphabetical order
+  std::string pattern;
+};
+/// Files of `folder` that a name or glob (*, ?, [abc] in its last part) stands for. A file of exactly that name wins.
+ImageMatch match_image(const std::filesystem::path& folder, const std::string& name_or_glob);
+
+/// The one file that is meant. @throws InputError where there is none, or several: lists them
+std::filesystem::path resolve_image(const std::filesystem::path& folder, const ImageNames& names,
+                                    const std::string& key);
+
+}  // namespace mbtfm::runner

@@ -1,0 +1,172 @@
+#include "pipeline/runner/record.h"
+
+#define TOML_ENABLE_FORMATTERS 1
+#include <toml++/toml.h>
+
+#include <algorithm>
+#include <nlohmann/json.hpp>
+#include <sstream>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/hash.h"
+
+namespace mbtfm::runner {
+namespace fs = std::filesystem;
+using nlohmann::json;
+
+namespace {
+
+json parse_json(const fs::path& file) {
+  try {
+    return json::parse(read_text(file));
+  } catch (const json::exception& error) {
+    throw InputError(file.string(), "a JSON file", error.what(), "delete it to run the stage again");
+  }
+}
+
+std::string first_difference(const Hashes& before, const Hashes& now) {
+  for (const auto& [name, hash] : now) {
+    const auto found = before.find(name);
+    if (found == before.end()) return name + " is new";
+    if (found->second != hash) return name + " has changed";
+  }
+  for (const auto& [name, hash] : before) {
+    if (!now.contains(name)) return name + " is gone";
+  }
+  return {};
+}
+
+}  // namespace
+
+Hashes hash_files(const fs::path& cell, const std::vector<std::string>& names) {
+  Hashes hashes;
+  for (const std::string& name : names) {
+    if (fs::is_regular_file(cell / name)) hashes[name] = sha256_of_file(cell / name);
+  }
+  return hashes;
+}
+
+std::optional<StageRecord> read_record(const fs::path& record_file) {
+  if (!fs::is_regular_file(record_file)) return {};
+  const json whole = parse_json(record_file);
+  StageRecord record;
+  const auto run = whole.find("run");
+  if (run == whole.end()) return record;
+  try {
+    record.finished = run->at("finished");
+    record.converged = run->value("converged", true);
+    record.version = run->value("version", "");
+    record.settings = run->value("settings", json::object()).dump();
+    record.inputs = run->value("inputs", Hashes{});
+    record.outputs = run->value("outputs", Hashes{});
+  } catch (const json::exception& error) {
+    throw InputError(record_file.string(), "a record of mbtfm run", error.what(), "delete it to run the stage again");
+  }
+  return record;
+}
+
+void write_begun(const fs::path& record_file, const Stage& stage) {
+  fs::create_directories(record_file.parent_path());
+  write_whole(record_file, json{{"stage", stage.name}, {"run", {{"finished", false}}}}.dump(1) + "\n");
+}
+
+bool is_begun(const fs::path& record_file) {
+  return fs::is_regular_file(record_file) && parse_json(record_file).contains("run");
+}
+
+void complete_record(const fs::path& record_file, const StageRecord& record, double seconds, double peak_memory_MB) {
+  nlohmann::ordered_json whole = nlohmann::ordered_json::parse(read_text(record_file));
+  whole["run"] = {{"finished", record.finished}, {"converged", record.converged},
+                  {"version", record.version},   {"settings", json::parse(record.settings)},
+                  {"inputs", record.inputs},     {"outputs", record.outputs},
+                  {"seconds", seconds},          {"peak_memory_MB", peak_memory_MB}};
+  write_whole(record_file, whole.dump(1) + "\n");
+}
+
+std::string settings_of(const Stage& stage, const fs::path& toml_file) {
+  toml::table whole;
+  try {
+    whole = toml::parse(read_text(toml_file), toml_file.string());
+  } catch (const toml::parse_error& error) {
+    throw InputError(toml_file.string() + ":" + std::to_string(error.source().begin.line), "a TOML file",
+                     std::string(error.description()));
+  }
+  toml::table relevant;
+  for (const auto& [key, value] : whole) {
+    const std::string table = value.is_table() ? std::string(key.str()) : std::string();
+    if (std::find(stage.tables.begin(), stage.tables.end(), table) != stage.tables.end()) relevant.insert(key, value);
+  }
+  std::ostringstream text;
+  text << toml::json_formatter(relevant);
+  return json::parse(text.str()).dump();
+}
+
+std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, const ImageNames& images) {
+  std::vector<std::string> names;
+  for (const ImageInput& image : stage.images) {
+    const ImageMatch match = match_image(cell, name_of_image(images, image.key));
+    for (const fs::path& file : match.files) names.push_back(file.lexically_relative(cell).generic_string());
+  }
+  names.insert(names.end(), stage.reads.begin(), stage.reads.end());
+  return names;
+}
+
+std::string name_of(StageState state) {
+  switch (state) {
+    case StageState::up_to_date:
+      return "up to date";
+    case StageState::given:
+      return "given";
+    case StageState::replaced:
+      return "replaced";
+    case StageState::not_asked:
+      return "not asked for";
+    case StageState::must_run:
+      return "run";
+  }
+  throw InternalError("unknown stage state");
+}
+
+StageSurroundings surroundings_of(const Stage& stage, const fs::path& cell, const ImageNames& images,
+                                  const std::string& version) {
+  std::vector<std::string> outputs = stage.writes;
+  if (const auto record = read_record(cell / stage.folder / "record.json")) {
+    for (const auto& [name, hash] : record->outputs) {
+      if (std::find(outputs.begin(), outputs.end(), name) == outputs.end()) outputs.push_back(name);
+    }
+  }
+  return {.version = version,
+          .settings = settings_of(stage, cell / "cell.toml"),
+          .inputs = hash_files(cell, inputs_of(stage, cell, images)),
+          .outputs = hash_files(cell, outputs)};
+}
+
+StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now) {
+  std::vector<std::string> missing;
+  for (const std::string& name : stage.writes) {
+    if (!now.outputs.contains(name)) missing.push_back(name);
+  }
+  if (!record) {
+    if (missing.empty()) return {StageState::given, "its outputs were there before the first run"};
+    if (missing.size() == stage.writes.size()) return {StageState::must_run, "not run yet"};
+    throw InputError(stage.folder, "all outputs of the stage, or none", "no " + missing.front(),
+                     "add the missing files, or remove the others and let mbtfm make them");
+  }
+  if (!record->finished) return {StageState::must_run, "was begun and not finished"};
+  if (!missing.empty()) return {StageState::must_run, missing.front() + " is gone"};
+  for (const auto& [name, hash] : now.outputs) {
+    const auto ours = record->outputs.find(name);
+    if (ours == record->outputs.end() || ours->second != hash) {
+      return {StageState::replaced, name + " was changed by hand: kept"};
+    }
+  }
+  if (!stage.images.empty() && now.inputs.empty()) return {StageState::given, "its images are gone: outputs kept"};
+  if (record->version != now.version) return {StageState::must_run, "was made by version " + record->version};
+  if (record->settings != now.settings) return {StageState::must_run, "its parameters have changed"};
+  const std::string difference = first_difference(record->inputs, now.inputs);
+  if (!difference.empty()) return {StageState::must_run, difference};
+  return {StageState::up_to_date, "same version, parameters and inputs"};
+}
+
+}  // namespace mbtfm::runner

@@ -1,0 +1,47 @@
+#include "pipeline/runner/stages.h"
+
+namespace mbtfm::runner {
+
+const std::vector<Stage>& stages() {
+  static const std::vector<std::string> cell_files = {"1_segment/adhesions.csv", "1_segment/fibres.csv",
+                                                      "1_segment/fibre_points.csv", "1_segment/outline.csv"};
+  static const std::string displacement = "2_track/displacement.csv";
+  static const std::string network = "3_network/network.vtu";
+  static const std::vector<Stage> list = {
+      {.name = "segment",
+       .folder = "1_segment",
+       .images = {{"adhesion-image", "adhesion"}, {"actin-image", "actin"}},
+       .arguments = {},
+       .output = {"out", "1_segment"},
+       .reads = {},
+       .writes = cell_files,
+       .tables = {"", "images", "segment"}},
+      {.name = "track",
+       .folder = "2_track",
+       .images = {{"stressed", "beads_stressed"}, {"relaxed", "beads_relaxed"}},
+       .arguments = {},
+       .output = {"out", "2_track"},
+       .reads = {},
+       .writes = {displacement},
+       .tables = {"", "images", "track"}},
+      {.name = "network",
+       .folder = "3_network",
+       .images = {},
+       .arguments = {{"cell", "1_segment"}},
+       .output = {"out", network},
+       .reads = cell_files,
+       .writes = {network},
+       .tables = {"", "network"}},
+      {.name = "fit",
+       .folder = "4_fit",
+       .images = {},
+       .arguments = {{"cell", "1_segment"}, {"network", network}, {"displacement", displacement}},
+       .output = {"out", "4_fit"},
+       .reads = {cell_files[0], cell_files[1], cell_files[2], cell_files[3], displacement, network},
+       .writes = {"4_fit/tensions.csv", "4_fit/adhesion_forces.csv", "4_fit/fit.json", "4_fit/contracted.vtu"},
+       .tables = {"", "gel", "network", "cables", "substrate", "fit"}},
+  };
+  return list;
+}
+
+}  // namespace mbtfm::runner

@@ -1,0 +1,34 @@
+/// The stages of a cell, in the order they run: what each reads, writes and depends on.
+#pragma once
+
+#include <string>
+#include <vector>
+
+namespace mbtfm::runner {
+
+/// An input image: a key of [images] in cell.toml, given to the stage as --flag.
+struct ImageInput {
+  std::string flag;
+  std::string key;
+};
+
+/// A file or folder of the cell folder, given to the stage as --flag.
+struct PathArgument {
+  std::string flag;
+  std::string path;
+};
+
+struct Stage {
+  std::string name;    ///< the executable is mbtfm-<name>
+  std::string folder;  ///< of its outputs and its record
+  std::vector<ImageInput> images;
+  std::vector<PathArgument> arguments;  ///< further inputs that earlier stages write
+  PathArgument output;
+  std::vector<std::string> reads;   ///< files behind `arguments`, relative to the cell folder
+  std::vector<std::string> writes;  ///< files without which the stage is not done
+  std::vector<std::string> tables;  ///< of cell.toml that its result depends on; empty: above the first table
+};
+
+const std::vector<Stage>& stages();
+
+}  // namespace mbtfm::runner

@@ -1,0 +1,15 @@
+#!/usr/bin/env bash
+# Simulate the demo cell (images and all), run every stage on it, and print the tensions beside the truth.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+./cmake/install_packages.sh
+cmake --preset release >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }
+mv build-configure.log build/configure.log
+echo "mbtfm: building (a few minutes the first time)"
+cmake --build build --target executables >build/build.log 2>&1 || { tail -n 40 build/build.log >&2; exit 1; }
+
+cell=build/demo/u2os
+echo "mbtfm: simulating the demo cell in $cell"
+./build/bin/mbtfm-simulate --scenario u2os --seed 1 --noise 0.07 --beads 10000 --images --out "$cell"
+./build/bin/mbtfm run "$cell"
+./build/bin/mbtfm compare "$cell"

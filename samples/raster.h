@@ -1,0 +1,44 @@
+/// Paints shapes, given in um, into an image. A pixel (column i, row j) has its centre at (i+½, j+½) pixel sizes.
+/// All functions add to what is there; what lies outside the image is cut off.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "pipeline/contract/types.h"
+#include "samples/random.h"
+#include "segment/image.h"
+
+namespace mbtfm::samples {
+
+using segment::Image;
+
+/// An image of zeros.
+Image blank_image(int size_px, double pixel_size_um);
+
+/// A Gaussian spot, integrated over each pixel: its centroid is its position, its sum `total`.
+struct Spot {
+  Vec2 position_um;
+  double total = 0;
+  double sigma_um = 0;
+};
+void add_spot(Image& image, const Spot& spot);
+
+/// An ellipse of brightness `amplitude`, domed a little, with a rim of `rim_um` (half the brightness lies on the
+/// ellipse itself) and brighter by `slope` at the end of its major axis that points along its angle.
+void add_ellipse(Image& image, const Adhesion& ellipse, double amplitude, double rim_um, double slope);
+
+/// A line of Gaussian cross-section (standard deviation `sigma_um`); `amplitude` by arc length in um.
+void add_line(Image& image, const Polyline& line, double sigma_um,
+              const std::function<double(double arc_length_um)>& amplitude);
+
+/// The share of each pixel that a polygon covers: 1 inside, 0 outside.
+Image coverage_of(const Polygon& polygon, int size_px, double pixel_size_um);
+
+/// The image after a Gaussian; beyond its border it goes on with its border's values.
+Image blurred(const Image& image, double sigma_um, int threads);
+
+/// Smooth Gaussian noise of mean 0 and standard deviation 1, correlated over `sigma_um`.
+Image smooth_noise(int size_px, double pixel_size_um, double sigma_um, Random& random, int threads);
+
+}  // namespace mbtfm::samples

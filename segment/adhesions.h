@@ -1,0 +1,41 @@
+/// Focal adhesions of a fluorescence image.
+#pragma once
+
+#include <vector>
+
+#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/types.h"
+#include "segment/image.h"
+
+namespace mbtfm::segment {
+
+struct AdhesionParameters {
+  double adhesion_background_um = 2.0;  ///< larger than half of the widest adhesion, smaller than illumination changes
+  double adhesion_smoothing_um = 0.08;  ///< below the resolution of light (0.2 um), so that it costs no detail
+  double adhesion_seed_noise = 5;       ///< five standard deviations: less than one false seed in 10^6 pixels
+  double adhesion_rim_noise = 2.5;      ///< the rim may be fainter than the seed, but still out of the noise
+  double adhesion_rim_level =
+      0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
+  double adhesion_level_radius_um = 0.6;  ///< height is taken this near: a long adhesion may fade along its length
+  double adhesion_split_depth = 0.3;      ///< two maxima are two adhesions where the dip between is this deep
+  double adhesion_smallest_um2 = 0.08;    ///< about one resolution element
+  double adhesion_largest_um2 = 25;       ///< beyond any focal adhesion; larger is a bright cell body
+  double adhesion_faintest = 0.25;        ///< relative to the bright ones: what is fainter is texture of the cytosol
+};
+
+void declare(ParameterList& list, AdhesionParameters& parameters);
+
+/// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis, split at
+/// intensity dips (watershed), put the rim of each at a share of its own height, measure to fractions of a pixel.
+///
+/// The result does not depend on gain or offset of the camera: every level is relative to noise or height.
+/// `mean_intensity` is the mean grey value above the local background. Sorted from left-to-right in rows of the image
+/// top to bottom, ids from 1.
+/// @param pixel_size_um  > 0
+/// @returns none where the image is constant or noise alone
+/// @throws InvalidData where a pixel is not finite
+/// Sources: Zamir et al., J Cell Sci 112:1655 (1999) for high-pass and watershed; Berginski et al., PLoS ONE 6:e22025
+/// (2011) for hysteresis and splitting.
+std::vector<Adhesion> find_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& parameters);
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,206 @@
+#include "segment/coarse_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "pipeline/contract/parallel.h"
+
+namespace mbtfm::segment {
+namespace {
+
+/// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
+Plane compressed(const Plane& plane) {
+  std::vector<double> sample;
+  for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
+  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
+  Plane result = plane;
+  for (float& value : result.values) value = value / (std::abs(value) + level);
+  return result;
+}
+
+/// A square of the plane, zero beyond the border; `margin` px of it on each side are blank.
+cv::Mat cut(const Plane& plane, int left, int top, int side, int margin) {
+  cv::Mat result = cv::Mat::zeros(side, side, CV_32F);
+  double sum = 0;
+  int n = 0;
+  for (int j = margin; j < side - margin; ++j) {
+    for (int i = margin; i < side - margin; ++i) {
+      const int x = left + i, y = top + j;
+      if (x < 0 || y < 0 || x >= plane.width || y >= plane.height) continue;
+      result.at<float>(j, i) = plane.at(x, y);
+      sum += plane.at(x, y), ++n;
+    }
+  }
+  if (n == 0) return result;
+  const float mean = static_cast<float>(sum / n);
+  for (int j = margin; j < side - margin; ++j) {
+    for (int i = margin; i < side - margin; ++i) {
+      const int x = left + i, y = top + j;
+      if (x >= 0 && y >= 0 && x < plane.width && y < plane.height) result.at<float>(j, i) -= mean;
+    }
+  }
+  return result;
+}
+
+double vertex(double before, double here, double after) {
+  const double curvature = before - 2 * here + after;
+  return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
+}
+
+/// Place of the highest value, to a fraction of a pixel, counted from the origin of a periodic picture; nothing where
+/// the next peak is nearly as high.
+std::optional<Vec2> peak_of(const cv::Mat& map, double least_ratio) {
+  cv::Point best;
+  double highest = 0;
+  cv::minMaxLoc(map, nullptr, &highest, nullptr, &best);
+  if (!(highest > 0)) return std::nullopt;
+  const int n = map.cols, m = map.rows;
+  const auto value = [&](int i, int j) { return map.at<float>((best.y + j + m) % m, (best.x + i + n) % n); };
+  const Vec2 fraction{vertex(value(-1, 0), value(0, 0), value(1, 0)), vertex(value(0, -1), value(0, 0), value(0, 1))};
+  const auto from_origin = [](int k, int size) { return k > size / 2 ? k - size : k; };
+  if (least_ratio > 1) {
+    constexpr int kOwn = 4;  // px around the peak that belong to it
+    for (int j = 0; j < m; ++j) {
+      const bool is_own_row = std::min(std::abs(j - best.y), m - std::abs(j - best.y)) <= kOwn;
+      const float* row = map.ptr<float>(j);
+      for (int i = 0; i < n; ++i) {
+        if (row[i] * least_ratio < highest) continue;
+        if (!is_own_row || std::min(std::abs(i - best.x), n - std::abs(i - best.x)) > kOwn) return std::nullopt;
+      }
+    }
+  }
+  return Vec2{from_origin(best.x, n) + fraction.x, from_origin(best.y, m) + fraction.y};
+}
+
+/// Shift between a window of the reference and the place in the target where it is expected.
+std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Vec2 centre, Vec2 expected, int window) {
+  const int side = 2 * window;
+  const int left = static_cast<int>(std::lround(centre.x)) - window;
+  const int top = static_cast<int>(std::lround(centre.y)) - window;
+  const int dx = static_cast<int>(std::lround(expected.x)), dy = static_cast<int>(std::lround(expected.y));
+  cv::Mat a, b, product;
+  cv::dft(cut(reference, left, top, side, window / 2), a);  // blank around: no wrap for shifts up to half a window
+  cv::dft(cut(target, left + dx, top + dy, side, 0), b);
+  cv::mulSpectrums(b, a, product, 0, true);
+  cv::idft(product, product, cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
+  constexpr double kLeastRatio = 1.15;
+  const auto shift = peak_of(product, kLeastRatio);
+  if (!shift || std::max(std::abs(shift->x), std::abs(shift->y)) > window / 2) return std::nullopt;
+  return Vec2{shift->x + dx, shift->y + dy};
+}
+
+Vec2 median_of(const std::vector<Vec2>& values) {
+  std::vector<double> x, y;
+  for (const Vec2 v : values) x.push_back(v.x), y.push_back(v.y);
+  return {quantile(x, 0.5), quantile(y, 0.5)};
+}
+
+std::vector<Vec2> around(const GridField& field, const std::vector<std::optional<Vec2>>& known, int i, int j,
+                         int reach) {
+  std::vector<Vec2> result;
+  for (int b = std::max(0, j - reach); b <= std::min(field.ny - 1, j + reach); ++b) {
+    for (int a = std::max(0, i - reach); a <= std::min(field.nx - 1, i + reach); ++a) {
+      const auto& value = known[static_cast<std::size_t>(b) * field.nx + a];
+      if (value && !(a == i && b == j)) result.push_back(*value);
+    }
+  }
+  return result;
+}
+
+/// Normalised median test (Westerweel & Scarano 2005), then holes take the median of what is known around them.
+void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherwise) {
+  const std::vector<std::optional<Vec2>> before = found;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+      const std::vector<Vec2> others = around(field, before, i, j, 1);
+      if (!before[k] || others.size() < 3) continue;
+      const Vec2 median = median_of(others);
+      std::vector<double> spread;
+      for (const Vec2 other : others) spread.push_back(norm(other - median));
+      // their threshold of 2, with a floor of 0.5 px: a steep peak is no outlier
+      if (norm(*before[k] - median) > 2 * (quantile(spread, 0.5) + 0.5)) found[k].reset();
+    }
+  }
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+      Vec2 value = otherwise;
+      for (int reach = 1; !found[k] && reach < std::max(field.nx, field.ny); ++reach) {
+        const std::vector<Vec2> others = around(field, found, i, j, reach);
+        if (others.size() < 3) continue;
+        value = median_of(others);
+        break;
+      }
+      field.u[k] = found[k].value_or(value);
+    }
+  }
+}
+
+GridField grid_over(const Plane& plane, double spacing) {
+  GridField field;
+  field.spacing = spacing;
+  field.nx = std::max(1, static_cast<int>(plane.width / spacing));
+  field.ny = std::max(1, static_cast<int>(plane.height / spacing));
+  field.first = {0.5 * (plane.width - 1 - (field.nx - 1) * spacing),
+                 0.5 * (plane.height - 1 - (field.ny - 1) * spacing)};
+  field.u.resize(static_cast<std::size_t>(field.nx) * field.ny);
+  return field;
+}
+
+}  // namespace
+
+Motion GridField::at(Vec2 place) const {
+  const auto split = [&](double offset, int n) {
+    const double at = std::clamp(offset / spacing, 0.0, std::max(0.0, n - 1.0));
+    const int k = std::clamp(static_cast<int>(at), 0, std::max(0, n - 2));
+    return std::pair(k, at - k);
+  };
+  const auto [i, s] = split(place.x - first.x, nx);
+  const auto [j, t] = split(place.y - first.y, ny);
+  const auto point = [&](int a, int b) {
+    return u[static_cast<std::size_t>(std::min(b, ny - 1)) * nx + std::min(a, nx - 1)];
+  };
+  const Vec2 above = (1 - s) * point(i, j) + s * point(i + 1, j);
+  const Vec2 below = (1 - s) * point(i, j + 1) + s * point(i + 1, j + 1);
+  const Vec2 along_x =
+      (1 / spacing) * ((1 - t) * (point(i + 1, j) - point(i, j)) + t * (point(i + 1, j + 1) - point(i, j + 1)));
+  const Vec2 along_y = (1 / spacing) * (below - above);
+  return {(1 - t) * above + t * below, along_x.x, along_y.x, along_x.y, along_y.y};
+}
+
+Vec2 drift_of(const Plane& reference, const Plane& target) {
+  const Plane a = compressed(reference), b = compressed(target);
+  const auto as_mat = [](const Plane& p) {
+    return cv::Mat(p.height, p.width, CV_32F, const_cast<float*>(p.values.data()));
+  };
+  cv::Mat window;
+  cv::createHanningWindow(window, {a.width, a.height}, CV_32F);
+  const cv::Point2d shift = cv::phaseCorrelate(as_mat(a), as_mat(b), window);
+  return {shift.x, shift.y};
+}
+
+GridField coarse_field(const Plane& reference, const Plane& target, Vec2 drift, int window, int threads) {
+  const Plane a = compressed(reference), b = compressed(target);
+  GridField field;
+  field.u = {drift};
+  field.nx = field.ny = 1;
+  for (int pass = 0; pass < 2; ++pass, window /= 2) {
+    GridField finer = grid_over(a, pass == 0 ? window / 2.0 : 0.75 * window);
+    std::vector<std::optional<Vec2>> found(finer.u.size());
+    parallel_for(finer.ny, threads, [&](int j) {
+      for (int i = 0; i < finer.nx; ++i) {
+        const Vec2 centre = finer.first + finer.spacing * Vec2{1.0 * i, 1.0 * j};
+        found[static_cast<std::size_t>(j) * finer.nx + i] = window_shift(a, b, centre, field.at(centre).u, window);
+      }
+    });
+    clean(finer, std::move(found), drift);
+    field = std::move(finer);
+  }
+  return field;
+}
+
+}  // namespace mbtfm::segment

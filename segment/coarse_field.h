@@ -1,0 +1,26 @@
+/// Inside of the bead tracker: a first displacement field on a grid.
+#pragma once
+
+#include "segment/plane.h"
+#include "segment/registration.h"
+
+namespace mbtfm::segment {
+
+/// A displacement field on a square grid of points, in px.
+struct GridField {
+  int nx = 0, ny = 0;
+  double spacing = 1;
+  Vec2 first;  ///< the first point
+  std::vector<Vec2> u;
+  /// Bilinear between the points, constant beyond them.
+  Motion at(Vec2 place) const;
+};
+
+/// Shift of the target as a whole: phase correlation.
+Vec2 drift_of(const Plane& reference, const Plane& target);
+
+/// Cross-correlate windows of `window` px (a power of two) twice, the second time at half the size around what the
+/// first found; points whose peak is ambiguous or differs from their neighbours' take their neighbours' median.
+GridField coarse_field(const Plane& reference, const Plane& target, Vec2 drift, int window, int threads);
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,30 @@
+/// Inside of the bead tracker: what moved the image as a whole.
+#pragma once
+
+#include <vector>
+
+#include "pipeline/contract/types.h"
+
+namespace mbtfm::segment {
+
+struct FarField {
+  Vec2 drift;      ///< px
+  double rms = 0;  ///< px, of a component about drift and the cell's tail
+  int n_beads = 0;
+  bool is_at_rest = false;  ///< the frame is quieter than the rest; otherwise the drift is the mean over all beads
+};
+
+/// Drift from the beads in a frame along the border of the image, `margin` px wide.
+///
+/// Even there the gel moves: a cell's displacement falls with its distance as slowly as 1/r². So the frame is fitted
+/// with a drift and the field of forces inside of it, which balance each other (a cell at rest exerts no net force):
+///
+///   u(x) = d + Σ_k K(x − x_k) f_k,   Σ f_k = 0,   K = [ (1−nu) 1 + nu e eᵀ ] / r  (Cerruti, nu = 1/2)
+///
+/// with the x_k on a grid of a twelfth of the inner field, 1/r softened within a patch; ridge regression.
+/// Where the frame moves as much as the rest (a layer of cells fills the picture) no place is at rest: the forces in
+/// the picture balance, more or less, and the drift is the mean over all beads.
+FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
+                   double height, double margin);
+
+}  // namespace mbtfm::segment

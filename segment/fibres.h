@@ -1,0 +1,43 @@
+/// Stress fibres of an actin image.
+#pragma once
+
+#include <vector>
+
+#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/types.h"
+#include "segment/image.h"
+
+namespace mbtfm::segment {
+
+struct FibreParameters {
+  double fibre_width_um = 0.6;          ///< typical bundle seen through a microscope; half to twice of it is found
+  double fibre_averaging_um = 0.7;      ///< along the fibre: straight over this length, long enough to beat noise
+  double fibre_start_noise = 6;         ///< no line of noise in 10^6 pixels
+  double fibre_follow_noise = 2.5;      ///< once begun a fibre may fade into the noise's upper per cent
+  double fibre_faintest = 0.2;          ///< relative to the bright ones: what is fainter is single filaments
+  double fibre_contrast = 0.25;         ///< relative to the cytosol beside it: the meshwork varies by less
+  double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
+  double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
+  double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture
+  double fibre_side_ratio = 0.25;       ///< a step (the cell's edge) falls on one side only, a fibre on both
+  double fibre_edge_um = 1.0;           ///< a line along the outline this near to it is the cortex of the edge …
+  double fibre_edge_height = 0.8;       ///< … unless it is as bright as the cell's bright fibres
+  double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
+  double fibre_simplify_um = 0.05;      ///< points are left out where the line moves less: half a pixel
+};
+
+void declare(ParameterList& list, FibreParameters& parameters);
+
+/// Find stress fibres: oriented ridge filters at three widths, lines traced along the ridges through crossings and
+/// gaps, collinear pieces joined, lines that fall on one side only (the cell's edge) rejected, ends tied to the
+/// adhesions they reach, type by the number of tied ends (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006).
+///
+/// A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
+/// `mean_intensity` the mean height above both sides in grey levels. Sorted by length, longest first, ids from 1.
+/// @param outline_um  lines whose middle lies outside are no fibres; empty: anywhere
+/// @param pixel_size_um  > 0
+/// @throws InvalidData where a pixel is not finite
+std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
+                               double pixel_size_um, const FibreParameters& parameters);
+
+}  // namespace mbtfm::segment

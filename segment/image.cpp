@@ -1,0 +1,85 @@
+#include "segment/image.h"
+
+#include <array>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "pipeline/contract/errors.h"
+#include "segment/image_file.h"
+
+namespace mbtfm::segment {
+namespace {
+
+constexpr const char* kExpected = "a TIFF or PNG image";
+
+struct Signature {
+  std::string_view bytes;
+  std::string_view name;
+};
+using namespace std::string_view_literals;
+constexpr Signature kForeignFormats[] = {{"\xFF\xD8\xFF"sv, "a JPEG image"},
+                                         {"GIF8"sv, "a GIF image"},
+                                         {"BM"sv, "a BMP image"},
+                                         {"PK\x03\x04"sv, "a zip archive"},
+                                         {"ZISRAWFILE"sv, "a Zeiss CZI file"},
+                                         {"\x70\x00\x00\x00"sv, "a Leica LIF file"},
+                                         {"\xDA\xCE\xBE\x0A"sv, "a Nikon ND2 file"},
+                                         {"\x00\x00\x00\x0CjP  "sv, "a JPEG 2000 image"},
+                                         {"\x89HDF"sv, "an HDF5 file"},
+                                         {"\x1F\x8B"sv, "a gzip archive"},
+                                         {"\xD0\xCF\x11\xE0"sv, "an Olympus OIB or Microsoft file"}};
+
+bool is_tiff(std::string_view head) {
+  return head.starts_with("II\x2A\x00"sv) || head.starts_with("MM\x00\x2A"sv) || head.starts_with("II\x2B\x00"sv) ||
+         head.starts_with("MM\x00\x2B"sv);
+}
+
+std::string head_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status)) throw InputError(file.string(), kExpected, "no such file");
+  if (std::filesystem::is_directory(status)) throw InputError(file.string(), kExpected, "a folder");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(file.string(), kExpected, "a file that may not be read", "check its permissions");
+  std::array<char, 16> bytes{};
+  stream.read(bytes.data(), bytes.size());
+  return {bytes.data(), static_cast<std::size_t>(stream.gcount())};
+}
+
+}  // namespace
+
+void require_plausible_size(const std::filesystem::path& file, std::uint64_t width, std::uint64_t height) {
+  constexpr std::uint64_t kAlways = 1u << 26;
+  constexpr std::uint64_t kPacking = 16;
+  const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  if (width == 0 || height == 0) throw InputError(file.string(), "an image of at least one pixel", size);
+  constexpr std::uint64_t kLongest = 1u << 30;  // so that products of two sides cannot overflow
+  if (width <= kLongest && height <= kLongest) {
+    const std::uint64_t n_pixels = width * height;
+    if (n_pixels <= kAlways) return;
+    if (n_pixels * sizeof(float) / kPacking <= std::filesystem::file_size(file)) return;
+  }
+  throw InputError(file.string(), "an image of a size that the file's bytes can fill",
+                   size + " in " + std::to_string(std::filesystem::file_size(file)) + " bytes",
+                   "the file is probably damaged: copy or export it again");
+}
+
+Image read_image(const std::filesystem::path& file, int page) {
+  const std::string head = head_of(file);
+  if (page < 0) throw InputError(file.string(), "a page number from 0", std::to_string(page));
+  if (is_tiff(head)) return read_tiff(file, page);
+  if (head.starts_with("\x89PNG")) {
+    if (page > 0) throw InputError(file.string(), "page " + std::to_string(page), "a PNG image, which has only page 0");
+    return read_png(file);
+  }
+  for (const Signature& format : kForeignFormats) {
+    if (head.starts_with(format.bytes)) {
+      throw InputError(file.string(), kExpected, std::string(format.name), "export it as 8- or 16-bit TIFF");
+    }
+  }
+  throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
+}
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,37 @@
+/// Inside of the image reader: what its TIFF and its PNG half share.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "segment/image.h"
+
+namespace mbtfm::segment {
+
+/// Read one page of a file that begins as a TIFF. @throws InputError
+Image read_tiff(const std::filesystem::path& file, int page);
+
+/// Read a file that begins as a PNG. @throws InputError
+Image read_png(const std::filesystem::path& file);
+
+/// Refuse a size that a damaged header makes up, before memory is taken for it.
+///
+/// Up to 2^26 pixels (256 MiB as float) any file may claim, since an even image packs almost without limit. More than
+/// that needs a sixteenth of the decoded bytes in the file: camera noise keeps real images from packing below a third.
+/// @throws InputError
+void require_plausible_size(const std::filesystem::path& file, std::uint64_t width, std::uint64_t height);
+
+/// The image's calibration as its TIFF tags tell it.
+struct TiffCalibration {
+  std::string description;                      ///< ImageDescription; empty: none
+  std::optional<double> x_resolution_per_unit;  ///< XResolution
+  std::optional<double> y_resolution_per_unit;  ///< YResolution
+};
+
+/// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons; nothing
+/// where none of them speaks (a resolution without a unit of ImageJ is a printer's) or where pixels are not square.
+std::optional<double> pixel_size_um(const TiffCalibration& calibration);
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,47 @@
+/// Inside of the bead tracker: registration of the surroundings of a bead between two images.
+#pragma once
+
+#include "segment/plane.h"
+
+namespace mbtfm::segment {
+
+/// A displacement and its gradient at a place: u(x) = u + G (x − place).
+struct Motion {
+  Vec2 u;
+  double ux_x = 0, ux_y = 0, uy_x = 0, uy_y = 0;
+  Vec2 at(Vec2 offset) const {
+    return {u.x + ux_x * offset.x + ux_y * offset.y, u.y + uy_x * offset.x + uy_y * offset.y};
+  }
+};
+
+/// The image that stays, with its slopes.
+struct Reference {
+  Plane plane, slope_x, slope_y;
+};
+Reference with_slopes(Plane plane);
+
+struct Window {
+  double sigma = 4;          ///< px, of its Gaussian weight
+  double gradient_sd = 0.2;  ///< how far the gradient may be from the expected one (prior standard deviation)
+  double noise = 1;          ///< standard deviation of the difference of two pixels, to weigh the prior with
+  int max_steps = 15;
+};
+
+struct Registered {
+  Motion motion;           ///< at the bead
+  double sigma_px = 0;     ///< standard error of a component of u
+  double similarity = -1;  ///< weighted correlation of the two windows
+  bool is_converged = false;
+};
+
+/// Find the motion that carries the surroundings of `place` in the reference to `target`, from a guess whose gradient
+/// is also what is expected of the gradient.
+///
+/// Minimises Σ w (a target(x + u(x)) + b − reference(x))² + (G − G₀)² noise²/gradient_sd² over u, G, a, b by
+/// inverse-compositional Gauss–Newton steps: slopes and normal matrix come from the reference and stay. Gain and
+/// offset are projected out. The standard error is that of a weighted fit with the window's own residual:
+/// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹.
+Registered registered(const Reference& reference, const Plane& target, Vec2 place, const Motion& guess,
+                      const Window& window);
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,88 @@
+#include "segment/segment_cell.h"
+
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::segment {
+
+namespace {
+
+std::string size_of(const Image& image) {
+  return std::to_string(image.width) + " × " + std::to_string(image.height) + " pixels";
+}
+
+std::string in_um(double value) { return std::to_string(value) + " um"; }
+
+void require_equal_sizes(const Channel& adhesion, const Channel& actin) {
+  const Image &a = adhesion.image, &b = actin.image;
+  if (a.width != b.width || a.height != b.height)
+    throw InputError(actin.name, size_of(a) + " as in " + adhesion.name, size_of(b),
+                     "both channels must show the same field at the same magnification");
+}
+
+}  // namespace
+
+void declare(ParameterList& list, SegmentParameters& p) {
+  list.table("");
+  list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
+           "side of a pixel in the specimen (um); unset: from the image's own calibration");
+  list.table("segment");
+  list.add("adhesion_page", p.adhesion_page, {.low = 1}, "page of the adhesion image to read, from 1");
+  list.add("actin_page", p.actin_page, {.low = 1}, "page of the actin image to read, from 1");
+  declare(list, p.adhesions);
+  declare(list, p.fibres);
+  declare(list, p.outline);
+}
+
+double common_pixel_size_um(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                            const SegmentParameters& p) {
+  if (adhesion && actin) require_equal_sizes(*adhesion, *actin);
+  if (p.pixel_size_um) return *p.pixel_size_um;
+  const auto of_adhesion = adhesion ? adhesion->image.pixel_size_um : std::nullopt;
+  const auto of_actin = actin ? actin->image.pixel_size_um : std::nullopt;
+  // calibrations are written with three digits or more
+  if (of_adhesion && of_actin && std::abs(*of_adhesion - *of_actin) > 2e-3 * *of_adhesion)
+    throw InputError(actin->name, "the pixel size of " + adhesion->name + ", " + in_um(*of_adhesion), in_um(*of_actin),
+                     "set pixel_size_um to the right one");
+  if (of_adhesion) return *of_adhesion;
+  if (of_actin) return *of_actin;
+  throw InputError((adhesion ? adhesion : actin)->name, "a calibration in the file", "none",
+                   "set pixel_size_um, in cell.toml or as --pixel_size_um");
+}
+
+Segmentation segment_cell(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                          const SegmentParameters& p) {
+  if (!adhesion && !actin) throw UsageError("an adhesion image or an actin image is needed, best both");
+  Segmentation result;
+  result.pixel_size_um = common_pixel_size_um(adhesion, actin, p);
+  const double pixel_um = result.pixel_size_um;
+  std::vector<Adhesion> found;
+  if (adhesion) {
+    found = find_adhesions(adhesion->image, pixel_um, p.adhesions);
+    if (found.empty())
+      throw InputError(adhesion->name,
+                       "bright spots of " + std::to_string(p.adhesions.adhesion_smallest_um2) +
+                           " um² or more that stand out of the noise",
+                       "no adhesion",
+                       "is this the adhesion channel, in focus? Check pixel_size_um (" + in_um(pixel_um) +
+                           "), adhesion_page, and adhesion_seed_noise for a faint image");
+  }
+  const Channel& shape = actin ? *actin : *adhesion;
+  result.cell.outline_um = find_outline(shape.image, found, pixel_um, p.outline);
+  if (result.cell.outline_um.empty())
+    throw InputError(
+        shape.name, "a cell brighter than its surroundings", "no cell",
+        "is this the right channel and page? Check pixel_size_um (" + in_um(pixel_um) + ") and outline_smallest_um2");
+  result.cell.adhesions = inside(result.cell.outline_um, found);
+  result.n_adhesions_outside = static_cast<int>(found.size() - result.cell.adhesions.size());
+  if (adhesion && result.cell.adhesions.empty())
+    throw InputError(adhesion->name, "adhesions inside the cell's outline",
+                     std::to_string(found.size()) + " outside and none inside",
+                     "do both channels show the same cell at the same place?");
+  if (actin)
+    result.cell.fibres = find_fibres(actin->image, result.cell.outline_um, result.cell.adhesions, pixel_um, p.fibres);
+  return result;
+}
+
+}  // namespace mbtfm::segment

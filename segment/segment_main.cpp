@@ -1,0 +1,75 @@
+#include <opencv2/core/utility.hpp>
+
+#include "pipeline/contract/files.h"
+#include "pipeline/contract/stage.h"
+#include "segment/overlay.h"
+#include "segment/segment_cell.h"
+
+namespace mbtfm::segment {
+
+namespace {
+
+std::optional<Channel> channel(StageContext& context, const std::string& argument, int page) {
+  if (!context.has_input(argument)) return std::nullopt;
+  const auto file = context.input(argument);
+  return Channel{file.string(), read_image(file, page - 1)};
+}
+
+StageReport report_of(const Segmentation& s) {
+  StageReport report;
+  const auto n_of = [&](FibreType type) {
+    std::int64_t n = 0;
+    for (const Fibre& f : s.cell.fibres) n += f.type == type;
+    return n;
+  };
+  double area_um2 = 0, length = 0;
+  for (const Adhesion& a : s.cell.adhesions) area_um2 += a.area_um2;
+  for (const Fibre& f : s.cell.fibres) length += length_um(f.points_um);
+  const auto n_adhesions = static_cast<std::int64_t>(s.cell.adhesions.size());
+  report.figures = {{"pixel_size_um", s.pixel_size_um},
+                    {"n_adhesions", n_adhesions},
+                    {"n_adhesions_outside", static_cast<std::int64_t>(s.n_adhesions_outside)},
+                    {"mean_adhesion_area_um2", n_adhesions > 0 ? area_um2 / static_cast<double>(n_adhesions) : 0.0},
+                    {"n_ventral", n_of(FibreType::ventral)},
+                    {"n_dorsal", n_of(FibreType::dorsal)},
+                    {"n_arc", n_of(FibreType::arc)},
+                    {"fibre_length_um", length},
+                    {"cell_area_um2", std::abs(signed_area_um2(s.cell.outline_um))}};
+  report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
+                   std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
+                   " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
+  if (s.n_adhesions_outside > 0)
+    report.summary += "; " + std::to_string(s.n_adhesions_outside) + " adhesions outside the cell left out";
+  return report;
+}
+
+StageReport run(const SegmentParameters& parameters, StageContext& context) {
+  cv::setNumThreads(context.threads);
+  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_page);
+  const auto actin = channel(context, "actin-image", parameters.actin_page);
+  const Segmentation s = segment_cell(adhesion, actin, parameters);
+  write_adhesions(context.output("out", "adhesions.csv"), s.cell.adhesions);
+  write_fibres(context.output("out", "fibres.csv"), context.output("out", "fibre_points.csv"), s.cell.fibres);
+  write_outline(context.output("out", "outline.csv"), s.cell.outline_um);
+  write_cell_vtp(context.output("out", "cell.vtp"), s.cell);
+  write_png(context.output("out", "overlay.png"), draw_overlay(adhesion, actin, s));
+  return report_of(s);
+}
+
+}  // namespace
+
+}  // namespace mbtfm::segment
+
+int main(int argc, char** argv) {
+  using mbtfm::FileArgument;
+  return mbtfm::run_stage<mbtfm::segment::SegmentParameters>(
+      {.name = "segment",
+       .purpose = "find adhesions, stress fibres and the outline of a cell in its microscope images",
+       .files = {{"adhesion-image", FileArgument::Kind::optional_input,
+                  "adhesion channel (TIFF or PNG); without it every fibre counts as an arc"},
+                 {"actin-image", FileArgument::Kind::optional_input,
+                  "actin channel (TIFF or PNG); without it no fibres, and the outline from the adhesion channel"},
+                 {"out", FileArgument::Kind::output_folder,
+                  "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png"}}},
+      argc, argv, mbtfm::segment::run);
+}

@@ -1,0 +1,342 @@
+#include <tiffio.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstring>
+#include <memory>
+#include <string>
+
+#include "pipeline/contract/errors.h"
+#include "segment/image_file.h"
+
+namespace mbtfm::segment {
+namespace {
+
+/// libtiff's complaints of one file; the first is the cause.
+struct Messages {
+  std::string first_error;
+};
+
+int keep_error(TIFF*, void* messages, const char*, const char* format, va_list arguments) {
+  char text[512];
+  std::vsnprintf(text, sizeof text, format, arguments);
+  auto& first = static_cast<Messages*>(messages)->first_error;
+  if (first.empty()) first = text;
+  return 1;  // handled: nothing goes to the terminal
+}
+
+/// Warnings are of no concern, but for the one that a file ends within its tags: the calibration may be lost with them.
+int keep_warning_of_early_end(TIFF* tiff, void* messages, const char* module, const char* format, va_list arguments) {
+  char text[512];
+  va_list copy;
+  va_copy(copy, arguments);
+  std::vsnprintf(text, sizeof text, format, copy);
+  va_end(copy);
+  if (std::strstr(text, "IO error during reading")) return keep_error(tiff, messages, module, format, arguments);
+  return 1;
+}
+
+struct Closer {
+  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
+};
+using TiffHandle = std::unique_ptr<TIFF, Closer>;
+
+TiffHandle open(const std::filesystem::path& file, const char* mode, Messages& messages) {
+  const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
+                                                                                 &TIFFOpenOptionsFree);
+  TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_error, &messages);
+  TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_warning_of_early_end, &messages);
+  return TiffHandle(TIFFOpenExt(file.c_str(), mode, options.get()));
+}
+
+/// How the samples of a page are laid out.
+struct Layout {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint16_t bits = 1;
+  std::uint16_t format = SAMPLEFORMAT_UINT;
+  std::uint16_t samples = 1;  ///< by pixel, alpha included
+  std::uint16_t colours = 1;  ///< of them, the first ones, that make the grey value: 1, or 3 for RGB
+  bool is_planar = false;
+  bool is_inverted = false;  ///< 0 is white
+};
+
+class Reader {
+ public:
+  Reader(const std::filesystem::path& file, int page) : file_(file), tiff_(open(file, "r", messages_)) {
+    if (!tiff_ || !messages_.first_error.empty()) fail("a whole TIFF image");
+    const auto of_first_page = calibration();
+    if (page > 0 && !TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(page))) {
+      messages_.first_error = std::to_string(TIFFNumberOfDirectories(tiff_.get())) + " pages";
+      fail("page " + std::to_string(page) + ", counted from 0");
+    }
+    calibration_ = pixel_size_um(calibration());
+    if (!calibration_) calibration_ = pixel_size_um(of_first_page);
+    layout_ = layout();
+  }
+
+  Image read() {
+    Image image;
+    image.width = static_cast<int>(layout_.width);
+    image.height = static_cast<int>(layout_.height);
+    image.pixel_size_um = calibration_;
+    image.full_scale = full_scale();
+    image.pixels.assign(static_cast<std::size_t>(layout_.width) * layout_.height, 0.0f);
+    const int n_planes = layout_.is_planar ? layout_.colours : 1;
+    for (int plane = 0; plane < n_planes; ++plane) read_plane(image, plane);
+    for (float& value : image.pixels) {
+      if (layout_.colours > 1) value /= static_cast<float>(layout_.colours);
+      if (layout_.is_inverted) value = static_cast<float>(image.full_scale) - value;
+      if (!std::isfinite(value)) refuse("finite pixel values", "NaN or infinity");
+    }
+    return image;
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& expected, const std::string& found, const std::string& hint = {}) const {
+    throw InputError(file_.string(), expected, found, hint);
+  }
+  [[noreturn]] void fail(const std::string& expected) const {
+    refuse(expected, messages_.first_error.empty() ? "damaged data" : messages_.first_error,
+           "the file may be truncated or damaged: copy or export it again");
+  }
+
+  template <class T>
+  T tag(ttag_t name, T otherwise) const {
+    T value{};
+    return TIFFGetFieldDefaulted(tiff_.get(), name, &value) ? value : otherwise;
+  }
+
+  TiffCalibration calibration() const {
+    TiffCalibration result;
+    const char* description = nullptr;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &description) && description) {
+      result.description = description;
+    }
+    float resolution = 0;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_XRESOLUTION, &resolution)) result.x_resolution_per_unit = resolution;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_YRESOLUTION, &resolution)) result.y_resolution_per_unit = resolution;
+    return result;
+  }
+
+  Layout layout() {
+    Layout result;
+    TIFFGetField(tiff_.get(), TIFFTAG_IMAGEWIDTH, &result.width);
+    TIFFGetField(tiff_.get(), TIFFTAG_IMAGELENGTH, &result.height);
+    require_plausible_size(file_, result.width, result.height);
+    result.bits = tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1);
+    result.format = tag<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
+    if (result.format == SAMPLEFORMAT_VOID) result.format = SAMPLEFORMAT_UINT;
+    result.samples = tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
+    result.is_planar = tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
+    require_known_samples(result);
+    set_colours(result);
+    return result;
+  }
+
+  void require_known_samples(const Layout& l) const {
+    const std::string found = std::to_string(l.bits) + " bits";
+    if (l.format == SAMPLEFORMAT_IEEEFP) {
+      if (l.bits != 32 && l.bits != 64) refuse("floating-point samples of 32 or 64 bits", found);
+    } else if (l.format == SAMPLEFORMAT_INT) {
+      if (l.bits != 8 && l.bits != 16 && l.bits != 32) refuse("signed samples of 8, 16 or 32 bits", found);
+    } else if (l.format == SAMPLEFORMAT_UINT) {
+      if (l.bits < 1 || l.bits > 32) refuse("samples of 1 to 32 bits", found);
+    } else {
+      refuse("real samples", "complex ones");
+    }
+  }
+
+  void set_colours(Layout& l) {
+    const auto compression = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+    if (!TIFFIsCODECConfigured(compression)) {
+      refuse("a compression that libtiff knows here", "compression " + std::to_string(compression),
+             "save the image uncompressed or with deflate");
+    }
+    std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+    TIFFGetField(tiff_.get(), TIFFTAG_PHOTOMETRIC, &photometric);
+    if (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG && !l.is_planar) {
+      TIFFSetField(tiff_.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);  // libjpeg converts
+      photometric = PHOTOMETRIC_RGB;
+    }
+    const bool is_grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE ||
+                         photometric == PHOTOMETRIC_PALETTE;
+    if (!is_grey && photometric != PHOTOMETRIC_RGB) {
+      refuse("a grey or RGB image", "photometric interpretation " + std::to_string(photometric),
+             "convert it to grey: the original of the microscope is best");
+    }
+    l.colours = is_grey ? 1 : 3;
+    l.is_inverted = photometric == PHOTOMETRIC_MINISWHITE;
+    if (l.is_inverted && l.format != SAMPLEFORMAT_UINT) refuse("0 to be black", "0 to be white in signed samples");
+    require_only_alpha_beyond(l);
+  }
+
+  /// Further samples that are channels of their own would be lost in silence.
+  void require_only_alpha_beyond(const Layout& l) const {
+    std::uint16_t n_extra = 0;
+    std::uint16_t* kinds = nullptr;
+    TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_EXTRASAMPLES, &n_extra, &kinds);
+    const bool is_alpha =
+        std::all_of(kinds, kinds + n_extra, [](auto kind) { return kind != EXTRASAMPLE_UNSPECIFIED; });
+    if (l.samples != l.colours + n_extra || (n_extra > 0 && !is_alpha)) {
+      refuse(l.colours == 1 ? "one grey channel a page" : "three colour channels",
+             std::to_string(l.samples) + " channels", "save each channel as a page of its own");
+    }
+  }
+
+  double full_scale() const {
+    if (layout_.format == SAMPLEFORMAT_IEEEFP) return 0;
+    return std::ldexp(1.0, layout_.format == SAMPLEFORMAT_INT ? layout_.bits - 1 : layout_.bits) - 1;
+  }
+
+  /// Add the samples of a plane (of all colours, where they lie side by side) to the pixels, block by block.
+  void read_plane(Image& image, int plane) {
+    const bool is_tiled = TIFFIsTiled(tiff_.get());
+    std::uint32_t block_width = layout_.width;
+    std::uint32_t block_height = std::min(tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, layout_.height), layout_.height);
+    if (is_tiled) {
+      block_width = tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0);
+      block_height = tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0);
+      require_plausible_size(file_, block_width, block_height);
+    }
+    const auto row_bytes = is_tiled ? TIFFTileRowSize(tiff_.get()) : TIFFScanlineSize(tiff_.get());
+    const auto block_bytes = is_tiled ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
+    const std::uint64_t samples = layout_.is_planar ? 1 : layout_.samples;
+    const std::uint64_t needed = (samples * layout_.bits * block_width + 7) / 8;
+    if (row_bytes <= 0 || block_bytes <= 0 || static_cast<std::uint64_t>(row_bytes) < needed ||
+        static_cast<std::uint64_t>(block_bytes) < needed * block_height || samples > 64) {
+      fail("a readable image");
+    }
+    std::vector<unsigned char> block(static_cast<std::size_t>(block_bytes));
+    std::vector<float> row(samples * block_width);
+    for (std::uint32_t top = 0; top < layout_.height; top += block_height) {
+      for (std::uint32_t left = 0; left < layout_.width; left += block_width) {
+        const std::uint32_t n_rows = std::min(block_height, layout_.height - top);
+        read_block(is_tiled, left, top, plane, block, is_tiled ? block_bytes : row_bytes * n_rows);
+        const std::uint32_t n_columns = std::min(block_width, layout_.width - left);
+        for (std::uint32_t j = 0; j < n_rows; ++j) {
+          unpack(block.data() + static_cast<std::size_t>(j) * row_bytes, row);
+          add_row(row, &image.at(static_cast<int>(left), static_cast<int>(top + j)), n_columns);
+        }
+      }
+    }
+  }
+
+  void read_block(bool is_tiled, std::uint32_t left, std::uint32_t top, int plane, std::vector<unsigned char>& block,
+                  tmsize_t n_bytes) {
+    const auto sample = static_cast<std::uint16_t>(plane);
+    messages_.first_error.clear();
+    const tmsize_t got = is_tiled ? TIFFReadEncodedTile(tiff_.get(), TIFFComputeTile(tiff_.get(), left, top, 0, sample),
+                                                        block.data(), static_cast<tmsize_t>(block.size()))
+                                  : TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), top, sample),
+                                                         block.data(), static_cast<tmsize_t>(block.size()));
+    if (got < n_bytes) fail("a whole image of " + std::to_string(layout_.height) + " rows");
+  }
+
+  template <class T>
+  static void unpack_as(const unsigned char* bytes, std::vector<float>& row) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      T value;
+      std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
+      row[i] = static_cast<float>(value);
+    }
+  }
+
+  /// Samples to floats. libtiff has put 16-, 24-, 32- and 64-bit samples into this machine's byte order; other widths
+  /// are packed from the highest bit on, without gaps.
+  void unpack(const unsigned char* bytes, std::vector<float>& row) const {
+    const bool is_signed = layout_.format == SAMPLEFORMAT_INT;
+    switch (layout_.bits) {
+      case 8:
+        return is_signed ? unpack_as<std::int8_t>(bytes, row) : unpack_as<std::uint8_t>(bytes, row);
+      case 16:
+        return is_signed ? unpack_as<std::int16_t>(bytes, row) : unpack_as<std::uint16_t>(bytes, row);
+      case 32:
+        if (layout_.format == SAMPLEFORMAT_IEEEFP) return unpack_as<float>(bytes, row);
+        return is_signed ? unpack_as<std::int32_t>(bytes, row) : unpack_as<std::uint32_t>(bytes, row);
+      case 64:
+        return unpack_as<double>(bytes, row);
+      case 24:
+        for (std::size_t i = 0; i < row.size(); ++i, bytes += 3) {
+          row[i] = static_cast<float>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
+        }
+        return;
+      default:
+        unpack_bits(bytes, row);
+    }
+  }
+
+  void unpack_bits(const unsigned char* bytes, std::vector<float>& row) const {
+    std::size_t at = 0;
+    for (float& value : row) {
+      std::uint32_t sample = 0;
+      for (int bit = 0; bit < layout_.bits; ++bit, ++at) sample = sample << 1 | (bytes[at / 8] >> (7 - at % 8) & 1u);
+      value = static_cast<float>(sample);
+    }
+  }
+
+  void add_row(const std::vector<float>& row, float* pixels, std::uint32_t n_columns) const {
+    const std::size_t stride = layout_.is_planar ? 1 : layout_.samples;
+    const std::size_t n_summed = layout_.is_planar ? 1 : layout_.colours;
+    for (std::uint32_t i = 0; i < n_columns; ++i) {
+      for (std::size_t c = 0; c < n_summed; ++c) pixels[i] += row[i * stride + c];
+    }
+  }
+
+  std::filesystem::path file_;
+  Messages messages_;
+  TiffHandle tiff_;
+  std::optional<double> calibration_;
+  Layout layout_;
+};
+
+void set_tags(TIFF* tiff, const Image& image) {
+  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(image.width));
+  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(image.height));
+  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
+  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
+  TIFFSetField(tiff, TIFFTAG_PREDICTOR, PREDICTOR_HORIZONTAL);
+  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(std::min(image.height, 64)));
+  if (!image.pixel_size_um) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53t\n");
+    return;
+  }
+  TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53t\nunit=micron\n");
+  TIFFSetField(tiff, TIFFTAG_XRESOLUTION, 1 / *image.pixel_size_um);
+  TIFFSetField(tiff, TIFFTAG_YRESOLUTION, 1 / *image.pixel_size_um);
+  TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
+}
+
+}  // namespace
+
+Image read_tiff(const std::filesystem::path& file, int page) { return Reader(file, page).read(); }
+
+void write_tiff(const std::filesystem::path& file, const Image& image) {
+  MBTFM_ASSERT(image.width > 0 && image.height > 0);
+  Messages messages;
+  const auto require = [&](bool is_done) {
+    if (!is_done) {
+      throw OutputError(file.string() + ": cannot be written" +
+                        (messages.first_error.empty() ? "" : ": " + messages.first_error));
+    }
+  };
+  TiffHandle tiff = open(file, "w", messages);
+  require(tiff != nullptr);
+  set_tags(tiff.get(), image);
+  std::vector<std::uint16_t> row(static_cast<std::size_t>(image.width));
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      row[i] = static_cast<std::uint16_t>(std::clamp(std::round(image.at(i, j)), 0.0f, 65535.0f));
+    }
+    require(TIFFWriteScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(j), 0) == 1);
+  }
+  require(TIFFWriteDirectory(tiff.get()) == 1);
+  tiff.reset();
+  require(messages.first_error.empty());
+}
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,237 @@
+#include "segment/trace.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "segment/grid.h"
+
+namespace mbtfm::segment {
+
+namespace {
+
+using std::numbers::pi;
+
+cv::Point2d unit(double angle_rad) { return {std::cos(angle_rad), std::sin(angle_rad)}; }
+cv::Point2d left_of(cv::Point2d e) { return {-e.y, e.x}; }
+double length(cv::Point2d d) { return std::hypot(d.x, d.y); }
+
+/// Which directions of lines already pass through each pixel, a bit each.
+class Claims {
+ public:
+  Claims(cv::Size size, int n_directions) : bits_(size, CV_32S, cv::Scalar(0)), n_(n_directions) {}
+
+  bool has(cv::Point2d point, double angle_rad) const {
+    const int x = cvRound(point.x), y = cvRound(point.y);
+    if (x < 0 || y < 0 || x >= bits_.cols || y >= bits_.rows) return false;
+    return (bits_.at<int>(y, x) >> index(angle_rad)) & 1;
+  }
+  void add(cv::Point2d point, double angle_rad, double radius_px) {
+    int mask = 0;
+    for (int k = -2; k <= 2; ++k) mask |= 1 << ((index(angle_rad) + k + n_) % n_);
+    const int r = static_cast<int>(std::ceil(radius_px));
+    for (int dy = -r; dy <= r; ++dy)
+      for (int dx = -r; dx <= r; ++dx) {
+        const int x = cvRound(point.x) + dx, y = cvRound(point.y) + dy;
+        if (dx * dx + dy * dy > radius_px * radius_px || x < 0 || y < 0 || x >= bits_.cols || y >= bits_.rows) continue;
+        bits_.at<int>(y, x) |= mask;
+      }
+  }
+
+ private:
+  int index(double angle_rad) const {
+    const int k = static_cast<int>(std::lround(angle_rad / pi * n_)) % n_;
+    return k < 0 ? k + n_ : k;
+  }
+  cv::Mat bits_;
+  int n_;
+};
+
+/// Offset of the maximum of a parabola through three equidistant values, within ±1; 0 where it has none.
+double peak_offset(double before, double at, double after) {
+  const double curvature = before - 2 * at + after;
+  return curvature < 0 ? std::clamp((before - after) / (2 * curvature), -1.0, 1.0) : 0;
+}
+
+struct Step {
+  cv::Point2d point;
+  double angle;
+  double height;
+};
+
+/// Best direction within one filter direction of the present one, then the ridge's centre across it.
+Step settle(const Ridges& ridges, const TraceRule& rule, Step s) {
+  const double turn = pi / ridges.n_directions();
+  const double before = ridges.at(s.point, s.angle - turn), at = ridges.at(s.point, s.angle),
+               after = ridges.at(s.point, s.angle + turn);
+  // a third of the way a step, so that noise in the direction averages out
+  const double limit = 1 / rule.smallest_radius_px;
+  s.angle += std::clamp(turn / 3 * peak_offset(before, at, after), -limit, limit);
+  const cv::Point2d across = left_of(unit(s.angle));
+  const double offset = peak_offset(ridges.at(s.point - across, s.angle), ridges.at(s.point, s.angle),
+                                    ridges.at(s.point + across, s.angle));
+  s.point += 0.5 * offset * across;
+  s.height = ridges.at(s.point, s.angle);
+  return s;
+}
+
+bool is_inside(const cv::Mat& image, cv::Point2d p) {
+  return p.x >= 0 && p.y >= 0 && p.x <= image.cols - 1 && p.y <= image.rows - 1;
+}
+
+/// Steps from `start` (excluded) until the line is lost for longer than the gap, or runs along one already traced.
+std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step start) {
+  std::vector<Step> steps;
+  std::size_t last_seen = 0, last_free = 0;
+  const int longest = 4 * (ridges.noise.rows + ridges.noise.cols);  // a closed ring ends
+  Step now = start;
+  double height_so_far = start.height;
+  for (int i = 0; i < longest; ++i) {
+    now.point += unit(now.angle);
+    if (!is_inside(ridges.noise, now.point)) break;
+    now = settle(ridges, rule, now);
+    steps.push_back(now);
+    const double level = std::max<double>(
+        {rule.follow_noise * sample(ridges.noise, now.point), rule.floor, rule.follow_share * height_so_far});
+    if (now.height >= level) {
+      last_seen = steps.size();
+      height_so_far += (now.height - height_so_far) / rule.memory_px;
+    }
+    if (!claims.has(now.point, now.angle)) last_free = steps.size();
+    if (static_cast<double>(steps.size() - last_seen) > rule.gap_px) break;
+    if (static_cast<double>(steps.size() - last_free) > 2 * rule.line_radius_px) break;
+  }
+  steps.resize(std::min(last_seen, last_free));
+  return steps;
+}
+
+Trace trace_from(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step seed) {
+  seed = settle(ridges, rule, settle(ridges, rule, seed));
+  Step back = seed;
+  back.angle += pi;
+  const std::vector<Step> ahead = follow(ridges, claims, rule, seed), behind = follow(ridges, claims, rule, back);
+  Trace trace;
+  const auto add = [&](const Step& s) {
+    trace.points.push_back(s.point);
+    trace.height.push_back(s.height);
+  };
+  for (auto s = behind.rbegin(); s != behind.rend(); ++s) add(*s);
+  add(seed);
+  for (const Step& s : ahead) add(s);
+  return trace;
+}
+
+void claim(Claims& claims, const Trace& trace, double radius_px) {
+  for (std::size_t i = 0; i < trace.points.size(); ++i) {
+    const std::size_t a = i > 1 ? i - 2 : 0, b = std::min(i + 2, trace.points.size() - 1);
+    const cv::Point2d d = trace.points[b] - trace.points[a];
+    claims.add(trace.points[i], std::atan2(d.y, d.x), radius_px);
+  }
+}
+
+/// Local maxima across their own direction that a line may start from, strongest first.
+std::vector<Step> seeds_of(const Ridges& ridges, const TraceRule& rule) {
+  std::vector<Step> seeds;
+  for (int y = 1; y + 1 < ridges.strongest.rows; ++y)
+    for (int x = 1; x + 1 < ridges.strongest.cols; ++x) {
+      const double height = ridges.strongest.at<float>(y, x);
+      if (height < std::max<double>(rule.start_noise * ridges.noise.at<float>(y, x), rule.floor) || height <= 0)
+        continue;
+      const double angle = pi * ridges.direction.at<int>(y, x) / ridges.n_directions();
+      const cv::Point2d across = left_of(unit(angle)), p(x, y);
+      if (ridges.at(p - across, angle) <= height && ridges.at(p + across, angle) < height)
+        seeds.push_back({p, angle, height});
+    }
+  std::stable_sort(seeds.begin(), seeds.end(), [](const Step& a, const Step& b) { return a.height > b.height; });
+  return seeds;
+}
+
+/// How many points to cut from the front: up to where the height first reaches a share of the plateau behind it.
+std::size_t faded_points(const std::vector<double>& height, const TraceRule& rule) {
+  const std::size_t window = std::min(height.size(), static_cast<std::size_t>(rule.end_window_px));
+  std::vector<double> plateau(height.begin(), height.begin() + static_cast<std::ptrdiff_t>(window));
+  const auto upper = plateau.begin() + static_cast<std::ptrdiff_t>(3 * (window - 1) / 4);
+  std::nth_element(plateau.begin(), upper, plateau.end());
+  std::size_t n = 0;
+  while (n < window && height[n] < rule.end_level * *upper) ++n;
+  return n;
+}
+
+void cut_faded_ends(Trace& trace, const TraceRule& rule) {
+  for (int side = 0; side < 2; ++side) {
+    const auto n = static_cast<std::ptrdiff_t>(faded_points(trace.height, rule));
+    trace.height.erase(trace.height.begin(), trace.height.begin() + n);
+    trace.points.erase(trace.points.begin(), trace.points.begin() + n);
+    std::reverse(trace.height.begin(), trace.height.end());
+    std::reverse(trace.points.begin(), trace.points.end());
+  }
+}
+
+/// How badly two ends fit to one line; nothing where they do not.
+std::optional<double> mismatch(const Trace& a, LineEnd end_a, const Trace& b, LineEnd end_b, const TraceRule& rule) {
+  const double reach = rule.end_window_px / 2;
+  const cv::Point2d pa = end_a == LineEnd::first ? a.points.front() : a.points.back();
+  const cv::Point2d pb = end_b == LineEnd::first ? b.points.front() : b.points.back();
+  const cv::Point2d gap = pb - pa, ea = outward(a.points, end_a, reach), eb = outward(b.points, end_b, reach);
+  const double distance = length(gap), sideways = std::max(std::abs(gap.cross(ea)), std::abs(gap.cross(eb)));
+  constexpr double kStraight = 0.94;  // cosine of 20°
+  if (distance > rule.join_gap_px || ea.dot(eb) > -kStraight) return std::nullopt;
+  if (gap.dot(ea) < -rule.line_radius_px || sideways > rule.line_radius_px / 2 + 0.15 * distance) return std::nullopt;
+  return distance + 4 * sideways;
+}
+
+void append(Trace& to, Trace from, LineEnd to_end, LineEnd from_end) {
+  const auto turn = [](Trace& t) {
+    std::reverse(t.points.begin(), t.points.end());
+    std::reverse(t.height.begin(), t.height.end());
+  };
+  if (to_end == LineEnd::first) turn(to);
+  if (from_end == LineEnd::last) turn(from);
+  to.points.insert(to.points.end(), from.points.begin(), from.points.end());
+  to.height.insert(to.height.end(), from.height.begin(), from.height.end());
+}
+
+/// Join the best-fitting pair of ends until none fits. Each round ends one line.
+void join_collinear(std::vector<Trace>& traces, const TraceRule& rule) {
+  for (;;) {
+    double best = std::numeric_limits<double>::infinity();
+    std::size_t first = 0, second = 0;
+    LineEnd end_first{}, end_second{};
+    for (std::size_t i = 0; i < traces.size(); ++i)
+      for (std::size_t j = i + 1; j < traces.size(); ++j)
+        for (const LineEnd a : {LineEnd::first, LineEnd::last})
+          for (const LineEnd b : {LineEnd::first, LineEnd::last})
+            if (const auto m = mismatch(traces[i], a, traces[j], b, rule); m && *m < best)
+              best = *m, first = i, second = j, end_first = a, end_second = b;
+    if (first == second) return;
+    append(traces[first], std::move(traces[second]), end_first, end_second);
+    traces.erase(traces.begin() + static_cast<std::ptrdiff_t>(second));
+  }
+}
+
+}  // namespace
+
+cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach) {
+  const std::size_t n = points.size(), back = std::min(n - 1, static_cast<std::size_t>(std::max(1.0, reach)));
+  const cv::Point2d d = end == LineEnd::first ? points[0] - points[back] : points[n - 1] - points[n - 1 - back];
+  const double l = length(d);
+  return l > 0 ? d / l : cv::Point2d(1, 0);
+}
+
+std::vector<Trace> trace_lines(const Ridges& ridges, const TraceRule& rule) {
+  Claims claims(ridges.noise.size(), ridges.n_directions());
+  std::vector<Trace> traces;
+  for (const Step& seed : seeds_of(ridges, rule)) {
+    if (claims.has(seed.point, seed.angle)) continue;
+    Trace trace = trace_from(ridges, claims, rule, seed);
+    claim(claims, trace, rule.line_radius_px);
+    cut_faded_ends(trace, rule);
+    if (trace.points.size() >= 3) traces.push_back(std::move(trace));
+  }
+  join_collinear(traces, rule);
+  std::erase_if(traces, [&](const Trace& t) { return static_cast<double>(t.points.size()) < rule.shortest_px; });
+  return traces;
+}
+
+}  // namespace mbtfm::segment

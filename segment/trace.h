@@ -1,0 +1,41 @@
+/// Lines traced along ridges. Internal to segment/ (OpenCV types). Lengths in pixels of the ridges' matrices.
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "segment/ridge.h"
+
+namespace mbtfm::segment {
+
+/// One traced line: points a pixel apart, and the ridge's height at each.
+struct Trace {
+  std::vector<cv::Point2d> points;
+  std::vector<double> height;
+};
+
+struct TraceRule {
+  double start_noise = 6;          ///< standard deviations a line must reach somewhere
+  double follow_noise = 2.5;       ///< and those it may fall to
+  double floor = 0;                ///< least height
+  double follow_share = 0.4;       ///< and the share of its height so far that it may fall to
+  double memory_px = 20;           ///< "so far": over about this length
+  double gap_px = 10;              ///< a line may be invisible for this long
+  double smallest_radius_px = 30;  ///< of curvature
+  double line_radius_px = 3;       ///< a second line of the same direction within it is the same
+  double shortest_px = 15;
+  double end_level = 0.5;     ///< a line ends where its height falls to this share of what it is before
+  double end_window_px = 20;  ///< over this length
+  double join_gap_px = 15;    ///< ends that point at each other from this far are one line
+};
+
+/// Follow lines from the strongest ridge points down, both ways, in steps of a pixel, re-centred across the line and
+/// turned to the best direction near the present one: other lines that cross have another direction and are not seen.
+/// Then cut ends that fade, join collinear pieces, drop the short ones.
+std::vector<Trace> trace_lines(const Ridges& ridges, const TraceRule& rule);
+
+/// Unit vector from the inside of the line to its first or last point, over `reach` pixels.
+enum class LineEnd { first, last };
+cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach);
+
+}  // namespace mbtfm::segment

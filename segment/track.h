@@ -1,0 +1,66 @@
+/// Displacement of the substrate from two images of its beads: pulled by the cell, and relaxed.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/report.h"
+#include "pipeline/contract/types.h"
+#include "segment/image.h"
+
+namespace mbtfm::segment {
+
+struct TrackParameters {
+  std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
+  int stressed_page = 1;                ///< counted from 1, as ImageJ shows them
+  int relaxed_page = 1;
+  double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
+  double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
+  double far_field_share = 0.12;       ///< of the image's side: the frame that is taken for far from the cell
+  double least_similarity = 0.6;       ///< correlation of a bead's neighbourhoods below which it is no match
+  double outlier_threshold = 4;        ///< in robust sd: 4 rejects one good bead in 16 000
+};
+void declare(ParameterList& list, TrackParameters& parameters);
+
+/// A bead in one image; pixels, 0 at the centre of the first pixel.
+struct DetectedBead {
+  Vec2 position_px;
+  double brightness = 0;  ///< height of the fitted spot above its surroundings, in the image's units
+};
+
+/// Bright spots of the image's own bead size, found to a fraction of a pixel.
+///
+/// The bead size is measured from the image's autocorrelation, the threshold from its noise; a Gaussian of that size
+/// is fitted to each local maximum with its neighbours' spots taken away.
+std::vector<DetectedBead> detect_beads(const Image& image, double detection_snr = TrackParameters{}.detection_snr,
+                                       int threads = 1);
+
+struct Tracking {
+  DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
+  Vec2 drift_um;                ///< of the stressed image as a whole; taken off the field
+  double far_field_rms_um = 0;  ///< of a displacement component in the frame, after the drift is taken off
+  double bead_sigma_um = 0;     ///< of a bead's picture
+  bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is the mean of all beads
+  double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
+  int n_good = 0;
+  int n_beads_stressed = 0;  ///< found in the stressed image
+};
+
+/// Displacement of each bead of `relaxed`.
+///
+/// 1. Windows of both images are cross-correlated on a grid, coarse to fine (drift: phase correlation).
+/// 2. Around each bead the stressed image is registered to the relaxed one by an affine map with free gain and offset
+///    (inverse-compositional Gauss–Newton: Baker & Matthews, IJCV 56:221, 2004), from the grid's prediction, and, where
+///    that fails, from that of the beads already tracked nearby or from the stressed image's unclaimed beads.
+/// 3. Each is registered backwards, compared with its neighbours (Westerweel & Scarano, Exp Fluids 39:1096, 2005) and
+///    flagged where it fails.
+/// 4. The window is chosen for each bead: the widest whose result agrees with all narrower ones within their errors
+///    (intersection of confidence intervals: Goldenshluger & Nemirovski, Math Methods Statist 6:135, 1997).
+///
+/// Neighbouring beads share pixels of their windows: their errors are correlated over about two bead diameters.
+/// @throws InvalidData where an image shows no beads or the sizes differ
+Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_size_um,
+                     const TrackParameters& parameters = {}, int threads = 1, const Progress& progress = {});
+
+}  // namespace mbtfm::segment

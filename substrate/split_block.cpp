@@ -1,0 +1,91 @@
+#include "substrate/split_block.h"
+
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::substrate {
+namespace {
+
+/// Lines at index_low … index_high times `step`, then towards either side growing steps over `margin`.
+std::vector<double> lines_of(int index_low, int index_high, double step, double margin) {
+  constexpr double kGrowth = 1.5;  // the correction fades over distances that grow with the distance itself
+  std::vector<double> growing;
+  double reach = 0;
+  for (double size = step; reach < margin; size *= kGrowth) growing.push_back(reach += size);
+  std::vector<double> lines;
+  for (auto d = growing.rbegin(); d != growing.rend(); ++d) lines.push_back(index_low * step - *d * margin / reach);
+  for (int index = index_low; index <= index_high; ++index) lines.push_back(index * step);
+  for (const double d : growing) lines.push_back(index_high * step + d * margin / reach);
+  return lines;
+}
+
+GridLines grid_of(const Squares& squares, const Gel& gel, const SubstrateParameters& parameters) {
+  const double step = gel.thickness_um / parameters.cells_per_thickness;
+  const double margin = parameters.margin_thicknesses * gel.thickness_um;
+  GridLines lines;
+  lines.x_um = lines_of(squares[0], squares[1], step, margin);
+  lines.y_um = lines_of(squares[2], squares[3], step, margin);
+  for (int k = 0; k <= parameters.cells_per_thickness; ++k) lines.z_um.push_back(k * step);
+  lines.z_um.back() = gel.thickness_um;
+  return lines;
+}
+
+/// Memory before anything is built: 45 kB an element are too few for any grid of Q2 (measured: 90 to 300).
+std::int64_t most_cells(const SubstrateParameters& parameters) {
+  return static_cast<std::int64_t>(allowed_GB(parameters.memory_limit_GB) / 45e-6);
+}
+
+std::vector<SidePoint> side_points_of(const ElasticSystem& system) {
+  const BlockMesh& mesh = system.mesh();
+  const GaussRule gauss = gauss_legendre(3);
+  std::vector<SidePoint> points;
+  for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
+    const Box& box = mesh.cells[cell];
+    for (int axis = 0; axis < 2; ++axis) {
+      const std::vector<double>& lines = axis == 0 ? mesh.lines.x_um : mesh.lines.y_um;
+      const double tiny = 1e-6 * box.size_um[axis];
+      for (int end = 0; end < 2; ++end) {
+        const double face = box.low_um[axis] + end * box.size_um[axis];
+        if (std::abs(face - (end == 0 ? lines.front() : lines.back())) > tiny) continue;
+        const double area = (end == 0 ? -1 : 1) * box.size_um[1 - axis] * box.size_um[2];
+        for (int g = 0; g < 9; ++g) {
+          std::array<double, 3> unit;
+          unit[axis] = end;
+          unit[1 - axis] = 0.5 * (1 + gauss.nodes[g % 3]);
+          unit[2] = 0.5 * (1 + gauss.nodes[g / 3]);
+          SidePoint point{.position_um = {},
+                          .normal_axis = axis,
+                          .area_um2 = 0.25 * gauss.weights[g % 3] * gauss.weights[g / 3] * area,
+                          .weights = system.cell_weights(static_cast<int>(cell), unit)};
+          for (int k = 0; k < 3; ++k) point.position_um[k] = box.low_um[k] + unit[k] * box.size_um[k];
+          points.push_back(std::move(point));
+        }
+      }
+    }
+  }
+  return points;
+}
+
+}  // namespace
+
+Squares squares_of(const Extent& scene, const Gel& gel, const SubstrateParameters& parameters) {
+  const double step = gel.thickness_um / parameters.cells_per_thickness;
+  check_size(scene, step, most_cells(parameters));
+  const auto below = [step](double x) { return static_cast<int>(std::floor(x / step)); };
+  return {below(scene.low_um.x), below(scene.high_um.x) + 1, below(scene.low_um.y), below(scene.high_um.y) + 1};
+}
+
+std::unique_ptr<SplitBlock> make_split_block(const Squares& squares, const Gel& gel,
+                                             const SubstrateParameters& parameters, int threads) {
+  const GridLines lines = grid_of(squares, gel, parameters);
+  BlockMesh mesh = make_block_mesh(
+      lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
+  // one thread in the BLAS: the grid is small, and the same bits matter more
+  auto block = std::unique_ptr<SplitBlock>(
+      new SplitBlock{squares, ElasticSystem(gel, std::move(mesh), threads, 1, parameters.memory_limit_GB), {}});
+  block->side_points = side_points_of(block->system);
+  return block;
+}
+
+}  // namespace mbtfm::substrate

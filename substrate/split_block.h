@@ -1,0 +1,36 @@
+/// The block and coarse grid of `split`: made for a gel and the part of its surface that a scene covers.
+#pragma once
+
+#include <array>
+#include <memory>
+
+#include "substrate/elastic_system.h"
+#include "substrate/scene.h"
+
+namespace mbtfm::substrate {
+
+/// Indices of the squares, of side thickness / cells_per_thickness, that the scene covers.
+using Squares = std::array<int, 4>;
+
+/// A quadrature point of a side of the block.
+struct SidePoint {
+  std::array<double, 3> position_um;
+  int normal_axis;
+  double area_um2;  ///< with the sign of the outward normal
+  std::vector<NodeWeight> weights;
+};
+
+struct SplitBlock {
+  Squares squares;
+  ElasticSystem system;
+  std::vector<SidePoint> side_points;
+};
+
+/// @throws NotSolved where the gel is so thin beside the scene that no grid of it fits
+Squares squares_of(const Extent& scene, const Gel& gel, const SubstrateParameters& parameters);
+
+/// @throws NotSolved where memory would not suffice
+std::unique_ptr<SplitBlock> make_split_block(const Squares& squares, const Gel& gel,
+                                             const SubstrateParameters& parameters, int threads);
+
+}  // namespace mbtfm::substrate

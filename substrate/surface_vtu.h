@@ -1,0 +1,16 @@
+/// The gel's surface under given forces, for ParaView.
+#pragma once
+
+#include <filesystem>
+
+#include "substrate/compliance.h"
+
+namespace mbtfm::substrate {
+
+/// Write quadrilaterals over the scene, finer where the adhesions are, with `displacement_um` by point and
+/// `traction_kPa` by cell (forces of the adhesions that hold its centre, over their areas).
+/// @throws OutputError; InvalidData and NotSolved as Substrate::displacements_um
+void write_substrate_vtu(const std::filesystem::path& file, const Substrate& substrate,
+                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,137 @@
+/// The whole chain on simulated cells, against the truth.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/files.h"
+#include "pipeline/report/compare.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using report::compare_with_truth;
+using report::Comparison;
+using test::Outcome;
+using test::run_program;
+using test::TemporaryFolder;
+
+Comparison simulate_and_run(const fs::path& cell, const std::string& arguments) {
+  const Outcome made = run_program("mbtfm-simulate " + arguments + " --quiet --out " + cell.string());
+  EXPECT_EQ(made.code, 0) << made.output;
+  const Outcome run = run_program("mbtfm run " + cell.string());
+  EXPECT_EQ(run.code, 0) << run.output;
+  return compare_with_truth(cell);
+}
+
+void expect_no_net_force_and_no_net_torque(const fs::path& cell) {
+  const auto adhesions = read_adhesions(cell / "1_segment/adhesions.csv");
+  const auto forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
+  ASSERT_EQ(adhesions.size(), forces.size());
+  Vec2 net_nN;
+  double total_nN = 0;
+  for (const AdhesionForce& f : forces) {
+    net_nN += f.force_nN;
+    total_nN += norm(f.force_nN);
+  }
+  // Equilibria are solved to 1e-9 of the largest tension at each of some thousand vertices.
+  EXPECT_LE(norm(net_nN), 1e-6 * total_nN);
+}
+
+TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
+  const TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  const Comparison comparison = simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000");
+  EXPECT_LE(comparison.relative_error, 0.25);
+  EXPECT_NEAR(comparison.total_force_nN / *comparison.true_total_force_nN, 1, 0.1);
+  expect_no_net_force_and_no_net_torque(cell);
+}
+
+TEST(Chain, tensions_come_back_from_images_alone) {
+  const TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  const Comparison comparison = simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000 --images");
+  EXPECT_GE(comparison.n_long_found_and_typed, 0.8 * comparison.n_long);
+  EXPECT_LE(comparison.relative_error, 0.35);
+  EXPECT_NEAR(comparison.total_force_nN / *comparison.true_total_force_nN, 1, 0.1);
+  expect_no_net_force_and_no_net_torque(cell);
+  EXPECT_TRUE(fs::exists(cell / "report.html"));
+  EXPECT_EQ(read_text(cell / "report.html").find("http://"), std::string::npos) << "the report needs no network";
+}
+
+TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
+  const TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  const Outcome made =
+      run_program("mbtfm-simulate --scenario u2os --seed 2 --noise 0 --beads 3000 --quiet --out " + cell.string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  const Outcome fit = run_program(
+      "mbtfm-fit --model layer --n_meshes 1 --tolerance 1e-9 --cell " + (cell / "1_segment").string() + " --network " +
+      (cell / "truth/network.vtu").string() + " --displacement " + (cell / "2_track/displacement.csv").string() +
+      " --config " + (cell / "cell.toml").string() + " --out " + (cell / "4_fit").string());
+  ASSERT_EQ(fit.code, 0) << fit.output;
+  const auto found = read_tensions(cell / "4_fit/tensions.csv");
+  const auto truth = read_tensions(cell / "truth/tensions.csv");
+  ASSERT_EQ(found.size(), truth.size());
+  double error = 0, size = 0;
+  for (std::size_t i = 1; i < truth.size(); ++i) {
+    ASSERT_EQ(found[i].fibre_id, truth[i].fibre_id);
+    error += std::pow(found[i].tension_nN - truth[i].tension_nN, 2);
+    size += std::pow(truth[i].tension_nN, 2);
+  }
+  EXPECT_LE(std::sqrt(error / size), 1e-6);
+}
+
+TEST(Chain, a_second_run_does_nothing_and_a_changed_input_runs_what_depends_on_it) {
+  const TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  simulate_and_run(cell, "--scenario two-adhesions --seed 1 --noise 0.07 --beads 800");
+  const auto before = fs::last_write_time(cell / "4_fit/tensions.csv");
+  EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 0);
+  EXPECT_EQ(fs::last_write_time(cell / "4_fit/tensions.csv"), before);
+
+  DisplacementField field = read_displacement(cell / "2_track/displacement.csv");
+  for (Bead& bead : field) bead.displacement_um = 2 * bead.displacement_um;
+  write_displacement(cell / "2_track/displacement.csv", field);
+  const double tension = read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN;
+  EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 0);
+  EXPECT_GT(read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN, 1.5 * tension);
+}
+
+TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
+  const TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  ASSERT_EQ(run_program("mbtfm-simulate --scenario ring --seed 1 --beads 1500 --quiet --out " + cell.string()).code, 0);
+  std::string first;
+  for (const char* threads : {"1", "2", "4"}) {
+    fs::remove_all(cell / "4_fit");
+    const Outcome run = run_program("mbtfm run --threads " + std::string(threads) + " " + cell.string());
+    ASSERT_EQ(run.code, 0) << run.output;
+    const std::string tensions = read_text(cell / "4_fit/tensions.csv");
+    if (first.empty()) first = tensions;
+    EXPECT_EQ(tensions, first) << threads << " threads";
+  }
+}
+
+TEST(Chain, the_oracle_cells_run_as_they_are) {
+  const fs::path reference = fs::path(MBTFM_SOURCE_DIR) / "../shared/reference";
+  if (!fs::exists(reference)) GTEST_SKIP() << "no ../shared/reference here";
+  for (const char* name : {"oracle_cell_21", "oracle_cell_22"}) {
+    const TemporaryFolder folder;
+    const fs::path cell = folder / "cell";
+    fs::copy(reference / name, cell, fs::copy_options::recursive);
+    for (const auto& entry : fs::recursive_directory_iterator(cell)) {
+      fs::permissions(entry, fs::perms::owner_write, fs::perm_options::add);
+    }
+    fs::permissions(cell, fs::perms::owner_write, fs::perm_options::add);
+    const Outcome run = run_program("mbtfm run " + cell.string());
+    EXPECT_EQ(run.code, 0) << run.output;
+    EXPECT_LE(compare_with_truth(cell).relative_error, 0.30) << name;
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm

@@ -1,0 +1,138 @@
+/// mbtfm-simulate as a person runs it.
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <fstream>
+#include <iterator>
+
+#include "pipeline/contract/files.h"
+#include "samples/scenario.h"
+#include "segment/image.h"
+#include "tests/support/temporary_folder.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace mbtfm;
+
+struct Outcome {
+  int code = 0;
+  std::string message;
+};
+
+std::string content_of(const fs::path& file) {
+  std::ifstream stream(file, std::ios::binary);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+Outcome simulate(const std::string& arguments) {
+  const test::TemporaryFolder folder;
+  const fs::path log = folder / "log";
+  const std::string command =
+      std::string(MBTFM_BINARY_DIR) + "/bin/mbtfm-simulate " + arguments + " > '" + log.string() + "' 2>&1";
+  const int status = std::system(command.c_str());
+  return {WEXITSTATUS(status), content_of(log)};
+}
+
+/// A small experiment: what does not need a whole cell is tested on this.
+const std::string kSmall = "--scenario two-adhesions --beads 300 ";
+
+TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
+  for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "samples" / "scenarios")) {
+    const std::string name = entry.path().stem().string();
+    SCOPED_TRACE(name);
+    const test::TemporaryFolder folder;
+    const fs::path cell = folder / "cell";
+    const Outcome outcome = simulate("--beads 500 --scenario " + name + " --out " + cell.string());
+    ASSERT_EQ(outcome.code, 0) << outcome.message;
+    const Cell segmented = read_cell(cell / "1_segment");
+    const Cell truth = read_cell(cell / "truth");
+    EXPECT_EQ(segmented.adhesions.size(), truth.adhesions.size());
+    EXPECT_EQ(read_tensions(cell / "truth" / "tensions.csv").size(), truth.fibres.size() + 1);
+    EXPECT_EQ(read_adhesion_forces(cell / "truth" / "adhesion_forces.csv").size(), truth.adhesions.size());
+    EXPECT_EQ(read_displacement(cell / "truth" / "displacement.csv").size(), 500u);
+    EXPECT_EQ(read_displacement(cell / "2_track" / "displacement.csv").size(), 500u);
+    EXPECT_FALSE(read_network(cell / "truth" / "network.vtu").links.empty());
+    EXPECT_FALSE(fs::exists(cell / "paxillin.tif"));
+  }
+}
+
+TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
+  const test::TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  const Outcome outcome = simulate(kSmall + "--images --out " + cell.string());
+  ASSERT_EQ(outcome.code, 0) << outcome.message;
+  for (const char* name : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
+    SCOPED_TRACE(name);
+    const segment::Image image = segment::read_image(cell / name);
+    EXPECT_EQ(image.width, 512);
+    EXPECT_EQ(image.height, 512);
+    ASSERT_TRUE(image.pixel_size_um);
+    EXPECT_NEAR(*image.pixel_size_um, 0.1, 1e-6);
+    const auto [low, high] = std::ranges::minmax(image.pixels);
+    EXPECT_GT(low, 0) << "clipped";
+    EXPECT_LT(high, 65535) << "clipped";
+    EXPECT_GT(high, low + 200) << "nothing to see";
+  }
+  EXPECT_TRUE(fs::exists(cell / "truth" / "beads.csv"));
+  EXPECT_FALSE(fs::exists(cell / "1_segment"));
+  EXPECT_FALSE(fs::exists(cell / "2_track"));
+}
+
+TEST(Simulate, images_do_not_join_the_segmentation_of_another_experiment) {
+  const test::TemporaryFolder folder;
+  const std::string out = "--out " + (folder / "cell").string();
+  ASSERT_EQ(simulate(kSmall + out).code, 0);
+  EXPECT_EQ(simulate(kSmall + out).code, 0) << "the same again is no matter";
+  EXPECT_EQ(simulate(kSmall + "--images " + out).code, 2);
+  EXPECT_FALSE(fs::exists(folder / "cell" / "actin.tif"));
+}
+
+TEST(Simulate, same_seed_same_bytes_for_any_number_of_threads) {
+  const test::TemporaryFolder folder;
+  ASSERT_EQ(simulate(kSmall + "--images --threads 1 --out " + (folder / "a").string()).code, 0);
+  ASSERT_EQ(simulate(kSmall + "--images --threads 3 --out " + (folder / "b").string()).code, 0);
+  int n_files = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(folder / "a")) {
+    if (!entry.is_regular_file()) continue;
+    const fs::path relative = fs::relative(entry.path(), folder / "a");
+    EXPECT_TRUE(content_of(entry.path()) == content_of(folder / "b" / relative)) << relative;
+    ++n_files;
+  }
+  EXPECT_GE(n_files, 12);
+}
+
+TEST(Simulate, flags_override_the_scenario_and_its_record_repeats_it) {
+  const test::TemporaryFolder folder;
+  const fs::path first = folder / "first", again = folder / "again";
+  ASSERT_EQ(simulate(kSmall + "--youngs_modulus_kPa 3 --noise 0.1 --out " + first.string()).code, 0);
+  EXPECT_NE(content_of(first / "cell.toml").find("youngs_modulus_kPa = 3"), std::string::npos);
+  const Outcome outcome =
+      simulate("--scenario " + (first / "truth" / "scenario.toml").string() + " --out " + again.string());
+  ASSERT_EQ(outcome.code, 0) << outcome.message;
+  EXPECT_EQ(content_of(first / "2_track" / "displacement.csv"), content_of(again / "2_track" / "displacement.csv"));
+}
+
+TEST(Simulate, wrong_arguments_are_explained_and_leave_nothing_behind) {
+  const test::TemporaryFolder folder;
+  const std::string out = " --out " + (folder / "cell").string();
+  const Outcome unknown = simulate("--scenario no-such" + out);
+  EXPECT_EQ(unknown.code, 2);
+  EXPECT_NE(unknown.message.find("two-adhesions"), std::string::npos) << unknown.message;
+  EXPECT_EQ(simulate("--scenario ./nowhere.toml" + out).code, 2);
+  EXPECT_EQ(simulate("--noise -1" + out).code, 2);
+  EXPECT_EQ(simulate("--youngs_modulus_kPa 0" + out).code, 2);
+  EXPECT_EQ(simulate("--poisson_ratio 0.5" + out).code, 2);
+  EXPECT_EQ(simulate(kSmall + "--bead_distance_um 9" + out).code, 2);
+  EXPECT_FALSE(fs::exists(folder / "cell"));
+
+  const fs::path file = folder / "mine.toml";
+  std::ofstream(file) << "[scenario]\nn_adhesion = 5\n";
+  const Outcome typo = simulate("--scenario " + file.string() + out);
+  EXPECT_EQ(typo.code, 3);
+  EXPECT_NE(typo.message.find("n_adhesions"), std::string::npos) << typo.message;
+}
+
+}  // namespace

@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include "segment/track.h"
+#include "tests/support/bead_pair.h"
+
+namespace mbtfm::segment {
+namespace {
+
+constexpr double kSide = 192;
+
+test::BeadPair small_pair() {
+  return test::draw_bead_pair(test::ring_of_adhesions(kSide, 3), {.width = 192, .n_beads = 740});
+}
+
+/// new(i, j) = old(place(i, j))
+template <class Place>
+Image rearranged(const Image& image, const Place& place) {
+  Image result = image;
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      const auto [a, b] = place(i, j);
+      result.at(i, j) = image.at(a, b);
+    }
+  }
+  return result;
+}
+
+/// The bead nearest to a place.
+const Bead& nearest(const DisplacementField& field, Vec2 place) {
+  return *std::min_element(field.begin(), field.end(), [&](const Bead& a, const Bead& b) {
+    return norm(a.position_um - place) < norm(b.position_um - place);
+  });
+}
+
+/// `turned` tracks the same scene under a symmetry; `back` brings a vector, `back_place` a place of it home.
+template <class Back, class BackPlace>
+void expect_same(const Tracking& plain, const Tracking& turned, const Back& back, const BackPlace& back_place) {
+  // beads at the threshold of a test fall on either side of it: as many as are flagged at all, at most
+  EXPECT_NEAR(plain.n_good, turned.n_good, static_cast<double>(plain.field.size()) - plain.n_good);
+  int n_same = 0;
+  for (const Bead& bead : turned.field) {
+    if (!bead.flag.empty()) continue;
+    const Bead& other = nearest(plain.field, back_place(bead.position_um));
+    // Sums in another order may choose another window, whose answer agrees within a standard error by construction.
+    const double allowed = 1.5 * std::max(bead.sigma_um, other.sigma_um);
+    if (other.flag.empty() && norm(back(bead.displacement_um) - other.displacement_um) < allowed) ++n_same;
+  }
+  EXPECT_GE(n_same, 0.95 * turned.n_good);
+}
+
+TEST(TrackProperty, a_mirrored_scene_gives_the_mirrored_field) {
+  const auto pair = small_pair();
+  const auto mirror = [](int i, int j) { return std::pair(191 - i, j); };
+  expect_same(
+      track_beads(pair.relaxed, pair.stressed, 1.0),
+      track_beads(rearranged(pair.relaxed, mirror), rearranged(pair.stressed, mirror), 1.0),
+      [](Vec2 u) {
+        return Vec2{-u.x, u.y};
+      },
+      [](Vec2 p) {
+        return Vec2{kSide - p.x, p.y};
+      });
+}
+
+TEST(TrackProperty, a_scene_turned_by_a_quarter_gives_the_turned_field) {
+  const auto pair = small_pair();
+  const auto turn = [](int i, int j) { return std::pair(j, 191 - i); };
+  expect_same(
+      track_beads(pair.relaxed, pair.stressed, 1.0),
+      track_beads(rearranged(pair.relaxed, turn), rearranged(pair.stressed, turn), 1.0),
+      [](Vec2 u) {
+        return Vec2{u.y, -u.x};
+      },
+      [](Vec2 p) {
+        return Vec2{p.y, kSide - p.x};
+      });
+}
+
+TEST(TrackProperty, gain_and_offset_of_an_image_do_not_matter) {
+  const auto pair = small_pair();
+  Image brighter = pair.stressed;
+  for (float& value : brighter.pixels) value = 1.7f * value + 300;
+  const auto same = [](Vec2 v) { return v; };
+  expect_same(track_beads(pair.relaxed, pair.stressed, 1.0), track_beads(pair.relaxed, brighter, 1.0), same, same);
+}
+
+TEST(TrackProperty, any_number_of_threads_gives_the_same_numbers) {
+  const auto pair = small_pair();
+  const Tracking one = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 1);
+  for (const int threads : {2, 3}) {
+    const Tracking more = track_beads(pair.relaxed, pair.stressed, 1.0, {}, threads);
+    ASSERT_EQ(one.field.size(), more.field.size());
+    for (std::size_t k = 0; k < one.field.size(); ++k) {
+      EXPECT_EQ(one.field[k].displacement_um, more.field[k].displacement_um);
+      EXPECT_EQ(one.field[k].sigma_um, more.field[k].sigma_um);
+      EXPECT_EQ(one.field[k].flag, more.field[k].flag);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

@@ -1,0 +1,152 @@
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/errors.h"
+#include "tests/support/equilibrium.h"
+#include "tests/support/lattice.h"
+
+namespace mbtfm {
+namespace {
+
+using network::CableNetwork;
+using network::Equilibrium;
+
+Equilibrium solved(const CableNetwork& cables, const std::vector<double>& tensions) {
+  const Equilibrium equilibrium = cables.equilibrium(tensions);
+  test::expect_equilibrium(cables, tensions, equilibrium);
+  EXPECT_TRUE(cables.adhesion_force_derivatives(tensions, equilibrium).allFinite());
+  return equilibrium;
+}
+
+TEST(HardCables, without_tension_nothing_moves_and_nothing_pulls) {
+  const CableNetwork cables(test::lattice({}));
+  const std::vector<double> tensions(cables.fibre_ids().size(), 0);
+  const Equilibrium equilibrium = solved(cables, tensions);
+  EXPECT_EQ(equilibrium.positions_um, cables.network().vertices_um);
+  EXPECT_LE(cables.adhesion_forces_nN(tensions, equilibrium).lpNorm<Eigen::Infinity>(), 1e-12);  // rounding of EA
+}
+
+TEST(HardCables, one_strong_fibre_among_weak_cables) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    const CableNetwork cables(test::lattice({.seed = seed}));
+    std::vector<double> tensions(cables.fibre_ids().size(), 0.01);
+    tensions[1] = 1000;
+    solved(cables, tensions);
+  }
+}
+
+TEST(HardCables, only_the_network_or_only_the_fibres_pull) {
+  for (unsigned seed = 1; seed <= 5; ++seed) {
+    SCOPED_TRACE(seed);
+    const CableNetwork cables(test::lattice({.seed = seed}));
+    std::vector<double> tensions(cables.fibre_ids().size(), 0);
+    tensions[0] = 0.06;
+    solved(cables, tensions);
+    std::fill(tensions.begin(), tensions.end(), 5);
+    tensions[0] = 0;
+    solved(cables, tensions);
+  }
+}
+
+TEST(HardCables, any_axial_stiffness) {
+  for (const double axial_stiffness : {1.0, 1e2, 1e4, 1e6}) {
+    SCOPED_TRACE(axial_stiffness);
+    const CableNetwork cables(test::lattice({.seed = 2}), {.axial_stiffness_nN = axial_stiffness});
+    solved(cables, test::random_tensions_nN(cables.fibre_ids().size(), 2));
+  }
+}
+
+TEST(HardCables, fewer_than_two_adhesions_have_no_equilibrium_but_a_point) {
+  for (const int id : {0, 1}) {
+    Network net = test::lattice({.columns = 4, .rows = 4});
+    for (int& a : net.adhesion_id) a = 0;
+    net.adhesion_id[0] = id;
+    EXPECT_THROW(CableNetwork{net}, InvalidData);
+  }
+}
+
+TEST(HardCables, two_adhesions_pull_each_other) {
+  Network net = test::lattice({.columns = 8, .rows = 8});
+  for (int& a : net.adhesion_id) a = 0;
+  net.adhesion_id.front() = 1;
+  net.adhesion_id.back() = 2;
+  const CableNetwork cables(net);
+  const std::vector<double> tensions(cables.fibre_ids().size(), 1);
+  const Equilibrium equilibrium = solved(cables, tensions);
+  const Eigen::VectorXd f = cables.adhesion_forces_nN(tensions, equilibrium);
+  const Vec2 between = net.vertices_um.back() - net.vertices_um.front();
+  EXPECT_NEAR(cross({f[0], f[1]}, between), 0, 1e-6 * norm({f[0], f[1]}) * norm(between));
+  EXPECT_GT(dot({f[0], f[1]}, between), 0);
+}
+
+TEST(HardCables, adhesions_on_a_line_collapse_the_network_onto_it) {
+  Network net = test::lattice({.columns = 8, .rows = 8});
+  for (std::size_t v = 0; v < net.adhesion_id.size(); ++v)
+    net.adhesion_id[v] = v % 8 == 0 || v % 8 == 5 ? 0 : v < 8 ? static_cast<int>(v) : 0;
+  const CableNetwork cables(net);
+  const std::vector<double> tensions(cables.fibre_ids().size(), 1);
+  const Equilibrium equilibrium = solved(cables, tensions);
+  // y = 0 is the line. Force t d / sqrt(d² + eps²) falls below any tension within some eps = 1.5e-5 um.
+  for (const Vec2 x : equilibrium.positions_um) EXPECT_NEAR(x.y, 0, 1e-3);
+}
+
+TEST(HardCables, a_part_that_nothing_holds_collapses_to_a_point_and_pulls_nothing) {
+  Network net = test::lattice({.columns = 6, .rows = 6});
+  const Network loose = test::lattice({.columns = 4, .rows = 4, .n_fibres = 0});
+  const int offset = static_cast<int>(net.vertices_um.size());
+  for (const Vec2 x : loose.vertices_um) net.vertices_um.push_back(x + Vec2{30, 0});
+  net.adhesion_id.resize(net.vertices_um.size(), 0);
+  for (Link link : loose.links) {
+    link.vertex_a += offset;
+    link.vertex_b += offset;
+    net.links.push_back(link);
+  }
+  const CableNetwork cables(net);
+  const std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), 1);
+  const Equilibrium equilibrium = solved(cables, tensions);
+  for (std::size_t v = offset; v < net.vertices_um.size(); ++v)
+    EXPECT_LE(norm(equilibrium.positions_um[v] - equilibrium.positions_um[offset]), 1e-6);
+  for (std::size_t k = net.links.size() - loose.links.size(); k < net.links.size(); ++k)
+    EXPECT_LE(equilibrium.link_force_nN[k], 1e-6);
+}
+
+TEST(HardCables, needle_triangles_and_fibres_close_together) {
+  // Squeezed to a fifteenth in y: rows 0.087 um apart.
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    Network net = test::lattice({.n_fibres = 8, .seed = seed});
+    for (Vec2& x : net.vertices_um) x.y /= 15;
+    for (Link& link : net.links)
+      link.rest_length_um = norm(net.vertices_um[link.vertex_b] - net.vertices_um[link.vertex_a]);
+    const CableNetwork cables(net);
+    solved(cables, test::random_tensions_nN(cables.fibre_ids().size(), seed));
+  }
+}
+
+TEST(HardCables, two_hundred_random_networks_converge_within_a_hundred_steps) {
+  int most = 0;
+  for (unsigned seed = 1; seed <= 200; ++seed) {
+    SCOPED_TRACE(seed);
+    const int size = 5 + static_cast<int>(seed % 9);
+    const CableNetwork cables(test::lattice({.columns = size, .rows = size, .n_fibres = size / 2, .seed = seed}));
+    std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), seed);
+    std::mt19937 random(seed);
+    for (double& t : tensions) t *= std::pow(10, static_cast<int>(random() % 7) - 4);  // 6e-6 to 1000 nN
+    const Equilibrium equilibrium = cables.equilibrium(tensions);
+    test::expect_equilibrium(cables, tensions, equilibrium);
+    most = std::max(most, equilibrium.report.iterations);
+  }
+  EXPECT_LE(most, 100);
+  RecordProperty("most_steps", most);
+}
+
+TEST(HardCables, wrong_tensions_are_named) {
+  const CableNetwork cables(test::lattice({}));
+  std::vector<double> tensions(cables.fibre_ids().size(), 1);
+  tensions[1] = -1;
+  EXPECT_THROW(cables.equilibrium(tensions), InvalidData);
+  EXPECT_THROW(cables.equilibrium({1}), InvalidData);
+}
+
+}  // namespace
+}  // namespace mbtfm

@@ -1,0 +1,77 @@
+/// Images without a cell give none, and say why.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "pipeline/contract/errors.h"
+#include "segment/segment_cell.h"
+#include "tests/support/drawn_image.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+void expect_nothing(const Image& image) {
+  EXPECT_TRUE(find_adhesions(image, 0.1, AdhesionParameters{}).empty());
+  EXPECT_TRUE(find_fibres(image, {}, {}, 0.1, FibreParameters{}).empty());
+  EXPECT_TRUE(find_outline(image, {}, 0.1, OutlineParameters{}).empty());
+}
+
+TEST(Segmentation, finds_nothing_in_a_constant_image) {
+  for (const float level : {0.0f, 100.0f, 65535.0f}) expect_nothing(even_image(200, 150, level));
+}
+
+TEST(Segmentation, finds_nothing_in_noise_alone) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    Image image = even_image(512, 512, 200);
+    add_noise(image, 15, seed);
+    expect_nothing(image);
+  }
+}
+
+TEST(Segmentation, takes_images_of_few_pixels) {
+  for (const int side : {1, 2, 5, 17}) expect_nothing(even_image(side, side, 3));
+}
+
+TEST(Segmentation, names_a_pixel_that_is_no_number) {
+  Image image = even_image(20, 20, 1);
+  image.at(3, 4) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(find_adhesions(image, 0.1, AdhesionParameters{}), InvalidData);
+}
+
+TEST(Segmentation, says_what_is_missing) {
+  SegmentParameters p;
+  const Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
+  EXPECT_THROW(segment_cell({}, {}, p), UsageError);
+  try {
+    segment_cell(flat, {}, p);
+    FAIL() << "no pixel size, and no error";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.where, "flat.tif");
+    EXPECT_NE(error.hint.find("pixel_size_um"), std::string::npos);
+  }
+  p.pixel_size_um = 0.1;
+  try {
+    segment_cell(flat, {}, p);
+    FAIL() << "no adhesion, and no error";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.found, "no adhesion");
+  }
+  EXPECT_THROW(segment_cell(flat, wide, p), InputError);
+  Channel one = flat, two = flat;
+  one.image.pixel_size_um = 0.1;
+  two.image.pixel_size_um = 0.2;
+  EXPECT_THROW(common_pixel_size_um(one, two, SegmentParameters{}), InputError);
+}
+
+TEST(Segmentation, takes_saturated_adhesions) {
+  DrawnScene s = drawn_scene(10, 7);
+  for (float& value : s.adhesion_image.pixels) value = std::min(value, 400.0f);
+  const auto found = find_adhesions(s.adhesion_image, s.kPixel_um, AdhesionParameters{});
+  EXPECT_EQ(score_adhesions(s.adhesions, found).n_matched, 5);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

@@ -1,0 +1,162 @@
+/// Hard cases of every model, and what none of them takes.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <fstream>
+
+#include "pipeline/contract/errors.h"
+#include "substrate/surface_vtu.h"
+#include "tests/support/substrate_scene.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::substrate {
+namespace {
+
+using std::numbers::pi;
+
+const Gel kGel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 20};
+
+Eigen::MatrixXd compliance(const std::string& model, const Gel& gel, const std::vector<Vec2>& points,
+                           const std::vector<Ellipse>& ellipses) {
+  return make_substrate(gel, test::model_named(model), 2)->compliance_um_per_nN(points, ellipses);
+}
+
+class Model : public testing::TestWithParam<const char*> {};
+INSTANTIATE_TEST_SUITE_P(All, Model, testing::Values("half-space", "layer", "split", "refined"), [](const auto& test) {
+  std::string name = test.param;
+  std::replace(name.begin(), name.end(), '-', '_');
+  return name;
+});
+
+/// Largest part of the displacement of a point in the middle of a loaded ellipse that may differ between models.
+double tolerance_of(const std::string& model) {
+  if (model == "refined") return 0.06;  // 1.4 elements across: inside an adhesion a few per cent
+  return model == "split" ? 2e-3 : 1e-7;
+}
+
+TEST_P(Model, copes_with_thin_and_thick_gels_near_incompressibility) {
+  if (std::string(GetParam()) == "half-space") GTEST_SKIP() << "has no thickness";
+  for (const auto& [thickness, half_side] : {std::pair{2.0, 4.0}, std::pair{1000.0, 40.0}}) {
+    for (const double nu : {0.0, 0.4999}) {
+      const Gel gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = thickness};
+      const auto points = test::scattered_points(200, half_side);
+      const std::vector<Ellipse> ellipse = {{{0.1, 0.2}, 0.6, 0.3, 0.4}};
+      const Eigen::MatrixXd layer = compliance("layer", gel, points, ellipse);
+      EXPECT_LT(test::mean_column_difference(compliance(GetParam(), gel, points, ellipse), layer),
+                tolerance_of(GetParam()))
+          << "nu " << nu << ", thickness " << thickness;
+    }
+  }
+}
+
+TEST_P(Model, copes_with_slender_and_tiny_and_overlapping_adhesions) {
+  // 1:10; 0.01 um²; two over each other; the same twice
+  const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.2, 0.3},
+                                         {{6, 1}, 0.08, 0.0398, 1},
+                                         {{1, 0.5}, 1, 0.6, 2},
+                                         {{-6, 2}, 1, 0.5, 0},
+                                         {{-6, 2}, 1, 0.5, 0}};
+  const auto points = test::scattered_points(400, 10);
+  const Eigen::MatrixXd g = compliance(GetParam(), kGel, points, ellipses);
+  EXPECT_TRUE(g.allFinite());
+  EXPECT_LT((g.middleCols(6, 2) - g.middleCols(8, 2)).norm(), 1e-12 * g.norm());
+  const Eigen::MatrixXd reference =
+      compliance(std::string(GetParam()) == "half-space" ? "half-space" : "layer", kGel, points, ellipses);
+  EXPECT_LT(test::mean_column_difference(g, reference), tolerance_of(GetParam()));
+}
+
+TEST_P(Model, is_continuous_through_the_centre_and_the_rim) {
+  for (const double b : {0.1, 0.5, 1.0}) {
+    const Ellipse ellipse = {{0, 0}, 1, b, 0};
+    std::vector<Vec2> points;
+    for (const double angle : {0.0, 0.3, 0.5 * pi, 3.0}) {
+      for (const double r : {0.0, 1e-9, 1 - 1e-9, 1.0, 1 + 1e-9}) {
+        points.push_back({r * std::cos(angle), r * b * std::sin(angle)});
+      }
+    }
+    const Eigen::MatrixXd g = compliance(GetParam(), kGel, points, {ellipse});
+    ASSERT_TRUE(g.allFinite());
+    // slopes at the rim grow as log(1 / distance): 1e-9 away no more than 1e-7 of the field
+    for (Eigen::Index i = 0; i < g.rows(); i += 10) {
+      EXPECT_LT((g.middleRows<2>(i) - g.middleRows<2>(i + 2)).norm(), 1e-7 * g.middleRows<2>(i).norm());
+      EXPECT_LT((g.middleRows<2>(i + 4) - g.middleRows<2>(i + 6)).norm(), 1e-7 * g.middleRows<2>(i).norm());
+      EXPECT_LT((g.middleRows<2>(i + 8) - g.middleRows<2>(i + 6)).norm(), 1e-7 * g.middleRows<2>(i).norm());
+    }
+  }
+}
+
+TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
+  const SubstrateParameters parameters = test::model_named(GetParam());
+  for (const Gel& gel : {Gel{8.4, 0.5, 20}, Gel{8.4, 0.6, 20}, Gel{8.4, -0.1, 20}, Gel{0, 0.4, 20}, Gel{-1, 0.4, 20},
+                         Gel{8.4, 0.4, 0}, Gel{NAN, 0.4, 20}, Gel{8.4, NAN, 20}}) {
+    EXPECT_THROW(make_substrate(gel, parameters, 1), InvalidData);
+  }
+  const auto model = make_substrate(kGel, parameters, 1);
+  const Ellipse good = {{0, 0}, 1, 0.5, 0};
+  EXPECT_THROW(model->compliance_um_per_nN({{NAN, 0}}, {good}), InvalidData);
+  EXPECT_THROW(model->compliance_um_per_nN({{0, INFINITY}}, {good}), InvalidData);
+  for (const Ellipse& bad : {Ellipse{{NAN, 0}, 1, 0.5, 0}, Ellipse{{0, 0}, 1, 0, 0}, Ellipse{{0, 0}, 0.5, 1, 0},
+                             Ellipse{{0, 0}, INFINITY, 1, 0}, Ellipse{{0, 0}, 1, 0.5, NAN}}) {
+    EXPECT_THROW(model->compliance_um_per_nN({{0, 0}}, {bad}), InvalidData);
+  }
+  EXPECT_THROW(model->displacements_um({{0, 0}}, {good}, {{NAN, 0}}), InvalidData);
+  EXPECT_THROW(model->displacements_um({{0, 0}}, {good}, {}), InvalidData);
+}
+
+TEST_P(Model, takes_empty_scenes) {
+  const auto model = make_substrate(kGel, test::model_named(GetParam()), 1);
+  EXPECT_EQ(model->compliance_um_per_nN({}, {}).size(), 0);
+  EXPECT_EQ(model->compliance_um_per_nN({{0, 0}}, {}).rows(), 2);
+  EXPECT_EQ(model->compliance_um_per_nN({}, {{{0, 0}, 1, 0.5, 0}}).cols(), 2);
+  const auto u = model->displacements_um({{1, 1}}, {}, {});
+  ASSERT_EQ(u.size(), 1u);
+  EXPECT_EQ(norm(u[0]), 0);
+}
+
+TEST(Substrate, names_the_models_it_knows) {
+  try {
+    make_substrate(kGel, test::model_named("layr"), 1);
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined"), std::string::npos) << error.what();
+  }
+  EXPECT_THROW(make_greens(kGel, test::model_named("split"), 1), UsageError);
+}
+
+TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
+  for (const char* name : {"split", "refined"}) {
+    SubstrateParameters parameters = test::model_named(name);
+    parameters.memory_limit_GB = 0.005;
+    const auto model = make_substrate(kGel, parameters, 1);
+    try {
+      model->compliance_um_per_nN(test::scattered_points(10, 40), test::scattered_ellipses(5, 30));
+      FAIL() << name;
+    } catch (const NotSolved& error) {
+      EXPECT_NE(error.report.reason.find("memory"), std::string::npos) << error.report.reason;
+    }
+  }
+  // a scene of 1 mm on a gel of 1 um: no grid of it fits
+  Gel thin = kGel;
+  thin.thickness_um = 1;
+  SubstrateParameters parameters = test::model_named("split");
+  parameters.memory_limit_GB = 4;
+  EXPECT_THROW(make_substrate(thin, parameters, 1)
+                   ->compliance_um_per_nN(test::scattered_points(10, 500), test::scattered_ellipses(5, 30)),
+               NotSolved);
+}
+
+TEST(Substrate, writes_its_surface_for_paraview) {
+  const test::TemporaryFolder folder;
+  const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.5, 0.3}, {{8, 3}, 1, 0.5, 1}};
+  const auto model = make_substrate(kGel, test::model_named("layer"), 2);
+  write_substrate_vtu(folder / "substrate.vtu", *model, ellipses, {{1, 0}, {0, -1}});
+  std::ifstream file(folder / "substrate.vtu");
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  EXPECT_NE(text.find("displacement_um"), std::string::npos);
+  EXPECT_NE(text.find("traction_kPa"), std::string::npos);
+  EXPECT_EQ(text.find("nan"), std::string::npos);
+  EXPECT_NE(text.find("</VTKFile>"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace mbtfm::substrate

@@ -1,0 +1,82 @@
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/errors.h"
+#include "segment/track.h"
+#include "tests/support/bead_pair.h"
+
+namespace mbtfm::segment {
+namespace {
+
+/// Share of the good beads that are more than `limit` px off.
+double share_wrong(const Tracking& tracking, const std::vector<test::Peak>& peaks, double limit) {
+  int n_wrong = 0;
+  for (const Bead& bead : tracking.field) {
+    const Vec2 truth = test::displacement(peaks, bead.position_um - Vec2{0.5, 0.5});
+    if (bead.flag.empty() && norm(bead.displacement_um - truth) > limit) ++n_wrong;
+  }
+  return n_wrong / std::max(1.0, static_cast<double>(tracking.n_good));
+}
+
+TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but_not_trust) {
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  const auto pair = test::draw_bead_pair(
+      peaks, {.width = 384, .n_beads = 2950, .lost = 0.05, .uneven_light = 0.5, .gain = 0.7, .offset = 200, .seed = 4});
+  const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+  // one bead in ten has lost its partner, and crowded as they are (one in two touches another) its neighbours suffer
+  EXPECT_GE(tracking.n_good, 0.8 * static_cast<double>(tracking.field.size()));
+  EXPECT_LE(share_wrong(tracking, peaks, 1.0), 0.01);
+}
+
+TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
+  const auto peaks = test::ring_of_adhesions(256, 2);
+  const auto bright = test::draw_bead_pair(peaks, {.width = 256, .n_beads = 700});
+  const auto faint = test::draw_bead_pair(peaks, {.width = 256, .n_beads = 700, .brightness = 150});
+  const auto mean_sigma = [](const Tracking& tracking) {
+    double sum = 0;
+    for (const Bead& bead : tracking.field) sum += bead.flag.empty() ? bead.sigma_um : 0;
+    return sum / tracking.n_good;
+  };
+  const Tracking of_bright = track_beads(bright.relaxed, bright.stressed, 1.0, {}, 2);
+  const Tracking of_faint = track_beads(faint.relaxed, faint.stressed, 1.0, {}, 2);
+  EXPECT_GT(mean_sigma(of_faint), 1.5 * mean_sigma(of_bright));
+  EXPECT_LE(share_wrong(of_faint, peaks, 1.0), 0.01);
+}
+
+TEST(TrackStability, two_pictures_of_different_beads_give_no_field) {
+  const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 1});
+  const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
+  const Tracking tracking = track_beads(one.relaxed, other.stressed, 1.0, {}, 2);
+  EXPECT_LE(tracking.n_good, 0.05 * static_cast<double>(tracking.field.size()));
+}
+
+std::string what_is_wrong(const Image& relaxed, const Image& stressed) {
+  try {
+    track_beads(relaxed, stressed, 1.0);
+  } catch (const InvalidData& error) {
+    return error.what();
+  }
+  return "nothing";
+}
+
+TEST(TrackStability, images_without_beads_are_refused) {
+  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
+  const auto noise = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
+  Image constant = pair.relaxed;
+  std::fill(constant.pixels.begin(), constant.pixels.end(), 7.0f);
+  const std::string relaxed = "the relaxed image: expected bright beads on a darker ground, found none";
+  const std::string stressed = "the stressed image: expected bright beads on a darker ground, found none";
+  EXPECT_EQ(what_is_wrong(constant, pair.stressed), relaxed);
+  EXPECT_EQ(what_is_wrong(pair.relaxed, constant), stressed);
+  EXPECT_EQ(what_is_wrong(constant, constant), relaxed);
+  EXPECT_EQ(what_is_wrong(noise.relaxed, noise.stressed), relaxed);
+}
+
+TEST(TrackStability, images_of_different_sizes_are_refused) {
+  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
+  const auto other = test::draw_bead_pair({}, {.width = 96, .n_beads = 170});
+  EXPECT_EQ(what_is_wrong(pair.relaxed, other.stressed),
+            "the stressed image: expected the relaxed image's 128 x 128 pixels, found 96 x 96");
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

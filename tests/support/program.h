@@ -1,0 +1,30 @@
+/// The project's programs as a person runs them.
+#pragma once
+
+#include <sys/wait.h>
+
+#include <cstdlib>
+#include <filesystem>
+#include <string>
+
+#include "pipeline/contract/csv.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::test {
+
+struct Outcome {
+  int code = 0;
+  std::string output;  ///< standard output and error
+};
+
+/// @param command  a program of build/bin with its arguments, e.g. "mbtfm run cell"
+/// @param before  shell commands that set its surroundings, e.g. "ulimit -f 4;"
+inline Outcome run_program(const std::string& command, const std::string& before = {}) {
+  const TemporaryFolder folder;
+  const std::filesystem::path log = folder / "log";
+  const std::string whole = before + std::string(MBTFM_BINARY_DIR) + "/bin/" + command + " > '" + log.string() + "' 2>&1";
+  const int status = std::system(whole.c_str());
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(log)};
+}
+
+}  // namespace mbtfm::test

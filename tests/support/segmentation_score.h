@@ -1,0 +1,156 @@
+/// How well a segmentation finds what is known to be there.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <vector>
+
+#include "pipeline/contract/types.h"
+
+namespace mbtfm::test {
+
+inline double distance_to_line_um(Vec2 p, const Polyline& line) {
+  double nearest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const Vec2 d = line[i + 1] - line[i];
+    const double t = std::clamp(dot(p - line[i], d) / std::max(dot(d, d), 1e-300), 0.0, 1.0);
+    nearest = std::min(nearest, norm(p - (line[i] + t * d)));
+  }
+  return nearest;
+}
+
+/// Points every 0.1 um along a line.
+inline Polyline densely(const Polyline& line) {
+  Polyline points;
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const int n = std::max(1, static_cast<int>(norm(line[i + 1] - line[i]) / 0.1));
+    for (int k = 0; k < n; ++k) points.push_back(line[i] + (1.0 * k / n) * (line[i + 1] - line[i]));
+  }
+  points.push_back(line.back());
+  return points;
+}
+
+/// Share of `line` within `tolerance_um` of `other`.
+inline double covered_share(const Polyline& line, const Polyline& other, double tolerance_um) {
+  int n = 0;
+  const Polyline points = densely(line);
+  for (const Vec2 p : points) n += distance_to_line_um(p, other) <= tolerance_um;
+  return 1.0 * n / static_cast<double>(points.size());
+}
+
+struct AdhesionScore {
+  int n_true = 0, n_found = 0, n_matched = 0;
+  double area_ratio = 0;       ///< summed area found over true, of the matched
+  double centre_error_um = 0;  ///< root mean square, of the matched
+  double angle_error_rad = 0;  ///< root mean square, of the matched with eccentricity above 0.8
+  std::vector<int> found_id;   ///< by true adhesion; 0: none
+  double f1() const { return 2.0 * n_matched / std::max(1, n_true + n_found); }
+};
+
+/// One-to-one, nearest first, where the centres are nearer than half the true minor axis plus 0.1 um.
+inline AdhesionScore score_adhesions(const std::vector<Adhesion>& truth, const std::vector<Adhesion>& found) {
+  struct Pair {
+    double distance;
+    std::size_t t, f;
+  };
+  std::vector<Pair> pairs;
+  for (std::size_t t = 0; t < truth.size(); ++t)
+    for (std::size_t f = 0; f < found.size(); ++f)
+      if (const double d = norm(truth[t].position_um - found[f].position_um); d < truth[t].minor_axis_um / 2 + 0.1)
+        pairs.push_back({d, t, f});
+  std::sort(pairs.begin(), pairs.end(), [](const Pair& a, const Pair& b) { return a.distance < b.distance; });
+  AdhesionScore s;
+  s.n_true = static_cast<int>(truth.size());
+  s.n_found = static_cast<int>(found.size());
+  s.found_id.assign(truth.size(), 0);
+  std::vector<bool> is_taken(found.size());
+  double true_area = 0, found_area = 0, squares = 0, angles = 0;
+  int n_long = 0;
+  for (const Pair& p : pairs) {
+    if (s.found_id[p.t] || is_taken[p.f]) continue;
+    s.found_id[p.t] = found[p.f].adhesion_id;
+    is_taken[p.f] = true;
+    ++s.n_matched;
+    true_area += truth[p.t].area_um2;
+    found_area += found[p.f].area_um2;
+    squares += p.distance * p.distance;
+    if (truth[p.t].minor_axis_um < 0.6 * truth[p.t].major_axis_um) {
+      const double turn = std::asin(std::abs(std::sin(truth[p.t].angle_rad - found[p.f].angle_rad)));
+      angles += turn * turn;
+      ++n_long;
+    }
+  }
+  s.area_ratio = found_area / true_area;
+  s.centre_error_um = std::sqrt(squares / std::max(1, s.n_matched));
+  s.angle_error_rad = std::sqrt(angles / std::max(1, n_long));
+  return s;
+}
+
+struct FibreScore {
+  int n_true = 0;    ///< longer than 4 um
+  int n_traced = 0;  ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
+  int n_typed = 0;   ///< … and has the type, and is held by the very adhesions
+  int n_found = 0;
+  int n_false = 0;            ///< found, and less than half of it near any true fibre
+  std::vector<int> found_id;  ///< by true fibre; 0: none
+};
+
+/// @param adhesions  of score_adhesions, to translate the ids at the ends
+inline FibreScore score_fibres(const Cell& truth, const Cell& found, const AdhesionScore& adhesions) {
+  constexpr double kTolerance_um = 0.4;  // two thirds of a fibre's width
+  const auto translated = [&](const std::optional<int>& id) {
+    if (!id) return 0;
+    for (std::size_t i = 0; i < truth.adhesions.size(); ++i)
+      if (truth.adhesions[i].adhesion_id == *id) return adhesions.found_id[i];
+    return 0;
+  };
+  FibreScore s;
+  s.n_found = static_cast<int>(found.fibres.size());
+  for (const Fibre& t : truth.fibres) {
+    s.found_id.push_back(0);
+    if (length_um(t.points_um) <= 4) continue;
+    ++s.n_true;
+    for (const Fibre& f : found.fibres) {
+      if (covered_share(t.points_um, f.points_um, kTolerance_um) < 0.8) continue;
+      if (covered_share(f.points_um, t.points_um, kTolerance_um) < 0.8) continue;
+      ++s.n_traced;
+      const int a = translated(t.start_adhesion_id), b = translated(t.end_adhesion_id);
+      const int c = f.start_adhesion_id.value_or(0), d = f.end_adhesion_id.value_or(0);
+      if (t.type == f.type && ((a == c && b == d) || (a == d && b == c))) {
+        ++s.n_typed;
+        s.found_id.back() = f.fibre_id;
+      }
+      break;
+    }
+  }
+  for (const Fibre& f : found.fibres) {
+    int n = 0;
+    const Polyline points = densely(f.points_um);
+    for (const Vec2 p : points)
+      n += std::any_of(truth.fibres.begin(), truth.fibres.end(),
+                       [&](const Fibre& t) { return distance_to_line_um(p, t.points_um) <= kTolerance_um; });
+    s.n_false += 2 * n < static_cast<int>(points.size());
+  }
+  return s;
+}
+
+/// Area in both outlines over area in either, counted on a grid of 0.1 um.
+inline double intersection_over_union(const Polygon& a, const Polygon& b) {
+  Vec2 low = a[0], high = a[0];
+  for (const Polygon* polygon : {&a, &b})
+    for (const Vec2 p : *polygon) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+    }
+  int n_both = 0, n_either = 0;
+  for (double y = low.y; y < high.y; y += 0.1)
+    for (double x = low.x; x < high.x; x += 0.1) {
+      const bool in_a = contains(a, {x, y}), in_b = contains(b, {x, y});
+      n_both += in_a && in_b;
+      n_either += in_a || in_b;
+    }
+  return 1.0 * n_both / n_either;
+}
+
+}  // namespace mbtfm::test

@@ -1,0 +1,229 @@
+#include "segment/image.h"
+
+#include <gtest/gtest.h>
+#include <tiffio.h>
+
+#include <algorithm>
+#include <cstring>
+#include <fstream>
+#include <sstream>
+
+#include "pipeline/contract/errors.h"
+#include "segment/image_file.h"
+#include "segment/png.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::segment {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryFolder;
+
+Image ramp(int width, int height) {
+  Image image;
+  image.width = width;
+  image.height = height;
+  for (int k = 0; k < width * height; ++k) image.pixels.push_back(static_cast<float>(37 * k % 60000));
+  return image;
+}
+
+TEST(Image, a_written_tiff_comes_back_with_its_calibration) {
+  const TemporaryFolder folder;
+  Image image = ramp(123, 77);
+  for (const double pixel_size_um : {0.1, 0.1625, 0.125, 0.06475, 0.64}) {
+    image.pixel_size_um = pixel_size_um;
+    write_tiff(folder / "a.tif", image);
+    const Image back = read_image(folder / "a.tif");
+    EXPECT_EQ(back.width, 123);
+    EXPECT_EQ(back.height, 77);
+    EXPECT_EQ(back.pixels, image.pixels);
+    EXPECT_EQ(back.full_scale, 65535);
+    ASSERT_TRUE(back.pixel_size_um);
+    EXPECT_DOUBLE_EQ(*back.pixel_size_um, pixel_size_um);  // six digits come back as they were
+  }
+  image.pixel_size_um.reset();
+  write_tiff(folder / "b.tif", image);
+  EXPECT_FALSE(read_image(folder / "b.tif").pixel_size_um);
+}
+
+TEST(Image, values_outside_16_bits_are_clamped_and_fractions_rounded) {
+  const TemporaryFolder folder;
+  Image image{.width = 4, .height = 1, .pixels = {-3.0f, 1.5f, 70000.0f, 2.4f}, .pixel_size_um = {}, .full_scale = 0};
+  write_tiff(folder / "a.tif", image);
+  EXPECT_EQ(read_image(folder / "a.tif").pixels, (std::vector<float>{0, 2, 65535, 2}));
+}
+
+TEST(Image, colour_is_read_as_the_mean_of_red_green_and_blue) {
+  const TemporaryFolder folder;
+  write_png(folder / "a.png", {.width = 2, .height = 1, .rgb = {10, 20, 60, 7, 7, 7}});
+  const Image image = read_image(folder / "a.png");
+  EXPECT_EQ(image.pixels, (std::vector<float>{30, 7}));
+  EXPECT_EQ(image.full_scale, 255);
+}
+
+struct CalibrationCase {
+  const char* description;
+  std::optional<double> x_resolution, y_resolution, expected_um;
+};
+
+TEST(Image, calibration_is_understood_in_each_dialect) {
+  const CalibrationCase cases[] = {
+      {"ImageJ=1.53t\nunit=micron\n", 6.153846, 6.153846, 0.1625},
+      {"ImageJ=1.53t\nunit=um\n", 8, 8, 0.125},
+      {"ImageJ=1.53t\nunit=\\u00B5m\nmin=0\n", 10, 10, 0.1},
+      {"ImageJ=1.53t\nunit=\xC2\xB5m\n", 10, 10, 0.1},
+      {"ImageJ=1.53t\nunit=\xB5m\n", 10, 10, 0.1},
+      {"ImageJ=1.53t\nunit=nm\n", 0.01, 0.01, 0.1},
+      {"ImageJ=1.53t\nunit=mm\n", 10000, 10000, 0.1},
+      {"ImageJ=1.53t\nunit=cm\n", 100, 100, 100.0},
+      {"ImageJ=1.53t\nunit=inch\n", 300, 300, 84.6667},
+      {"ImageJ=1.53t\n", 300, 300, {}},  // a printer's resolution
+      {"", 300, 300, {}},                // the same
+      {"ImageJ=1.53t\nunit=pixel\n", 1, 1, {}},
+      {"ImageJ=1.53t\nunit=um\n", {}, {}, {}},
+      {"ImageJ=1.53t\nunit=um\n", 0, 0, {}},
+      {"ImageJ=1.53t\nunit=um\n", 5, 4, {}},  // not square
+      {"<OME><Pixels PhysicalSizeX=\"0.16\" PhysicalSizeY=\"0.16\"/></OME>", {}, {}, 0.16},
+      {"<OME><Pixels PhysicalSizeXUnit=\"nm\" PhysicalSizeX=\"160.0\"/></OME>", {}, {}, 0.16},
+      {"<OME><Pixels PhysicalSizeX='0.2' PhysicalSizeXUnit='\xC2\xB5m'/></OME>", 1, 1, 0.2},
+      {"<OME><Pixels PhysicalSizeX=\"1\" PhysicalSizeXUnit=\"pixel\"/></OME>", {}, {}, {}},
+      {"<OME><Pixels SizeX=\"3\"/></OME>", {}, {}, {}},
+      {"[Improvision Data]\r\rXCalibrationMicrons=0.16\rYCalibrationMicrons=0.16\rZCalibrationMicrons=0.35\r",
+       {},
+       {},
+       0.16},
+  };
+  for (const CalibrationCase& c : cases) {
+    EXPECT_EQ(pixel_size_um({c.description, c.x_resolution, c.y_resolution}), c.expected_um) << c.description;
+  }
+}
+
+std::string error_of(const fs::path& file, int page = 0) {
+  try {
+    read_image(file, page);
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.where, file.string());
+    return error.found;
+  }
+  return "no error";
+}
+
+TEST(Image, what_is_no_image_is_named_for_what_it_is) {
+  const TemporaryFolder folder;
+  EXPECT_EQ(error_of(folder / "none.tif"), "no such file");
+  fs::create_directory(folder / "folder.tif");
+  EXPECT_EQ(error_of(folder / "folder.tif"), "a folder");
+  std::ofstream(folder / "empty.tif");
+  EXPECT_EQ(error_of(folder / "empty.tif"), "an empty file");
+  std::ofstream(folder / "zip.tif") << "PK\x03\x04 and so on";
+  EXPECT_EQ(error_of(folder / "zip.tif"), "a zip archive");
+  std::ofstream(folder / "text.tif") << "bead 1, bead 2";
+  EXPECT_EQ(error_of(folder / "text.tif"), "bytes of neither");
+  write_tiff(folder / "a.tif", ramp(9, 9));
+  EXPECT_EQ(error_of(folder / "a.tif", 3), "1 pages");
+}
+
+/// Overwrite a tag's 4-byte value in a little-endian TIFF.
+void set_tag(const fs::path& file, std::uint16_t tag, std::uint32_t value) {
+  std::ifstream in(file, std::ios::binary);
+  std::string bytes((std::istreambuf_iterator<char>(in)), {});
+  std::uint32_t at = 0;
+  std::memcpy(&at, &bytes[4], 4);
+  std::uint16_t n_tags = 0;
+  std::memcpy(&n_tags, &bytes[at], 2);
+  for (std::uint32_t entry = at + 2; entry < at + 2 + 12u * n_tags; entry += 12) {
+    if (std::memcmp(&bytes[entry], &tag, 2) != 0) continue;
+    const std::uint16_t kLong = 4;
+    std::memcpy(&bytes[entry + 2], &kLong, 2);
+    std::memcpy(&bytes[entry + 8], &value, 4);
+  }
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+TEST(Image, a_size_the_file_cannot_fill_takes_no_memory) {
+  const TemporaryFolder folder;
+  write_tiff(folder / "a.tif", ramp(50, 50));
+  set_tag(folder / "a.tif", TIFFTAG_IMAGEWIDTH, 2000000000);
+  EXPECT_NE(error_of(folder / "a.tif").find("2000000000 x 50 pixels"), std::string::npos);
+  set_tag(folder / "a.tif", TIFFTAG_IMAGEWIDTH, 40000);
+  set_tag(folder / "a.tif", TIFFTAG_IMAGELENGTH, 40000);
+  EXPECT_NE(error_of(folder / "a.tif").find("40000 x 40000 pixels"), std::string::npos);
+}
+
+// ---- images of other programs
+
+const fs::path kShared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+
+struct Decoded {
+  std::string file, shape, photometric, program;
+  int bits = 0;
+  int samples = 0;
+  double low = 0, high = 0, sum = 0;
+};
+
+std::vector<Decoded> decoded_by_others(const fs::path& table) {
+  std::ifstream in(table);
+  std::string line;
+  std::getline(in, line);
+  std::vector<Decoded> result;
+  while (std::getline(in, line)) {
+    std::vector<std::string> fields;
+    std::stringstream cells(line);
+    for (std::string cell; std::getline(cells, cell, ',');) fields.push_back(cell);
+    fields.resize(19);
+    if (fields[16].empty() || fields[4].empty() || fields[5].empty()) continue;  // undecoded
+    result.push_back({fields[0], fields[14], fields[8], fields[13], std::stoi(fields[4]), std::stoi(fields[5]),
+                      std::stod(fields[16]), std::stod(fields[17]), std::stod(fields[18])});
+  }
+  return result;
+}
+
+TEST(Image, real_files_decode_as_by_other_programs) {
+  if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
+  int n_compared = 0;
+  for (const Decoded& expected : decoded_by_others(kShared / "tiff/reference_decode_open.csv")) {
+    // what the other program expands (2, 4, 12 bits by PIL) or leaves inverted has no comparable sum
+    const bool is_raw = expected.program == "tifffile" || expected.bits >= 8;
+    const bool is_grey = expected.samples == 1 && expected.photometric != "MINISWHITE";
+    const bool is_rgb = expected.samples == 3 && expected.photometric == "RGB";
+    if (!fs::exists(kShared / expected.file) || !is_raw || !(is_grey || is_rgb)) continue;
+    SCOPED_TRACE(expected.file);
+    Image image;
+    ASSERT_NO_THROW(image = read_image(kShared / expected.file));
+    double sum = 0;
+    for (const float value : image.pixels) sum += value;
+    const double scale = is_rgb ? 3 : 1;
+    EXPECT_NEAR(sum * scale, expected.sum, 1e-6 * std::abs(expected.sum) + 1e-3);  // float's 2^-24
+    if (is_grey) {
+      EXPECT_FLOAT_EQ(*std::min_element(image.pixels.begin(), image.pixels.end()), static_cast<float>(expected.low));
+      EXPECT_FLOAT_EQ(*std::max_element(image.pixels.begin(), image.pixels.end()), static_cast<float>(expected.high));
+    }
+    ++n_compared;
+  }
+  EXPECT_GT(n_compared, 60);
+}
+
+TEST(Image, real_calibrations_are_found) {
+  if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
+  const std::pair<const char*, std::optional<double>> cases[] = {
+      {"tiff/imagej153t/hyperstack_c2z3t4_16bit_micron.tif", 0.1625},
+      {"tiff/imagej153t/inch300.tif", 84.6667},
+      {"tiff/imagej153t/lut8_cm.tif", 100.0},
+      {"tiff/imagej153t/rgb_nm.tif", 0.0650026},
+      {"tiff/imagej153t/stack7_16bit_mu_sign.tif", 0.1},
+      {"tiff/imagej153t/uncalibrated_8bit.tif", std::nullopt},
+      {"tiff/derived_tiffcp/beads_2ch.ome.tif", 0.16},
+      {"tiff/derived_tiffcp/beads_2ch_nm.ome.tif", 0.16},
+      {"tiff/derived_tiffcp/beads_16_none.tif", std::nullopt},
+      {"actin/micropattern_chirality/Control/0001_20Feb20_siNT.tif", 0.16},
+      {"actin/bronchial_monolayer/U13_72_P1_5_SF.tif", 0.293}};
+  for (const auto& [file, expected] : cases) {
+    const auto found = read_image(kShared / file).pixel_size_um;
+    ASSERT_EQ(found.has_value(), expected.has_value()) << file;
+    EXPECT_NEAR(found.value_or(0), expected.value_or(0), 1e-5 * expected.value_or(0)) << file;
+  }
+  EXPECT_EQ(read_image(kShared / "tiff/derived_tiffcp/beads_2ch.ome.tif", 1).pixel_size_um, 0.16);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

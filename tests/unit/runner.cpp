@@ -1,0 +1,276 @@
+/// The runner on stages that are shell scripts: which it runs, which it leaves, what it says.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <sstream>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/runner/batch.h"
+#include "pipeline/runner/images.h"
+#include "pipeline/runner/lock.h"
+#include "pipeline/runner/run_cell.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::runner {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryFolder;
+
+void make_executable(const fs::path& file, const std::string& text) {
+  write_text(file, text);
+  fs::permissions(file, fs::perms::owner_all);
+}
+
+// Each output is a line that the stage's inputs decide, but for the segmentation: it is the same for all images, as for
+// two images that differ outside the cell only. With exit-<name> beside it, a stage ends with the code in that file.
+constexpr const char* kStageScript = R"sh(#!/bin/sh
+here=$(dirname "$0"); name=$(basename "$0"); name=${name#mbtfm-}; all=""
+while [ $# -gt 0 ]; do
+  case "$1" in
+    --check) check=1; shift;;
+    --quiet) shift;;
+    --out) out=$2; shift 2;;
+    --record) record=$2; shift 2;;
+    --config) config=$2; shift 2;;
+    --threads) shift 2;;
+    *) [ -f "$2" ] && all="$all $2"; shift 2;;
+  esac
+done
+if [ -n "$check" ]; then grep -q refuse_$name "$config" && { echo "mbtfm-$name: error: refused" >&2; exit 2; }; exit 0; fi
+echo $name >> "$here/calls"
+code=0; [ -f "$here/exit-$name" ] && code=$(cat "$here/exit-$name")
+[ $code -ne 0 ] && [ $code -ne 4 ] && { echo "mbtfm-$name: error: made to fail" >&2; exit $code; }
+sum=$(cat $all "$config" | cksum)
+case $name in
+  segment) for f in adhesions fibres fibre_points outline; do echo same > "$out/$f.csv"; done;;
+  track) echo "$sum" > "$out/displacement.csv";;
+  network) echo "$sum" > "$out";;
+  fit) for f in tensions.csv adhesion_forces.csv fit.json contracted.vtu; do echo "{}" > "$out/$f"; done;;
+esac
+echo "{\"stage\": \"$name\", \"version\": \"1\", \"summary\": \"made by a script\"}" > "$record"
+exit $code
+)sh";
+
+class Runner : public testing::Test {
+ protected:
+  TemporaryFolder folder_;
+  const fs::path cell_ = folder_ / "cell";
+  const fs::path bin_ = folder_ / "bin";
+  RunOptions options_{
+      .stage_folder = bin_, .threads = 2, .is_quiet = true, .only = {}, .redo = {}, .version = "1", .say = nullptr};
+
+  void SetUp() override {
+    fs::create_directories(cell_);
+    fs::create_directories(bin_);
+    for (const Stage& stage : stages()) make_executable(bin_ / ("mbtfm-" + stage.name), kStageScript);
+    write_parameters("");
+    for (const char* image : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
+      write_text(cell_ / image, image);
+    }
+  }
+
+  void write_parameters(const std::string& further) {
+    write_text(cell_ / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\n" + further);
+  }
+
+  /// Names of the stages that a run starts, sorted: two of them start at the same time.
+  std::string started() {
+    fs::remove(bin_ / "calls");
+    last_ = run_cell(cell_, options_);
+    return calls();
+  }
+  std::string calls() {
+    if (!fs::exists(bin_ / "calls")) return "";
+    std::istringstream lines(read_text(bin_ / "calls"));
+    std::vector<std::string> names;
+    for (std::string name; lines >> name;) names.push_back(name);
+    std::sort(names.begin(), names.end());
+    std::string list;
+    for (const std::string& name : names) list += (list.empty() ? "" : " ") + name;
+    return list;
+  }
+  StageState state_of(const std::string& stage) const {
+    for (const StageOutcome& outcome : last_.stages) {
+      if (outcome.stage == stage) return outcome.status.state;
+    }
+    throw InternalError("no stage " + stage);
+  }
+  CellOutcome last_;
+};
+
+TEST_F(Runner, runs_all_stages_once) {
+  EXPECT_EQ(started(), "fit network segment track");
+  EXPECT_EQ(started(), "");
+  EXPECT_TRUE(fs::exists(cell_ / "run.json"));
+}
+
+TEST_F(Runner, runs_again_exactly_what_depends_on_a_changed_table) {
+  started();
+  write_parameters("[fit]\nn_meshes = 2\n");
+  EXPECT_EQ(started(), "fit");
+  write_parameters("[fit]\nn_meshes = 2\n[track]\nx = 1\n");
+  EXPECT_EQ(started(), "fit track");  // the script's displacement differs for another cell.toml
+  write_parameters("[fit]\nn_meshes = 2\n[track]\nx = 1\n[segment]\ny = 1\n");
+  EXPECT_EQ(started(), "segment");  // its outputs are the same bytes: nothing after it is affected
+}
+
+TEST_F(Runner, order_and_comments_of_the_parameter_file_do_not_matter) {
+  started();
+  write_text(cell_ / "cell.toml", "pixel_size_um = 0.1 # calibrated\n\n[gel]\nyoungs_modulus_kPa = 8 # kPa\n");
+  EXPECT_EQ(started(), "");
+}
+
+TEST_F(Runner, runs_again_for_a_changed_image_or_another_version) {
+  started();
+  write_text(cell_ / "beads_relaxed.tif", "another");
+  EXPECT_EQ(started(), "fit track");
+  options_.version = "2";
+  EXPECT_EQ(started(), "fit network segment track");
+}
+
+TEST_F(Runner, keeps_an_output_that_was_changed_by_hand) {
+  started();
+  write_text(cell_ / "1_segment/fibres.csv", "drawn by hand");
+  EXPECT_EQ(started(), "fit network");
+  EXPECT_EQ(state_of("segment"), StageState::replaced);
+  EXPECT_EQ(read_text(cell_ / "1_segment/fibres.csv"), "drawn by hand");
+  EXPECT_NE(read_text(cell_ / "run.json").find("\"replaced\""), std::string::npos);
+  EXPECT_EQ(started(), "");
+  options_.redo = {"segment"};
+  EXPECT_EQ(started(), "fit network segment");
+}
+
+TEST_F(Runner, takes_given_outputs_without_images) {
+  for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"}) {
+    fs::create_directories(cell_ / "1_segment");
+    write_text(cell_ / "1_segment" / file, file);
+  }
+  fs::remove(cell_ / "paxillin.tif");
+  fs::remove(cell_ / "actin.tif");
+  EXPECT_EQ(started(), "fit network track");
+  EXPECT_EQ(state_of("segment"), StageState::given);
+  EXPECT_EQ(started(), "");
+}
+
+TEST_F(Runner, keeps_outputs_whose_images_were_moved_away) {
+  started();
+  for (const char* image : {"beads_stressed.tif", "beads_relaxed.tif"}) fs::remove(cell_ / image);
+  EXPECT_EQ(started(), "");
+}
+
+TEST_F(Runner, rejects_a_half_given_stage) {
+  fs::create_directories(cell_ / "1_segment");
+  write_text(cell_ / "1_segment/adhesions.csv", "given");
+  EXPECT_THROW(started(), InputError);
+  EXPECT_EQ(read_text(cell_ / "1_segment/adhesions.csv"), "given");
+}
+
+TEST_F(Runner, starts_nothing_where_an_image_lacks) {
+  fs::remove(cell_ / "beads_relaxed.tif");
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("beads_relaxed.tif"), std::string::npos);
+  }
+  EXPECT_EQ(calls(), "");
+}
+
+TEST_F(Runner, starts_nothing_where_a_stage_refuses_its_parameters) {
+  write_parameters("[fit]\nrefuse_fit = 1\n");
+  EXPECT_THROW(started(), StageFailed);
+  EXPECT_EQ(calls(), "");
+}
+
+TEST_F(Runner, runs_a_stage_again_that_was_interrupted) {
+  started();
+  write_begun(cell_ / "2_track/record.json", stages()[1]);  // as a kill in the middle of the stage leaves it
+  EXPECT_EQ(started(), "track");
+}
+
+TEST_F(Runner, passes_on_the_exit_code_and_resumes) {
+  write_text(bin_ / "exit-network", "3");
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const StageFailed& error) {
+    EXPECT_EQ(error.exit_code, 3);
+  }
+  EXPECT_EQ(calls(), "network segment track");
+  fs::remove(bin_ / "exit-network");
+  EXPECT_EQ(started(), "fit network");
+}
+
+TEST_F(Runner, goes_on_after_a_stage_that_did_not_converge_and_never_forgets_it) {
+  write_text(bin_ / "exit-network", "4");
+  EXPECT_EQ(started(), "fit network segment track");
+  EXPECT_FALSE(last_.converged());
+  EXPECT_EQ(started(), "");
+  EXPECT_FALSE(last_.converged());
+}
+
+TEST_F(Runner, only_runs_the_stages_asked_for) {
+  options_.only = {"segment"};
+  EXPECT_EQ(started(), "segment");
+  options_.only = {"fit"};
+  EXPECT_THROW(started(), InputError);  // no network yet
+  options_.only = {"fits"};
+  EXPECT_THROW(started(), UsageError);
+}
+
+TEST_F(Runner, keeps_away_from_a_cell_that_another_run_holds) {
+  const FolderLock lock(cell_);
+  EXPECT_THROW(started(), InputError);
+}
+
+TEST_F(Runner, names_of_images_are_globs_that_fit_one_file) {
+  write_text(cell_ / "c1_pax.tif", "");
+  write_text(cell_ / "c2_pax.tif", "");
+  ImageNames names;
+  names.adhesion = "c1_*.tif";
+  EXPECT_EQ(resolve_image(cell_, names, "adhesion"), cell_ / "c1_pax.tif");
+  names.adhesion = "*_pax.tif";
+  try {
+    resolve_image(cell_, names, "adhesion");
+    FAIL() << "no error";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("c1_pax.tif, c2_pax.tif"), std::string::npos);
+  }
+}
+
+TEST_F(Runner, a_file_whose_name_looks_like_a_glob_is_found) {
+  write_text(cell_ / "cell[1].tif", "");
+  ImageNames names;
+  names.actin = "cell[1].tif";
+  EXPECT_EQ(resolve_image(cell_, names, "actin"), cell_ / "cell[1].tif");
+}
+
+TEST(Batch, a_failed_cell_does_not_stop_the_others) {
+  const TemporaryFolder folder;
+  for (const char* name : {"a", "b", "deeper/c"}) {
+    fs::create_directories(folder / name);
+    write_text(folder / (std::string(name) + "/cell.toml"), "");
+  }
+  fs::create_directories(folder / "a/inner");
+  write_text(folder / "a/inner/cell.toml", "");  // part of a, not a cell
+  make_executable(folder / "mbtfm",
+                  "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
+  const auto cells = find_cells(folder.path());
+  ASSERT_EQ(cells.size(), 3u);
+  const auto outcomes = run_batch(cells, {.program = folder / "mbtfm", .arguments = {}, .jobs = 2, .say = nullptr});
+  EXPECT_EQ(outcomes[0].exit_code, 0);
+  EXPECT_EQ(outcomes[1].exit_code, 3);
+  EXPECT_EQ(outcomes[1].message, "mbtfm: error: broken");
+  EXPECT_EQ(outcomes[2].exit_code, 128 + 9);
+}
+
+TEST(Batch, a_folder_without_cells_is_an_error) {
+  const TemporaryFolder folder;
+  EXPECT_THROW(find_cells(folder.path()), InputError);
+}
+
+}  // namespace
+}  // namespace mbtfm::runner

@@ -1,0 +1,131 @@
+#include "pipeline/contract/stage.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryFolder;
+
+struct Example {
+  double length_um = 1.5;
+  bool is_fast = false;
+};
+void declare(ParameterList& list, Example& e) {
+  list.table("network");
+  list.add("length_um", e.length_um, Range::positive(), "length (um)");
+  list.add("is_fast", e.is_fast, "whether to be fast");
+}
+
+const StageDescription kDescription = {.name = "example",
+                                       .purpose = "an example",
+                                       .files = {{"in", FileArgument::Kind::input, "what is read"},
+                                                 {"out", FileArgument::Kind::output_folder, "what is written"}}};
+
+class Stage : public ::testing::Test {
+ protected:
+  int run(std::vector<std::string> arguments, const std::function<StageReport(const Example&, StageContext&)>& body) {
+    arguments.insert(arguments.begin(), "mbtfm-example");
+    std::vector<char*> argv;
+    for (std::string& a : arguments) argv.push_back(a.data());
+    return run_stage<Example>(kDescription, static_cast<int>(argv.size()), argv.data(), body);
+  }
+  std::vector<std::string> files() const {
+    return {"--quiet", "--in", (folder_ / "in.txt").string(), "--out", (folder_ / "out").string()};
+  }
+  std::vector<std::string> files_and(std::vector<std::string> more) const {
+    std::vector<std::string> all = files();
+    all.insert(all.end(), more.begin(), more.end());
+    return all;
+  }
+  void SetUp() override { write_text(folder_ / "in.txt", "in"); }
+  TemporaryFolder folder_;
+};
+
+StageReport write_two(const Example&, StageContext& context) {
+  context.input("in");
+  write_text(context.output("out", "a.csv"), "a");
+  write_text(context.output("out", "deep/b.csv"), "b");
+  return {.summary = "two files", .figures = {{"n", std::int64_t{2}}}};
+}
+
+TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {
+  EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string(), "--length_um", "2.5", "--is_fast"}),
+                [](const Example& e, StageContext& context) {
+                  EXPECT_EQ(e.length_um, 2.5);
+                  EXPECT_TRUE(e.is_fast);
+                  return write_two(e, context);
+                }),
+            0);
+  EXPECT_EQ(read_text(folder_ / "out/a.csv"), "a");
+  EXPECT_EQ(read_text(folder_ / "out/deep/b.csv"), "b");
+  const std::string record = read_text(folder_ / "record.json");
+  for (const char* word : {"\"stage\": \"example\"", "\"length_um\": 2.5", "\"in.txt\"", "\"out/deep/b.csv\"",
+                           "\"n\": 2", "\"summary\": \"two files\""}) {
+    EXPECT_NE(record.find(word), std::string::npos) << word << " is not in " << record;
+  }
+}
+
+TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
+  const std::vector<std::pair<int, std::function<void()>>> failures = {
+      {2, [] { throw UsageError("usage"); }},
+      {3, [] { throw InputError("a.csv:3", "a number", "'x'"); }},
+      {3, [] { throw InvalidData("adhesion 3", "an area", "none"); }},
+      {4, [] { throw NotSolved(Report{.reason = "reason"}); }},
+      {5, [] { throw OutputError("disk full"); }},
+      {70, [] { throw InternalError("bug"); }},
+  };
+  for (const auto& [code, fail] : failures) {
+    EXPECT_EQ(run(files(),
+                  [&](const Example& e, StageContext& context) {
+                    write_two(e, context);
+                    fail();
+                    return StageReport{};
+                  }),
+              code);
+    EXPECT_FALSE(fs::exists(folder_ / "out")) << "code " << code;
+  }
+}
+
+TEST_F(Stage, what_has_not_converged_is_written_and_marked) {
+  EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string()}),
+                [](const Example& e, StageContext& context) {
+                  StageReport report = write_two(e, context);
+                  report.converged = false;
+                  return report;
+                }),
+            4);
+  EXPECT_TRUE(fs::exists(folder_ / "out/a.csv"));
+  EXPECT_NE(read_text(folder_ / "record.json").find("\"converged\": false"), std::string::npos);
+}
+
+TEST_F(Stage, flags_win_over_the_file_and_the_file_over_the_default) {
+  write_text(folder_ / "cell.toml", "[network]\nlength_um = 3\nis_fast = true\n");
+  const std::string config = (folder_ / "cell.toml").string();
+  const auto expect_length = [](double length_um) {
+    return [length_um](const Example& e, StageContext& context) {
+      EXPECT_EQ(e.length_um, length_um);
+      return write_two(e, context);
+    };
+  };
+  EXPECT_EQ(run(files(), expect_length(1.5)), 0);
+  EXPECT_EQ(run(files_and({"--config", config}), expect_length(3)), 0);
+  EXPECT_EQ(run(files_and({"--config", config, "--length_um", "4"}), expect_length(4)), 0);
+}
+
+TEST_F(Stage, wrong_flags_and_values_are_usage_errors_and_a_wrong_file_an_input_error) {
+  EXPECT_EQ(run(files_and({"--lenght_um", "2"}), write_two), 2);
+  EXPECT_EQ(run(files_and({"--length_um", "-2"}), write_two), 2);
+  EXPECT_EQ(run({"--out", "x"}, write_two), 2) << "an input is missing";
+  EXPECT_EQ(run(files_and({"--config", (folder_ / "none.toml").string()}), write_two), 3);
+  write_text(folder_ / "bad.toml", "[network]\nlength = 3\n");
+  EXPECT_EQ(run(files_and({"--check", "--config", (folder_ / "bad.toml").string()}), write_two), 3);
+  EXPECT_FALSE(fs::exists(folder_ / "out")) << "--check runs nothing";
+}
+
+}  // namespace
+}  // namespace mbtfm
