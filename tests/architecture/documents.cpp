@@ -1,0 +1,52 @@
+/// The pages of docs/ are in step with the program.
+#include <gtest/gtest.h>
+
+#include <regex>
+
+#include "pipeline/contract/files.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kDocs = fs::path(MBTFM_SOURCE_DIR) / "docs";
+
+TEST(Documents, the_examples_of_the_format_page_are_read) {
+  const std::string page = read_text(kDocs / "formats.md");
+  const std::regex example("```csv ([a-z_]+\\.csv)\n([^`]*)```");
+  const test::TemporaryFolder folder;
+  int n_examples = 0;
+  for (std::sregex_iterator at(page.begin(), page.end(), example), end; at != end; ++at, ++n_examples) {
+    write_text(folder / (*at)[1], (*at)[2].str());
+  }
+  EXPECT_EQ(n_examples, 7);
+  EXPECT_EQ(read_cell(folder.path()).fibres.size(), 2u);
+  EXPECT_EQ(read_displacement(folder / "displacement.csv").size(), 2u);
+  EXPECT_EQ(read_tensions(folder / "tensions.csv").size(), 3u);
+  EXPECT_EQ(read_adhesion_forces(folder / "adhesion_forces.csv").size(), 2u);
+}
+
+std::string parameter_page() {
+  std::string page =
+      "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
+      "and a "
+      "flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file.\n";
+  for (const char* stage : {"segment", "track", "network", "contract", "fit", "simulate", "stats"}) {
+    const auto outcome = test::run_program("mbtfm-" + std::string(stage) + " --parameters");
+    EXPECT_EQ(outcome.code, 0) << outcome.output;
+    page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outcome.output;
+  }
+  return page;
+}
+
+/// Set MBTFM_WRITE_DOCS to write the page instead.
+TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
+  const std::string page = parameter_page();
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "parameters.md", page);
+  EXPECT_EQ(read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+}
+
+}  // namespace
+}  // namespace mbtfm
