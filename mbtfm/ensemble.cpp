@@ -35,6 +35,14 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& jacobian) {
   return half * half.transpose();
 }
 
+/// Forces with every fibre at the network's tension.
+Eigen::VectorXd network_forces_nN(const TensionProblem& problem, const Trial& trial) {
+  const double tension = trial.tensions_nN[0];
+  constexpr double kNothing = 1e-6;  // of the largest tension: such a network carries no force that one could tell
+  if (tension <= kNothing * trial.tensions_nN.maxCoeff()) return Eigen::VectorXd::Zero(trial.forces_nN.size());
+  return problem.evaluate(Eigen::VectorXd::Constant(trial.tensions_nN.size(), tension), &trial).forces_nN;
+}
+
 MeshFit fit_mesh(const network::CableNetwork& network, const LinearData& data, const std::vector<int>& adhesion_ids,
                  const FitParameters& parameters, int threads) {
   const TensionProblem problem(network, data, adhesion_ids);
@@ -50,8 +58,7 @@ MeshFit fit_mesh(const network::CableNetwork& network, const LinearData& data, c
     const Eigen::Matrix2d c = rows * mesh.tension_covariance * rows.transpose();
     mesh.force_covariance_diagonal.row(a) << c(0, 0), c(0, 1), c(1, 1);
   }
-  const Eigen::VectorXd network_only = Eigen::VectorXd::Constant(trial.tensions_nN.size(), trial.tensions_nN[0]);
-  mesh.network_forces_nN = problem.evaluate(network_only, &trial).forces_nN;
+  mesh.network_forces_nN = network_forces_nN(problem, trial);
   return mesh;
 }
 

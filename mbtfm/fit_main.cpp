@@ -17,6 +17,9 @@
 namespace mbtfm::inverse {
 namespace {
 
+// Chi squared per degree of freedom. Another network of the same cell leaves up to about 1.1 at 5 % noise.
+constexpr double kPoorFit = 1.3;
+
 struct FitStageParameters {
   Gel gel;
   network::NetworkParameters network;
@@ -289,6 +292,11 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
   if (inputs.n_flagged > 0) report.summary += "; " + std::to_string(inputs.n_flagged) + " flagged beads left out";
   if (!fit.report.converged) report.summary = fit.report.reason;
+  if (data.has_errors && fit.chi_squared_per_degree > kPoorFit) {
+    report.summary += "; the model explains the beads poorly (chi squared " +
+                      std::to_string(fit.chi_squared_per_degree) +
+                      " per degree of freedom): do displacement, segmentation and gel belong together?";
+  }
   for (const auto& figure : substrate->figures()) report.figures.push_back(figure);
   return report;
 }

@@ -19,6 +19,11 @@ std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
   return indices;
 }
 
+// Of the network's tension in one step: without it the links hang loose and the next derivative tells nothing of them.
+constexpr double kLargestDrop = 0.9;
+// Of the largest tension: less than this is as good as none.
+constexpr double kNothing = 1e-6;
+
 // Part of the whole misfit: of 10 000 beads' chi² of 20 000 this is 0.001, a thirtieth of a standard error.
 constexpr double kNegligible = 5e-8;
 
@@ -85,8 +90,8 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
 TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters,
                             const Eigen::VectorXd& start_nN) {
   TensionFit fit;
-  fit.trial = problem.evaluate(start_nN);
-  fit.n_evaluations = 1;
+  fit.trial = problem.evaluate(scaled_to_data_nN(problem, start_nN));
+  fit.n_evaluations = 2;
   double gain_of_late = 0;
   double damping = 1e-3;  // relative to the diagonal; small, as forces are nearly linear in the tensions
   Eigen::MatrixXd jacobian = problem.jacobian(fit.trial);
@@ -97,8 +102,10 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     // A tension that no bead feels has a zero diagonal; the floor keeps it where it is.
     const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-12 * H.diagonal().maxCoeff() + 1e-300);
     const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale).asDiagonal());
-    const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, -fit.trial.tensions_nN);
     const double largest = fit.trial.tensions_nN.maxCoeff();
+    Eigen::VectorXd low = -fit.trial.tensions_nN;
+    if (fit.trial.tensions_nN[0] > kNothing * largest) low[0] *= kLargestDrop;
+    const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, low);
     fit.report.last_change = step.cwiseAbs().maxCoeff() / std::max(largest, std::numeric_limits<double>::min());
 
     const double predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step));
@@ -120,7 +127,7 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     if (gain > 0) jacobian = problem.jacobian(fit.trial);
     // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
     gain_of_late = 0.5 * gain_of_late + std::max(0.0, gain) * predicted;
-    if (i >= 5 && gain_of_late < kNegligible * (fit.trial.objective + 0.5 * problem.data().floor_squared)) {
+    if (i >= 5 && gain > 0 && gain_of_late < kNegligible * (fit.trial.objective + 0.5 * problem.data().floor_squared)) {
       fit.report.converged = true;
       fit.report.reason = "the last steps lower the misfit by less than any bead could tell";
       break;

@@ -64,12 +64,15 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
   return gradient;
 }
 
+Eigen::VectorXd scaled_to_data_nN(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN) {
+  const Eigen::VectorXd response = problem.data().reduced * problem.evaluate(tensions_nN).forces_nN;
+  const double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
+  // Where the cell seems to push, as noise alone may look, any small positive size serves.
+  return (factor > 0 ? factor : 1e-3 / std::max(tensions_nN.maxCoeff(), 1e-300)) * tensions_nN;
+}
+
 Eigen::VectorXd uniform_start_nN(const TensionProblem& problem) {
-  const Trial trial = problem.evaluate(Eigen::VectorXd::Ones(problem.n_tensions()));
-  const Eigen::VectorXd response = problem.data().reduced * trial.forces_nN;
-  const double scale = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
-  // Where the cell seems to push (noise only), any small positive value serves.
-  return Eigen::VectorXd::Constant(problem.n_tensions(), scale > 0 ? scale : 1e-3);
+  return scaled_to_data_nN(problem, Eigen::VectorXd::Ones(problem.n_tensions()));
 }
 
 }  // namespace mbtfm::inverse

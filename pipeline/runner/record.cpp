@@ -71,6 +71,12 @@ void write_begun(const fs::path& record_file, const Stage& stage) {
   write_whole(record_file, json{{"stage", stage.name}, {"run", {{"finished", false}}}}.dump(1) + "\n");
 }
 
+void forget_begun(const fs::path& record_file) {
+  std::error_code is_not_empty;
+  fs::remove(record_file);
+  fs::remove(record_file.parent_path(), is_not_empty);
+}
+
 bool is_begun(const fs::path& record_file) {
   return fs::is_regular_file(record_file) && parse_json(record_file).contains("run");
 }

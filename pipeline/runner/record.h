@@ -31,6 +31,8 @@ struct StageRecord {
 std::optional<StageRecord> read_record(const std::filesystem::path& record_file);
 /// Before a stage begins: from now on its outputs may be a mixture of two runs.
 void write_begun(const std::filesystem::path& record_file, const Stage& stage);
+/// Take the mark back, and the folder with it where nothing else is in it.
+void forget_begun(const std::filesystem::path& record_file);
 /// The record is still the one of write_begun.
 bool is_begun(const std::filesystem::path& record_file);
 /// Add the runner's part to the record that the stage wrote (or to none).

@@ -5,6 +5,7 @@
 #include <mutex>
 #include <sstream>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/runner/lock.h"
@@ -119,12 +120,17 @@ StageOutcome CellRun::start(const Stage& stage, const StageStatus& before, int t
   const fs::path record_file = cell_ / stage.folder / "record.json";
   const std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
   const StageSurroundings now = surroundings_of(stage, cell_, images_, options_.version);
+  const bool had_record = fs::is_regular_file(record_file);
+  const std::string record_before = had_record ? read_text(record_file) : std::string();
   write_begun(record_file, stage);
   const ProcessResult result = run_process(command);
   // A stage that did not converge and yet wrote its outputs has written a record, too.
   const bool converged = result.exit_code != kNotSolved;
   const bool has_outputs = !result.signal && (result.exit_code == 0 || (!converged && !is_begun(record_file)));
   if (!has_outputs) {
+    // A stage that ends by itself has left its outputs as they were: so must be the record.
+    if (!result.signal && had_record) write_whole(record_file, record_before);
+    if (!result.signal && !had_record) forget_begun(record_file);
     throw StageFailed("mbtfm-" + stage.name + ": " + how_it_ended(result), result.signal ? 70 : result.exit_code);
   }
   const Hashes outputs = hash_files(cell_, stage.writes);
