@@ -110,6 +110,11 @@ struct AdhesionForce {
 };
 
 double length_um(const Polyline& points);
+/// Where between a (0) and b (1) the segment is nearest to the point.
+double nearest_share(Vec2 a, Vec2 b, Vec2 point);
+double distance_to_segment_um(Vec2 point_um, Vec2 a_um, Vec2 b_um);
+/// The ellipse of an adhesion as a polygon.
+Polygon ellipse_corners(const Adhesion& adhesion, int n_corners);
 /// Signed area; positive where the polygon turns from +x towards +y.
 double signed_area_um2(const Polygon& polygon);
 bool contains(const Polygon& polygon, Vec2 point);

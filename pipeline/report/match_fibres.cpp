@@ -7,13 +7,6 @@
 namespace mbtfm::report {
 namespace {
 
-double distance_to_segment_um(Vec2 p, Vec2 a, Vec2 b) {
-  const Vec2 along = b - a;
-  const double length2 = dot(along, along);
-  const double t = length2 > 0 ? std::clamp(dot(p - a, along) / length2, 0.0, 1.0) : 0.0;
-  return norm(p - (a + t * along));
-}
-
 double distance_to_line_um(Vec2 p, const Polyline& line) {
   double nearest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 1; i < line.size(); ++i) {
