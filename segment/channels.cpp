@@ -13,9 +13,9 @@ std::string size_of(const Image& image) {
   return std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels";
 }
 
-std::string in_um(double value) { return shortest(value) + " um"; }
-
 }  // namespace
+
+std::string in_um(double length_um) { return shortest(length_um) + " um"; }
 
 void require_equal_sizes(const Channel& first, const Channel& second) {
   if (first.image.width == second.image.width && first.image.height == second.image.height) return;

@@ -14,6 +14,9 @@ struct Channel {
   Image image;
 };
 
+/// "0.1 um", for messages.
+std::string in_um(double length_um);
+
 /// @throws InputError where the two are not of one size
 void require_equal_sizes(const Channel& first, const Channel& second);
 

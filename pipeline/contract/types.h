@@ -106,7 +106,8 @@ struct AdhesionForce {
   int adhesion_id = 0;
   Vec2 force_nN;  ///< of the cell on the substrate
   std::optional<double> sigma_nN;
-  bool connected = false;  ///< a segmented fibre ends on it
+  bool connected = false;              ///< a segmented fibre ends on it
+  std::optional<double> moment_nN_um;  ///< about the adhesion's centre, from +x towards +y
 };
 
 double length_um(const Polyline& points);
