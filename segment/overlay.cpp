@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <limits>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/contract/polyline.h"
 #include "segment/ellipse.h"
 #include "segment/grid.h"
 
@@ -134,40 +134,6 @@ class Canvas {
   std::vector<cv::Rect> taken_;
 };
 
-/// The point at a share (0 to 1) of the line's length.
-Vec2 point_along(const Polyline& line_um, double share) {
-  double left = share * length_um(line_um);
-  for (std::size_t i = 0; i + 1 < line_um.size(); ++i) {
-    const Vec2 step = line_um[i + 1] - line_um[i];
-    if (left <= norm(step) && norm(step) > 0) return line_um[i] + (left / norm(step)) * step;
-    left -= norm(step);
-  }
-  return line_um.back();
-}
-
-double distance_um(Vec2 place, const Polyline& line_um) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i + 1 < line_um.size(); ++i) {
-    const Vec2 step = line_um[i + 1] - line_um[i], from = place - line_um[i];
-    const double length2 = dot(step, step);
-    const double share = length2 > 0 ? std::clamp(dot(from, step) / length2, 0.0, 1.0) : 0;
-    nearest = std::min(nearest, norm(from - share * step));
-  }
-  return nearest;
-}
-
-/// Places for a fibre's label: its middle, then ever nearer to its ends; where no other fibre passes first.
-std::vector<Vec2> places_on(const Fibre& fibre, const std::vector<Fibre>& fibres, double clear_um) {
-  std::vector<Vec2> places;
-  for (const double share : {0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8}) places.push_back(point_along(fibre.points_um, share));
-  std::stable_partition(places.begin(), places.end(), [&](Vec2 place) {
-    return std::none_of(fibres.begin(), fibres.end(), [&](const Fibre& other) {
-      return other.fibre_id != fibre.fibre_id && distance_um(place, other.points_um) < clear_um;
-    });
-  });
-  return places;
-}
-
 /// Below, above, right and left of an adhesion.
 std::vector<Vec2> places_beside(const Adhesion& a, double pixel_um) {
   const double gap = a.major_axis_um / 2 + 10 * pixel_um;
@@ -178,7 +144,7 @@ std::vector<Vec2> places_beside(const Adhesion& a, double pixel_um) {
 void draw_labels(Canvas& canvas, const Cell& cell) {
   constexpr double kClear_px = 30;  // about a label's width
   for (const Fibre& f : cell.fibres)
-    canvas.label(places_on(f, cell.fibres, kClear_px * canvas.pixel_um()), std::to_string(f.fibre_id),
+    canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()), std::to_string(f.fibre_id),
                  colour_of(f.type), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
   std::vector<const Adhesion*> large_first;
