@@ -44,7 +44,7 @@ cv::Mat background(const std::optional<Channel>& adhesion, const std::optional<C
   const cv::Mat purple = adhesion ? stretched(adhesion->image) : cv::Mat::zeros(any.height, any.width, CV_32F);
   // alone, a channel may use the whole range; together they share it
   const double share_grey = adhesion ? 150 : 210, share_purple = actin ? 150 : 210;
-  const double tint[3] = {1.0, actin ? 0.1 : 0.7, 0.95};
+  const double tint[3] = {1.0, actin ? 0.1 : 1.0, actin ? 0.95 : 1.0};  // alone it is grey, so that marks stand out
   cv::Mat rgb;
   for (int i = 0; i < 3; ++i) {
     const cv::Mat sum = share_grey * grey + share_purple * tint[i] * purple;
