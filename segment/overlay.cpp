@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/contract/polyline.h"
 #include "segment/ellipse.h"
 #include "segment/grid.h"
 
@@ -12,12 +13,15 @@ namespace mbtfm::segment {
 
 namespace {
 
-/// Colours are red, green, blue.
-const cv::Scalar kVentral(240, 110, 10), kDorsal(86, 180, 233), kArc(240, 228, 66), kAdhesion(0, 220, 160),
-    kOutline(255, 255, 255), kInk(20, 20, 20), kPaper(255, 255, 255);
+/// Colours are red, green, blue: those of the report's plots, lighter for the dark ground.
+const cv::Scalar kVentral(0, 214, 143), kDorsal(86, 180, 255), kArc(255, 183, 40), kAdhesion(255, 170, 235),
+    kOutline(225, 225, 225), kInk(15, 15, 15), kPaper(255, 255, 255);
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
-constexpr int kShift = 4;  // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
-constexpr int kFooter = 64;
+constexpr int kShift = 4;           // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
+constexpr double kLongSide = 1600;  // px: two screens' pixels for each where a page shows it 700 px wide
+constexpr double kMargin_um = 3;    // around the cell, so that one sees what the outline leaves out
+constexpr double kFibreText = 1.0, kAdhesionText = 0.6, kLegendText = 1.0;  // times 22 px: height of a capital
+constexpr double kStemOfU = 4;  // px from the left of the letter's box at size 1
 
 cv::Scalar colour_of(FibreType type) {
   return type == FibreType::ventral ? kVentral : type == FibreType::dorsal ? kDorsal : kArc;
@@ -40,7 +44,7 @@ cv::Mat background(const std::optional<Channel>& adhesion, const std::optional<C
   const cv::Mat purple = adhesion ? stretched(adhesion->image) : cv::Mat::zeros(any.height, any.width, CV_32F);
   // alone, a channel may use the whole range; together they share it
   const double share_grey = adhesion ? 150 : 210, share_purple = actin ? 150 : 210;
-  const double tint[3] = {1.0, actin ? 0.1 : 0.7, 0.95};
+  const double tint[3] = {1.0, actin ? 0.1 : 1.0, actin ? 0.95 : 1.0};  // alone it is grey, so that marks stand out
   cv::Mat rgb;
   for (int i = 0; i < 3; ++i) {
     const cv::Mat sum = share_grey * grey + share_purple * tint[i] * purple;
@@ -50,42 +54,106 @@ cv::Mat background(const std::optional<Channel>& adhesion, const std::optional<C
   return rgb;
 }
 
+/// Where a text's lower left corner lies, and what it covers.
+struct Place {
+  cv::Point origin;
+  cv::Rect covered;
+};
+
+int thickness_of(double size) { return size >= 1 ? 2 : 1; }
+
+Place centred_text(cv::Point2d centre, const std::string& text, double size) {
+  int baseline = 0;
+  const cv::Size box = cv::getTextSize(text, kFont, size, thickness_of(size), &baseline);
+  const cv::Point origin(cvRound(centre.x) - box.width / 2, cvRound(centre.y) + box.height / 2);
+  constexpr int kRim = 3;
+  return {origin, {origin.x - kRim, origin.y - box.height - kRim, box.width + 2 * kRim, box.height + 2 * kRim}};
+}
+
+/// The part of the images around the cell, enlarged or reduced to a size that suits a screen.
 class Canvas {
  public:
-  Canvas(const cv::Mat& rgb, double pixel_um)
-      : zoom_(std::max(1, static_cast<int>(std::lround(2048.0 / std::max(rgb.cols, rgb.rows))))),
-        pixel_um_(pixel_um / zoom_) {
-    cv::resize(rgb, picture_, cv::Size(), zoom_, zoom_, cv::INTER_CUBIC);
+  Canvas(const cv::Mat& rgb, const Segmentation& s) {
+    cv::Rect2d box = bounds_px(s);
+    box &= cv::Rect2d(0, 0, rgb.cols, rgb.rows);
+    const cv::Rect pixels(cv::Point(cvFloor(box.x), cvFloor(box.y)),
+                          cv::Point(cvCeil(box.x + box.width), cvCeil(box.y + box.height)));
+    zoom_ = kLongSide / std::max(pixels.width, pixels.height);
+    pixel_um_ = s.pixel_size_um / zoom_;
+    corner_um_ = {pixels.x * s.pixel_size_um, pixels.y * s.pixel_size_um};
+    cv::resize(rgb(pixels), picture_, cv::Size(), zoom_, zoom_, zoom_ < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
   }
 
   void line(const Polyline& points_um, bool is_closed, const cv::Scalar& colour, int thickness) {
     std::vector<cv::Point> points;
-    for (const Vec2 p : points_um) points.push_back(fixed(p));
+    for (const Vec2 p : points_um) {
+      const cv::Point2d q = at(p) * (1 << kShift);
+      points.emplace_back(cvRound(q.x), cvRound(q.y));
+    }
     cv::polylines(picture_, points, is_closed, colour, thickness, cv::LINE_AA, kShift);
   }
-  /// Text centred on a point, on a dark rim.
-  void label(Vec2 at_um, const std::string& text, const cv::Scalar& colour, double size) {
-    int baseline = 0;
-    const cv::Size box = cv::getTextSize(text, kFont, size, 1, &baseline);
-    const cv::Point2d c = to_pixels(at_um, pixel_um_);
-    cv::Point at(cvRound(c.x) - box.width / 2, cvRound(c.y) + box.height / 2);
-    at.x = std::clamp(at.x, 1, std::max(1, picture_.cols - box.width - 1));
-    at.y = std::clamp(at.y, box.height + 1, picture_.rows - 2);
-    cv::putText(picture_, text, at, kFont, size, kInk, 3, cv::LINE_AA);
-    cv::putText(picture_, text, at, kFont, size, colour, 1, cv::LINE_AA);
+  /// Keep labels off this place.
+  void occupy(const Polyline& points_um) {
+    std::vector<cv::Point2f> points;
+    for (const Vec2 p : points_um) points.emplace_back(at(p));
+    taken_.push_back(cv::boundingRect(points));
+  }
+  /// Text on a dark rim, centred on the first of the points where it hides no other; nowhere if there is none.
+  void label(const std::vector<Vec2>& candidates_um, const std::string& text, const cv::Scalar& colour, double size) {
+    const cv::Rect whole(0, 0, picture_.cols, picture_.rows);
+    for (const Vec2 candidate : candidates_um) {
+      const Place place = centred_text(at(candidate), text, size);
+      const auto hides = [&](const cv::Rect& other) { return (other & place.covered).area() > 0; };
+      if ((whole & place.covered) != place.covered || std::any_of(taken_.begin(), taken_.end(), hides)) continue;
+      cv::putText(picture_, text, place.origin, kFont, size, kInk, thickness_of(size) + 4, cv::LINE_AA);
+      cv::putText(picture_, text, place.origin, kFont, size, colour, thickness_of(size), cv::LINE_AA);
+      taken_.push_back(place.covered);
+      return;
+    }
   }
   const cv::Mat& picture() const { return picture_; }
   double pixel_um() const { return pixel_um_; }
 
  private:
-  cv::Point fixed(Vec2 p) const {
-    const cv::Point2d q = to_pixels(p, pixel_um_) * (1 << kShift);
-    return {cvRound(q.x), cvRound(q.y)};
+  static cv::Rect2d bounds_px(const Segmentation& s) {
+    std::vector<cv::Point2f> points;
+    for (const Vec2 p : s.cell.outline_um) points.emplace_back(p.x, p.y);
+    for (const Adhesion& a : s.cell.adhesions) points.emplace_back(a.position_um.x, a.position_um.y);
+    for (const Fibre& f : s.cell.fibres)
+      for (const Vec2 p : f.points_um) points.emplace_back(p.x, p.y);
+    const cv::Rect box = cv::boundingRect(points);
+    const double scale = 1 / s.pixel_size_um;
+    return {(box.x - kMargin_um) * scale, (box.y - kMargin_um) * scale, (box.width + 2 * kMargin_um) * scale,
+            (box.height + 2 * kMargin_um) * scale};
   }
-  int zoom_;
-  double pixel_um_;
+  cv::Point2d at(Vec2 p_um) const { return to_pixels(p_um - corner_um_, pixel_um_); }
+
+  double zoom_ = 1, pixel_um_ = 1;
+  Vec2 corner_um_;
   cv::Mat picture_;
+  std::vector<cv::Rect> taken_;
 };
+
+/// Below, above, right and left of an adhesion.
+std::vector<Vec2> places_beside(const Adhesion& a, double pixel_um) {
+  const double gap = a.major_axis_um / 2 + 10 * pixel_um;
+  return {a.position_um + Vec2{0, gap}, a.position_um - Vec2{0, gap}, a.position_um + Vec2{1.4 * gap, 0},
+          a.position_um - Vec2{1.4 * gap, 0}};
+}
+
+void draw_labels(Canvas& canvas, const Cell& cell) {
+  constexpr double kClear_px = 30;  // about a label's width
+  for (const Fibre& f : cell.fibres)
+    canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()), std::to_string(f.fibre_id),
+                 colour_of(f.type), kFibreText);
+  for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
+  std::vector<const Adhesion*> large_first;
+  for (const Adhesion& a : cell.adhesions) large_first.push_back(&a);
+  std::stable_sort(large_first.begin(), large_first.end(),
+                   [](const Adhesion* a, const Adhesion* b) { return a->area_um2 > b->area_um2; });
+  for (const Adhesion* a : large_first)
+    canvas.label(places_beside(*a, canvas.pixel_um()), std::to_string(a->adhesion_id), kAdhesion, kAdhesionText);
+}
 
 /// 1, 2 or 5 times a power of ten, at most `limit`.
 double round_length(double limit) {
@@ -93,52 +161,75 @@ double round_length(double limit) {
   return power * (limit >= 5 * power ? 5 : limit >= 2 * power ? 2 : 1);
 }
 
-void draw_legend(cv::Mat& footer, const Segmentation& s, double pixel_um) {
-  const double size = footer.cols < 1200 ? 0.5 : 0.75;
-  const int middle = footer.rows / 2 + 6;
-  int x = 16;
-  const auto entry = [&](const cv::Scalar& colour, const std::string& text) {
-    cv::line(footer, {x, middle - 6}, {x + 30, middle - 6}, kInk, 6, cv::LINE_AA);
-    cv::line(footer, {x, middle - 6}, {x + 30, middle - 6}, colour, 4, cv::LINE_AA);
-    cv::putText(footer, text, {x + 38, middle}, kFont, size, kInk, 1, cv::LINE_AA);
-    int baseline = 0;
-    x += 60 + cv::getTextSize(text, kFont, size, 1, &baseline).width;
-  };
+/// A line in a colour and what it stands for. "um" is drawn as µm, which OpenCV's font lacks.
+struct Entry {
+  std::string text;
+  cv::Scalar colour;
+  int bar = 56;     ///< length of the line (px)
+  int height = 10;  ///< of the line (px)
+};
+
+std::vector<Entry> entries_of(const Cell& cell, double pixel_um, int width) {
+  std::vector<Entry> entries;
   for (const FibreType type : kFibreTypes) {
     const auto n =
-        std::count_if(s.cell.fibres.begin(), s.cell.fibres.end(), [&](const Fibre& f) { return f.type == type; });
-    entry(colour_of(type), std::string(name_of(type)) + " " + std::to_string(n));
+        std::count_if(cell.fibres.begin(), cell.fibres.end(), [&](const Fibre& f) { return f.type == type; });
+    entries.push_back({std::string(name_of(type)) + " " + std::to_string(n), colour_of(type)});
   }
-  entry(kAdhesion, "adhesion " + std::to_string(s.cell.adhesions.size()));
-  entry(kOutline, "outline");
-  const double bar_um = round_length(0.2 * footer.cols * pixel_um);
-  const int bar = cvRound(bar_um / pixel_um), right = footer.cols - 16;
-  cv::rectangle(footer, {right - bar, middle + 2}, {right, middle + 10}, kInk, cv::FILLED);
+  entries.push_back({"adhesion " + std::to_string(cell.adhesions.size()), kAdhesion});
+  entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});
+  const double bar_um = round_length(0.2 * width * pixel_um);
   char text[32];
   std::snprintf(text, sizeof text, "%g um", bar_um);
+  entries.push_back({text, kInk, cvRound(bar_um / pixel_um)});
+  return entries;
+}
+
+int text_width(const std::string& text) {
   int baseline = 0;
-  const cv::Size box = cv::getTextSize(text, kFont, size, 1, &baseline);
-  cv::putText(footer, text, {right - (bar + box.width) / 2, middle - 6}, kFont, size, kInk, 1, cv::LINE_AA);
+  return cv::getTextSize(text, kFont, kLegendText, thickness_of(kLegendText), &baseline).width;
+}
+
+void draw_entry(cv::Mat& footer, const Entry& entry, cv::Point at) {
+  const int thickness = thickness_of(kLegendText);
+  cv::rectangle(footer, {at.x, at.y - entry.height / 2}, {at.x + entry.bar, at.y + entry.height / 2}, entry.colour,
+                cv::FILLED);
+  const cv::Point origin(at.x + entry.bar + 14, at.y + 11);
+  cv::putText(footer, entry.text, origin, kFont, kLegendText, kInk, thickness, cv::LINE_AA);
+  const auto unit = entry.text.find(" um");
+  if (unit == std::string::npos) return;
+  const int stem = origin.x + text_width(entry.text.substr(0, unit + 1)) + cvRound(kStemOfU * kLegendText);
+  cv::line(footer, {stem, origin.y}, {stem, origin.y + cvRound(7 * kLegendText)}, kInk, thickness, cv::LINE_AA);
+}
+
+/// Entries from left to right, in as many lines as they need.
+cv::Mat legend(const std::vector<Entry>& entries, int width) {
+  constexpr int kLine = 56, kGap = 14, kBetween = 26;
+  std::vector<cv::Point> places;
+  cv::Point at(kGap, kLine / 2);
+  for (const Entry& entry : entries) {
+    const int needed = entry.bar + kGap + text_width(entry.text);
+    if (at.x > kGap && at.x + needed > width - kGap) at = {kGap, at.y + kLine};
+    places.push_back(at);
+    at.x += needed + kBetween;
+  }
+  cv::Mat footer(at.y + kLine / 2, width, CV_8UC3, kPaper);
+  for (std::size_t i = 0; i < entries.size(); ++i) draw_entry(footer, entries[i], places[i]);
+  return footer;
 }
 
 }  // namespace
 
 Picture draw_overlay(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
                      const Segmentation& s) {
-  Canvas canvas(background(adhesion, actin), s.pixel_size_um);
-  canvas.line(s.cell.outline_um, true, kOutline, 1);
-  for (const Adhesion& a : s.cell.adhesions) canvas.line(ellipse_polygon(a, 32), true, kAdhesion, 1);
-  for (const Fibre& f : s.cell.fibres) canvas.line(f.points_um, false, colour_of(f.type), 2);
-  constexpr double kSmall = 0.35, kLarge = 0.6;
-  for (const Adhesion& a : s.cell.adhesions)
-    canvas.label(a.position_um + Vec2{0, a.major_axis_um / 2 + 8 * canvas.pixel_um()}, std::to_string(a.adhesion_id),
-                 kAdhesion, kSmall);
-  for (const Fibre& f : s.cell.fibres)
-    canvas.label(f.points_um[f.points_um.size() / 2], std::to_string(f.fibre_id), colour_of(f.type), kLarge);
-  cv::Mat whole(canvas.picture().rows + kFooter, canvas.picture().cols, CV_8UC3, kPaper);
-  canvas.picture().copyTo(whole(cv::Rect(0, 0, whole.cols, canvas.picture().rows)));
-  cv::Mat footer = whole(cv::Rect(0, canvas.picture().rows, whole.cols, kFooter));
-  draw_legend(footer, s, canvas.pixel_um());
+  Canvas canvas(background(adhesion, actin), s);
+  canvas.line(s.cell.outline_um, true, kOutline, 2);
+  for (const Adhesion& a : s.cell.adhesions) canvas.line(ellipse_polygon(a, 32), true, kAdhesion, 2);
+  for (const Fibre& f : s.cell.fibres) canvas.line(f.points_um, false, colour_of(f.type), 3);
+  draw_labels(canvas, s.cell);
+  cv::Mat whole;
+  const int width = canvas.picture().cols;
+  cv::vconcat(canvas.picture(), legend(entries_of(s.cell, canvas.pixel_um(), width), width), whole);
   return {whole.cols, whole.rows, std::vector<std::uint8_t>(whole.data, whole.data + whole.total() * 3)};
 }
 

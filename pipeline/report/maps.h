@@ -2,6 +2,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "pipeline/report/results.h"
 
@@ -14,10 +15,9 @@ struct Figure {
 
 /// Ellipses coloured by traction, with the force on the substrate as arrows.
 Figure adhesion_map(const CellResults& results);
-/// Arrows over the beads, thinned out evenly.
-Figure displacement_map(const CellResults& results);
-/// What the model leaves unexplained, averaged over neighbouring beads. Needs results.residual.
-Figure residual_map(const CellResults& results);
+/// Measured displacement, and where results.residual is known also the fitted one and the difference: means over the
+/// beads of small squares, drawn to one scale.
+std::vector<Figure> displacement_maps(const CellResults& results);
 enum class NetworkForm { original, contracted };
 Figure network_map(const CellResults& results, NetworkForm form);
 

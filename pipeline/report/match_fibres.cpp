@@ -1,19 +1,12 @@
 #include "pipeline/report/match_fibres.h"
 
 #include <algorithm>
-#include <limits>
 #include <tuple>
+
+#include "pipeline/contract/polyline.h"
 
 namespace mbtfm::report {
 namespace {
-
-double distance_to_line_um(Vec2 p, const Polyline& line) {
-  double nearest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 1; i < line.size(); ++i) {
-    nearest = std::min(nearest, distance_to_segment_um(p, line[i - 1], line[i]));
-  }
-  return nearest;
-}
 
 /// Mean over a's length of the distance from b: midpoints of pieces no longer than step_um, weighted by length.
 double directed_distance_um(const Polyline& a, const Polyline& b, double step_um) {
@@ -22,7 +15,7 @@ double directed_distance_um(const Polyline& a, const Polyline& b, double step_um
     const double piece = norm(a[i] - a[i - 1]);
     const int n = std::max(1, static_cast<int>(std::ceil(piece / step_um)));
     for (int k = 0; k < n; ++k) {
-      sum += piece / n * distance_to_line_um(a[i - 1] + (k + 0.5) / n * (a[i] - a[i - 1]), b);
+      sum += piece / n * distance_to_line_um(b, a[i - 1] + (k + 0.5) / n * (a[i] - a[i - 1]));
     }
     length += piece;
   }

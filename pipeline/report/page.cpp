@@ -30,7 +30,8 @@ svg .frame{fill:#fff;stroke:#444}
 svg .tick{stroke:#444;fill:none}
 svg .grid{stroke:#e3e5e8;fill:none}
 svg path{fill:none}
-.scroll{overflow-x:auto;max-width:100%}
+.what{font-size:1.05rem}
+.scroll{overflow-x:auto;max-width:100%;margin:.7em 0}
 table{border-collapse:collapse;font-size:.86rem;width:auto}
 th,td{padding:.28em .55em;border-bottom:1px solid #e6e8eb;text-align:left;vertical-align:top}
 th{cursor:pointer;white-space:nowrap;background:#f6f7f8}
@@ -40,6 +41,11 @@ details{margin:.6em 0}
 summary{cursor:pointer;font-weight:600}
 .keep{white-space:nowrap}
 .type{display:inline-block;width:.75em;height:.75em;border-radius:50%;margin-right:.4em}
+@media (max-width:600px){
+main{padding:12px 8px 40px}section{padding:12px 10px}
+svg{font-size:17px}
+th,th.n{white-space:normal}th,td{padding:.28em .3em}table{font-size:.8rem}
+}
 @media print{body{background:#fff}section{break-inside:avoid;border:0}}
 )css";
 

@@ -15,16 +15,12 @@
 #include "pipeline/report/results.h"
 #include "pipeline/report/svg.h"
 #include "pipeline/report/tension_plot.h"
+#include "pipeline/report/tension_table.h"
 
 namespace mbtfm::report {
 namespace {
 
 std::string optional_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
-
-std::string type_cell(FibreType type) {
-  return fmt::format("<span class=\"keep\"><span class=\"type\" style=\"background:{}\"></span>{}</span>",
-                     colour_of(type), full_name_of(type));
-}
 
 std::string findings_section(const CellResults& results, const Provenance& provenance) {
   std::vector<std::string> not_converged, by_hand;
@@ -47,63 +43,6 @@ std::string findings_section(const CellResults& results, const Provenance& prove
   return section("In short", html + "</ul>\n");
 }
 
-Table tension_table(const CellResults& results) {
-  Table table{{{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % low", true}, {"95 % high", true}}, {}};
-  const bool has_truth = results.comparison.has_value();
-  if (has_truth) {
-    for (const char* title : {"truth (nN)", "− truth (nN)", "− truth (%)", "true fibre"}) {
-      table.columns.push_back({title, true});
-    }
-    table.columns.push_back({"true type"});
-  }
-  for (const auto& [title, is_number] :
-       {std::pair{"length (µm)", true}, {"width (µm)", true}, {"identifiable", false}}) {
-    table.columns.push_back({title, is_number});
-  }
-  const auto truth_cells = [](double tension_nN, const std::optional<double>& truth_nN) {
-    if (!truth_nN) return std::vector<std::string>{"–", "–", "–"};
-    const double deviation = tension_nN - *truth_nN;
-    return std::vector<std::string>{readable(*truth_nN), readable(deviation),
-                                    *truth_nN > 0 ? readable(100 * deviation / *truth_nN) : "–"};
-  };
-  if (const auto t = results.tensions.find(0); t != results.tensions.end()) {
-    std::vector<std::string> row = {"0", "actin network", readable(t->second.tension_nN),
-                                    optional_number(t->second.low_nN), optional_number(t->second.high_nN)};
-    if (has_truth) {
-      for (auto& cell : truth_cells(t->second.tension_nN, results.comparison->true_network_nN)) row.push_back(cell);
-      row.insert(row.end(), {"–", "actin network"});
-    }
-    row.insert(row.end(), {"–", "–", t->second.identifiable ? "yes" : "<b>no</b>"});
-    table.rows.push_back(row);
-  }
-  for (const FibreRow& fibre : fibre_rows(results)) {
-    const Tension& t = fibre.tension;
-    std::vector<std::string> row = {std::to_string(fibre.fibre->fibre_id), type_cell(fibre.fibre->type),
-                                    readable(t.tension_nN), optional_number(t.low_nN), optional_number(t.high_nN)};
-    if (has_truth) {
-      for (auto& cell : truth_cells(t.tension_nN, fibre.true_tension_nN)) row.push_back(cell);
-      row.push_back(fibre.true_fibre_id ? std::to_string(*fibre.true_fibre_id) : "none");
-      row.push_back(fibre.true_type ? type_cell(*fibre.true_type) : "–");
-    }
-    row.insert(row.end(), {readable(length_um(fibre.fibre->points_um)), readable(fibre.fibre->width_um),
-                           t.identifiable ? "yes" : "<b>no</b>"});
-    table.rows.push_back(row);
-  }
-  return table;
-}
-
-/// The true fibres that no found one stands for, as a sentence.
-std::string missed_fibres(const Comparison& comparison) {
-  std::string list;
-  for (const ComparedFibre& fibre : comparison.fibres) {
-    if (fibre.found) continue;
-    list += fmt::format("{}{} ({}, {} nN, {} µm)", list.empty() ? "" : ", ", fibre.truth->fibre_id,
-                        full_name_of(fibre.truth->type), optional_number(fibre.true_tension_nN),
-                        readable(length_um(fibre.truth->points_um)));
-  }
-  return list.empty() ? "" : "<p class=\"sub\">True fibres that were not found: " + list + ".</p>\n";
-}
-
 std::string tension_section(const CellResults& results) {
   std::string html = "<div class=\"grid\">\n";
   html += figure("Tension of each fibre", tension_plot(results),
@@ -111,12 +50,7 @@ std::string tension_section(const CellResults& results) {
                  "fitted, the spread between them.");
   const Figure network = network_map(results, NetworkForm::original);
   html += figure(network.title, network.svg, network.caption) + "</div>\n" + html_of(tension_table(results));
-  if (results.comparison) html += missed_fibres(*results.comparison);
-  html += fmt::format(
-      "<p class=\"sub\">Actin network: t = {} nN a cable; as a surface tension {} nN/µm, which does not "
-      "depend on the mesh.</p>\n",
-      results.tensions.contains(0) ? readable(results.tensions.at(0).tension_nN) : "–",
-      readable(results.fit.network_surface_tension_nN_per_um));
+  html += tension_notes(results);
   return section("Tensions", html);
 }
 
@@ -124,14 +58,15 @@ std::string map_section(const CellResults& results) {
   std::string html = "<div class=\"grid\">\n";
   const auto add = [&](const Figure& f) { html += figure(f.title, f.svg, f.caption); };
   if (results.overlay) {
-    html += figure("Segmentation",
-                   "<img alt=\"segmentation over the images\" src=\"data:image/png;base64," +
-                       base64(read_text(*results.overlay)) + "\">",
-                   "Adhesions, fibres and outline over the images they were found in.");
+    html +=
+        figure("Segmentation",
+               "<img alt=\"segmentation over the images\" src=\"data:image/png;base64," +
+                   base64(read_text(*results.overlay)) + "\">",
+               "Adhesions, fibres and outline over the images they were found in. Numbers are the ids of the tables; "
+               "adhesions without room for theirs have none. Full size: 1_segment/overlay.png.");
   }
   add(adhesion_map(results));
-  add(displacement_map(results));
-  if (results.residual) add(residual_map(results));
+  for (const Figure& map : displacement_maps(results)) add(map);
   add(network_map(results, NetworkForm::contracted));
   return section("Maps", html +
                              "</div>\n<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
@@ -166,10 +101,10 @@ std::string adhesion_section(const CellResults& results) {
   Table top{all.columns, {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
   const Balance balance = balance_of(results);
   std::string html = fmt::format(
-      "<p>The {} strongest of {}. Net force {:.1e} and net torque {:.1e} of what they would be "
-      "if all pulled the same way{}.</p>\n",
+      "<p>The {} strongest of {}. Balance: the sum of all forces is {:.0e} of the sum of their magnitudes, that of "
+      "their torques {:.0e}{}.</p>\n",
       top.rows.size(), all.rows.size(), balance.net_force, balance.net_torque,
-      " (the moments inside single adhesions, which the table lacks, not counted)");
+      balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
   html += html_of(top);
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
   return section("Forces of the adhesions", html);
@@ -253,10 +188,11 @@ std::string report_html(const std::filesystem::path& cell) {
   const CellResults results = read_results(cell);
   const Provenance provenance = read_provenance(cell / "run.json");
   std::string body = fmt::format(
-      "<h1>{}</h1><p class=\"sub\">Model-based traction force microscopy, mbtfm {} · gel: E = {} kPa, ν = {}, {} µm "
-      "thick</p>\n",
-      html_escaped(results.name), kVersion, readable(results.gel.youngs_modulus_kPa),
-      readable(results.gel.poisson_ratio), readable(results.gel.thickness_um));
+      "<h1>{}</h1><p class=\"what\">Tensions of the stress fibres and forces of the adhesions of one cell, by "
+      "model-based traction force microscopy</p>\n<p class=\"sub\">Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} "
+      "µm thick · mbtfm {}</p>\n",
+      html_escaped(results.name), readable(results.gel.youngs_modulus_kPa), readable(results.gel.poisson_ratio),
+      readable(results.gel.thickness_um), kVersion);
   body += findings_section(results, provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
   body += map_section(results) + adhesion_section(results) + provenance_section(results, provenance);

@@ -4,13 +4,12 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 
 namespace mbtfm::report {
 namespace {
 
 // Room around the map for the axes' numbers, in the drawing's px; below it each legend takes one line.
-constexpr double kLeft_px = 46, kTop_px = 8, kRight_px = 10, kBottom_px = 42, kLegendLine_px = 46;
+constexpr double kLeft_px = 46, kTop_px = 8, kRight_px = 10, kBottom_px = 48, kArrowLegend_px = 26, kColourBar_px = 40;
 constexpr double kInk_px = MapDrawing::kWidth_px - kLeft_px - kRight_px;
 
 /// Plasma (S. van der Walt & N. Smith, matplotlib) without its lightest fifth, which is lost on white paper.
@@ -36,7 +35,8 @@ std::vector<double> ticks(double low, double high) {
   const double fine = round_below((high - low) / 5);
   const double step = (high - low) / fine <= 5 ? fine : round_below(2.5 * fine);
   std::vector<double> list;
-  for (double t = std::ceil(low / step) * step; t <= high; t += step) list.push_back(std::abs(t) < step / 2 ? 0 : t);
+  for (double t = std::ceil(low / step) * step; t <= high + 1e-9 * step; t += step)
+    list.push_back(std::abs(t) < step / 2 ? 0 : t);
   return list;
 }
 
@@ -98,17 +98,10 @@ double round_below(double value) {
   return power * (digit >= 5 ? 5 : digit >= 2 ? 2 : 1);
 }
 
-Polygon ellipse_corners(const Adhesion& a) {
-  constexpr int kCorners = 16;  // an ellipse is a few px long
-  Polygon corners;
-  const Vec2 along{std::cos(a.angle_rad), std::sin(a.angle_rad)};
-  const Vec2 across{-along.y, along.x};
-  for (int i = 0; i < kCorners; ++i) {
-    const double phi = 2 * std::numbers::pi * i / kCorners;
-    corners.push_back(a.position_um + 0.5 * a.major_axis_um * std::cos(phi) * along +
-                      0.5 * a.minor_axis_um * std::sin(phi) * across);
-  }
-  return corners;
+double round_end(double value) {
+  if (!(value > 0)) return 0;
+  const std::vector<double> list = ticks(0, value);
+  return list.back() >= value ? value : list.back() + list[1];
 }
 
 MapDrawing::MapDrawing(const Box& box_um) : box_um_(box_um) {
@@ -166,20 +159,27 @@ void MapDrawing::arrow(Vec2 from_um, Vec2 shift_px, const std::string& colour) {
   if (!path.empty()) body_ += "<path d=\"" + path + "\" style=\"stroke:" + colour + "\"/>\n";
 }
 
+void MapDrawing::label(Vec2 at_um, const std::string& text) {
+  body_ += fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\" style=\"font-size:12px;font-weight:600;stroke:#fff;"
+      "stroke-width:4;stroke-linejoin:round;paint-order:stroke;pointer-events:none\">{}</text>\n",
+      x(at_um.x), y(at_um.y) + 4, html_escaped(text));
+}
+
 void MapDrawing::begin_group(const std::string& style) { body_ += "<g style=\"" + style + "\">\n"; }
 void MapDrawing::end_group() { body_ += "</g>\n"; }
 
 void MapDrawing::arrow_legend(double length_px, const std::string& text) {
-  const double at_y = kTop_px + height_px_ + kBottom_px + kLegendLine_px * n_legends_ + 22;
+  const double at_y = kTop_px + height_px_ + kBottom_px + legends_px_ + 14;
   legend_ += fmt::format("<path d=\"{}\" style=\"stroke:#111;fill:none;stroke-width:1.6\"/>",
                          arrow_path(kLeft_px, at_y - 5, {length_px, 0}));
   legend_ +=
       fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", kLeft_px + length_px + 8, at_y, html_escaped(text));
-  ++n_legends_;
+  legends_px_ += kArrowLegend_px;
 }
 
 void MapDrawing::colour_bar(const ColourScale& scale) {
-  const double top = kTop_px + height_px_ + kBottom_px + kLegendLine_px * n_legends_ + 6;
+  const double top = kTop_px + height_px_ + kBottom_px + legends_px_ + 4;
   constexpr int kSteps = 40;
   constexpr double kBar_px = 240;
   for (int i = 0; i < kSteps; ++i) {
@@ -189,16 +189,18 @@ void MapDrawing::colour_bar(const ColourScale& scale) {
   }
   for (const double tick : ticks(scale.low, scale.high)) {
     const double at = kLeft_px + kBar_px * (tick - scale.low) / (scale.high - scale.low);
-    legend_ +=
-        fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">{}</text>", at, top + 28, readable(tick));
+    legend_ += fmt::format(
+        "<path d=\"M{0:.1f},{1:.1f}v4\" class=\"tick\"/><text x=\"{0:.1f}\" y=\"{2:.1f}\" "
+        "text-anchor=\"middle\">{3}</text>",
+        at, top + 12, top + 30, readable(tick));
   }
   legend_ += fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n", kLeft_px + kBar_px + 12, top + 12,
                          html_escaped(scale.label));
-  ++n_legends_;
+  legends_px_ += kColourBar_px;
 }
 
 std::string MapDrawing::str(const std::string& description) const {
-  const double total = kTop_px + height_px_ + kBottom_px + kLegendLine_px * n_legends_;
+  const double total = kTop_px + height_px_ + kBottom_px + legends_px_;
   std::string svg = fmt::format(
       "<svg viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" aria-label=\"{}\">"
       "<rect x=\"{}\" y=\"{}\" width=\"{:.1f}\" height=\"{:.1f}\" class=\"frame\"/>\n",

@@ -29,6 +29,9 @@ struct ColourScale {
 /// Round number (1, 2 or 5 times a power of ten) nearest below.
 double round_below(double value);
 
+/// End of a colour bar from zero that shows `value`: the next of the bar's ticks. 0 where nothing is positive.
+double round_end(double value);
+
 /// A map of the cell: x right, y down, both in um.
 class MapDrawing {
  public:
@@ -42,6 +45,8 @@ class MapDrawing {
   void dot(Vec2 at_um, double radius_px, const std::string& style, const std::string& hover = {});
   /// An arrow that begins at `from_um` and is `length_px` long.
   void arrow(Vec2 from_um, Vec2 shift_px, const std::string& colour);
+  /// A short text centred on a point, on a white rim.
+  void label(Vec2 at_um, const std::string& text);
   void begin_group(const std::string& style);
   void end_group();
 
@@ -62,10 +67,7 @@ class MapDrawing {
   double px_per_um_ = 1;
   double height_px_ = 0;  ///< of the map
   std::string body_, legend_;
-  int n_legends_ = 0;
+  double legends_px_ = 0;  ///< height of those added so far
 };
-
-/// Corners of an adhesion's ellipse.
-Polygon ellipse_corners(const Adhesion& adhesion);
 
 }  // namespace mbtfm::report

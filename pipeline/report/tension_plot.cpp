@@ -9,7 +9,7 @@
 namespace mbtfm::report {
 namespace {
 
-constexpr double kWidth_px = 560, kLeft_px = 92, kRight_px = 16, kRow_px = 20, kTop_px = 34, kBottom_px = 46;
+constexpr double kWidth_px = 560, kLeft_px = 104, kRight_px = 16, kRow_px = 20, kTop_px = 34, kBottom_px = 46;
 
 /// Largest value to show.
 double largest_nN(const std::vector<FibreRow>& rows) {
@@ -50,11 +50,11 @@ std::string legend(bool has_truth, bool has_unidentifiable) {
                     fmt::format("<path d=\"M{:.0f},14h26\" style=\"stroke:#555;stroke-width:2\"/>", kLeft_px - 13) +
                     fmt::format("<text x=\"{:.0f}\" y=\"19\">fit, 95 % interval</text>", kLeft_px + 20);
   if (has_truth) {
-    svg += truth_mark(kLeft_px + 168, 14) + fmt::format("<text x=\"{:.0f}\" y=\"19\">truth</text>", kLeft_px + 179);
+    svg += truth_mark(kLeft_px + 188, 14) + fmt::format("<text x=\"{:.0f}\" y=\"19\">truth</text>", kLeft_px + 199);
   }
   if (has_unidentifiable) {
-    svg += mark(kLeft_px + 240, 14, "#555", false) +
-           fmt::format("<text x=\"{:.0f}\" y=\"19\">not identifiable</text>", kLeft_px + 251);
+    svg += mark(kLeft_px + 268, 14, "#555", false) +
+           fmt::format("<text x=\"{:.0f}\" y=\"19\">not identifiable</text>", kLeft_px + 279);
   }
   return svg + "\n";
 }

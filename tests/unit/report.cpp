@@ -5,10 +5,12 @@
 #include <regex>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/report/arrows.h"
 #include "pipeline/report/base64.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/svg.h"
+#include "pipeline/report/tension_table.h"
 #include "tests/support/fake_cell.h"
 #include "tests/support/temporary_folder.h"
 
@@ -97,6 +99,69 @@ TEST(Report, round_steps_are_one_two_five) {
   EXPECT_DOUBLE_EQ(round_below(1), 1);
   EXPECT_DOUBLE_EQ(round_below(49), 20);
   EXPECT_DOUBLE_EQ(round_below(0.0021), 0.002);
+}
+
+TEST(Report, colour_bars_end_at_a_tick_that_shows_the_value) {
+  EXPECT_DOUBLE_EQ(round_end(5.9), 6);
+  EXPECT_DOUBLE_EQ(round_end(13.4), 15);
+  EXPECT_DOUBLE_EQ(round_end(0.31), 0.4);
+  EXPECT_DOUBLE_EQ(round_end(10), 10);
+  EXPECT_EQ(round_end(0), 0);
+}
+
+std::string text_of(const CellResults& results) {
+  std::string text;
+  for (const Finding& finding : findings_of(results, {}, {})) text += finding.text + "\n";
+  return text;
+}
+
+TEST(Report, counts_one_tension_in_the_singular) {
+  const FakeCell cell;
+  CellResults results = read_results(cell.folder.path());
+  for (auto& [id, tension] : results.tensions) tension.tension_nN = 1;
+  results.tensions.at(1).tension_nN = 0;
+  EXPECT_NE(text_of(results).find("1 tension is zero"), std::string::npos);
+  results.tensions.at(2).tension_nN = 0;
+  EXPECT_NE(text_of(results).find("2 tensions are zero"), std::string::npos);
+}
+
+TEST(Report, tells_the_noise_from_the_models_error) {
+  const FakeCell cell;
+  CellResults results = read_results(cell.folder.path());
+  results.fit.relative_l2 = 0.5;
+  results.fit.expected_relative_l2 = 0.4;  // 0.4² / 0.5² = 64 %
+  EXPECT_NE(text_of(results).find("64 % is the noise of the beads"), std::string::npos);
+  EXPECT_NE(text_of(results).find("36 % the error of the model"), std::string::npos);
+  results.fit.relative_l2 = 0.39;
+  EXPECT_NE(text_of(results).find("All that the model leaves"), std::string::npos);
+}
+
+TEST(Report, shows_no_more_digits_of_a_tension_than_its_interval_warrants) {
+  const FakeCell cell;
+  CellResults results = read_results(cell.folder.path());
+  for (auto& [id, tension] : results.tensions) {
+    tension = {.fibre_id = id, .tension_nN = 0.0251, .low_nN = 0, .high_nN = 4.29, .identifiable = true};
+  }
+  results.tensions.at(0) = {.tension_nN = 0.04312, .low_nN = 0.016188, .high_nN = 0.07003, .identifiable = true};
+  const Table table = tension_table(results);
+  EXPECT_EQ(table.rows[0][2], "0.043");
+  EXPECT_EQ(table.rows[0][3], "0.016 – 0.070");
+  EXPECT_EQ(table.rows[1][2], "0.0");
+  EXPECT_EQ(table.rows[1][3], "0.0 – 4.3");
+}
+
+TEST(Report, averages_arrows_over_squares_and_drops_those_of_few_beads) {
+  VectorField field;
+  for (int i = 0; i < 9; ++i) {
+    field.positions_um.push_back({2.5, 2.5});
+    field.vectors.push_back({i % 2 ? 1.0 : -1.0, 3});
+  }
+  field.positions_um.push_back({7.5, 7.5});
+  field.vectors.push_back({5, 5});
+  const AveragedField mean = averaged(field, {{0, 0}, {10, 10}}, 5);
+  ASSERT_EQ(mean.means.vectors.size(), 1u);
+  EXPECT_DOUBLE_EQ(mean.means.vectors[0].x, -1.0 / 9);
+  EXPECT_DOUBLE_EQ(mean.means.vectors[0].y, 3);
 }
 
 TEST(Compare, without_true_fibres_ids_are_the_same) {

@@ -1,0 +1,89 @@
+#include "pipeline/report/arrows.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace mbtfm::report {
+namespace {
+
+// Arrows across the map at most: one every 16 px.
+constexpr double kArrowsAcross = 31;
+// The mean of nine beads has a third of their noise.
+constexpr double kMembers = 9;
+// Squares cut by the map's rim hold fewer; the mean of two would show their noise.
+constexpr std::size_t kFewest = 3;
+
+bool is_inside(const Box& box, Vec2 p) {
+  return p.x >= box.low.x && p.x <= box.high.x && p.y >= box.low.y && p.y <= box.high.y;
+}
+
+}  // namespace
+
+double percentile(std::vector<double> values, double share) {
+  if (values.empty()) return 0;
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+double averaging_side_um(const VectorField& field, const Box& box) {
+  const Vec2 size = box.high - box.low;
+  const auto n_inside =
+      std::count_if(field.positions_um.begin(), field.positions_um.end(), [&](Vec2 p) { return is_inside(box, p); });
+  const double area_um2 = size.x * size.y;
+  const double needed_um = n_inside > 0 ? std::sqrt(kMembers * area_um2 / static_cast<double>(n_inside)) : size.x;
+  // a whole number of squares across
+  return size.x / std::clamp(std::floor(size.x / needed_um), 1.0, kArrowsAcross);
+}
+
+AveragedField averaged(const VectorField& field, const Box& box, double side_um) {
+  std::map<std::pair<int, int>, std::vector<std::size_t>> squares;
+  std::size_t n_inside = 0;
+  for (std::size_t i = 0; i < field.positions_um.size(); ++i) {
+    const Vec2 p = field.positions_um[i];
+    if (!is_inside(box, p)) continue;
+    ++n_inside;
+    squares[{static_cast<int>((p.y - box.low.y) / side_um), static_cast<int>((p.x - box.low.x) / side_um)}].push_back(
+        i);
+  }
+  AveragedField result{.means = {}, .side_um = side_um, .mean_members = 0};
+  for (const auto& [place, members] : squares) {
+    if (members.size() < kFewest) continue;
+    Vec2 position, vector;
+    for (const std::size_t i : members) {
+      position += field.positions_um[i];
+      vector += field.vectors[i];
+    }
+    const double share = 1.0 / static_cast<double>(members.size());
+    result.means.positions_um.push_back(share * position);
+    result.means.vectors.push_back(share * vector);
+  }
+  if (!squares.empty()) result.mean_members = static_cast<double>(n_inside) / static_cast<double>(squares.size());
+  return result;
+}
+
+ArrowScale arrow_scale(const std::vector<Vec2>& vectors) {
+  // The longest arrows but for the top 1 %, in px of the drawing: long enough to compare, short enough to tell apart.
+  constexpr double kLongArrow_px = 44;
+  std::vector<double> lengths;
+  for (const Vec2 v : vectors) lengths.push_back(norm(v));
+  const double top = percentile(lengths, 0.99);
+  return {.top = top, .px_per_unit = top > 0 ? kLongArrow_px / top : 0};
+}
+
+void draw_arrows(MapDrawing& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
+                 const std::string& unit) {
+  if (!(scale.top > 0)) return;
+  const ColourScale colours{.low = 0, .high = round_end(scale.top), .label = what + " (" + unit + ")"};
+  map.begin_group("fill:none;stroke-width:1.5");
+  for (std::size_t i = 0; i < field.vectors.size(); ++i) {
+    map.arrow(field.positions_um[i], scale.px_per_unit * field.vectors[i], colours.colour(norm(field.vectors[i])));
+  }
+  map.end_group();
+  const double legend = round_below(scale.top);
+  map.arrow_legend(scale.px_per_unit * legend, readable(legend) + " " + unit);
+  map.colour_bar(colours);
+}
+
+}  // namespace mbtfm::report

@@ -1,0 +1,44 @@
+/// Fields of arrows on the report's maps.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "pipeline/report/svg.h"
+
+namespace mbtfm::report {
+
+/// Vectors at points, to be drawn as arrows.
+struct VectorField {
+  std::vector<Vec2> positions_um, vectors;
+};
+
+/// Means over square cells that hold at least three points.
+struct AveragedField {
+  VectorField means;
+  double side_um = 0;       ///< of the squares
+  double mean_members = 0;  ///< points a square
+};
+
+/// Side of the squares over which to average: as small as arrows can be told apart, larger where they would hold too
+/// few points for noise to fade.
+double averaging_side_um(const VectorField& field, const Box& box);
+
+AveragedField averaged(const VectorField& field, const Box& box, double side_um);
+
+/// How long an arrow is; shared by maps that are to be compared.
+struct ArrowScale {
+  double top = 0;  ///< length of the longest arrows and end of the colours, in the field's unit
+  double px_per_unit = 0;
+};
+/// Of no length where nothing moves.
+ArrowScale arrow_scale(const std::vector<Vec2>& vectors);
+
+/// Draw a field with its arrow legend and colour bar. @param what  named in the colour bar
+void draw_arrows(MapDrawing& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
+                 const std::string& unit);
+
+/// The value below which a share (0 to 1) of the values lies; 0 of none.
+double percentile(std::vector<double> values, double share);
+
+}  // namespace mbtfm::report
