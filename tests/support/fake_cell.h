@@ -151,7 +151,8 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
     forces.push_back({.adhesion_id = a.adhesion_id,
                       .force_nN = (0.5 * strength(random) / (norm(arm) + 1)) * arm,
                       .sigma_nN = 0.1,
-                      .connected = a.adhesion_id % 2 == 1});
+                      .connected = a.adhesion_id % 2 == 1,
+                      .moment_nN_um = {}});
     net += forces.back().force_nN;
   }
   FitSummary summary{.relative_l2 = 0.16,
