@@ -20,7 +20,7 @@ struct MeshFit {
   TensionFit fit;
   Eigen::MatrixXd tension_covariance;         ///< from the beads' noise
   Eigen::MatrixXd force_covariance_diagonal;  ///< adhesions × (xx, xy, yy)
-  Eigen::VectorXd network_forces_nN;
+  Eigen::VectorXd network_forces_nN, torques_nN_um;
 };
 
 /// (JᵀJ)⁻¹; a direction in which no bead tells anything gets an infinite variance.
@@ -59,6 +59,7 @@ MeshFit fit_mesh(const network::CableNetwork& network, const LinearData& data, c
     mesh.force_covariance_diagonal.row(a) << c(0, 0), c(0, 1), c(1, 1);
   }
   mesh.network_forces_nN = network_forces_nN(problem, trial);
+  mesh.torques_nN_um = problem.torques_nN_um(trial);
   return mesh;
 }
 
@@ -99,10 +100,12 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, con
   for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == all.fibre_ids);
   const Eigen::Index n_forces = data.compliance_um_per_nN.cols();
   all.forces_nN = all.network_forces_nN = Eigen::VectorXd::Zero(n_forces);
+  all.torques_nN_um = Eigen::VectorXd::Zero(n_forces / 2);
   all.report.converged = true;
   for (const MeshFit& mesh : meshes) {
     all.forces_nN += mesh.fit.trial.forces_nN / n_meshes;
     all.network_forces_nN += mesh.network_forces_nN / n_meshes;
+    all.torques_nN_um += mesh.torques_nN_um / n_meshes;
     all.report.iterations = std::max(all.report.iterations, mesh.fit.report.iterations);
     all.report.last_change = std::max(all.report.last_change, mesh.fit.report.last_change);
     if (!mesh.fit.report.converged || all.report.reason.empty()) all.report.reason = mesh.fit.report.reason;

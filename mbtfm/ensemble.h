@@ -22,6 +22,7 @@ struct EnsembleFit {
   std::vector<int> fibre_ids;  ///< front() is 0, the actin network
   std::vector<Estimate> tensions_nN;
   Eigen::VectorXd forces_nN;                  ///< by adhesion: fx, fy; mean over the meshes
+  Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
   std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
   Eigen::VectorXd network_forces_nN;          ///< with every fibre at the network's tension: the network's part
   double chi_squared_per_degree = 0;          ///< of the mean over meshes: 1 where the model explains all but the noise

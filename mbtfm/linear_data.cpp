@@ -12,7 +12,8 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
   const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
   MBTFM_ASSERT(compliance_um_per_nN.rows() == n_rows);
   const bool has_sigmas = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
-  LinearData data{.has_errors = has_sigmas};
+  LinearData data;
+  data.has_errors = has_sigmas;
   data.displacement_um.resize(n_rows);
   data.weight_per_um.resize(n_rows);
   for (std::size_t i = 0; i < beads.size(); ++i) {

@@ -45,6 +45,19 @@ Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* 
   return trial;
 }
 
+Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
+  const Network& network = cables_.network();
+  const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
+  Eigen::VectorXd torques = Eigen::VectorXd::Zero(data_.compliance_um_per_nN.cols() / 2);
+  for (std::size_t v = 0; v < reactions.size(); ++v) {
+    if (network.adhesion_id[v] == 0) continue;
+    const auto& ids = cables_.adhesion_ids();
+    const auto at = std::lower_bound(ids.begin(), ids.end(), network.adhesion_id[v]) - ids.begin();
+    torques[pair_of_[static_cast<std::size_t>(at)]] += cross(network.vertices_um[v], reactions[v]);
+  }
+  return torques;
+}
+
 Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
   return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium));
 }

@@ -31,6 +31,8 @@ class TensionProblem {
 
   /// @param nearby  a trial whose equilibrium is a good place to start, or none
   Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr) const;
+  /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
+  Eigen::VectorXd torques_nN_um(const Trial& trial) const;
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
   Eigen::MatrixXd force_derivatives(const Trial& trial) const;
   /// d(C R)/dt

@@ -119,8 +119,7 @@ double OutlineCurve::nearest(Vec2 point_um) const {
   for (std::size_t i = 0; i < points_um_.size(); ++i) {
     const Vec2 a = points_um_[i];
     const Vec2 step = points_um_[(i + 1) % points_um_.size()] - a;
-    const double squared = dot(step, step);
-    const double along = squared > 0 ? std::clamp(dot(point_um - a, step) / squared, 0.0, 1.0) : 0.0;
+    const double along = nearest_share(a, a + step, point_um);
     const Vec2 gap = point_um - (a + along * step);
     const double distance = dot(gap, gap);
     if (distance < smallest) {

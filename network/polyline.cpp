@@ -7,16 +7,6 @@
 #include <vector>
 
 namespace mbtfm::network {
-namespace {
-
-double distance_to_segment(Vec2 point, Vec2 a, Vec2 b) {
-  const Vec2 step = b - a;
-  const double squared = dot(step, step);
-  const double along = squared > 0 ? std::clamp(dot(point - a, step) / squared, 0.0, 1.0) : 0.0;
-  return norm(point - (a + along * step));
-}
-
-}  // namespace
 
 Polyline simplified(const Polyline& points_um, double tolerance_um) {
   const int n = static_cast<int>(points_um.size());
@@ -30,7 +20,7 @@ Polyline simplified(const Polyline& points_um, double tolerance_um) {
     int furthest = first;
     double largest = tolerance_um;
     for (int i = first + 1; i < last; ++i) {
-      const double distance = distance_to_segment(points_um[i], points_um[first], points_um[last]);
+      const double distance = distance_to_segment_um(points_um[i], points_um[first], points_um[last]);
       if (distance > largest) {
         largest = distance;
         furthest = i;
@@ -60,8 +50,8 @@ Polyline without_short_pieces(Polyline points_um, double shortest_um) {
     if (piece == points_um.size() - 1) {
       lost = piece - 1;
     } else if (piece > 1) {
-      const double first = distance_to_segment(points_um[piece - 1], points_um[piece - 2], points_um[piece]);
-      const double second = distance_to_segment(points_um[piece], points_um[piece - 1], points_um[piece + 1]);
+      const double first = distance_to_segment_um(points_um[piece - 1], points_um[piece - 2], points_um[piece]);
+      const double second = distance_to_segment_um(points_um[piece], points_um[piece - 1], points_um[piece + 1]);
       lost = first < second ? piece - 1 : piece;
     }
     points_um.erase(points_um.begin() + static_cast<std::ptrdiff_t>(lost));

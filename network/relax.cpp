@@ -31,12 +31,6 @@ constexpr double kWall = 0.75;      // a vertex nearer to a segment of the frame
 constexpr double kFinest = 0.4;     // edge length where the frame is finer than that
 constexpr double kGrading = 0.3;    // growth of the edge length with distance from there
 
-double distance_to_segment(Vec2 point, Vec2 a, Vec2 b) {
-  const Vec2 step = b - a;
-  const double along = std::clamp(dot(point - a, step) / dot(step, step), 0.0, 1.0);
-  return norm(point - (a + along * step));
-}
-
 /// The wanted edge length: `edge`, but less near vertices of the frame that are closer together.
 class Size {
  public:
@@ -147,7 +141,7 @@ class Relaxation {
         grid.for_each_near(p, p, clearance, [&](int k) {
           const FrameSegment& s = frame_.segments[k];
           is_clear = is_clear &&
-                     distance_to_segment(p, frame_.points_um[s.vertex_a], frame_.points_um[s.vertex_b]) > clearance;
+                     distance_to_segment_um(p, frame_.points_um[s.vertex_a], frame_.points_um[s.vertex_b]) > clearance;
         });
         alone.for_each_near(p, p, clearance,
                             [&](int v) { is_clear = is_clear && norm(frame_.points_um[v] - p) > clearance; });

@@ -76,7 +76,8 @@ std::vector<AdhesionForce> force_list(const Cell& cell, const std::map<int, Vec2
     list.push_back({.adhesion_id = a.adhesion_id,
                     .force_nN = found == forces.end() ? Vec2{} : found->second,
                     .sigma_nN = {},
-                    .connected = connected.contains(a.adhesion_id)});
+                    .connected = connected.contains(a.adhesion_id),
+                    .moment_nN_um = {}});
   }
   return list;
 }

@@ -6,23 +6,6 @@
 
 namespace mbtfm::segment {
 
-namespace {
-
-std::string size_of(const Image& image) {
-  return std::to_string(image.width) + " × " + std::to_string(image.height) + " pixels";
-}
-
-std::string in_um(double value) { return std::to_string(value) + " um"; }
-
-void require_equal_sizes(const Channel& adhesion, const Channel& actin) {
-  const Image &a = adhesion.image, &b = actin.image;
-  if (a.width != b.width || a.height != b.height)
-    throw InputError(actin.name, size_of(a) + " as in " + adhesion.name, size_of(b),
-                     "both channels must show the same field at the same magnification");
-}
-
-}  // namespace
-
 void declare(ParameterList& list, SegmentParameters& p) {
   list.table("");
   list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
@@ -35,27 +18,13 @@ void declare(ParameterList& list, SegmentParameters& p) {
   declare(list, p.outline);
 }
 
-double common_pixel_size_um(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                            const SegmentParameters& p) {
-  if (adhesion && actin) require_equal_sizes(*adhesion, *actin);
-  if (p.pixel_size_um) return *p.pixel_size_um;
-  const auto of_adhesion = adhesion ? adhesion->image.pixel_size_um : std::nullopt;
-  const auto of_actin = actin ? actin->image.pixel_size_um : std::nullopt;
-  // calibrations are written with three digits or more
-  if (of_adhesion && of_actin && std::abs(*of_adhesion - *of_actin) > 2e-3 * *of_adhesion)
-    throw InputError(actin->name, "the pixel size of " + adhesion->name + ", " + in_um(*of_adhesion), in_um(*of_actin),
-                     "set pixel_size_um to the right one");
-  if (of_adhesion) return *of_adhesion;
-  if (of_actin) return *of_actin;
-  throw InputError((adhesion ? adhesion : actin)->name, "a calibration in the file", "none",
-                   "set pixel_size_um, in cell.toml or as --pixel_size_um");
-}
-
 Segmentation segment_cell(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
                           const SegmentParameters& p) {
   if (!adhesion && !actin) throw UsageError("an adhesion image or an actin image is needed, best both");
   Segmentation result;
-  result.pixel_size_um = common_pixel_size_um(adhesion, actin, p);
+  const Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
+  require_equal_sizes(first, second);
+  result.pixel_size_um = common_pixel_size_um(first, second, p.pixel_size_um);
   const double pixel_um = result.pixel_size_um;
   std::vector<Adhesion> found;
   if (adhesion) {

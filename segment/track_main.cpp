@@ -4,39 +4,11 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
+#include "segment/channels.h"
 #include "segment/track.h"
 
 namespace mbtfm::segment {
 namespace {
-
-struct Photograph {
-  std::string name;
-  Image image;
-};
-
-std::string size_of(const Image& image) {
-  return std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels";
-}
-
-std::string in_um(double length) { return std::to_string(length) + " um"; }
-
-double common_pixel_size_um(const Photograph& relaxed, const Photograph& stressed, const TrackParameters& parameters) {
-  if (relaxed.image.width != stressed.image.width || relaxed.image.height != stressed.image.height) {
-    throw InputError(stressed.name, "the size of " + relaxed.name + ", " + size_of(relaxed.image),
-                     size_of(stressed.image), "both bead images must show the same field at the same magnification");
-  }
-  if (parameters.pixel_size_um) return *parameters.pixel_size_um;
-  const auto a = relaxed.image.pixel_size_um, b = stressed.image.pixel_size_um;
-  // calibrations are written with three digits or more
-  if (a && b && std::abs(*a - *b) > 2e-3 * *a) {
-    throw InputError(stressed.name, "the pixel size of " + relaxed.name + ", " + in_um(*a), in_um(*b),
-                     "set pixel_size_um to the right one");
-  }
-  if (a) return *a;
-  if (b) return *b;
-  throw InputError(relaxed.name, "a calibration in the file", "none",
-                   "set pixel_size_um, in cell.toml or as --pixel_size_um");
-}
 
 void write_field(StageContext& context, const DisplacementField& field) {
   write_displacement(context.output("out", "displacement.csv"), field);
@@ -84,9 +56,10 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
 StageReport run(const TrackParameters& parameters, StageContext& context) {
   cv::setNumThreads(context.threads);
   const auto stressed_file = context.input("stressed"), relaxed_file = context.input("relaxed");
-  const Photograph stressed{stressed_file.string(), read_image(stressed_file, parameters.stressed_page - 1)};
-  const Photograph relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_page - 1)};
-  const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters);
+  const Channel stressed{stressed_file.string(), read_image(stressed_file, parameters.stressed_page - 1)};
+  const Channel relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_page - 1)};
+  require_equal_sizes(relaxed, stressed);
+  const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
   try {
     const Tracking tracking =
         track_beads(relaxed.image, stressed.image, pixel_size_um, parameters, context.threads, context.progress);

@@ -211,6 +211,7 @@ std::vector<AdhesionForce> read_adhesion_forces(const Path& file) {
     f.force_nN = {table.number(row, "fx_nN"), table.number(row, "fy_nN")};
     if (table.has("sigma_nN")) f.sigma_nN = table.optional_number(row, "sigma_nN");
     if (table.has("connected")) f.connected = read_flag(table, row, "connected");
+    if (table.has("moment_nN_um")) f.moment_nN_um = table.optional_number(row, "moment_nN_um");
   }
   return forces;
 }
@@ -220,13 +221,13 @@ void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& f
   std::map<int, const Adhesion*> adhesion_of;
   for (const Adhesion& a : adhesions) adhesion_of[a.adhesion_id] = &a;
   CsvText csv({"adhesion_id", "x_um", "y_um", "area_um2", "fx_nN", "fy_nN", "force_nN", "traction_kPa", "sigma_nN",
-               "connected"});
+               "connected", "moment_nN_um"});
   for (const AdhesionForce& f : forces) {
     MBTFM_ASSERT(adhesion_of.contains(f.adhesion_id));
     const Adhesion& a = *adhesion_of[f.adhesion_id];
     csv.add(f.adhesion_id).add(a.position_um.x).add(a.position_um.y).add(a.area_um2);
     csv.add(f.force_nN.x).add(f.force_nN.y).add(norm(f.force_nN)).add(norm(f.force_nN) / a.area_um2);
-    csv.add(f.sigma_nN).add(text_of(f.connected)).end_row();
+    csv.add(f.sigma_nN).add(text_of(f.connected)).add(f.moment_nN_um).end_row();
   }
   write_text(file, csv.str());
 }

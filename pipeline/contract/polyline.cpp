@@ -18,10 +18,7 @@ Vec2 point_along_um(const Polyline& line_um, double share) {
 double distance_to_line_um(const Polyline& line_um, Vec2 point_um) {
   double nearest_um = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i + 1 < line_um.size(); ++i) {
-    const Vec2 step = line_um[i + 1] - line_um[i], from = point_um - line_um[i];
-    const double length2 = dot(step, step);
-    const double share = length2 > 0 ? std::clamp(dot(from, step) / length2, 0.0, 1.0) : 0.0;
-    nearest_um = std::min(nearest_um, norm(from - share * step));
+    nearest_um = std::min(nearest_um, distance_to_segment_um(point_um, line_um[i], line_um[i + 1]));
   }
   return nearest_um;
 }

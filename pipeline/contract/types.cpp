@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numbers>
 #include <set>
 
 #include "pipeline/contract/errors.h"
@@ -33,6 +34,28 @@ double length_um(const Polyline& points) {
   return length;
 }
 
+double nearest_share(Vec2 a, Vec2 b, Vec2 point) {
+  const Vec2 step = b - a;
+  const double squared = dot(step, step);
+  return squared > 0 ? std::clamp(dot(point - a, step) / squared, 0.0, 1.0) : 0.0;
+}
+
+double distance_to_segment_um(Vec2 point_um, Vec2 a_um, Vec2 b_um) {
+  return norm(point_um - (a_um + nearest_share(a_um, b_um, point_um) * (b_um - a_um)));
+}
+
+Polygon ellipse_corners(const Adhesion& adhesion, int n_corners) {
+  const Vec2 along{std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
+  const Vec2 across{-along.y, along.x};
+  Polygon corners;
+  for (int i = 0; i < n_corners; ++i) {
+    const double phi = 2 * std::numbers::pi * i / n_corners;
+    corners.push_back(adhesion.position_um + 0.5 * adhesion.major_axis_um * std::cos(phi) * along +
+                      0.5 * adhesion.minor_axis_um * std::sin(phi) * across);
+  }
+  return corners;
+}
+
 double signed_area_um2(const Polygon& polygon) {
   double doubled = 0;
   for (std::size_t i = 0; i < polygon.size(); ++i) doubled += cross(polygon[i], polygon[(i + 1) % polygon.size()]);
@@ -55,10 +78,8 @@ Vec2 nearest_on_boundary_um(const Polygon& polygon, Vec2 point) {
   double smallest = std::numeric_limits<double>::infinity();
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Vec2 a = polygon[i];
-    const Vec2 edge = polygon[(i + 1) % polygon.size()] - a;
-    const double squared = dot(edge, edge);
-    const double along = squared > 0 ? std::clamp(dot(point - a, edge) / squared, 0.0, 1.0) : 0.0;
-    const Vec2 candidate = a + along * edge;
+    const Vec2 b = polygon[(i + 1) % polygon.size()];
+    const Vec2 candidate = a + nearest_share(a, b, point) * (b - a);
     const double distance = norm(point - candidate);
     if (distance < smallest) {
       smallest = distance;

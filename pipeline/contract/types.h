@@ -106,10 +106,16 @@ struct AdhesionForce {
   int adhesion_id = 0;
   Vec2 force_nN;  ///< of the cell on the substrate
   std::optional<double> sigma_nN;
-  bool connected = false;  ///< a segmented fibre ends on it
+  bool connected = false;              ///< a segmented fibre ends on it
+  std::optional<double> moment_nN_um;  ///< about the adhesion's centre, from +x towards +y
 };
 
 double length_um(const Polyline& points);
+/// Where between a (0) and b (1) the segment is nearest to the point.
+double nearest_share(Vec2 a, Vec2 b, Vec2 point);
+double distance_to_segment_um(Vec2 point_um, Vec2 a_um, Vec2 b_um);
+/// The ellipse of an adhesion as a polygon.
+Polygon ellipse_corners(const Adhesion& adhesion, int n_corners);
 /// Signed area; positive where the polygon turns from +x towards +y.
 double signed_area_um2(const Polygon& polygon);
 bool contains(const Polygon& polygon, Vec2 point);

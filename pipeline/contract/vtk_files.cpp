@@ -13,8 +13,6 @@
 #include <vtkXMLUnstructuredGridReader.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
-#include <numbers>
-
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
@@ -61,18 +59,7 @@ vtkNew<vtkDoubleArray> double_array(const PointArray& values) {
   return array;
 }
 
-Polygon ellipse_corners(const Adhesion& a) {
-  constexpr int kCorners = 32;  // enough to look smooth
-  Polygon corners;
-  const Vec2 along{std::cos(a.angle_rad), std::sin(a.angle_rad)};
-  const Vec2 across{-along.y, along.x};
-  for (int i = 0; i < kCorners; ++i) {
-    const double phi = 2 * std::numbers::pi * i / kCorners;
-    corners.push_back(a.position_um + 0.5 * a.major_axis_um * std::cos(phi) * along +
-                      0.5 * a.minor_axis_um * std::sin(phi) * across);
-  }
-  return corners;
-}
+constexpr int kEllipseCorners = 32;  // enough to look smooth
 
 /// Points and cells of a vtkPolyData in the making. VTK numbers the cells: vertices, lines, polygons.
 class Shapes {
@@ -246,7 +233,7 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
     label(f.fibre_id, 1 + static_cast<int>(f.type), 0);
   }
   for (const Adhesion& a : cell.adhesions) {
-    shapes.add_polygon(ellipse_corners(a));
+    shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
     label(0, 0, a.adhesion_id);
   }
   const auto poly = shapes.data();
@@ -274,7 +261,7 @@ void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions
   Shapes shapes;
   const auto label = int_array("adhesion_id");
   for (const Adhesion& a : adhesions) {
-    shapes.add_polygon(ellipse_corners(a));
+    shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
     label->InsertNextValue(a.adhesion_id);
   }
   const auto poly = shapes.data();

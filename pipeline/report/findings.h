@@ -23,6 +23,7 @@ std::vector<Finding> findings_of(const CellResults& results, const std::vector<s
 /// |sum of forces| and |sum of torques about the centre of the adhesions|, relative to the sum of the magnitudes.
 struct Balance {
   double net_force = 0, net_torque = 0;
+  bool has_moments = false;  ///< those of single adhesions are in the table, and counted
 };
 Balance balance_of(const CellResults& results);
 

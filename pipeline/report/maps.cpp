@@ -10,6 +10,8 @@
 namespace mbtfm::report {
 namespace {
 
+constexpr int kEllipseCorners = 16;  // an ellipse is a few px long
+
 constexpr const char* kOutlineStyle = "fill:none;stroke:#888;stroke-width:1;stroke-dasharray:5 3";
 // Around the cell: the displacement reaches beyond it.
 constexpr double kMargin_um = 5;
@@ -26,7 +28,8 @@ MapDrawing new_map(const CellResults& results) {
 }
 
 void draw_adhesions(MapDrawing& map, const CellResults& results, const std::string& style) {
-  for (const Adhesion& adhesion : results.cell.adhesions) map.polygon(ellipse_corners(adhesion), style);
+  for (const Adhesion& adhesion : results.cell.adhesions)
+    map.polygon(ellipse_corners(adhesion, kEllipseCorners), style);
 }
 
 using Pieces = std::vector<std::pair<Vec2, Vec2>>;
@@ -138,7 +141,8 @@ Figure adhesion_map(const CellResults& results) {
   const ArrowScale scale = arrow_scale(forces);
   for (std::size_t i = 0; i < results.forces.size(); ++i) {
     const Adhesion& adhesion = *by_id.at(results.forces[i].adhesion_id);
-    map.polygon(ellipse_corners(adhesion), "stroke:#333;stroke-width:0.5;fill:" + colours.colour(tractions[i]),
+    map.polygon(ellipse_corners(adhesion, kEllipseCorners),
+                "stroke:#333;stroke-width:0.5;fill:" + colours.colour(tractions[i]),
                 fmt::format("adhesion {}: {} nN, {} kPa on {} µm²", adhesion.adhesion_id, readable(norm(forces[i])),
                             readable(tractions[i]), readable(adhesion.area_um2)));
   }

@@ -103,10 +103,10 @@ std::string adhesion_section(const CellResults& results) {
   Table top{all.columns, {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
   const Balance balance = balance_of(results);
   std::string html = fmt::format(
-      "<p>The {} strongest of {}. Balance: the sum of all forces is {} of the sum of their magnitudes, that of "
-      "their "
-      "torques {} (without the moments inside single adhesions, which the table lacks).</p>\n",
-      top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque));
+      "<p>The {} strongest of {}. Balance: the sum of all forces is {} of the sum of their magnitudes, that of their "
+      "torques {}{}.</p>\n",
+      top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque),
+      balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
   html += html_of(top);
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
   return section("Forces of the adhesions", html);

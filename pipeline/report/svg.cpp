@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <numbers>
 
 namespace mbtfm::report {
 namespace {
@@ -103,19 +102,6 @@ double round_end(double value) {
   if (!(value > 0)) return 0;
   const std::vector<double> list = ticks(0, value);
   return list.back() >= value ? value : list.back() + list[1];
-}
-
-Polygon ellipse_corners(const Adhesion& a) {
-  constexpr int kCorners = 16;  // an ellipse is a few px long
-  Polygon corners;
-  const Vec2 along{std::cos(a.angle_rad), std::sin(a.angle_rad)};
-  const Vec2 across{-along.y, along.x};
-  for (int i = 0; i < kCorners; ++i) {
-    const double phi = 2 * std::numbers::pi * i / kCorners;
-    corners.push_back(a.position_um + 0.5 * a.major_axis_um * std::cos(phi) * along +
-                      0.5 * a.minor_axis_um * std::sin(phi) * across);
-  }
-  return corners;
 }
 
 MapDrawing::MapDrawing(const Box& box_um) : box_um_(box_um) {

@@ -70,7 +70,4 @@ class MapDrawing {
   double legends_px_ = 0;  ///< height of those added so far
 };
 
-/// Corners of an adhesion's ellipse.
-Polygon ellipse_corners(const Adhesion& adhesion);
-
 }  // namespace mbtfm::report

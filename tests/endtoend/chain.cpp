@@ -33,13 +33,19 @@ void expect_no_net_force_and_no_net_torque(const fs::path& cell) {
   const auto forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
   ASSERT_EQ(adhesions.size(), forces.size());
   Vec2 net_nN;
-  double total_nN = 0;
-  for (const AdhesionForce& f : forces) {
-    net_nN += f.force_nN;
-    total_nN += norm(f.force_nN);
+  double total_nN = 0, net_torque_nN_um = 0, total_torque_nN_um = 0;
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    ASSERT_EQ(forces[a].adhesion_id, adhesions[a].adhesion_id);
+    ASSERT_TRUE(forces[a].moment_nN_um.has_value());
+    const double torque_nN_um = cross(adhesions[a].position_um, forces[a].force_nN) + *forces[a].moment_nN_um;
+    net_nN += forces[a].force_nN;
+    total_nN += norm(forces[a].force_nN);
+    net_torque_nN_um += torque_nN_um;
+    total_torque_nN_um += std::abs(torque_nN_um);
   }
-  // Equilibria are solved to 1e-9 of the largest tension at each of some thousand vertices.
+  // Each of some thousand free vertices is at rest to 1e-9 of the largest tension.
   EXPECT_LE(norm(net_nN), 1e-6 * total_nN);
+  EXPECT_LE(std::abs(net_torque_nN_um), 1e-6 * total_torque_nN_um);
 }
 
 TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {

@@ -63,7 +63,7 @@ TEST(Segmentation, says_what_is_missing) {
   Channel one = flat, two = flat;
   one.image.pixel_size_um = 0.1;
   two.image.pixel_size_um = 0.2;
-  EXPECT_THROW(common_pixel_size_um(one, two, SegmentParameters{}), InputError);
+  EXPECT_THROW(common_pixel_size_um(one, two, std::nullopt), InputError);
 }
 
 TEST(Segmentation, takes_saturated_adhesions) {

@@ -1,0 +1,162 @@
+#include "mbtfm/fit_results.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "mbtfm/noise.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+double sum_of_magnitudes(const Eigen::VectorXd& forces_nN) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) sum += forces_nN.segment<2>(i).norm();
+  return sum;
+}
+
+/// |sum of forces| and |sum of torques| over the sums of their magnitudes: rounding only.
+struct Imbalance {
+  double force = 0, torque = 0;
+};
+
+Imbalance imbalance(const EnsembleFit& fit) {
+  Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
+  for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
+  constexpr double kTiny = 1e-300;  // a cell without any force is balanced
+  return {.force = net_nN.norm() / std::max(sum_of_magnitudes(fit.forces_nN), kTiny),
+          .torque = std::abs(fit.torques_nN_um.sum()) / std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
+}
+
+/// Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
+/// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
+double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
+  double sum_um = 0;
+  for (const Link& link : network.links) {
+    if (link.fibre_id == 0) sum_um += link.share * link.rest_length_um;
+  }
+  return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
+}
+
+}  // namespace
+
+std::vector<Tension> tensions_of(const EnsembleFit& fit) {
+  const int n_meshes = static_cast<int>(fit.fits.size());
+  double largest_nN = 0;
+  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
+  std::vector<Tension> tensions;
+  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
+    const Estimate& e = fit.tensions_nN[i];
+    const double half_width = half_width_95(e, n_meshes);
+    // A tension that could be anything that occurs in this cell was not measured.
+    const double scale = i == 0 ? e.value : largest_nN;
+    tensions.push_back({.fibre_id = fit.fibre_ids[i],
+                        .tension_nN = e.value,
+                        .low_nN = std::max(0.0, e.value - half_width),
+                        .high_nN = e.value + half_width,
+                        .identifiable = e.noise < scale});
+  }
+  return tensions;
+}
+
+std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
+  std::set<int> connected;
+  for (const Fibre& f : cell.fibres) {
+    if (f.start_adhesion_id) connected.insert(*f.start_adhesion_id);
+    if (f.end_adhesion_id) connected.insert(*f.end_adhesion_id);
+  }
+  std::vector<AdhesionForce> forces;
+  for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
+    const auto at = 2 * static_cast<Eigen::Index>(a);
+    const Vec2 force_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
+    const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
+    forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
+                      .force_nN = force_nN,
+                      .sigma_nN = fit.force_magnitudes_nN[a].standard_error(),
+                      .connected = connected.contains(cell.adhesions[a].adhesion_id),
+                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, force_nN)});
+  }
+  return forces;
+}
+
+FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
+                      const std::vector<network::CableNetwork>& networks, const FitParameters& parameters) {
+  const NoiseLevel noise =
+      noise_level(inputs.beads, data, fit.forces_nN, inputs.cell.outline_um, parameters.far_distance_um);
+  const double measured_um = data.displacement_um.norm();
+  FitSummary s;
+  s.relative_l2 = relative_l2(data, fit.forces_nN);
+  s.noise_um = noise.sigma_um;
+  s.expected_relative_l2 =
+      measured_um > 0 ? noise.sigma_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
+  s.total_force_nN = sum_of_magnitudes(fit.forces_nN);
+  s.network_force_nN = sum_of_magnitudes(fit.network_forces_nN);
+  s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
+  s.network_surface_tension_nN_per_um =
+      surface_tension_nN_per_um(networks.front().network(), inputs.cell.outline_um, fit.tensions_nN[0].value);
+  s.n_meshes = static_cast<int>(fit.fits.size());
+  s.iterations = fit.report.iterations;
+  s.converged = fit.report.converged;
+  const Imbalance balance = imbalance(fit);
+  double mesh_part = 0, noise_part = 0;
+  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
+    mesh_part += std::pow(fit.tensions_nN[i].spread, 2);
+    noise_part += std::pow(fit.tensions_nN[i].noise, 2);
+  }
+  s.more = {{"noise_source", noise.source},
+            {"chi_squared_per_degree", fit.chi_squared_per_degree},
+            {"net_force_over_total", balance.force},
+            {"net_torque_over_total", balance.torque},
+            {"tension_error_from_noise_nN", std::sqrt(noise_part)},
+            {"tension_error_from_mesh_nN", std::sqrt(mesh_part)},
+            {"n_beads", std::int64_t(inputs.beads.size())},
+            {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
+            {"method", parameters.method},
+            {"reason", fit.report.reason}};
+  return s;
+}
+
+DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, const EnsembleFit& fit) {
+  const Eigen::VectorXd model = data.compliance_um_per_nN * fit.forces_nN;
+  DisplacementField field = inputs.beads;
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    field[i].displacement_um = {model[row], model[row + 1]};
+    field[i].sigma_um = 0;
+  }
+  return field;
+}
+
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted) {
+  std::vector<Vec2> points;
+  PointArray u{.name = "measured_um", .scalars = {}, .vectors = {}};
+  PointArray model{.name = "fitted_um", .scalars = {}, .vectors = {}};
+  PointArray residual{.name = "residual_um", .scalars = {}, .vectors = {}};
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    points.push_back(measured[i].position_um);
+    u.vectors.push_back(measured[i].displacement_um);
+    model.vectors.push_back(fitted[i].displacement_um);
+    residual.vectors.push_back(measured[i].displacement_um - fitted[i].displacement_um);
+  }
+  write_points_vtp(file, points, {u, model, residual});
+}
+
+void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces) {
+  PointArray force{.name = "force_nN", .scalars = {}, .vectors = {}};
+  PointArray traction{.name = "traction_kPa", .scalars = {}, .vectors = {}};
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    force.vectors.push_back(forces[a].force_nN);
+    traction.vectors.push_back(1 / cell.adhesions[a].area_um2 * forces[a].force_nN);
+  }
+  write_ellipses_vtp(file, cell.adhesions, {force, traction});
+}
+
+void write_contracted(const Path& file, const network::CableNetwork& network, const EnsembleFit& fit) {
+  std::vector<double> tensions;
+  for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
+  const network::Equilibrium e = network.equilibrium(tensions, fit.fits.front().trial.equilibrium.positions_um);
+  write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN);
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,32 @@
+/// What the fit tells its user, from what the ensemble of meshes found.
+#pragma once
+
+#include <vector>
+
+#include "mbtfm/ensemble.h"
+#include "pipeline/contract/files.h"
+
+namespace mbtfm::inverse {
+
+struct FitInputs {
+  Cell cell;
+  Network network;
+  DisplacementField beads;  ///< without the flagged ones
+  int n_flagged = 0;
+};
+
+/// By group, with 95 % intervals.
+std::vector<Tension> tensions_of(const EnsembleFit& fit);
+/// By adhesion of the cell, with standard errors.
+std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell);
+FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
+                      const std::vector<network::CableNetwork>& networks, const FitParameters& parameters);
+/// The model's displacement at the beads.
+DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, const EnsembleFit& fit);
+
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted);
+void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces);
+/// The first network, contracted by the mean tensions.
+void write_contracted(const Path& file, const network::CableNetwork& network, const EnsembleFit& fit);
+
+}  // namespace mbtfm::inverse

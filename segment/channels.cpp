@@ -1,0 +1,40 @@
+#include "segment/channels.h"
+
+#include <cmath>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::segment {
+
+namespace {
+
+std::string size_of(const Image& image) {
+  return std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels";
+}
+
+}  // namespace
+
+std::string in_um(double length_um) { return shortest(length_um) + " um"; }
+
+void require_equal_sizes(const Channel& first, const Channel& second) {
+  if (first.image.width == second.image.width && first.image.height == second.image.height) return;
+  throw InputError(second.name, size_of(first.image) + " as in " + first.name, size_of(second.image),
+                   "both images must show the same field at the same magnification");
+}
+
+double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um) {
+  if (given_um) return *given_um;
+  const std::optional<double> a = first.image.pixel_size_um, b = second.image.pixel_size_um;
+  constexpr double kSame = 2e-3;  // calibrations are written with three digits or more
+  if (a && b && std::abs(*a - *b) > kSame * *a) {
+    throw InputError(second.name, "the pixel size of " + first.name + ", " + in_um(*a), in_um(*b),
+                     "set pixel_size_um to the right one");
+  }
+  if (a) return *a;
+  if (b) return *b;
+  throw InputError(first.name, "a calibration in the file", "none",
+                   "set pixel_size_um, in cell.toml or as --pixel_size_um");
+}
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,27 @@
+/// Images that belong together.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "segment/image.h"
+
+namespace mbtfm::segment {
+
+/// An image and the name by which errors call it.
+struct Channel {
+  std::string name;
+  Image image;
+};
+
+/// "0.1 um", for messages.
+std::string in_um(double length_um);
+
+/// @throws InputError where the two are not of one size
+void require_equal_sizes(const Channel& first, const Channel& second);
+
+/// The pixel size of two images of one field: the one given, or else the calibration that they have.
+/// @throws InputError where neither tells it, or they contradict each other
+double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um);
+
+}  // namespace mbtfm::segment
