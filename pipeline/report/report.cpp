@@ -10,6 +10,7 @@
 #include "pipeline/report/base64.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/maps.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
 #include "pipeline/report/results.h"
@@ -19,8 +20,6 @@
 
 namespace mbtfm::report {
 namespace {
-
-std::string optional_number(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
 
 std::string findings_section(const CellResults& results, const Provenance& provenance) {
   std::vector<std::string> not_converged, by_hand;
@@ -80,7 +79,7 @@ std::string adhesion_section(const CellResults& results) {
                    [](const AdhesionForce& a, const AdhesionForce& b) { return norm(a.force_nN) > norm(b.force_nN); });
   Table all{{{"adhesion", true},
              {"force (nN)", true},
-             {"± (nN)", true},
+             {"std. error (nN)", true},
              {"Fx (nN)", true},
              {"Fy (nN)", true},
              {"traction (kPa)", true},
@@ -92,18 +91,21 @@ std::string adhesion_section(const CellResults& results) {
   for (const AdhesionForce& force : forces) {
     const Adhesion& adhesion = *by_id.at(force.adhesion_id);
     const double magnitude = norm(force.force_nN);
-    all.rows.push_back({std::to_string(force.adhesion_id), readable(magnitude), optional_number(force.sigma_nN),
-                        readable(force.force_nN.x), readable(force.force_nN.y), readable(magnitude / adhesion.area_um2),
-                        readable(adhesion.area_um2), readable(adhesion.position_um.x), readable(adhesion.position_um.y),
-                        force.connected ? "yes" : "no"});
+    const bool has_error = force.sigma_nN && *force.sigma_nN > 0;
+    const std::optional<int> decimals = has_error ? std::optional(decimals_for(*force.sigma_nN)) : std::nullopt;
+    all.rows.push_back({std::to_string(force.adhesion_id), rounded(magnitude, decimals),
+                        rounded(force.sigma_nN, decimals), rounded(force.force_nN.x, decimals),
+                        rounded(force.force_nN.y, decimals), rounded(magnitude / adhesion.area_um2, 2),
+                        rounded(adhesion.area_um2, 2), fmt::format("{:.1f}", adhesion.position_um.x),
+                        fmt::format("{:.1f}", adhesion.position_um.y), force.connected ? "yes" : "no"});
   }
   constexpr std::size_t kTop = 12;  // fits a screen
   Table top{all.columns, {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
   const Balance balance = balance_of(results);
   std::string html = fmt::format(
-      "<p>The {} strongest of {}. Balance: the sum of all forces is {:.0e} of the sum of their magnitudes, that of "
-      "their torques {:.0e}{}.</p>\n",
-      top.rows.size(), all.rows.size(), balance.net_force, balance.net_torque,
+      "<p>The {} strongest of {}. Balance: the sum of all forces is {} of the sum of their magnitudes, that of their "
+      "torques {}{}.</p>\n",
+      top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque),
       balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
   html += html_of(top);
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
@@ -137,10 +139,15 @@ std::string figure_pairs(const CellResults& results) {
 }
 
 std::string effects_table(const Provenance& provenance) {
-  Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}, {"s", true}}, {}};
+  const bool are_timed = std::any_of(provenance.effects.begin(), provenance.effects.end(),
+                                     [](const EffectLine& effect) { return !effect.seconds.empty(); });
+  Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}}, {}};
+  if (are_timed) table.columns.push_back({"seconds", true});
   for (const EffectLine& effect : provenance.effects) {
-    table.rows.push_back({html_escaped(effect.name), html_escaped(effect.stage), effect.is_on ? "on" : "off",
-                          html_escaped(effect.why), effect.seconds});
+    std::vector<std::string> row = {html_escaped(effect.name), html_escaped(effect.stage), effect.is_on ? "on" : "off",
+                                    html_escaped(effect.why)};
+    if (are_timed) row.push_back(effect.seconds);
+    table.rows.push_back(row);
   }
   return html_of(table);
 }

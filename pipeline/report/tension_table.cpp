@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/svg.h"
 #include "pipeline/report/tension_plot.h"
 
@@ -22,9 +23,6 @@ std::optional<double> half_interval_nN(const Tension& t) {
   return *t.high_nN - t.tension_nN;
 }
 
-/// Decimals that show two digits of an error.
-int decimals_for(double error) { return std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9); }
-
 /// Decimals that suit most fibres: those of the median error. None: as many as each number needs.
 std::optional<int> common_decimals(const std::vector<FibreRow>& rows) {
   std::vector<double> errors;
@@ -36,27 +34,10 @@ std::optional<int> common_decimals(const std::vector<FibreRow>& rows) {
   return decimals_for(errors[errors.size() / 2]);
 }
 
-/// No more than three significant digits and no more than so many decimals.
-std::string rounded(double value, std::optional<int> decimals) {
-  if (!decimals) return readable(value);
-  const int exponent = value != 0 ? static_cast<int>(std::floor(std::log10(std::abs(value)))) : 0;
-  return fmt::format("{:.{}f}", value, std::clamp(2 - exponent, 0, *decimals));
-}
-
-std::string rounded(const std::optional<double>& value, std::optional<int> decimals) {
-  return value ? rounded(*value, decimals) : "–";
-}
-
 std::string interval_cell(const Tension& t, std::optional<int> decimals) {
   if (!t.identifiable) return "<b>not identifiable</b>";
   if (!t.low_nN || !t.high_nN) return "–";
   return rounded(*t.low_nN, decimals) + " – " + rounded(*t.high_nN, decimals);
-}
-
-std::string with_sign(double value, int decimals) {
-  const std::string text = fmt::format("{:+.{}f}", value, decimals);
-  if (text.find_first_of("123456789") == std::string::npos) return text.substr(1);  // no sign of nothing
-  return text[0] == '-' ? "−" + text.substr(1) : text;
 }
 
 /// Truth, error in per cent, error in halves of the interval.
@@ -80,6 +61,15 @@ std::string true_fibre_cell(const FibreRow& row) {
   return cell;
 }
 
+/// The adhesions that hold the fibre.
+std::string ends_cell(const Fibre& fibre) {
+  std::string cell;
+  for (const auto& id : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
+    if (id) cell += (cell.empty() ? "" : ", ") + std::to_string(*id);
+  }
+  return cell.empty() ? "–" : cell;
+}
+
 std::vector<std::string> network_row(const CellResults& results, const Tension& t) {
   const auto half_nN = half_interval_nN(t);
   const std::optional<int> decimals = half_nN ? std::optional(decimals_for(*half_nN)) : std::nullopt;
@@ -89,7 +79,7 @@ std::vector<std::string> network_row(const CellResults& results, const Tension& 
     for (auto& cell : truth_cells(t, results.comparison->true_network_nN, decimals)) row.push_back(cell);
     row.push_back("–");
   }
-  row.push_back("–");
+  row.insert(row.end(), {"–", "all"});
   return row;
 }
 
@@ -116,6 +106,7 @@ Table tension_table(const CellResults& results) {
     }
   }
   table.columns.push_back({"length (µm)", true});
+  table.columns.push_back({"adhesions"});
   if (const auto t = results.tensions.find(0); t != results.tensions.end()) {
     table.rows.push_back(network_row(results, t->second));
   }
@@ -130,6 +121,7 @@ Table tension_table(const CellResults& results) {
       row.push_back(true_fibre_cell(fibre));
     }
     row.push_back(fmt::format("{:.1f}", length_um(fibre.fibre->points_um)));
+    row.push_back(ends_cell(*fibre.fibre));
     table.rows.push_back(row);
   }
   return table;

@@ -1,0 +1,23 @@
+/// Numbers for people: as many digits as they deserve.
+#pragma once
+
+#include <optional>
+#include <string>
+
+namespace mbtfm::report {
+
+/// Decimals that show two digits of an error. @param error  > 0
+int decimals_for(double error);
+
+/// No more than three significant digits and no more than so many decimals; without these, three significant digits.
+std::string rounded(double value, std::optional<int> decimals);
+/// "–" for none.
+std::string rounded(const std::optional<double>& value, std::optional<int> decimals);
+
+/// "+0.3", "−0.3", "0.0"
+std::string with_sign(double value, int decimals);
+
+/// A digit times a power of ten, as HTML.
+std::string power_of_ten(double value);
+
+}  // namespace mbtfm::report
