@@ -3,6 +3,7 @@
 #include <limits>
 
 #include "mbtfm/tension_fit.h"
+#include "pipeline/contract/csv.h"
 
 namespace mbtfm::inverse {
 
@@ -119,8 +120,8 @@ TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParam
   }
   fit.report.reason = fit.report.converged
                           ? "the tensions change by less than the tolerance"
-                          : "the tensions still change by " + scientific(fit.report.last_change) +
-                                " of the largest after " + std::to_string(fit.n_evaluations) + " evaluations";
+                          : "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +
+                                std::to_string(fit.n_evaluations) + " evaluations";
   return fit;
 }
 

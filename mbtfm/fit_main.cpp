@@ -4,6 +4,7 @@
 
 #include "mbtfm/fit_results.h"
 #include "network/mesh.h"
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/parallel.h"
@@ -138,16 +139,14 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
       std::count_if(tensions.begin(), tensions.end(), [](const Tension& t) { return !t.identifiable; });
   StageReport report{.converged = fit.report.converged,
                      .summary = std::to_string(tensions.size() - 1) + " fibre tensions, total force " +
-                                std::to_string(summary.total_force_nN) + " nN, relative L2 " +
-                                std::to_string(summary.relative_l2),
+                                brief(summary.total_force_nN) + " nN, relative L2 " + brief(summary.relative_l2),
                      .figures = summary.more,
                      .effects = effects_of(*substrate, inputs, p.fit)};
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
   if (inputs.n_flagged > 0) report.summary += "; " + std::to_string(inputs.n_flagged) + " flagged beads left out";
   if (!fit.report.converged) report.summary = fit.report.reason;
   if (data.has_errors && fit.chi_squared_per_degree > kPoorFit) {
-    report.summary += "; the model explains the beads poorly (chi squared " +
-                      std::to_string(fit.chi_squared_per_degree) +
+    report.summary += "; the model explains the beads poorly (chi squared " + brief(fit.chi_squared_per_degree) +
                       " per degree of freedom): do displacement, segmentation and gel belong together?";
   }
   for (const auto& figure : substrate->figures()) report.figures.push_back(figure);

@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "mbtfm/tension_fit.h"
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::inverse {
@@ -137,8 +138,8 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     fit.objective_by_evaluation.push_back(fit.trial.objective);
   }
   if (!fit.report.converged) {
-    fit.report.reason = "the tensions still change by " + scientific(fit.report.last_change) +
-                        " of the largest after " + std::to_string(fit.report.iterations) + " steps";
+    fit.report.reason = "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +
+                        std::to_string(fit.report.iterations) + " steps";
   }
   return fit;
 }

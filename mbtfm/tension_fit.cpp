@@ -1,6 +1,5 @@
 #include "mbtfm/tension_fit.h"
 
-#include <cstdio>
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
@@ -19,12 +18,6 @@ void declare(ParameterList& list, FitParameters& p) {
            "equilibria solved by a conjugate gradient method at most");
   list.add("far_distance_um", p.far_distance_um, Range::not_negative(),
            "beads this far outside the outline tell the noise level (um)");
-}
-
-std::string scientific(double value) {
-  char text[32];
-  std::snprintf(text, sizeof text, "%.1e", value);
-  return text;
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,

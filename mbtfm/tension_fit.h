@@ -45,9 +45,6 @@ struct Block {
 TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParameters& parameters, int threads,
                                    const Eigen::VectorXd& start_nN, const std::vector<Block>& blocks);
 
-/// "1.2e-05", for messages.
-std::string scientific(double value);
-
 /// The minimiser of ½ xᵀ H x + gᵀ x over x >= low, for symmetric positive definite H, by an active set.
 Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
                                           const Eigen::VectorXd& low);

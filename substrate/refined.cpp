@@ -5,6 +5,7 @@
 #include <mutex>
 #include <numbers>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/elastic_system.h"
 #include "substrate/ellipse_load.h"
@@ -101,7 +102,7 @@ class Refined final : public Substrate {
     return {{.name = "finite thickness", .is_on = true, .why = "refined: elements down to the rigid base"},
             {.name = "finite sides",
              .is_on = true,
-             .why = "refined: free sides " + std::to_string(parameters_.margin_thicknesses) +
+             .why = "refined: free sides " + brief(parameters_.margin_thicknesses) +
                     " thicknesses beyond adhesions and beads"},
             vertical_displacement_off()};
   }

@@ -9,6 +9,7 @@
 #include <memory>
 #include <mutex>
 
+#include "pipeline/contract/csv.h"
 #include "substrate/greens_model.h"
 #include "substrate/load_cases.h"
 #include "substrate/models.h"
@@ -75,7 +76,7 @@ class Split final : public Substrate {
     return {{.name = "finite thickness", .is_on = true, .why = "split: finite element correction for the rigid base"},
             {.name = "finite sides",
              .is_on = true,
-             .why = "split: free sides " + std::to_string(parameters_.margin_thicknesses) +
+             .why = "split: free sides " + brief(parameters_.margin_thicknesses) +
                     " thicknesses beyond adhesions and beads; further away they would change less than 0.1 %"},
             vertical_displacement_off()};
   }

@@ -68,6 +68,9 @@ class CsvText {
 /// Shortest text that reads back as the same number.
 std::string shortest(double value);
 
+/// Three significant digits, for people.
+std::string brief(double value);
+
 /// The whole of a file. @throws InputError
 std::string read_text(const std::filesystem::path& file);
 /// Write all or throw. @throws OutputError
