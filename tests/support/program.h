@@ -22,7 +22,8 @@ struct Outcome {
 inline Outcome run_program(const std::string& command, const std::string& before = {}) {
   const TemporaryFolder folder;
   const std::filesystem::path log = folder / "log";
-  const std::string whole = before + std::string(MBTFM_BINARY_DIR) + "/bin/" + command + " > '" + log.string() + "' 2>&1";
+  const std::string whole =
+      before + std::string(MBTFM_BINARY_DIR) + "/bin/" + command + " > '" + log.string() + "' 2>&1";
   const int status = std::system(whole.c_str());
   return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(log)};
 }
