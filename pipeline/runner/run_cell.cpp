@@ -15,7 +15,7 @@ namespace mbtfm::runner {
 namespace fs = std::filesystem;
 namespace {
 
-/// The exit code of a stage that did not converge but wrote its outputs (STYLE.md §7).
+/// The exit code of a stage that did not converge but wrote its outputs (docs/formats.md, "Exit codes").
 constexpr int kNotSolved = 4;
 
 bool contains_name(const std::vector<std::string>& names, const std::string& name) {
