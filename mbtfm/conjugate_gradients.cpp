@@ -16,7 +16,7 @@ class Minimisation {
                const Eigen::VectorXd& start)
       : problem_(problem), parameters_(parameters), threads_(threads) {
     fit_.trial = problem.evaluate(start);
-    note(fit_.trial);
+    fit_.n_evaluations = 1;
   }
 
   TensionFit& fit() { return fit_; }
@@ -62,15 +62,9 @@ class Minimisation {
  private:
   Trial at(double step, const Eigen::VectorXd& direction) {
     Trial trial = problem_.evaluate((fit_.trial.tensions_nN + step * direction).cwiseMax(0.0), &fit_.trial);
-    note(trial);
+    ++fit_.n_evaluations;
     return trial;
   }
-  void note(const Trial& trial) {
-    ++fit_.n_evaluations;
-    auto& history = fit_.objective_by_evaluation;
-    history.push_back(history.empty() ? trial.objective : std::min(history.back(), trial.objective));
-  }
-
   const TensionProblem& problem_;
   const FitParameters& parameters_;
   int threads_;

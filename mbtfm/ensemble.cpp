@@ -38,8 +38,7 @@ Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& jacobian) {
 /// Forces with every fibre at the network's tension.
 Eigen::VectorXd network_forces_nN(const TensionProblem& problem, const Trial& trial) {
   const double tension = trial.tensions_nN[0];
-  constexpr double kNothing = 1e-6;  // of the largest tension: such a network carries no force that one could tell
-  if (tension <= kNothing * trial.tensions_nN.maxCoeff()) return Eigen::VectorXd::Zero(trial.forces_nN.size());
+  if (tension <= kNoTension * trial.tensions_nN.maxCoeff()) return Eigen::VectorXd::Zero(trial.forces_nN.size());
   return problem.evaluate(Eigen::VectorXd::Constant(trial.tensions_nN.size(), tension), &trial).forces_nN;
 }
 

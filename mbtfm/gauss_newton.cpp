@@ -22,8 +22,6 @@ std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
 
 // Of the network's tension in one step: without it the links hang loose and the next derivative tells nothing of them.
 constexpr double kLargestDrop = 0.9;
-// Of the largest tension: less than this is as good as none.
-constexpr double kNothing = 1e-6;
 
 // Part of the whole misfit: of 10 000 beads' chi² of 20 000 this is 0.001, a thirtieth of a standard error.
 constexpr double kNegligible = 5e-8;
@@ -105,7 +103,7 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale).asDiagonal());
     const double largest = fit.trial.tensions_nN.maxCoeff();
     Eigen::VectorXd low = -fit.trial.tensions_nN;
-    if (fit.trial.tensions_nN[0] > kNothing * largest) low[0] *= kLargestDrop;
+    if (fit.trial.tensions_nN[0] > kNoTension * largest) low[0] *= kLargestDrop;
     const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, low);
     fit.report.last_change = step.cwiseAbs().maxCoeff() / std::max(largest, std::numeric_limits<double>::min());
 
@@ -135,7 +133,6 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     }
     if (gain > 0.75) damping = std::max(1e-12, damping / 10);
     if (gain < 0.25) damping = std::max(10 * damping, gain > 0 ? 0.0 : 1e-2);
-    fit.objective_by_evaluation.push_back(fit.trial.objective);
   }
   if (!fit.report.converged) {
     fit.report.reason = "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +

@@ -21,11 +21,13 @@ struct FitParameters {
 };
 void declare(ParameterList& list, FitParameters& parameters);
 
+/// Of the largest tension: a network's tension below this is as good as none.
+inline constexpr double kNoTension = 1e-6;
+
 struct TensionFit {
   Trial trial;  ///< the best one
   Report report;
-  int n_evaluations = 0;                        ///< equilibria solved, those of finite differences included
-  std::vector<double> objective_by_evaluation;  ///< the smallest so far
+  int n_evaluations = 0;  ///< equilibria solved, those of finite differences included
 };
 
 /// @throws UsageError for a method it does not know
