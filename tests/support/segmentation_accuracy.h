@@ -33,7 +33,7 @@ inline SimulatedCell simulated_cell(const std::string& scenario, const std::stri
     return samples::recorded(photons_of(specimen, m, kThreads), m, seed, exposure, kThreads);
   };
   cell.adhesion = {"paxillin.tif", image(paxillin_specimen(cell.truth, m, seed, kThreads), 0)};
-  cell.actin = {"actin.tif", image(actin_specimen(cell.truth, m, seed, kThreads), 1)};
+  cell.actin = {"actin.tif", image(actin_specimen(cell.truth, p.cell.n_ruffles, m, seed, kThreads), 1)};
   for (segment::Channel* channel : {&cell.adhesion, &cell.actin}) channel->image.pixel_size_um = m.pixel_size_um;
   return cell;
 }
