@@ -10,6 +10,8 @@
 #include "pipeline/report/compare.h"
 #include "pipeline/report/report.h"
 #include "pipeline/runner/batch.h"
+#include "pipeline/runner/batch_table.h"
+#include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
 
@@ -27,7 +29,8 @@ struct CommandLine {
   int threads = available_threads();
   int jobs = 1;
   bool is_quiet = false;
-  std::vector<std::string> only, redo;
+  std::vector<std::string> only, redo, patterns;
+  fs::path template_toml;
 };
 
 void say(const std::string& line) { std::fprintf(stderr, "mbtfm: %s\n", line.c_str()); }
@@ -55,6 +58,9 @@ int run(const CommandLine& line) {
 }
 
 int batch(const CommandLine& line) {
+  std::vector<runner::ImagePattern> patterns;
+  for (const std::string& text : line.patterns) patterns.push_back(runner::parse_pattern(text));
+  if (!patterns.empty()) runner::make_cell_folders(line.folder, patterns, line.template_toml);
   const std::vector<fs::path> cells = runner::find_cells(line.folder);
   std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
                                         "--stages-dir", line.stage_folder.string()};
@@ -63,6 +69,7 @@ int batch(const CommandLine& line) {
   const auto outcomes = runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
                                                   .arguments = arguments,
                                                   .jobs = line.jobs,
+                                                  .only = line.only,
                                                   .say = line.is_quiet ? nullptr : say});
   int n_failed = 0;
   for (const runner::BatchCell& cell : outcomes) {
@@ -70,7 +77,9 @@ int batch(const CommandLine& line) {
     ++n_failed;
     std::fprintf(stderr, "mbtfm: %s: exit code %d: %s\n", cell.cell.c_str(), cell.exit_code, cell.message.c_str());
   }
-  std::fprintf(stderr, "mbtfm: %zu cells done, %d failed\n", outcomes.size() - n_failed, n_failed);
+  const fs::path table = line.folder / "batch.csv";
+  runner::write_batch_table(table, line.folder, outcomes, line.only);
+  std::fprintf(stderr, "mbtfm: %zu cells done, %d failed; %s\n", outcomes.size() - n_failed, n_failed, table.c_str());
   return n_failed == 0 ? kDone : kFailed;
 }
 
@@ -110,8 +119,11 @@ CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name,
 }
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
-  command->add_option("--only", line.only, "run these stages only: segment, track, network, fit");
-  command->add_option("--redo", line.redo, "run these stages even if up to date or changed by hand");
+  // one value a flag: else the folder that follows would be taken for another
+  command->add_option("--only", line.only, "run this stage only, or these: segment, track, network, fit")
+      ->allow_extra_args(false);
+  command->add_option("--redo", line.redo, "run this stage, or these, even if up to date or changed by hand")
+      ->allow_extra_args(false);
   command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
 }
 
@@ -125,6 +137,12 @@ int start(int argc, char** argv) {
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
+  batch_command
+      ->add_option("--pattern", line.patterns,
+                   "make cell folders for images that lie together: KEY=PATTERN with KEY of [images] and "
+                   "{cell} for the cell's name, as in adhesion='{cell}_pax.tif'")
+      ->allow_extra_args(false);
+  batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
   add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", "CELL");

@@ -2,6 +2,7 @@
 
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
+#include "segment/contact_sheet.h"
 #include "segment/overlay.h"
 #include "segment/segment_cell.h"
 
@@ -53,6 +54,8 @@ StageReport run(const SegmentParameters& parameters, StageContext& context) {
   write_outline(context.output("out", "outline.csv"), s.cell.outline_um);
   write_cell_vtp(context.output("out", "cell.vtp"), s.cell);
   write_png(context.output("out", "overlay.png"), draw_overlay(adhesion, actin, s));
+  if (!parameters.contact_sheet.empty())
+    write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));
   return report_of(s);
 }
 

@@ -165,12 +165,17 @@ CellOutcome CellRun::run() {
   const std::vector<Stage>& all = stages();
   CellOutcome outcome;
   outcome.stages.resize(all.size());
-  const int workers = std::min(options_.threads, 2);
+  const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
+  const auto is_asked = [&](const std::vector<int>& chain) {
+    return options_.only.empty() || std::any_of(chain.begin(), chain.end(), [&](int i) {
+             return std::find(options_.only.begin(), options_.only.end(), all[i].name) != options_.only.end();
+           });
+  };
+  const int workers = is_asked(chains[0]) && is_asked(chains[1]) ? std::min(options_.threads, 2) : 1;
   const auto threads_of = [&](int chain) {
     return workers == 1 ? options_.threads
                         : (chain == 0 ? options_.threads - options_.threads / 2 : options_.threads / 2);
   };
-  const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
   parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
     for (const int i : chains[chain]) outcome.stages[i] = bring_up_to_date(all[i], threads_of(chain));
   });
