@@ -20,8 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace mbtfm;
 
-constexpr int kDone = 0, kFailed = 1, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70,
-              kInterrupted = 130;
+using namespace exit_code;
 
 struct CommandLine {
   fs::path folder;
@@ -157,33 +156,16 @@ int start(int argc, char** argv) {
   return compare(line);
 }
 
-int fail(int code, const char* kind, const char* message, const std::string& hint = {}) {
-  std::fprintf(stderr, "mbtfm: %s: %s\n", kind, message);
-  if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
-  return code;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   runner::watch_interrupts();
   try {
     return start(argc, argv);
-  } catch (const UsageError& error) {
-    return fail(kUsage, "error", error.what());
-  } catch (const InputError& error) {
-    return fail(kInput, "error", error.what(), error.hint);
-  } catch (const InvalidData& error) {
-    return fail(kInput, "error", error.what());
   } catch (const runner::StageFailed& error) {
-    return fail(error.exit_code, "error", error.what());
-  } catch (const runner::Interrupted& error) {
-    return fail(kInterrupted, "error", error.what());
-  } catch (const OutputError& error) {
-    return fail(kOutput, "error", error.what());
-  } catch (const fs::filesystem_error& error) {
-    return fail(kOutput, "error", error.what());
-  } catch (const std::exception& error) {
-    return fail(kBug, "internal error", error.what(), "please report this with the command and its inputs");
+    std::fprintf(stderr, "mbtfm: error: %s\n", error.what());
+    return error.exit_code;
+  } catch (...) {
+    return report_current_exception("mbtfm");
   }
 }
