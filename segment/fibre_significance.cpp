@@ -21,7 +21,7 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
 double expected_false_lines(double significance, double area_um2) {
   // The strongest chains of a texture have an exponential tail. Density and scale were counted in 24 simulated cells of
   // meshwork alone (71 000 um², scenario no-fibres, three image qualities), where it holds from 10 lines a cell to 0.1.
-  constexpr double kDensity_per_um2 = 0.0036, kAt = 10.7, kScale = 1.35;
+  constexpr double kDensity_per_um2 = 0.0036, kAt = 12.4, kScale = 1.71;
   return kDensity_per_um2 * area_um2 * std::exp((kAt - significance) / kScale);
 }
 

@@ -44,9 +44,8 @@ cv::Rect box_of(const Polygon& outline_um, cv::Size size, double pixel_um, doubl
 
 Field field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
   const cv::Rect box = box_of(outline_um, image.size(), pixel_um, 2 * p.fibre_averaging_um);
-  // at 0.85 pixels 3 % of a Gaussian's spectrum lie beyond what the pixels carry
-  const double narrowest_px = p.fibre_width_um / kFwhm / std::numbers::sqrt2 / pixel_um;
-  const int factor = std::max(1, static_cast<int>(narrowest_px / 0.85));
+  // a fibre's deviation spans 1.2 pixels: the grid carries all but 1e-3 of its spectrum
+  const int factor = std::max(1, static_cast<int>(p.fibre_width_um / kFwhm / pixel_um / 1.2));
   Field field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
   field.is_inside = cv::Mat(field.image.size(), CV_8U, cv::Scalar(outline_um.empty() ? 255 : 0));
   if (outline_um.empty()) return field;

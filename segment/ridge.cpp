@@ -69,7 +69,10 @@ FilterBank bank_of(const RidgeScales& scales, int n_directions) {
         bank.filters[static_cast<std::size_t>(i)].push_back(
             pair_of_filters(bank.side, along(2 * i, n_directions), along(2 * i + 1, n_directions), w, l));
   });
-  for (const cv::Mat& filters : bank.filters[0]) bank.noise_gain = std::max(bank.noise_gain, noise_gain_of(filters));
+  // along the pixels and across their diagonal: the grid cuts the narrow filter's spectrum differently
+  for (const std::size_t pair : {std::size_t{0}, bank.filters.size() / 2})
+    for (const cv::Mat& filters : bank.filters[pair])
+      bank.noise_gain = std::max(bank.noise_gain, noise_gain_of(filters));
   return bank;
 }
 
@@ -136,52 +139,76 @@ Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeSc
   return ridges;
 }
 
-cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px) {
-  // a disc of six grid cells' radius holds 113 values; every second direction tells the spread of all
-  constexpr int kCellsInRadius = 6;
-  const int factor = std::max(1, static_cast<int>(radius_px / kCellsInRadius));
-  const int radius = static_cast<int>(std::lround(radius_px / factor));
-  const cv::Size size = is_inside.size();
-  const cv::Size coarse((size.width + factor - 1) / factor, (size.height + factor - 1) / factor);
+namespace {
+
+/// Magnitudes of responses on a coarse grid, one pixel picked from each block, and where they are the cell's.
+struct Picked {
+  std::vector<cv::Mat> magnitude;
+  cv::Mat is_inside;
+};
+
+Picked pick(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, int factor) {
+  const cv::Size size((is_inside.cols + factor - 1) / factor, (is_inside.rows + factor - 1) / factor);
   const auto place = [&](int i, int n) { return std::min(i * factor + factor / 2, n - 1); };
-  std::vector<cv::Mat> picked;
-  for (std::size_t k = 0; k < responses.size(); k += 2) {
-    picked.emplace_back(coarse, CV_32F);
-    for (int y = 0; y < coarse.height; ++y)
-      for (int x = 0; x < coarse.width; ++x)
-        picked.back().at<float>(y, x) = std::abs(responses[k].at<float>(place(y, size.height), place(x, size.width)));
+  Picked picked{{}, cv::Mat(size, CV_8U)};
+  for (std::size_t k = 0; k < responses.size(); k += 2) picked.magnitude.emplace_back(size, CV_32F);
+  for (int y = 0; y < size.height; ++y)
+    for (int x = 0; x < size.width; ++x) {
+      const cv::Point from(place(x, is_inside.cols), place(y, is_inside.rows));
+      picked.is_inside.at<std::uint8_t>(y, x) = is_inside.at<std::uint8_t>(from);
+      for (std::size_t k = 0; k < picked.magnitude.size(); ++k)
+        picked.magnitude[k].at<float>(y, x) = std::abs(responses[2 * k].at<float>(from));
+    }
+  return picked;
+}
+
+/// The q-quantile; reorders the values.
+float quantile_of(std::vector<float>& values, double q) {
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size()));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+/// The spread around one place of the coarse grid; 0 where nothing of the cell is around.
+float spread_at(const Picked& picked, cv::Point2d centre, double radius, std::vector<float>& values,
+                std::vector<float>& medians) {
+  medians.clear();
+  for (const cv::Mat& magnitude : picked.magnitude) {
+    values.clear();
+    const int top = std::max(0, cvCeil(centre.y - radius)),
+              bottom = std::min(magnitude.rows - 1, cvFloor(centre.y + radius));
+    for (int y = top; y <= bottom; ++y) {
+      const double half = std::sqrt(radius * radius - (y - centre.y) * (y - centre.y));
+      const int left = std::max(0, cvCeil(centre.x - half)),
+                right = std::min(magnitude.cols - 1, cvFloor(centre.x + half));
+      for (int x = left; x <= right; ++x)
+        if (picked.is_inside.at<std::uint8_t>(y, x) != 0) values.push_back(magnitude.at<float>(y, x));
+    }
+    if (values.empty()) return 0;
+    medians.push_back(quantile_of(values, 0.5));
   }
-  const auto is_texture = [&](int y, int x) {
-    return y >= 0 && x >= 0 && y < coarse.height && x < coarse.width &&
-           is_inside.at<std::uint8_t>(place(y, size.height), place(x, size.width)) != 0;
-  };
-  const auto median = [](std::vector<float>& values) {
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return *middle;
-  };
-  cv::Mat spread(coarse, CV_32F, cv::Scalar(0));
-  cv::parallel_for_(cv::Range(0, coarse.height), [&](const cv::Range& rows) {
-    std::vector<cv::Point> around;
-    std::vector<float> values, medians(picked.size());
+  return 1.4826f * quantile_of(medians, 0.25);  // the median magnitude of a normal variate is 0.6745 deviations
+}
+
+}  // namespace
+
+cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px) {
+  constexpr int kCellsInRadius = 6;  // about 113 values in a disc
+  constexpr int kCellsApart = 2;     // a third of the radius from disc to disc
+  const int factor = std::max(1, cvRound(radius_px / kCellsInRadius));
+  const Picked picked = pick(responses, is_inside, factor);
+  cv::Mat fine, spread((picked.is_inside.rows + kCellsApart - 1) / kCellsApart,
+                       (picked.is_inside.cols + kCellsApart - 1) / kCellsApart, CV_32F);
+  cv::parallel_for_(cv::Range(0, spread.rows), [&](const cv::Range& rows) {
+    std::vector<float> values, medians;
     for (int y = rows.start; y < rows.end; ++y)
-      for (int x = 0; x < coarse.width; ++x) {
-        around.clear();
-        for (int dy = -radius; dy <= radius; ++dy)
-          for (int dx = -radius; dx <= radius; ++dx)
-            if (dx * dx + dy * dy <= radius * radius && is_texture(y + dy, x + dx)) around.emplace_back(x + dx, y + dy);
-        if (around.empty()) continue;
-        for (std::size_t k = 0; k < picked.size(); ++k) {
-          values.clear();
-          for (const cv::Point p : around) values.push_back(picked[k].at<float>(p));
-          medians[k] = median(values);
-        }
-        spread.at<float>(y, x) = 1.4826f * median(medians);  // normal: the median magnitude is 0.6745 deviations
+      for (int x = 0; x < spread.cols; ++x) {
+        const cv::Point2d centre((x + 0.5) * kCellsApart - 0.5, (y + 0.5) * kCellsApart - 0.5);
+        spread.at<float>(y, x) = spread_at(picked, centre, radius_px / factor, values, medians);
       }
   });
-  cv::Mat fine;
-  cv::resize(spread, fine, cv::Size(coarse.width * factor, coarse.height * factor), 0, 0, cv::INTER_LINEAR);
-  return fine(cv::Rect(cv::Point(0, 0), size)).clone();
+  cv::resize(spread, fine, spread.size() * (factor * kCellsApart), 0, 0, cv::INTER_LINEAR);
+  return fine(cv::Rect(cv::Point(0, 0), is_inside.size())).clone();
 }
 
 }  // namespace mbtfm::segment

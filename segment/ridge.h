@@ -31,8 +31,9 @@ struct RidgeScales {
 /// @param is_inside  CV_8U, not 0 where the texture is the cell's; nothing outside of it counts as texture
 Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions = 16);
 
-/// Robust standard deviation of the responses within a disc, of zero mean and from what lies inside alone: the median
-/// over the directions, so that bundles that run alike in a whole neighbourhood do not count as its texture.
+/// Robust standard deviation of the responses within a disc, of zero mean and from what lies inside alone: the
+/// lower quartile over the directions, so that bundles that fill a neighbourhood in one direction, or two that cross,
+/// do not count as its texture.
 cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px);
 
 }  // namespace mbtfm::segment

@@ -86,10 +86,9 @@ bool is_on(const cv::Mat& image, cv::Point2d p) {
 std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step start) {
   std::vector<Step> steps;
   std::size_t last_seen = 0, last_free = 0;
-  const int longest = 4 * (ridges.noise.rows + ridges.noise.cols);  // a closed ring ends
   Step now = start;
   double height_so_far = start.height;
-  for (int i = 0; i < longest; ++i) {
+  while (std::abs(now.angle - start.angle) < 2 * pi) {  // a ring ends
     now.point += unit(now.angle);
     if (!is_on(ridges.noise, now.point)) break;
     now = settle(ridges, rule, now);

@@ -30,7 +30,9 @@ Fibre fibre(int id) {
           .end_adhesion_id = {},
           .mean_intensity = 3,
           .confidence = 0.5,
-          .points_um = {{0, 0}, {1, 0.5}, {2, 0.7}}};
+          .points_um = {{0, 0}, {1, 0.5}, {2, 0.7}},
+          .type_confidence = 0.75,
+          .type_reason = "start held 0.1 um from adhesion 7; end free"};
 }
 
 Network network() {
@@ -65,6 +67,19 @@ TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
   EXPECT_EQ(fibres[1].start_adhesion_id, 7);
   EXPECT_EQ(fibres[1].end_adhesion_id, std::nullopt);
   EXPECT_TRUE(fibres[1].points_um == fibre(4).points_um);
+  EXPECT_EQ(fibres[1].type_confidence, 0.75);
+  EXPECT_EQ(fibres[1].type_reason, fibre(4).type_reason);
+}
+
+TEST(Files, fibres_drawn_elsewhere_need_no_reasons) {
+  const TemporaryFolder folder;
+  write_text(folder / "fibres.csv",
+             "fibre_id,type,length_um,width_um,start_adhesion_id,end_adhesion_id,mean_intensity,confidence\n"
+             "1,arc,5,0.6,,,3,1\n");
+  write_text(folder / "fibre_points.csv", "fibre_id,point,x_um,y_um\n1,0,0,0\n1,1,3,4\n");
+  const auto fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv");
+  ASSERT_EQ(fibres.size(), 1u);
+  EXPECT_TRUE(fibres[0].type_reason.empty());
 }
 
 TEST(Files, a_network_comes_back_as_it_was_written) {

@@ -1,0 +1,128 @@
+/// Drawn fibres are found where they were drawn, each as one, of the right width and type.
+#include <gtest/gtest.h>
+
+#include "segment/fibres.h"
+#include "tests/support/drawn_image.h"
+#include "tests/support/segmentation_accuracy.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+std::vector<Fibre> fibres_of(const Image& image, const std::vector<Adhesion>& adhesions = {}) {
+  return find_fibres(image, {}, adhesions, 0.1, FibreParameters{});
+}
+
+Image drawn(const std::vector<Polyline>& lines, double height = 300, double width_um = 0.6) {
+  Image image = even_image(256, 256, 100);
+  for (const Polyline& line : lines) draw_line(image, line, height, width_um, 0.1);
+  add_noise(image, 10, 1);
+  return image;
+}
+
+void expect_traced(const Fibre& fibre, const Polyline& line) {
+  EXPECT_GT(covered_share(fibre.points_um, line, 0.1), 0.95);  // half a pixel of the filter's grid
+  EXPECT_GT(covered_share(line, fibre.points_um, 0.1), 0.9);
+}
+
+TEST(Fibres, are_followed_through_a_crossing_and_typed_by_their_adhesions) {
+  for (const double noise : {0.0, 10.0, 40.0}) {
+    SCOPED_TRACE(noise);
+    const DrawnScene scene = drawn_scene(noise, 2);
+    const auto fibres = fibres_of(scene.actin_image, scene.adhesions);
+    ASSERT_EQ(fibres.size(), 3u);
+    EXPECT_EQ(fibres[0].type, FibreType::ventral);
+    EXPECT_EQ(fibres[1].type, FibreType::ventral);
+    EXPECT_EQ(fibres[2].type, FibreType::dorsal);
+    for (const Polyline& line : scene.fibres)
+      EXPECT_TRUE(std::any_of(fibres.begin(), fibres.end(), [&](const Fibre& f) {
+        return covered_share(f.points_um, line, 0.1) > 0.95 && covered_share(line, f.points_um, 0.1) > 0.9;
+      }));
+    // the filter's grid of 0.2 um widens 0.6 um to sqrt(0.6² + 0.2²·2.355²/12 ·2) = 0.63
+    for (const Fibre& f : fibres) EXPECT_NEAR(f.width_um, 0.63, 0.1);
+  }
+}
+
+TEST(Fibres, half_to_twice_as_wide_as_typical_are_found_with_their_width) {
+  for (const double width_um : {0.3, 0.6, 1.2}) {
+    SCOPED_TRACE(width_um);
+    const Polyline line{{4, 6}, {21, 19}};
+    const auto fibres = fibres_of(drawn({line}, 300, width_um));
+    ASSERT_EQ(fibres.size(), 1u);
+    expect_traced(fibres[0], line);
+    // the grid's width of 0.2 um, as above; the profile reaches out 0.9 um and takes a wide fibre's flank for its side
+    EXPECT_NEAR(fibres[0].width_um, std::sqrt(width_um * width_um + 0.037), width_um > 1 ? 0.25 : 0.1);
+  }
+}
+
+TEST(Fibres, that_bend_are_followed) {
+  Polyline arc;
+  for (double a = 0.3; a < 2.2; a += 0.05) arc.push_back({12.8 + 9 * std::cos(a), 6 + 9 * std::sin(a)});
+  const auto fibres = fibres_of(drawn({arc}));
+  ASSERT_EQ(fibres.size(), 1u);
+  expect_traced(fibres[0], arc);
+}
+
+TEST(Fibres, with_a_gap_are_one) {
+  const auto fibres = fibres_of(drawn({{{4, 12}, {12, 12.5}}, {{13, 12.56}, {22, 13.1}}}));
+  ASSERT_EQ(fibres.size(), 1u);
+  EXPECT_NEAR(length_um(fibres[0].points_um), 18, 0.5);
+}
+
+TEST(Fibres, side_by_side_stay_two) {
+  const auto fibres = fibres_of(drawn({{{4, 12}, {21, 12.6}}, {{4, 13.2}, {21, 13.8}}}));
+  EXPECT_EQ(fibres.size(), 2u);
+}
+
+TEST(Fibres, without_adhesions_are_arcs) {
+  const DrawnScene scene = drawn_scene(10, 3);
+  const auto fibres = fibres_of(scene.actin_image);
+  EXPECT_EQ(fibres.size(), 3u);
+  for (const Fibre& f : fibres) {
+    EXPECT_EQ(f.type, FibreType::arc);
+    EXPECT_FALSE(f.start_adhesion_id || f.end_adhesion_id);
+    EXPECT_EQ(f.type_reason, "start far from any adhesion; end far from any adhesion");
+  }
+}
+
+TEST(Fibres, tell_why_they_have_their_type) {
+  const Polyline line{{5, 12}, {20, 12}};
+  const auto fibres = fibres_of(drawn({line}), {ellipse(3, {4.9, 12}, 1.6, 0.6, 0), ellipse(8, {12, 12}, 1, 0.6, 0)});
+  ASSERT_EQ(fibres.size(), 1u);
+  EXPECT_EQ(fibres[0].type, FibreType::dorsal);
+  EXPECT_NE(fibres[0].type_reason.find("held 0.0 um from adhesion 3"), std::string::npos) << fibres[0].type_reason;
+  EXPECT_NE(fibres[0].type_reason.find("; over adhesion 8"), std::string::npos) << fibres[0].type_reason;
+  EXPECT_GT(fibres[0].type_confidence, 0.95);
+}
+
+TEST(Fibres, that_stop_at_the_limit_of_reach_are_decided_by_their_direction) {
+  // a cell's edge at x = 22 um, the adhesion 1.4 um ahead of the end: 0.7 of the way counts, about the reach of 1 um
+  const Polygon cell{{1, 1}, {22, 1}, {22, 24}, {1, 24}};
+  const auto end_of = [&](const Polyline& line, const Adhesion& adhesion) {
+    const auto fibres = find_fibres(drawn({line}), cell, {adhesion}, 0.1, FibreParameters{});
+    return fibres.size() == 1 ? fibres[0] : Fibre{};
+  };
+  const Fibre across = end_of({{6, 12}, {18.5, 12}}, ellipse(1, {20.3, 12}, 0.8, 0.6, 0));
+  const Fibre along = end_of({{18.5, 19}, {18.5, 8}}, ellipse(1, {18.5, 6.2}, 0.8, 0.6, 1.57));
+  EXPECT_EQ(across.type, FibreType::dorsal) << across.type_reason;
+  EXPECT_EQ(along.type, FibreType::arc) << along.type_reason;
+  for (const Fibre* f : {&across, &along}) EXPECT_LT(f->type_confidence, 0.95);
+}
+
+/// The targets at ordinary quality, on one cell of each kind; means over seeds come from segmentation_accuracy.
+TEST(Fibres, of_simulated_cells_are_found) {
+  for (const std::string scenario : {"u2os", "crowded"}) {
+    SCOPED_TRACE(scenario);
+    const SimulatedCell cell = simulated_cell(scenario, "ordinary", 1);
+    Cell found = cell.truth;
+    found.fibres = find_fibres(cell.actin.image, found.outline_um, found.adhesions, 0.1, FibreParameters{});
+    Accuracy accuracy = accuracy_of(cell.truth, found);
+    EXPECT_GE(accuracy["fibre centreline F1 (0.25 um)"], 0.90);
+    EXPECT_GE(accuracy["fibres in one piece"], 0.85);
+    EXPECT_GE(accuracy["fibre type right"], 0.90);
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

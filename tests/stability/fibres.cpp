@@ -1,0 +1,88 @@
+/// Actin images without fibres give none; what looks like fibres but is not is left out.
+#include <gtest/gtest.h>
+
+#include <opencv2/core.hpp>
+
+#include "segment/fibres.h"
+#include "tests/support/drawn_image.h"
+#include "tests/support/segmentation_accuracy.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+std::vector<Fibre> fibres_of(const Image& image, double pixel_um = 0.1) {
+  return find_fibres(image, {}, {}, pixel_um, FibreParameters{});
+}
+
+TEST(Fibres, of_a_constant_image_are_none) {
+  for (const float level : {0.0f, 100.0f, 65535.0f}) EXPECT_TRUE(fibres_of(even_image(200, 150, level)).empty());
+}
+
+TEST(Fibres, of_noise_alone_are_none) {
+  for (const std::uint64_t seed : {1, 2, 3})
+    for (const double pixel_um : {0.05, 0.1, 0.2}) {
+      SCOPED_TRACE(std::to_string(seed) + " " + std::to_string(pixel_um));
+      Image image = even_image(512, 384, 200);
+      add_noise(image, 15, seed);
+      EXPECT_TRUE(fibres_of(image, pixel_um).empty());
+    }
+}
+
+TEST(Fibres, of_a_saturated_image_are_none) {
+  Image image = even_image(300, 300, 70000);
+  add_noise(image, 3000, 1);
+  for (float& value : image.pixels) value = std::min(value, 65535.0f);
+  EXPECT_TRUE(fibres_of(image).empty());
+}
+
+TEST(Fibres, take_images_of_few_pixels_and_narrow_ones) {
+  for (const int side : {1, 2, 5, 17}) {
+    EXPECT_TRUE(fibres_of(even_image(side, side, 3)).empty());
+    EXPECT_TRUE(fibres_of(even_image(side, 700, 3)).empty());
+  }
+}
+
+/// The stated meaning of fibre_false_per_cell: 0.5 lines a cell are expected, and Poisson's chance of more than two is
+/// 1.4 %.
+TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
+  for (const std::string quality : {"poor", "ordinary", "good"}) {
+    SCOPED_TRACE(quality);
+    const SimulatedCell cell = simulated_cell("no-fibres", quality, 1);
+    EXPECT_LE(find_fibres(cell.actin.image, cell.truth.outline_um, cell.truth.adhesions, 0.1, FibreParameters{}).size(),
+              2u);
+  }
+}
+
+TEST(Fibres, of_a_step_are_none) {
+  Image image = even_image(256, 256, 100);
+  for (int row = 0; row < 256; ++row)
+    for (int column = 0; column < 256; ++column)
+      if (column + row / 4 > 150) image.at(column, row) = 400;
+  add_noise(image, 10, 1);
+  EXPECT_TRUE(fibres_of(image).empty());
+}
+
+TEST(Fibres, are_the_same_for_any_number_of_threads) {
+  const DrawnScene scene = drawn_scene(20, 1);
+  const int before = cv::getNumThreads();
+  std::vector<std::vector<Fibre>> found;
+  for (const int threads : {1, 2, 4}) {
+    cv::setNumThreads(threads);
+    found.push_back(find_fibres(scene.actin_image, {}, scene.adhesions, scene.kPixel_um, FibreParameters{}));
+  }
+  cv::setNumThreads(before);
+  for (const auto& fibres : found) {
+    ASSERT_EQ(fibres.size(), found[0].size());
+    for (std::size_t i = 0; i < fibres.size(); ++i) {
+      EXPECT_EQ(fibres[i].points_um, found[0][i].points_um);
+      EXPECT_EQ(fibres[i].width_um, found[0][i].width_um);
+      EXPECT_EQ(fibres[i].confidence, found[0][i].confidence);
+      EXPECT_EQ(fibres[i].type_reason, found[0][i].type_reason);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

@@ -1,0 +1,102 @@
+/// Fibres in images that no one here made, where they are at hand (../shared/data); skipped elsewhere.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "segment/segment_cell.h"
+#include "tests/support/segmentation_score.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+const std::filesystem::path kActin = std::filesystem::path(MBTFM_SOURCE_DIR) / "../shared/data/actin";
+
+#define REQUIRE_DATA()                  \
+  if (!std::filesystem::exists(kActin)) \
+  GTEST_SKIP() << "needs the microscope images of ../shared/data, not in this tree"
+
+/// Single cells on discs of 1 800 um²; the second page of one file is actin.
+struct DiscCell {
+  const char* file;
+  int page;
+};
+const DiscCell kDiscCells[] = {{"Control/0001_20Feb20_siNT.tif", 0},  {"Control/0003_20Feb20_siNT.tif", 0},
+                               {"Control/0005_20Feb20_siNT.tif", 0},  {"Control/0001_control.tif", 1},
+                               {"siINF2/0001_20Feb20_siINF2.tif", 0}, {"siINF2/0002_20Feb20_siINF2.tif", 0}};
+
+Image image_of(const DiscCell& cell) { return read_image(kActin / "micropattern_chirality" / cell.file, cell.page); }
+
+Cell segmented(const Image& image, const SegmentParameters& p = {}) {
+  return segment_cell(std::nullopt, Channel{"actin", image}, p).cell;
+}
+
+double length_um(const std::vector<Fibre>& fibres) {
+  double sum = 0;
+  for (const Fibre& f : fibres) sum += mbtfm::length_um(f.points_um);
+  return sum;
+}
+
+template <class Move>
+double agreement(const std::vector<Fibre>& a, std::vector<Fibre> b, double tolerance_um, Move back) {
+  for (Fibre& f : b)
+    for (Vec2& p : f.points_um) p = back(p);
+  return score_lines(a, b, tolerance_um).f1();
+}
+
+TEST(RealFibres, of_cells_on_discs_lie_on_the_disc) {
+  REQUIRE_DATA();
+  for (const DiscCell& disc : kDiscCells) {
+    SCOPED_TRACE(disc.file);
+    const Cell cell = segmented(image_of(disc));
+    const double radius_um = std::sqrt(1800 / std::numbers::pi);
+    Vec2 centre;
+    for (const Vec2 p : cell.outline_um) centre += (1.0 / static_cast<double>(cell.outline_um.size())) * p;
+    for (const Fibre& f : cell.fibres)
+      for (const Vec2 p : f.points_um) EXPECT_LT(norm(p - centre), 1.2 * radius_um);
+    EXPECT_GT(length_um(cell.fibres), 200);  // 0.25 to 0.4 mm are found of the 0.5 to 3 mm that an eye follows
+    EXPECT_LT(length_um(cell.fibres), 3000);
+  }
+}
+
+TEST(RealFibres, are_the_same_in_brighter_turned_and_mirrored_images) {
+  REQUIRE_DATA();
+  const Image image = image_of(kDiscCells[0]);
+  const Cell cell = segmented(image);
+  const double pixel_um = *image.pixel_size_um, tolerance_um = 3 * pixel_um;
+  for (const float gain : {0.8f, 1.2f}) {
+    Image other = image;
+    for (float& value : other.pixels) value *= gain;
+    EXPECT_GE(agreement(cell.fibres, segmented(other).fibres, tolerance_um, [](Vec2 p) { return p; }), 0.9);
+  }
+  Image turned = image, mirrored = image;
+  turned.width = image.height, turned.height = image.width;
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      turned.at(image.height - 1 - row, column) = image.at(column, row);
+      mirrored.at(image.width - 1 - column, row) = image.at(column, row);
+    }
+  const double height_um = image.height * pixel_um, width_um = image.width * pixel_um;
+  EXPECT_GE(agreement(cell.fibres, segmented(turned).fibres, tolerance_um,
+                      [&](Vec2 p) {
+                        return Vec2{p.y, height_um - p.x};
+                      }),
+            0.9);
+  EXPECT_GE(agreement(cell.fibres, segmented(mirrored).fibres, tolerance_um,
+                      [&](Vec2 p) {
+                        return Vec2{width_um - p.x, p.y};
+                      }),
+            0.9);
+}
+
+TEST(RealFibres, of_a_layer_of_many_cells_are_found_without_an_outline) {
+  REQUIRE_DATA();
+  const Image image = read_image(kActin / "bronchial_monolayer/U13_72_P1_5_SF.tif");
+  const auto fibres = find_fibres(image, {}, {}, *image.pixel_size_um, FibreParameters{});
+  EXPECT_GT(fibres.size(), 20u);
+  for (const Fibre& f : fibres) EXPECT_GE(mbtfm::length_um(f.points_um), FibreParameters{}.fibre_shortest_um);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
