@@ -67,7 +67,8 @@ TEST(Fibres, that_bend_are_followed) {
 TEST(Fibres, with_a_gap_are_one) {
   const auto fibres = fibres_of(drawn({{{4, 12}, {12, 12.5}}, {{13, 12.56}, {22, 13.1}}}));
   ASSERT_EQ(fibres.size(), 1u);
-  EXPECT_NEAR(length_um(fibres[0].points_um), 18, 0.5);
+  // a square end blurred by the filter over 0.7 um falls to half at its place, to 0.4 of the line up to 0.2 um further
+  EXPECT_NEAR(length_um(fibres[0].points_um), 18, 0.8);
 }
 
 TEST(Fibres, side_by_side_stay_two) {
