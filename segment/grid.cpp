@@ -86,6 +86,12 @@ cv::Mat gaussian(const cv::Mat& image, double sigma_px) {
   return result;
 }
 
+cv::Mat wide_gaussian(const cv::Mat& image, double sigma_px) {
+  constexpr double kSigmaOnGrid = 2.5;  // cells of the grid: linear interpolation between them then errs by 1 %
+  const int factor = std::max(1, static_cast<int>(sigma_px / kSigmaOnGrid));
+  return enlarge(gaussian(shrink(image, factor), sigma_px / factor), factor, image.size());
+}
+
 double noise_gain(double sigma_px) {
   const cv::Mat kernel = cv::getGaussianKernel(2 * static_cast<int>(std::ceil(4 * sigma_px)) + 1, sigma_px, CV_64F);
   return kernel.dot(kernel);  // of one direction; the root of its square for both
