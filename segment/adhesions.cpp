@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/csv.h"
 #include "segment/adhesion_fit.h"
 #include "segment/adhesion_parts.h"
+#include "segment/emptiness.h"
 #include "segment/grid.h"
 
 namespace mbtfm::segment {
@@ -126,6 +128,24 @@ std::vector<Adhesion> find_adhesions(const Image& image, double pixel_size_um, c
   for (const AdhesionRegion& region : find_adhesion_regions(image, pixel_size_um, p))
     adhesions.push_back(region.adhesion);
   return adhesions;
+}
+
+std::string why_no_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& p) {
+  if (std::string reason = emptiness_of(image); !reason.empty()) return reason;
+  const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
+  const auto parts = adhesion_parts(c, pixel_size_um, p);
+  if (!parts.empty())
+    return "of " + std::to_string(parts.size()) +
+           " spots none is larger than adhesion_smallest_um2 = " + shortest(p.adhesion_smallest_um2) +
+           " and smaller than adhesion_largest_um2 = " + shortest(p.adhesion_largest_um2);
+  double highest = 0;
+  for (int y = 0; y < c.height.rows; ++y)
+    for (int x = 0; x < c.height.cols; ++x)
+      if (const double level = c.noise.at<float>(y, x); level > 0)
+        highest = std::max(highest, c.height.at<float>(y, x) / level);
+  return "nothing above the noise, the brightest spot " + brief(highest) +
+         " of its standard deviations over the background, where adhesion_seed_noise asks for " +
+         shortest(p.adhesion_seed_noise);
 }
 
 }  // namespace mbtfm::segment

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "pipeline/contract/parameters.h"
@@ -52,5 +53,8 @@ std::vector<AdhesionRegion> find_adhesion_regions(const Image& image, double pix
                                                   const AdhesionParameters& parameters);
 /// The same without the pixels.
 std::vector<Adhesion> find_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& parameters);
+
+/// Why there is no adhesion in an image in which none is found: what stands out of the noise least short of one.
+std::string why_no_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& parameters);
 
 }  // namespace mbtfm::segment

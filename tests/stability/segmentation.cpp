@@ -57,7 +57,7 @@ TEST(Segmentation, says_what_is_missing) {
     segment_cell(flat, {}, p);
     FAIL() << "no adhesion, and no error";
   } catch (const InputError& error) {
-    EXPECT_EQ(error.found, "no adhesion");
+    EXPECT_EQ(error.found, "every pixel is 5");
   }
   EXPECT_THROW(segment_cell(flat, wide, p), InputError);
   Channel one = flat, two = flat;
