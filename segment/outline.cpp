@@ -23,22 +23,35 @@ cv::Mat filled(const cv::Mat& mask) {
   return framed(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
 }
 
-/// The connected parts of at least `smallest` pixels, the largest first.
-std::vector<cv::Mat> parts_of(const cv::Mat& mask, double smallest) {
-  cv::Mat labels, stats, centroids;
-  const int n = cv::connectedComponentsWithStats(mask, labels, stats, centroids, 4, CV_32S);
-  std::vector<std::pair<int, int>> parts;
-  for (int i = 1; i < n; ++i)
-    if (const int area = stats.at<int>(i, cv::CC_STAT_AREA); area >= smallest) parts.emplace_back(-area, i);
-  std::sort(parts.begin(), parts.end());
-  std::vector<cv::Mat> result;
-  for (const auto& [area, label] : parts) result.push_back(labels == label);
+/// Parts of a mask by label, from 1, of at least `smallest` pixels each, the largest first.
+struct Parts {
+  struct Part {
+    int label, n_pixels;
+    cv::Rect box;
+  };
+  cv::Mat labels;
+  std::vector<Part> parts;
+  cv::Mat mask(const Part& part) const { return labels == part.label; }
+};
+
+Parts parts_of(const cv::Mat& mask, double smallest) {
+  Parts result;
+  cv::Mat stats, centroids;
+  const int n = cv::connectedComponentsWithStats(mask, result.labels, stats, centroids, 4, CV_32S);
+  for (int i = 1; i < n; ++i) {
+    const auto of = [&](int column) { return stats.at<int>(i, column); };
+    const cv::Rect box(of(cv::CC_STAT_LEFT), of(cv::CC_STAT_TOP), of(cv::CC_STAT_WIDTH), of(cv::CC_STAT_HEIGHT));
+    if (of(cv::CC_STAT_AREA) >= smallest) result.parts.push_back({i, of(cv::CC_STAT_AREA), box});
+  }
+  std::stable_sort(result.parts.begin(), result.parts.end(),
+                   [](const Parts::Part& a, const Parts::Part& b) { return a.n_pixels > b.n_pixels; });
   return result;
 }
 
 cv::Mat without_debris(const cv::Mat& mask, double smallest) {
+  const Parts parts = parts_of(filled(mask), smallest);
   cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
-  for (const cv::Mat& part : parts_of(filled(mask), smallest)) result |= part;
+  for (const Parts::Part& part : parts.parts) result(part.box) |= parts.labels(part.box) == part.label;
   return result;
 }
 
@@ -192,12 +205,16 @@ cv::Mat holes_in(const cv::Mat& values, const cv::Mat& mask, double band_px, dou
   cv::min(cv::Mat(rise * 0.25), cv::Mat(rise - 4 * noise), quarter);
   const cv::Mat dark = (height < rise * 0.5) & mask, darkest = (height < quarter) & mask;
   cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
-  for (const cv::Mat& hole : parts_of(dark, smallest)) {
+  const Parts gaps = parts_of(dark, smallest);
+  const cv::Rect frame(cv::Point(0, 0), mask.size());
+  for (const Parts::Part& gap : gaps.parts) {
+    const cv::Rect box = cv::Rect(gap.box.tl() - cv::Point(1, 1), gap.box.br() + cv::Point(1, 1)) & frame;
+    const cv::Mat hole = gaps.labels(box) == gap.label;
     cv::Mat rim;
     cv::dilate(hole, rim, disc_of(1));
     // a gap that reaches the edge is no hole
-    if (cv::countNonZero(rim & ~mask) == 0 && 2 * cv::countNonZero(hole & darkest) > cv::countNonZero(hole))
-      result |= hole;
+    if (cv::countNonZero(rim & ~mask(box)) == 0 && 2 * cv::countNonZero(hole & darkest(box)) > gap.n_pixels)
+      result(box) |= hole;
   }
   return result;
 }
@@ -218,7 +235,7 @@ Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameter
   const cv::Mat small = shrink(full, factor);
   const double sigma_px = std::max(0.5, p.outline_smoothing_um / s.pixel_um);
   s.smooth = gaussian(small, sigma_px);
-  s.noise = quantile(local_noise(small, s.band_px), 0.5) * noise_gain(sigma_px);
+  s.noise = overall_noise(small) * noise_gain(sigma_px);
   return s;
 }
 
@@ -271,6 +288,11 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
   return polygon;
 }
 
+/// A gap whose ring crosses the outline is a bay.
+bool is_inside(const Polygon& hole, const Polygon& outer) {
+  return std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
+}
+
 bool touches_border(const cv::Mat& mask) {
   return cv::countNonZero(mask.row(0)) + cv::countNonZero(mask.row(mask.rows - 1)) + cv::countNonZero(mask.col(0)) +
              cv::countNonZero(mask.col(mask.cols - 1)) >
@@ -289,6 +311,7 @@ void declare(ParameterList& list, OutlineParameters& p) {
            "an adhesion this far outside still belongs to the cell (um)");
   list.add("outline_spacing_um", p.outline_spacing_um, Range::positive(), "distance of the outline's points (um)");
   list.add("outline_smallest_um2", p.outline_smallest_um2, Range::positive(), "least area of a cell (um²)");
+  list.add("outline_largest_um2", p.outline_largest_um2, Range::positive(), "greatest area of a cell (um²)");
   list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::positive(),
            "least area of a gap in a cell (um²)");
 }
@@ -302,16 +325,19 @@ std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesi
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
   std::vector<CellOutline> cells;
-  for (const cv::Mat& part : parts_of(filled(mask), smallest)) {
-    const auto rings = rings_of(part & ~holes);
+  const Parts parts = parts_of(filled(mask), smallest);
+  for (const Parts::Part& each : parts.parts) {
     CellOutline cell;
+    const cv::Mat part = parts.mask(each);
     cell.is_cut_by_border = touches_border(part);
+    cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
+    const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
     for (const auto& ring : rings) {
       const Polygon polygon = polygon_of(s, ring, adhesions, p);
       if (cell.outer_um.empty()) {
         cell.outer_um = polygon;
         cell.area_um2 = std::abs(signed_area_um2(polygon));
-      } else if (std::abs(signed_area_um2(polygon)) >= p.outline_smallest_hole_um2 / 2) {
+      } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
         cell.holes_um.push_back(polygon);
         cell.area_um2 -= std::abs(signed_area_um2(polygon));
       }

@@ -15,6 +15,7 @@ struct OutlineParameters {
   double outline_reach_um = 3;            ///< an adhesion up to this far outside is still this cell's
   double outline_spacing_um = 0.5;        ///< of the polygon's points
   double outline_smallest_um2 = 50;       ///< less is debris, not a spread cell
+  double outline_largest_um2 = 30000;     ///< ten spread cells: more is a sheet of cells that touch
   double outline_smallest_hole_um2 = 10;  ///< less is a gap in the actin mesh, over which the membrane spans
 };
 
@@ -25,6 +26,7 @@ struct CellOutline {
   Polygon outer_um;
   std::vector<Polygon> holes_um;
   double area_um2 = 0;            ///< without the holes
+  bool is_sheet = false;          ///< larger than any single cell; its holes are left out
   bool is_cut_by_border = false;  ///< the image ends before the cell does
 };
 

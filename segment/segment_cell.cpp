@@ -55,6 +55,10 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& c
         channel.name, "a cell brighter than its surroundings",
         "no cell: nothing of " + shortest(p.outline.outline_smallest_um2) + " um² or more stands out of the noise",
         "is this the right channel and page? Check pixel_size_um (" + in_um(pixel_um) + ") and outline_smallest_um2");
+  if (cells.front().is_sheet)
+    throw InputError(
+        channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",
+        "crop the image to a single cell; outline_largest_um2 is " + shortest(p.outline.outline_largest_um2));
   if (p.cell == 0) return cells;
   if (p.cell > static_cast<int>(cells.size()))
     throw InputError(channel.name, "cell " + std::to_string(p.cell), std::to_string(cells.size()) + " in all",
