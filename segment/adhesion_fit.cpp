@@ -101,21 +101,12 @@ std::array<Difference, 3> differences(const BlurredEllipse& e, const Priors& p) 
            {kBlur, std::log(e.blur) - p.blur.mean, 1, p.blur.weight}}};
 }
 
-double squares(const std::vector<Sample>& samples, const State& s, const Priors& priors) {
-  const EllipseModel model(s.ellipse);
-  double sum = 0;
-  for (const Difference& d : differences(s.ellipse, priors))
-    if (d.weight > 0) sum += d.weight * d.value * d.value;
-  for (const Sample& p : samples) {
-    const double residual = p.value - s.ground - model.value(p.column, p.row);
-    sum += residual * residual;
-  }
-  return sum;
-}
-
+/// Sum of squares and normal equations of the linearised problem.
 struct Normal {
   Matrix matrix = Matrix::zeros();
   Vector right;
+  double squares = 0;        ///< of residuals and differences from what is known before
+  double image_squares = 0;  ///< of residuals alone
 };
 
 Normal normal_equations(const std::vector<Sample>& samples, const State& s, const Priors& priors) {
@@ -124,6 +115,7 @@ Normal normal_equations(const std::vector<Sample>& samples, const State& s, cons
   for (const Sample& p : samples) {
     const EllipseValue f = model.with_derivatives(p.column, p.row);
     const double residual = p.value - s.ground - f.value;
+    n.image_squares += residual * residual;
     Vector d;
     for (int i = 0; i < kGround; ++i) d[i] = f.derivative[i];
     d[kGround] = 1;
@@ -134,13 +126,17 @@ Normal normal_equations(const std::vector<Sample>& samples, const State& s, cons
   }
   for (int i = 0; i < kUnknowns; ++i)
     for (int j = 0; j < i; ++j) n.matrix(j, i) = n.matrix(i, j);
+  n.squares = n.image_squares;
   for (const Difference& d : differences(s.ellipse, priors))
     if (d.weight > 0) {
+      n.squares += d.weight * d.value * d.value;
       n.matrix(d.unknown, d.unknown) += d.weight * d.slope * d.slope;
       n.right[d.unknown] -= d.weight * d.value * d.slope;
     }
   return n;
 }
+
+enum class Shape { held, free };
 
 void hold(Normal& n, int unknown) {
   for (int i = 0; i < kUnknowns; ++i) n.matrix(i, unknown) = n.matrix(unknown, i) = 0;
@@ -148,38 +144,39 @@ void hold(Normal& n, int unknown) {
   n.right[unknown] = 0;
 }
 
-enum class Shape { held, free };
-
 struct Solution {
   State state;
+  Normal normal;  ///< there
   bool is_settled = false;
-  double squares = 0;
+  double scatter = 0;  ///< mean square of the residuals
 };
 
 /// Levenberg–Marquardt (Marquardt 1963).
 Solution solve(const std::vector<Sample>& samples, const State& start, Shape shape, const Priors& priors) {
-  Solution s{start, false, squares(samples, start, priors)};
+  Solution s{start, normal_equations(samples, start, priors)};
+  const double n_samples = static_cast<double>(samples.size());
   double damping = 1e-3;
   for (int k = 0; k < kIterations && !s.is_settled && damping < 1e6; ++k) {
-    Normal n = normal_equations(samples, s.state, priors);
+    Normal n = s.normal;
     if (shape == Shape::held) hold(n, kBlur), hold(n, kDome);
     for (int i = 0; i < kUnknowns; ++i) n.matrix(i, i) *= 1 + damping;
     Vector step;
     if (!cv::solve(n.matrix, n.right, step, cv::DECOMP_CHOLESKY)) {
-      damping = std::max(1e-3, 10 * damping);
+      damping *= 10;
       continue;
     }
     const State next = moved(s.state, step);
-    const double after = squares(samples, next, priors);
-    s.is_settled = std::abs(s.squares - after) < kSettled * s.squares / static_cast<double>(samples.size());
-    if (after <= s.squares) {
+    const Normal there = normal_equations(samples, next, priors);
+    s.is_settled = std::abs(n.squares - there.squares) < kSettled * n.squares / n_samples;
+    if (there.squares <= n.squares) {
       s.state = next;
-      s.squares = after;
+      s.normal = there;
       damping /= 10;
     } else {
       damping *= 10;
     }
   }
+  s.scatter = s.normal.image_squares / n_samples;
   return s;
 }
 
@@ -203,22 +200,23 @@ double mean_noise(const cv::Mat& noise, const std::vector<Sample>& samples) {
   return sum / static_cast<double>(samples.size());
 }
 
-FittedEllipse fit(const cv::Mat& height, const cv::Mat& noise, const BlurredEllipse& start,
+/// @param window  the ellipse around which pixels are taken
+/// @param from    where the iteration starts
+FittedEllipse fit(const cv::Mat& height, const cv::Mat& noise, const BlurredEllipse& window, const BlurredEllipse& from,
                   const std::vector<EllipseModel>& neighbours, const Priors& priors) {
-  const auto samples = samples_around(height, start, neighbours);
-  FittedEllipse result{start};
+  const auto samples = samples_around(height, window, neighbours);
+  FittedEllipse result{window};
   if (samples.size() <= kUnknowns) return result;
-  const Solution s = solve(samples, {start, 0}, Shape::held, priors);
+  const Solution s = solve(samples, {from, 0}, Shape::held, priors);
+  const double n = static_cast<double>(samples.size());
   double mean = 0, variance = 0;
-  for (const Sample& p : samples) mean += p.value / static_cast<double>(samples.size());
-  for (const Sample& p : samples) variance += (p.value - mean) * (p.value - mean);
-  const double of_noise = std::pow(mean_noise(noise, samples), 2) * static_cast<double>(samples.size());
-  const double signal = variance - of_noise;
-  result.unexplained = signal > 0 ? std::max(0.0, s.squares - of_noise) / signal : 1;
-  const BlurredEllipse& e = s.state.ellipse;
-  result.scatter = squares(samples, s.state, {}) / static_cast<double>(samples.size());
-  result.is_settled = s.is_settled && is_plausible(e, start);
-  if (is_plausible(e, start)) result.ellipse = in_order(e);
+  for (const Sample& p : samples) mean += p.value / n;
+  for (const Sample& p : samples) variance += (p.value - mean) * (p.value - mean) / n;
+  const double of_noise = std::pow(mean_noise(noise, samples), 2), signal = variance - of_noise;
+  result.unexplained = signal > 0 ? std::max(0.0, s.scatter - of_noise) / signal : 1;
+  result.scatter = s.scatter;
+  result.is_settled = s.is_settled && is_plausible(s.state.ellipse, window);
+  if (is_plausible(s.state.ellipse, window)) result.ellipse = in_order(s.state.ellipse);
   return result;
 }
 
@@ -278,7 +276,7 @@ std::optional<ShapeEvidence> evidence_of_shape(const cv::Mat& height, const Blur
   const auto samples = samples_around(height, start, neighbours);
   if (samples.size() <= kUnknowns) return std::nullopt;
   Solution s = solve(samples, {start, 0}, Shape::held, {});
-  const double scatter = s.squares / static_cast<double>(samples.size() - kUnknowns);  // noise and misfit
+  const double scatter = s.scatter;  // noise and misfit
   Priors before;
   before.blur = {std::log(start.blur), scatter / (kBlurDeviation * kBlurDeviation)};
   before.dome = {start.dome, scatter / (kDomeDeviation * kDomeDeviation)};
@@ -286,8 +284,7 @@ std::optional<ShapeEvidence> evidence_of_shape(const cv::Mat& height, const Blur
   const BlurredEllipse& e = s.state.ellipse;
   if (!s.is_settled || !is_plausible(e, start)) return std::nullopt;
   Matrix covariance;
-  const Matrix matrix = normal_equations(samples, s.state, before).matrix;
-  if (cv::invert(matrix, covariance, cv::DECOMP_CHOLESKY) == 0) return std::nullopt;
+  if (cv::invert(s.normal.matrix, covariance, cv::DECOMP_CHOLESKY) == 0) return std::nullopt;
   // of the inverse, these rows and columns are the inverse of the information that is left
   const cv::Matx22d part(covariance(kBlur, kBlur), covariance(kBlur, kDome), covariance(kDome, kBlur),
                          covariance(kDome, kDome));
@@ -356,7 +353,7 @@ std::vector<FittedEllipse> fit_ellipses(const cv::Mat& height, const cv::Mat& no
   std::vector<Priors> priors(start.size());
   for (int round = 0; round < kRounds; ++round) {
     for_each_with_neighbours(height, start, current, [&](int i, const std::vector<EllipseModel>& near) {
-      fitted[i] = fit(height, noise, start[i], near, priors[i]);
+      fitted[i] = fit(height, noise, start[i], current[i], near, priors[i]);
     });
     const auto common = common_brightness(fitted);
     for (std::size_t i = 0; i < current.size(); ++i) {
