@@ -76,22 +76,18 @@ std::array<Model, kLineWidths_um.size()> models_at(double place, const Profile& 
   return models;
 }
 
-/// Squared residual of the best model that gets brighter inwards.
-double cost_of(const Profile& profile, const std::array<Model, kLineWidths_um.size()>& models) {
-  double total = product(profile, profile), least = std::numeric_limits<double>::infinity();
-  for (int k = 0; k < 2; ++k) total -= std::pow(product(profile, models[0].basis[k]), 2);
-  const double step = product(profile, models[0].basis[2]), without_line = total - (step > 0 ? step * step : 0);
-  for (const Model& model : models) {
-    const double line = product(profile, model.basis[3]);
-    least = std::min(least, line > 0 ? total - step * step - line * line : without_line);
-  }
-  return least;
-}
-
-struct Across {
-  std::vector<cv::Point2d> normals;  ///< outwards, of length 1
-  double turn = 1;
+/// Squared residuals of models that get brighter inwards, without a line and with the best one.
+struct Residuals {
+  double step, line;
 };
+
+Residuals residuals_of(const Profile& profile, const std::array<Model, kLineWidths_um.size()>& models) {
+  double rest = product(profile, profile), line = 0;
+  for (int k = 0; k < 2; ++k) rest -= std::pow(product(profile, models[0].basis[k]), 2);
+  const double step = product(profile, models[0].basis[2]);
+  for (const Model& model : models) line = std::max(line, product(profile, model.basis[3]));
+  return {rest - (step > 0 ? step * step : 0), rest - step * step - line * line};
+}
 
 std::vector<cv::Point2d> outward_normals(const std::vector<cv::Point2d>& ring) {
   const std::size_t n = ring.size();
@@ -148,17 +144,26 @@ std::vector<int> cheapest_round(const std::vector<std::vector<double>>& cost) {
   return path;
 }
 
-/// In units of the typical least cost of a sample, so that differences are log-likelihoods.
-void normalise(std::vector<std::vector<double>>& cost, std::size_t n_samples) {
+/// Minus the log-likelihood of each place, but for a constant: squared residuals over twice their variance, which the
+/// best places tell. A line must earn its two parameters (Akaike 1974), or noise would find one inside of every step.
+std::vector<std::vector<double>> costs_of(const std::vector<std::vector<Residuals>>& residuals, std::size_t n_samples) {
   std::vector<double> least;
-  for (const auto& row : cost) least.push_back(*std::min_element(row.begin(), row.end()));
+  for (const auto& row : residuals) {
+    least.push_back(std::numeric_limits<double>::infinity());
+    for (const Residuals& r : row) least.back() = std::min({least.back(), r.step, r.line});
+  }
   const auto middle = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 2);
   std::nth_element(least.begin(), middle, least.end());
-  const double unit = 2 * std::max(*middle, 1e-30) / static_cast<double>(n_samples - kColumns);
-  for (auto& row : cost) {
-    const double lowest = *std::min_element(row.begin(), row.end());
-    for (double& value : row) value = (value - lowest) / unit;
+  const double variance = std::max(*middle, 1e-30) / static_cast<double>(n_samples - kColumns);
+  std::vector<std::vector<double>> costs;
+  for (const auto& row : residuals) {
+    costs.emplace_back();
+    for (const Residuals& r : row)
+      costs.back().push_back(std::min(r.step / (2 * variance), r.line / (2 * variance) + 2));
+    const double lowest = *std::min_element(costs.back().begin(), costs.back().end());
+    for (double& cost : costs.back()) cost -= lowest;
   }
+  return costs;
 }
 
 }  // namespace
@@ -170,15 +175,15 @@ std::vector<cv::Point2d> on_edge(const cv::Mat& image, const std::vector<cv::Poi
   std::vector<std::array<Model, kLineWidths_um.size()>> models;
   for (const double place : at) models.push_back(models_at(place, offsets));
   const auto normals = outward_normals(ring);
-  std::vector<std::vector<double>> cost(ring.size(), std::vector<double>(at.size()));
+  std::vector<std::vector<Residuals>> residuals(ring.size(), std::vector<Residuals>(at.size()));
   cv::parallel_for_(cv::Range(0, static_cast<int>(ring.size())), [&](const cv::Range& range) {
     for (int i = range.start; i < range.end; ++i) {
       const cv::Point2d step = ring[(i + 1) % ring.size()] - ring[i];
       const Profile profile = profile_at(image, ring[i], normals[i], std::hypot(step.x, step.y), offsets, pixel_um);
-      for (std::size_t k = 0; k < at.size(); ++k) cost[i][k] = cost_of(profile, models[k]);
+      for (std::size_t k = 0; k < at.size(); ++k) residuals[i][k] = residuals_of(profile, models[k]);
     }
   });
-  normalise(cost, offsets.size());
+  std::vector<std::vector<double>> cost = costs_of(residuals, offsets.size());
   const int rest = static_cast<int>(std::lround(kInward_um / kStep_um));  // the place of a point that does not move
   constexpr double kHeld = 1e6;
   for (std::size_t i = 0; i < ring.size(); ++i)
