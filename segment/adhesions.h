@@ -21,7 +21,7 @@ struct AdhesionParameters {
       0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
   double adhesion_level_radius_um = 0.6;   ///< height is taken this near: a long adhesion may fade along its length
   std::optional<double> adhesion_blur_um;  ///< unset: as the image shows it
-  double adhesion_split_depth = 0.3;       ///< two maxima are two adhesions where the dip between is this deep
+  double adhesion_split_depth = 0.25;      ///< the dip between two points that the optics just resolve (Rayleigh: 26 %)
   double adhesion_smallest_um2 = 0.08;     ///< about one resolution element
   double adhesion_largest_um2 = 25;        ///< beyond any focal adhesion; larger is a bright cell body
   double adhesion_faintest = 0.25;         ///< relative to the bright ones: what is fainter is texture of the cytosol
