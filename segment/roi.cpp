@@ -146,46 +146,68 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
   }
 }
 
-/// Second derivatives at the nodes of the natural cubic spline through `values` at 0, 1, 2, … (Thomas' algorithm).
-std::vector<double> spline_bends(const std::vector<double>& values) {
-  const std::size_t n = values.size();
-  std::vector<double> bends(n, 0.0), above(n, 0.0);
-  for (std::size_t i = 1; i + 1 < n; ++i) {
-    const double pivot = 4 - above[i - 1];
-    above[i] = 1 / pivot;
-    bends[i] = (6 * (values[i - 1] - 2 * values[i] + values[i + 1]) - bends[i - 1]) / pivot;
+/// The natural cubic spline through values at increasing places (Thomas' algorithm for its second derivatives).
+class NaturalSpline {
+ public:
+  NaturalSpline(std::vector<double> places, std::vector<double> values)
+      : places_(std::move(places)), values_(std::move(values)), bends_(values_.size(), 0.0) {
+    const std::size_t n = values_.size();
+    std::vector<double> above(n, 0.0);
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+      const double before = places_[i] - places_[i - 1], after = places_[i + 1] - places_[i];
+      const double pivot = 2 * (before + after) - before * above[i - 1];
+      const double kink = (values_[i + 1] - values_[i]) / after - (values_[i] - values_[i - 1]) / before;
+      above[i] = after / pivot;
+      bends_[i] = (6 * kink - before * bends_[i - 1]) / pivot;
+    }
+    for (std::size_t i = n - 1; i-- > 1;) bends_[i] -= above[i] * bends_[i + 1];
   }
-  for (std::size_t i = n - 1; i-- > 1;) bends[i] -= above[i] * bends[i + 1];
-  return bends;
+  double at(double place) const {
+    const auto next = std::upper_bound(places_.begin() + 1, places_.end() - 1, place);
+    const auto i = static_cast<std::size_t>(next - places_.begin()) - 1;
+    const double h = places_[i + 1] - places_[i], b = (place - places_[i]) / h, a = 1 - b;
+    return a * values_[i] + b * values_[i + 1] +
+           ((a * a * a - a) * bends_[i] + (b * b * b - b) * bends_[i + 1]) * h * h / 6;
+  }
+
+ private:
+  std::vector<double> places_, values_, bends_;
+};
+
+std::vector<Vec2> without_repetition(const std::vector<Vec2>& points) {
+  std::vector<Vec2> different;
+  for (const Vec2 p : points) {
+    if (different.empty() || !(p == different.back())) different.push_back(p);
+  }
+  return different;
 }
 
-double spline_value(const std::vector<double>& values, const std::vector<double>& bends, double at) {
-  const auto i = std::min(static_cast<std::size_t>(at), values.size() - 2);
-  const double b = at - static_cast<double>(i), a = 1 - b;
-  return a * values[i] + b * values[i + 1] + ((a * a * a - a) * bends[i] + (b * b * b - b) * bends[i + 1]) / 6;
-}
-
-/// The curve that ImageJ draws through the nodes: natural cubic splines of x and y over the nodes' numbers; a closed
-/// one repeats 7 nodes at either end, fewer where there are fewer (SplineFitter.initSpline). A point every two pixels
-/// of the nodes' line, at least 100 (PolygonRoi.fitSpline).
+/// The curve that ImageJ draws through the nodes: natural cubic splines of x and y over the sum of the square roots of
+/// the nodes' distances; a closed one repeats up to 7 nodes at either end (SplineFitter). A point every two pixels of
+/// the nodes' line, at least 100 (PolygonRoi.fitSpline).
 std::vector<Vec2> spline_through(std::vector<Vec2> nodes, bool is_closed) {
-  if (nodes.size() < 3) return nodes;
-  const std::size_t n_own = nodes.size();
-  if (is_closed) nodes.push_back(nodes.front());
-  const auto n_points = std::max<std::size_t>(100, static_cast<std::size_t>(length_um(nodes) / 2));
-  const std::size_t n_extra = !is_closed ? 0 : nodes.size() >= 7 ? 7 : nodes.size() / 2 - 1;
-  std::vector<double> x, y;
-  for (std::size_t i = 0; i < nodes.size() + 2 * n_extra; ++i) {
-    const Vec2 node = is_closed ? nodes[(i + 7 * n_own - n_extra) % n_own] : nodes[i];
+  nodes = without_repetition(nodes);
+  if (is_closed && !nodes.empty() && !(nodes.front() == nodes.back())) nodes.push_back(nodes.front());
+  const std::size_t n = nodes.size();
+  if (n < 3) return nodes;
+  std::vector<double> own(n, 0.0);
+  for (std::size_t i = 1; i < n; ++i) own[i] = own[i - 1] + std::sqrt(norm(nodes[i] - nodes[i - 1]));
+  const std::size_t n_repeated = is_closed ? std::min<std::size_t>(7, n - 1) : 0;
+  std::vector<double> places, x, y;
+  const auto add = [&](double place, Vec2 node) {
+    places.push_back(place);
     x.push_back(node.x);
     y.push_back(node.y);
-  }
-  const std::vector<double> x_bends = spline_bends(x), y_bends = spline_bends(y);
+  };
+  for (std::size_t i = n - 1 - n_repeated; i + 1 < n; ++i) add(own[i] - own.back(), nodes[i]);
+  for (std::size_t i = 0; i < n; ++i) add(own[i], nodes[i]);
+  for (std::size_t i = 1; i <= n_repeated; ++i) add(own[i] + own.back(), nodes[i]);
+  const NaturalSpline spline_x(places, x), spline_y(places, y);
+  const auto n_points = std::max<std::size_t>(100, static_cast<std::size_t>(length_um(nodes) / 2));
   std::vector<Vec2> curve;
   for (std::size_t i = 0; i < n_points; ++i) {
-    const double at =
-        static_cast<double>(n_extra) + static_cast<double>(i * (nodes.size() - 1)) / static_cast<double>(n_points - 1);
-    curve.push_back({spline_value(x, x_bends, at), spline_value(y, y_bends, at)});
+    const double place = own.back() * static_cast<double>(i) / static_cast<double>(n_points - 1);
+    curve.push_back({spline_x.at(place), spline_y.at(place)});
   }
   return curve;
 }

@@ -8,6 +8,7 @@
 #include "segment/adhesions.h"
 #include "segment/channels.h"
 #include "segment/fibres.h"
+#include "segment/hand_drawn.h"
 #include "segment/outline.h"
 
 namespace mbtfm::segment {
@@ -30,12 +31,13 @@ struct Segmentation {
 };
 
 /// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions.
-/// Without an adhesion channel there are no adhesions and every fibre is an arc; without actin no fibres.
+/// Without an adhesion channel there are no adhesions and every fibre is an arc; without actin no fibres. What is drawn
+/// by hand is used instead of each.
 /// @throws UsageError without any channel
 /// @throws InputError where sizes or calibrations contradict each other or none tells the pixel size; where no cell, or
 /// in a given adhesion channel no adhesion,
 ///         is found
 Segmentation segment_cell(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                          const SegmentParameters& parameters);
+                          const SegmentParameters& parameters, const HandDrawn& drawn = {});
 
 }  // namespace mbtfm::segment

@@ -2,6 +2,7 @@
 
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
+#include "segment/cell_rois.h"
 #include "segment/overlay.h"
 #include "segment/segment_cell.h"
 
@@ -13,6 +14,12 @@ std::optional<Channel> channel(StageContext& context, const std::string& argumen
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
   return Channel{file.string(), read_image(file, page - 1)};
+}
+
+std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument) {
+  if (!context.has_input(argument)) return std::nullopt;
+  const auto file = context.input(argument);
+  return RoiSet{file.string(), read_rois(file)};
 }
 
 StageReport report_of(const Segmentation& s) {
@@ -47,13 +54,24 @@ StageReport run(const SegmentParameters& parameters, StageContext& context) {
   cv::setNumThreads(context.threads);
   const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_page);
   const auto actin = channel(context, "actin-image", parameters.actin_page);
-  const Segmentation s = segment_cell(adhesion, actin, parameters);
+  const HandDrawn drawn{roi_set(context, "outline-roi"), roi_set(context, "adhesion-rois"),
+                        roi_set(context, "fibre-rois")};
+  const Segmentation s = segment_cell(adhesion, actin, parameters, drawn);
   write_adhesions(context.output("out", "adhesions.csv"), s.cell.adhesions);
   write_fibres(context.output("out", "fibres.csv"), context.output("out", "fibre_points.csv"), s.cell.fibres);
   write_outline(context.output("out", "outline.csv"), s.cell.outline_um);
   write_cell_vtp(context.output("out", "cell.vtp"), s.cell);
   write_png(context.output("out", "overlay.png"), draw_overlay(adhesion, actin, s));
-  return report_of(s);
+  write_roi_set(context.output("out", "RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
+  StageReport report = report_of(s);
+  const auto say = [&](const char* part, const auto& set) {
+    report.figures.push_back({std::string(part) + "_drawn_by_hand", set.has_value()});
+    if (set) report.summary += std::string("; ") + part + " drawn by hand";
+  };
+  say("outline", drawn.outline);
+  say("adhesions", drawn.adhesions);
+  say("fibres", drawn.fibres);
+  return report;
 }
 
 }  // namespace
@@ -69,7 +87,12 @@ int main(int argc, char** argv) {
                   "adhesion channel (TIFF or PNG); without it every fibre counts as an arc"},
                  {"actin-image", FileArgument::Kind::optional_input,
                   "actin channel (TIFF or PNG); without it no fibres, and the outline from the adhesion channel"},
+                 {"outline-roi", FileArgument::Kind::optional_input,
+                  "ImageJ selection used as the cell's outline (.roi)"},
+                 {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas used as adhesions (.roi or .zip)"},
+                 {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines used as fibres (.roi or .zip)"},
                  {"out", FileArgument::Kind::output_folder,
-                  "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png"}}},
+                  "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
+                  "RoiSet.zip"}}},
       argc, argv, mbtfm::segment::run);
 }

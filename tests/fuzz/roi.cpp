@@ -57,7 +57,11 @@ std::vector<std::string> samples(const fs::path& folder) {
   return result;
 }
 
-void write(const fs::path& file, const std::string& bytes) { std::ofstream(file, std::ios::binary) << bytes; }
+/// As a new file: to overwrite an old one, some file systems wait for the disk.
+void write(const fs::path& file, const std::string& bytes) {
+  fs::remove(file);
+  std::ofstream(file, std::ios::binary) << bytes;
+}
 
 TEST(RoiFuzz, a_truncated_set_or_geometry_is_an_input_error_at_every_length) {
   const test::TemporaryFolder folder;
