@@ -10,6 +10,8 @@
 #include "pipeline/report/compare.h"
 #include "pipeline/report/report.h"
 #include "pipeline/runner/batch.h"
+#include "pipeline/runner/batch_table.h"
+#include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
 
@@ -18,8 +20,7 @@ namespace {
 namespace fs = std::filesystem;
 using namespace mbtfm;
 
-constexpr int kDone = 0, kFailed = 1, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70,
-              kInterrupted = 130;
+using namespace exit_code;
 
 struct CommandLine {
   fs::path folder;
@@ -27,7 +28,8 @@ struct CommandLine {
   int threads = available_threads();
   int jobs = 1;
   bool is_quiet = false;
-  std::vector<std::string> only, redo;
+  std::vector<std::string> only, redo, patterns;
+  fs::path template_toml;
 };
 
 void say(const std::string& line) { std::fprintf(stderr, "mbtfm: %s\n", line.c_str()); }
@@ -55,6 +57,9 @@ int run(const CommandLine& line) {
 }
 
 int batch(const CommandLine& line) {
+  std::vector<runner::ImagePattern> patterns;
+  for (const std::string& text : line.patterns) patterns.push_back(runner::parse_pattern(text));
+  if (!patterns.empty()) runner::make_cell_folders(line.folder, patterns, line.template_toml);
   const std::vector<fs::path> cells = runner::find_cells(line.folder);
   std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
                                         "--stages-dir", line.stage_folder.string()};
@@ -63,6 +68,7 @@ int batch(const CommandLine& line) {
   const auto outcomes = runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
                                                   .arguments = arguments,
                                                   .jobs = line.jobs,
+                                                  .only = line.only,
                                                   .say = line.is_quiet ? nullptr : say});
   int n_failed = 0;
   for (const runner::BatchCell& cell : outcomes) {
@@ -70,7 +76,9 @@ int batch(const CommandLine& line) {
     ++n_failed;
     std::fprintf(stderr, "mbtfm: %s: exit code %d: %s\n", cell.cell.c_str(), cell.exit_code, cell.message.c_str());
   }
-  std::fprintf(stderr, "mbtfm: %zu cells done, %d failed\n", outcomes.size() - n_failed, n_failed);
+  const fs::path table = line.folder / "batch.csv";
+  runner::write_batch_table(table, line.folder, outcomes, line.only);
+  std::fprintf(stderr, "mbtfm: %zu cells done, %d failed; %s\n", outcomes.size() - n_failed, n_failed, table.c_str());
   return n_failed == 0 ? kDone : kFailed;
 }
 
@@ -110,8 +118,11 @@ CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name,
 }
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
-  command->add_option("--only", line.only, "run these stages only: segment, track, network, fit");
-  command->add_option("--redo", line.redo, "run these stages even if up to date or changed by hand");
+  // one value a flag: else the folder that follows would be taken for another
+  command->add_option("--only", line.only, "run this stage only, or these: segment, track, network, fit")
+      ->allow_extra_args(false);
+  command->add_option("--redo", line.redo, "run this stage, or these, even if up to date or changed by hand")
+      ->allow_extra_args(false);
   command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
 }
 
@@ -125,6 +136,12 @@ int start(int argc, char** argv) {
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
+  batch_command
+      ->add_option("--pattern", line.patterns,
+                   "make cell folders for images that lie together: KEY=PATTERN with KEY of [images] and "
+                   "{cell} for the cell's name, as in adhesion='{cell}_pax.tif'")
+      ->allow_extra_args(false);
+  batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
   add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", "CELL");
@@ -139,33 +156,16 @@ int start(int argc, char** argv) {
   return compare(line);
 }
 
-int fail(int code, const char* kind, const char* message, const std::string& hint = {}) {
-  std::fprintf(stderr, "mbtfm: %s: %s\n", kind, message);
-  if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
-  return code;
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
   runner::watch_interrupts();
   try {
     return start(argc, argv);
-  } catch (const UsageError& error) {
-    return fail(kUsage, "error", error.what());
-  } catch (const InputError& error) {
-    return fail(kInput, "error", error.what(), error.hint);
-  } catch (const InvalidData& error) {
-    return fail(kInput, "error", error.what());
   } catch (const runner::StageFailed& error) {
-    return fail(error.exit_code, "error", error.what());
-  } catch (const runner::Interrupted& error) {
-    return fail(kInterrupted, "error", error.what());
-  } catch (const OutputError& error) {
-    return fail(kOutput, "error", error.what());
-  } catch (const fs::filesystem_error& error) {
-    return fail(kOutput, "error", error.what());
-  } catch (const std::exception& error) {
-    return fail(kBug, "internal error", error.what(), "please report this with the command and its inputs");
+    std::fprintf(stderr, "mbtfm: error: %s\n", error.what());
+    return error.exit_code;
+  } catch (...) {
+    return report_current_exception("mbtfm");
   }
 }

@@ -47,12 +47,15 @@ std::vector<double> draw_spread(Sketch& sketch, const TensionParameters& tension
   return drawn;
 }
 
-/// Brightness: adhesions and fibres differ by a quarter.
+/// Brightness of adhesions and fibres, width of fibres.
 void draw_brightness(Sketch& sketch, std::uint64_t seed) {
   Random random(seed, Stream::specimen);
-  const LogNormal brightness{.median = 1, .log_sd = 0.25, .low = 0.5, .high = 2};
+  const double log_sd = sketch.parameters.brightness_log_sd;
+  const LogNormal brightness{
+      .median = 1, .log_sd = log_sd, .low = std::min(0.5, 1 - log_sd), .high = std::max(2.0, 1 + 2 * log_sd)};
   for (Adhesion& a : sketch.adhesions) a.mean_intensity = draw(random, brightness);
   for (Fibre& f : sketch.fibres) f.mean_intensity = draw(random, brightness);
+  for (Fibre& f : sketch.fibres) f.width_um *= std::exp(sketch.parameters.fibre_width_log_sd * random.normal());
 }
 
 void check_field(const Sketch& sketch, double field_um) {

@@ -16,7 +16,8 @@ MicroscopeParameters at_quality(MicroscopeParameters microscope);
 
 /// Paxillin and actin: relative density of fluorophore, about 1 in a bright adhesion or fibre.
 Image paxillin_specimen(const Cell& cell, const MicroscopeParameters& microscope, std::uint64_t seed, int threads);
-Image actin_specimen(const Cell& cell, const MicroscopeParameters& microscope, std::uint64_t seed, int threads);
+Image actin_specimen(const Cell& cell, int n_ruffles, const MicroscopeParameters& microscope, std::uint64_t seed,
+                     int threads);
 
 /// Photons by pixel of a specimen: PSF, haze, uneven illumination.
 Image photons_of(const Image& specimen, const MicroscopeParameters& microscope, int threads);

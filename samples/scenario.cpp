@@ -35,12 +35,16 @@ void declare_cell(ParameterList& list, CellParameters& p) {
   list.add("n_ventral", p.n_ventral, Range::between(0, 1000), "ventral fibres");
   list.add("n_dorsal", p.n_dorsal, Range::between(0, 1000), "dorsal fibres");
   list.add("n_arc", p.n_arc, Range::between(0, 1000), "transverse arcs");
-  list.add("fibre_width_um", p.fibre_width_um, Range::positive(), "width of a fibre (um)");
+  list.add("fibre_width_um", p.fibre_width_um, Range::positive(), "median width of a fibre (um)");
+  list.add("fibre_width_log_sd", p.fibre_width_log_sd, Range::between(0, 0.5), "spread of the widths' logarithm");
   list.add("fibre_spacing_um", p.fibre_spacing_um, Range::positive(), "least gap of fibres that run alongside (um)");
   list.add("free_end_clearance_um", p.free_end_clearance_um, Range::not_negative(),
            "least gap between a fibre's free end and an adhesion (um)");
   list.add("n_pairs", p.n_pairs, Range::between(0, 1000), "ventral fibres with a parallel neighbour");
   list.add("pair_spacing_um", p.pair_spacing_um, Range::positive(), "distance of these neighbours (um)");
+  list.add("brightness_log_sd", p.brightness_log_sd, Range::between(0, 0.7),
+           "spread of the logarithm of the adhesions' and fibres' brightness");
+  list.add("n_ruffles", p.n_ruffles, Range::between(0, 1000), "folds of the membrane near the edge, bright in actin");
 }
 
 void declare_tension(ParameterList& list, TensionParameters& p) {

@@ -34,11 +34,14 @@ struct CellParameters {
   int n_ventral = 7;                   ///< 369 fibres in 21 cells: 18 a cell
   int n_dorsal = 7;
   int n_arc = 6;
-  double fibre_width_um = 0.6;
+  double fibre_width_um = 0.6;         ///< median
+  double fibre_width_log_sd = 0;       ///< all alike
   double fibre_spacing_um = 2.0;       ///< least distance of fibres that run alongside; crossing is free
   double free_end_clearance_um = 1.5;  ///< from a fibre's free end to the nearest adhesion: its type stays clear
   int n_pairs = 0;                     ///< ventral fibres that come with a parallel neighbour
   double pair_spacing_um = 1.2;        ///< of the neighbours: two fibre widths
+  double brightness_log_sd = 0.25;     ///< of adhesions and fibres: they differ by a quarter
+  int n_ruffles = 0;                   ///< folds of the membrane near the edge, bright in actin
 };
 
 /// Tensions by fibre type: log-normal, after the histograms of thesis fig. 3.14.

@@ -94,6 +94,27 @@ void add_fibre_image(Image& image, const Fibre& fibre, Random& random) {
   add_line(image, resampled(fibre.points_um, 0.5), fibre.width_um / kFullWidthPerSigma, amplitude);
 }
 
+/// A fold of the membrane: a wavy band along the edge, a little inside.
+void add_ruffle(Image& image, const Polygon& outline, Random& random) {
+  const double length = random.uniform(4, 10), depth = random.uniform(0.3, 2), wavelength = random.uniform(1.5, 3);
+  const double swing = random.uniform(0.15, 0.4), brightness = random.uniform(0.5, 1.2);
+  const int n = static_cast<int>(outline.size()), first = random.below(n);
+  const double turn = signed_area_um2(outline) > 0 ? 1 : -1;
+  Polyline band;
+  double s = 0;
+  for (int i = first; s < length && i < first + n; ++i) {
+    const Vec2 here = outline[i % n], step = outline[(i + 1) % n] - here;
+    const double l = std::max(norm(step), 1e-9);
+    const Vec2 inward = (turn / l) * Vec2{-step.y, step.x};
+    band.push_back(here + (depth + swing * std::sin(2 * std::numbers::pi * s / wavelength)) * inward);
+    s += l;
+  }
+  const auto wave = modulation(0.3, 1.5, random);
+  // it rises and fades over its ends
+  const auto amplitude = [&](double t) { return brightness * wave(t) * std::min({1.0, t, std::max(0.0, length - t)}); };
+  if (band.size() > 1) add_line(image, resampled(band, 0.2), random.uniform(0.15, 0.35), amplitude);
+}
+
 void add_thin_filaments(Image& image, const Cell& cell, Random& random) {
   const Vec2 centre = centroid_of(cell.outline_um);
   for (int i = 0; i < number_of(kFilaments_per_um2, cell); ++i) {
@@ -129,7 +150,7 @@ Image paxillin_specimen(const Cell& cell, const MicroscopeParameters& m, std::ui
   return image;
 }
 
-Image actin_specimen(const Cell& cell, const MicroscopeParameters& m, std::uint64_t seed, int threads) {
+Image actin_specimen(const Cell& cell, int n_ruffles, const MicroscopeParameters& m, std::uint64_t seed, int threads) {
   Random random(seed, Stream::optics, 1);
   Image image = thickness_of(cell, m, random, threads);
   for (float& value : image.pixels) value *= static_cast<float>(kCytosolicActin);
@@ -139,6 +160,7 @@ Image actin_specimen(const Cell& cell, const MicroscopeParameters& m, std::uint6
   const auto ruffles = modulation(0.35, 8, random);
   add_line(image, edge, kEdgeActin_um, [&](double s) { return kEdgeActin * ruffles(s); });
   for (const Fibre& fibre : cell.fibres) add_fibre_image(image, fibre, random);
+  for (int i = 0; i < n_ruffles; ++i) add_ruffle(image, cell.outline_um, random);
   return image;
 }
 

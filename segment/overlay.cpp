@@ -27,21 +27,23 @@ cv::Scalar colour_of(FibreType type) {
   return type == FibreType::ventral ? kVentral : type == FibreType::dorsal ? kDorsal : kArc;
 }
 
-/// 0 to 1 between the 1 % and the 99.8 % quantile, brightened by a root so that faint structure shows.
-cv::Mat stretched(const Image& image) {
-  const cv::Mat values = matrix_of(image);
+/// Part of an image at the size of the picture, 0 to 1 between its 1 % and its 99.8 % quantile, brightened by a root so
+/// that faint structure shows.
+cv::Mat stretched(const Image& image, const cv::Rect& part, cv::Size size) {
+  cv::Mat values;
+  cv::resize(matrix_of(image)(part), values, size, 0, 0, size.width < part.width ? cv::INTER_AREA : cv::INTER_CUBIC);
   const double low = quantile(values, 0.01), high = quantile(values, 0.998);
-  cv::Mat result = (values - low) / std::max(high - low, 1e-12);
-  result = cv::min(cv::max(result, 0.0), 1.0);
-  cv::pow(result, 0.7, result);
-  return result;
+  values = cv::min(cv::max((values - low) / std::max(high - low, 1e-12), 0.0), 1.0);
+  cv::pow(values, 0.7, values);
+  return values;
 }
 
-cv::Mat background(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin) {
-  const Image& any = actin ? actin->image : adhesion->image;
+cv::Mat background(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin, const cv::Rect& part,
+                   cv::Size size) {
   cv::Mat planes[3];
-  const cv::Mat grey = actin ? stretched(actin->image) : cv::Mat::zeros(any.height, any.width, CV_32F);
-  const cv::Mat purple = adhesion ? stretched(adhesion->image) : cv::Mat::zeros(any.height, any.width, CV_32F);
+  const cv::Mat none = cv::Mat::zeros(size, CV_32F);
+  const cv::Mat grey = actin ? stretched(actin->image, part, size) : none;
+  const cv::Mat purple = adhesion ? stretched(adhesion->image, part, size) : none;
   // alone, a channel may use the whole range; together they share it
   const double share_grey = adhesion ? 150 : 210, share_purple = actin ? 150 : 210;
   const double tint[3] = {1.0, actin ? 0.1 : 1.0, actin ? 0.95 : 1.0};  // alone it is grey, so that marks stand out
@@ -73,15 +75,17 @@ Place centred_text(cv::Point2d centre, const std::string& text, double size) {
 /// The part of the images around the cell, enlarged or reduced to a size that suits a screen.
 class Canvas {
  public:
-  Canvas(const cv::Mat& rgb, const Segmentation& s) {
-    cv::Rect2d box = bounds_px(s);
-    box &= cv::Rect2d(0, 0, rgb.cols, rgb.rows);
-    const cv::Rect pixels(cv::Point(cvFloor(box.x), cvFloor(box.y)),
-                          cv::Point(cvCeil(box.x + box.width), cvCeil(box.y + box.height)));
-    zoom_ = kLongSide / std::max(pixels.width, pixels.height);
-    pixel_um_ = s.pixel_size_um / zoom_;
-    corner_um_ = {pixels.x * s.pixel_size_um, pixels.y * s.pixel_size_um};
-    cv::resize(rgb(pixels), picture_, cv::Size(), zoom_, zoom_, zoom_ < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
+  Canvas(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin, const View& view,
+         double pixel_size_um, double long_side) {
+    const Image& any = actin ? actin->image : adhesion->image;
+    const Vec2 low = (1 / pixel_size_um) * view.low_um, high = (1 / pixel_size_um) * view.high_um;
+    const cv::Rect wanted(cv::Point(cvFloor(low.x), cvFloor(low.y)), cv::Point(cvCeil(high.x), cvCeil(high.y)));
+    const cv::Rect part = wanted & cv::Rect(0, 0, any.width, any.height);
+    const double zoom = long_side / std::max(part.width, part.height);
+    pixel_um_ = pixel_size_um / zoom;
+    corner_um_ = {part.x * pixel_size_um, part.y * pixel_size_um};
+    const cv::Size size(std::max(1, cvRound(part.width * zoom)), std::max(1, cvRound(part.height * zoom)));
+    picture_ = background(adhesion, actin, part, size);
   }
 
   void line(const Polyline& points_um, bool is_closed, const cv::Scalar& colour, int thickness) {
@@ -115,20 +119,9 @@ class Canvas {
   double pixel_um() const { return pixel_um_; }
 
  private:
-  static cv::Rect2d bounds_px(const Segmentation& s) {
-    std::vector<cv::Point2f> points;
-    for (const Vec2 p : s.cell.outline_um) points.emplace_back(p.x, p.y);
-    for (const Adhesion& a : s.cell.adhesions) points.emplace_back(a.position_um.x, a.position_um.y);
-    for (const Fibre& f : s.cell.fibres)
-      for (const Vec2 p : f.points_um) points.emplace_back(p.x, p.y);
-    const cv::Rect box = cv::boundingRect(points);
-    const double scale = 1 / s.pixel_size_um;
-    return {(box.x - kMargin_um) * scale, (box.y - kMargin_um) * scale, (box.width + 2 * kMargin_um) * scale,
-            (box.height + 2 * kMargin_um) * scale};
-  }
   cv::Point2d at(Vec2 p_um) const { return to_pixels(p_um - corner_um_, pixel_um_); }
 
-  double zoom_ = 1, pixel_um_ = 1;
+  double pixel_um_ = 1;
   Vec2 corner_um_;
   cv::Mat picture_;
   std::vector<cv::Rect> taken_;
@@ -218,19 +211,43 @@ cv::Mat legend(const std::vector<Entry>& entries, int width) {
   return footer;
 }
 
+void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
+  canvas.line(cell.outline_um, true, kOutline, thickness);
+  for (const Adhesion& a : cell.adhesions) canvas.line(ellipse_polygon(a, 32), true, kAdhesion, thickness);
+  for (const Fibre& f : cell.fibres) canvas.line(f.points_um, false, colour_of(f.type), thickness + 1);
+}
+
 }  // namespace
+
+View view_of(const Segmentation& s) {
+  Polyline points = s.cell.outline_um;
+  for (const Adhesion& a : s.cell.adhesions) points.push_back(a.position_um);
+  for (const Fibre& f : s.cell.fibres) points.insert(points.end(), f.points_um.begin(), f.points_um.end());
+  View view{points.front(), points.front()};
+  for (const Vec2 p : points) {
+    view.low_um = {std::min(view.low_um.x, p.x), std::min(view.low_um.y, p.y)};
+    view.high_um = {std::max(view.high_um.x, p.x), std::max(view.high_um.y, p.y)};
+  }
+  const Vec2 margin{kMargin_um, kMargin_um};
+  return {view.low_um - margin, view.high_um + margin};
+}
 
 Picture draw_overlay(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
                      const Segmentation& s) {
-  Canvas canvas(background(adhesion, actin), s);
-  canvas.line(s.cell.outline_um, true, kOutline, 2);
-  for (const Adhesion& a : s.cell.adhesions) canvas.line(ellipse_polygon(a, 32), true, kAdhesion, 2);
-  for (const Fibre& f : s.cell.fibres) canvas.line(f.points_um, false, colour_of(f.type), 3);
+  Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kLongSide);
+  draw_marks(canvas, s.cell, 2);
   draw_labels(canvas, s.cell);
   cv::Mat whole;
   const int width = canvas.picture().cols;
   cv::vconcat(canvas.picture(), legend(entries_of(s.cell, canvas.pixel_um(), width), width), whole);
   return {whole.cols, whole.rows, std::vector<std::uint8_t>(whole.data, whole.data + whole.total() * 3)};
+}
+
+cv::Mat draw_thumbnail(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                       const Segmentation& s, const View& view, int long_side_px) {
+  Canvas canvas(adhesion, actin, view, s.pixel_size_um, long_side_px);
+  draw_marks(canvas, s.cell, 1);
+  return canvas.picture();
 }
 
 }  // namespace mbtfm::segment

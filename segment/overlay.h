@@ -1,6 +1,7 @@
-/// A picture of a segmentation on its images, to judge it by eye.
+/// Pictures of a segmentation on its images, to judge it by eye. Internal to segment/ (OpenCV).
 #pragma once
 
+#include <opencv2/core.hpp>
 #include <optional>
 
 #include "segment/png.h"
@@ -14,5 +15,17 @@ namespace mbtfm::segment {
 /// have room, the largest adhesions' first; below a legend and a scale bar.
 Picture draw_overlay(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
                      const Segmentation& segmentation);
+
+/// The part of the specimen that a picture shows.
+struct View {
+  Vec2 low_um, high_um;
+};
+
+/// The cell and a margin around it.
+View view_of(const Segmentation& segmentation);
+
+/// The same in small, without text: outline, ellipses and fibres (8-bit red, green, blue).
+cv::Mat draw_thumbnail(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                       const Segmentation& segmentation, const View& view, int long_side_px);
 
 }  // namespace mbtfm::segment

@@ -96,6 +96,9 @@ bool write_all(png_structp png, png_infop info, std::FILE* stream, const Picture
   png_init_io(png, stream);
   png_set_IHDR(png, info, static_cast<png_uint_32>(picture.width), static_cast<png_uint_32>(picture.height), 8,
                PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
+  // a seventh of the default's time for 5 % more bytes, on an overlay
+  png_set_compression_level(png, 2);
+  png_set_filter(png, PNG_FILTER_TYPE_BASE, PNG_FILTER_SUB);
   png_write_info(png, info);
   for (int j = 0; j < picture.height; ++j) {
     png_write_row(png, picture.rgb.data() + static_cast<std::size_t>(j) * picture.width * 3);

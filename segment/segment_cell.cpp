@@ -13,6 +13,8 @@ void declare(ParameterList& list, SegmentParameters& p) {
   list.table("segment");
   list.add("adhesion_page", p.adhesion_page, {.low = 1}, "page of the adhesion image to read, from 1");
   list.add("actin_page", p.actin_page, {.low = 1}, "page of the actin image to read, from 1");
+  list.add("contact_sheet", p.contact_sheet,
+           "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
   declare(list, p.adhesions);
   declare(list, p.fibres);
   declare(list, p.outline);

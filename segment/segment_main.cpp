@@ -3,6 +3,7 @@
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
 #include "segment/cell_rois.h"
+#include "segment/contact_sheet.h"
 #include "segment/overlay.h"
 #include "segment/segment_cell.h"
 
@@ -50,6 +51,16 @@ StageReport report_of(const Segmentation& s) {
   return report;
 }
 
+void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
+  const std::pair<std::string, bool> parts[] = {{"outline", drawn.outline.has_value()},
+                                                {"adhesions", drawn.adhesions.has_value()},
+                                                {"fibres", drawn.fibres.has_value()}};
+  for (const auto& [part, is_drawn] : parts) {
+    report.figures.emplace_back(part + "_drawn_by_hand", is_drawn);
+    if (is_drawn) report.summary += "; " + part + " drawn by hand";
+  }
+}
+
 StageReport run(const SegmentParameters& parameters, StageContext& context) {
   cv::setNumThreads(context.threads);
   const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_page);
@@ -63,14 +74,10 @@ StageReport run(const SegmentParameters& parameters, StageContext& context) {
   write_cell_vtp(context.output("out", "cell.vtp"), s.cell);
   write_png(context.output("out", "overlay.png"), draw_overlay(adhesion, actin, s));
   write_roi_set(context.output("out", "RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
+  if (!parameters.contact_sheet.empty())
+    write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));
   StageReport report = report_of(s);
-  const auto say = [&](const char* part, const auto& set) {
-    report.figures.push_back({std::string(part) + "_drawn_by_hand", set.has_value()});
-    if (set) report.summary += std::string("; ") + part + " drawn by hand";
-  };
-  say("outline", drawn.outline);
-  say("adhesions", drawn.adhesions);
-  say("fibres", drawn.fibres);
+  add_drawn_by_hand(report, drawn);
   return report;
 }
 

@@ -1,4 +1,4 @@
-/// What can go wrong, one type for each kind; `run_stage` turns them into messages and exit codes.
+/// What can go wrong, one type for each kind, and how a program ends with it.
 #pragma once
 
 #include <stdexcept>
@@ -7,6 +7,18 @@
 #include "pipeline/contract/report.h"
 
 namespace mbtfm {
+
+/// How a program ends (docs/formats.md, "Exit codes").
+namespace exit_code {
+inline constexpr int kDone = 0;
+inline constexpr int kFailed = 1;  ///< of a batch: some cells failed
+inline constexpr int kUsage = 2;
+inline constexpr int kInput = 3;
+inline constexpr int kNotSolved = 4;  ///< the outputs are there, marked
+inline constexpr int kOutput = 5;
+inline constexpr int kBug = 70;           ///< EX_SOFTWARE of sysexits.h
+inline constexpr int kInterrupted = 130;  ///< as shells count: 128 + SIGINT
+}  // namespace exit_code
 
 /// A wrong flag, a parameter out of range, a violated relation between parameters. Exit code 2.
 struct UsageError : std::runtime_error {
@@ -45,6 +57,11 @@ struct OutputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
+/// Ctrl-C or SIGTERM; what is left undone is said in the message. Exit code 130.
+struct Interrupted : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
 /// Our bug. Exit code 70.
 struct InternalError : std::logic_error {
   using std::logic_error::logic_error;
@@ -55,5 +72,9 @@ struct InternalError : std::logic_error {
   do {                                                                                                                \
     if (!(holds)) throw ::mbtfm::InternalError(std::string(__FILE__) + ":" + std::to_string(__LINE__) + ": " #holds); \
   } while (false)
+
+/// In a catch block: tell what was thrown, with its hint, as an error of `program` on stderr.
+/// @returns its exit code
+int report_current_exception(const std::string& program);
 
 }  // namespace mbtfm

@@ -239,6 +239,15 @@ std::string to_text(const Parameter& p) {
       p.member);
 }
 
+Parameter& parameter_named(ParameterList& list, const std::string& name) {
+  std::vector<std::string> known;
+  for (Parameter& p : list.all()) {
+    if (p.name == name) return p;
+    known.push_back(p.name);
+  }
+  throw UsageError("no parameter is called '" + name + "': " + unknown_key_hint(known, name));
+}
+
 void check_complete(const ParameterList& list) {
   for (const Parameter& p : list.all()) {
     if (p.is_required && !p.is_set) {

@@ -73,6 +73,8 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
 /// Set one parameter from text, as a flag does. @throws UsageError
 void set_from_text(Parameter& parameter, const std::string& text);
 std::string to_text(const Parameter& parameter);
+/// The parameter of this name. @throws UsageError that names the nearest one there is
+Parameter& parameter_named(ParameterList& list, const std::string& name);
 /// @throws UsageError where a required parameter was never set
 void check_complete(const ParameterList& list);
 /// The parameter page of this list: one table of name, default, range, meaning for each table of cell.toml.

@@ -22,11 +22,7 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int kDone = 0, kUsage = 2, kInput = 3, kNotSolved = 4, kOutput = 5, kBug = 70, kInterrupted = 130;
-
-struct Interrupted : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+using namespace exit_code;
 
 std::atomic<bool> was_interrupted = false;
 extern "C" void note_signal(int) { was_interrupted = true; }
@@ -103,7 +99,7 @@ void set_files(StageContext& context, const StageDescription& description, const
 Progress terminal_progress(const std::string& stage, bool is_quiet) {
   const bool is_shown = !is_quiet && isatty(STDERR_FILENO);
   return [stage, is_shown, last = -1](double fraction, std::string_view what) mutable {
-    if (was_interrupted) throw Interrupted("interrupted");
+    if (was_interrupted) throw Interrupted("interrupted; nothing was written");
     const int percent = static_cast<int>(100 * fraction);
     if (!is_shown || percent == last) return;
     last = percent;
@@ -199,11 +195,6 @@ void commit(const StageContext& context) {
   }
 }
 
-void say(const std::string& stage, const std::string& kind, const std::string& message, const std::string& hint = {}) {
-  std::fprintf(stderr, "mbtfm-%s: %s: %s\n", stage.c_str(), kind.c_str(), message.c_str());
-  if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
-}
-
 int run(const StageDescription& description, ParameterList& list, const CommandLine& line,
         const std::function<StageReport(StageContext&)>& body) {
   const auto begin = std::chrono::steady_clock::now();
@@ -219,7 +210,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     if (!line.record.empty()) write_record(line.record, description, list, context, report, seconds.count());
     commit(context);
     if (!report.converged) {
-      say(description.name, "error", "not converged: " + report.summary);
+      std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", description.name.c_str(), report.summary.c_str());
       return kNotSolved;
     }
     if (!line.is_quiet) std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
@@ -231,8 +222,6 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
 }
 
 }  // namespace
-
-bool StageContext::was_interrupted() const { return mbtfm::was_interrupted; }
 
 fs::path StageContext::input(const std::string& name) {
   MBTFM_ASSERT(inputs_.contains(name));
@@ -288,33 +277,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     set_parameters(list, line, app);
     if (line.only_check) return kDone;
     return run(description, list, line, body);
-  } catch (const UsageError& error) {
-    say(stage, "error", error.what());
-    return kUsage;
-  } catch (const InputError& error) {
-    say(stage, "error", error.what(), error.hint);
-    return kInput;
-  } catch (const InvalidData& error) {
-    say(stage, "error", error.what());
-    return kInput;
-  } catch (const NotSolved& error) {
-    say(stage, "error", std::string("not solved: ") + error.what());
-    return kNotSolved;
-  } catch (const OutputError& error) {
-    say(stage, "error", error.what());
-    return kOutput;
-  } catch (const fs::filesystem_error& error) {
-    say(stage, "error", error.what());
-    return kOutput;
-  } catch (const Interrupted&) {
-    say(stage, "error", "interrupted; nothing was written");
-    return kInterrupted;
-  } catch (const std::bad_alloc&) {
-    say(stage, "error", "out of memory", "fewer threads, a coarser mesh or fewer beads need less");
-    return kNotSolved;
-  } catch (const std::exception& error) {
-    say(stage, "internal error", error.what(), "please report this with the command and its inputs");
-    return kBug;
+  } catch (...) {
+    return report_current_exception("mbtfm-" + stage);
   }
 }
 

@@ -32,7 +32,6 @@ class StageContext {
  public:
   int threads = 1;
   Progress progress;
-  bool was_interrupted() const;
 
   /// Path of an input that was given.
   std::filesystem::path input(const std::string& name);

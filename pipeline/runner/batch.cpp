@@ -9,6 +9,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
+#include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/process.h"
 
 namespace mbtfm::runner {
@@ -25,16 +26,15 @@ void collect_cells(const fs::path& folder, std::vector<fs::path>& cells) {
   }
 }
 
-/// The last line of a log that tells of an error, or its last line.
-std::string last_error(const fs::path& log_file) {
+/// The first line of a log that tells of an error: it is the cause of those after it; or else its last line.
+std::string first_error(const fs::path& log_file) {
   std::ifstream log(log_file);
-  std::string last, error;
+  std::string last;
   for (std::string line; std::getline(log, line);) {
-    if (line.empty()) continue;
-    last = line;
-    if (line.find(": error: ") != std::string::npos) error = line;
+    if (line.find(": error: ") != std::string::npos) return line;
+    if (!line.empty()) last = line;
   }
-  return error.empty() ? last : error;
+  return last;
 }
 
 BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
@@ -48,12 +48,24 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
     outcome.seconds = result.seconds;
     outcome.exit_code = result.signal ? 128 + *result.signal : result.exit_code;  // the shell's convention
     if (result.signal) outcome.message = how_it_ended(result);
-    if (!result.signal && result.exit_code != 0) outcome.message = last_error(log);
+    if (!result.signal && result.exit_code != 0) outcome.message = first_error(log);
   } catch (const OutputError& error) {  // no log, no process: this cell's matter, not the batch's
     outcome.exit_code = 5;
     outcome.message = error.what();
   }
   return outcome;
+}
+
+std::string progress_line(const BatchCell& cell, int n_done, std::size_t n, const std::vector<std::string>& only) {
+  std::ostringstream line;
+  line << '[' << n_done << '/' << n << "] " << cell.cell.string() << ": " << std::fixed << std::setprecision(1)
+       << cell.seconds << " s: ";
+  if (cell.exit_code == 0) {
+    line << last_summary(cell.cell, only);
+  } else {
+    line << "FAILED, exit code " << cell.exit_code;
+  }
+  return line.str();
 }
 
 }  // namespace
@@ -79,11 +91,7 @@ std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const Batch
     const std::lock_guard lock(output);
     ++n_done;
     if (!options.say) return;
-    std::ostringstream line;
-    line << '[' << n_done << '/' << cells.size() << "] " << cells[i].string() << ": "
-         << (outcomes[i].exit_code == 0 ? "done" : "FAILED") << ", " << std::fixed << std::setprecision(1)
-         << outcomes[i].seconds << " s";
-    options.say(line.str());
+    options.say(progress_line(outcomes[i], n_done, cells.size(), options.only));
   });
   return outcomes;
 }

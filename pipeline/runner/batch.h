@@ -16,6 +16,7 @@ struct BatchOptions {
   std::filesystem::path program;       ///< mbtfm itself
   std::vector<std::string> arguments;  ///< passed on to `mbtfm run`
   int jobs = 1;                        ///< cells at a time
+  std::vector<std::string> only;       ///< stages whose summary is told; empty: all
   std::function<void(const std::string&)> say;
 };
 
@@ -23,7 +24,7 @@ struct BatchCell {
   std::filesystem::path cell;
   int exit_code = 0;
   double seconds = 0;
-  std::string message;  ///< where it failed: the last error it printed
+  std::string message;  ///< where it failed: the first error it printed
 };
 
 /// `mbtfm run` for every cell. What it prints goes to run.log in the cell folder.

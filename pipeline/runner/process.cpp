@@ -21,6 +21,7 @@ namespace {
 constexpr int kCannotExecute = 127;
 
 std::atomic<bool> was_interrupted = false;
+constexpr const char* kStopped = "interrupted; finished stages are kept";
 extern "C" void note_interrupt(int) { was_interrupted = true; }
 
 /// The child, between fork and exec: only async-signal-safe calls, as other threads of the parent may hold locks.
@@ -44,7 +45,7 @@ void watch_interrupts() {
 
 ProcessResult run_process(const std::vector<std::string>& command,
                           const std::optional<std::filesystem::path>& log_file) {
-  if (was_interrupted) throw Interrupted();
+  if (was_interrupted) throw Interrupted(kStopped);
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
@@ -68,7 +69,7 @@ ProcessResult run_process(const std::vector<std::string>& command,
   rusage usage{};
   while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
   }
-  if (was_interrupted) throw Interrupted();
+  if (was_interrupted) throw Interrupted(kStopped);
   ProcessResult result;
   result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   constexpr double kMegabytePerKibibyte = 1024e-6;  // ru_maxrss is in KiB

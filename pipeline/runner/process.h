@@ -3,17 +3,13 @@
 
 #include <filesystem>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
 namespace mbtfm::runner {
 
-/// The user pressed Ctrl-C: the running programs have got it, too, and end by themselves; no further one is started.
-struct Interrupted : std::runtime_error {
-  Interrupted() : std::runtime_error("interrupted; finished stages are kept") {}
-};
-/// From now on Ctrl-C is noted, not obeyed.
+/// From now on Ctrl-C is noted, not obeyed: the running programs have got it, too, and end by themselves; no further
+/// one is started.
 void watch_interrupts();
 
 struct ProcessResult {

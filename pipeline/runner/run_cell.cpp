@@ -15,9 +15,6 @@ namespace mbtfm::runner {
 namespace fs = std::filesystem;
 namespace {
 
-/// The exit code of a stage that did not converge but wrote its outputs (docs/formats.md, "Exit codes").
-constexpr int kNotSolved = 4;
-
 bool contains_name(const std::vector<std::string>& names, const std::string& name) {
   return std::find(names.begin(), names.end(), name) != names.end();
 }
@@ -90,7 +87,8 @@ void CellRun::check_before_start() const {
     const ProcessResult check =
         run_process({executable_of(stage, options_), "--check", "--config", (cell_ / "cell.toml").string()});
     if (check.exit_code != 0 || check.signal) {
-      throw StageFailed("mbtfm-" + stage.name + " does not accept cell.toml", check.signal ? 70 : check.exit_code);
+      throw StageFailed("mbtfm-" + stage.name + " does not accept cell.toml",
+                        check.signal ? exit_code::kBug : check.exit_code);
     }
   }
 }
@@ -129,13 +127,14 @@ StageOutcome CellRun::start(const Stage& stage, const StageStatus& before, int t
   write_begun(record_file, stage);
   const ProcessResult result = run_process(command);
   // A stage that did not converge and yet wrote its outputs has written a record, too.
-  const bool converged = result.exit_code != kNotSolved;
+  const bool converged = result.exit_code != exit_code::kNotSolved;
   const bool has_outputs = !result.signal && (result.exit_code == 0 || (!converged && !is_begun(record_file)));
   if (!has_outputs) {
     // A stage that ends by itself has left its outputs as they were: so must be the record.
     if (!result.signal && had_record) write_whole(record_file, record_before);
     if (!result.signal && !had_record) forget_begun(record_file);
-    throw StageFailed("mbtfm-" + stage.name + ": " + how_it_ended(result), result.signal ? 70 : result.exit_code);
+    throw StageFailed("mbtfm-" + stage.name + ": " + how_it_ended(result),
+                      result.signal ? exit_code::kBug : result.exit_code);
   }
   const Hashes outputs = hash_files(cell_, stage.writes);
   for (const std::string& file : stage.writes) {
@@ -169,12 +168,17 @@ CellOutcome CellRun::run() {
   const std::vector<Stage>& all = stages();
   CellOutcome outcome;
   outcome.stages.resize(all.size());
-  const int workers = std::min(options_.threads, 2);
+  const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
+  const auto is_asked = [&](const std::vector<int>& chain) {
+    return options_.only.empty() || std::any_of(chain.begin(), chain.end(), [&](int i) {
+             return std::find(options_.only.begin(), options_.only.end(), all[i].name) != options_.only.end();
+           });
+  };
+  const int workers = is_asked(chains[0]) && is_asked(chains[1]) ? std::min(options_.threads, 2) : 1;
   const auto threads_of = [&](int chain) {
     return workers == 1 ? options_.threads
                         : (chain == 0 ? options_.threads - options_.threads / 2 : options_.threads / 2);
   };
-  const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
   parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
     for (const int i : chains[chain]) outcome.stages[i] = bring_up_to_date(all[i], threads_of(chain));
   });

@@ -43,8 +43,9 @@ struct AdhesionScore {
   int n_true = 0, n_found = 0, n_matched = 0;
   double area_ratio = 0;       ///< summed area found over true, of the matched
   double centre_error_um = 0;  ///< root mean square, of the matched
-  double angle_error_rad = 0;  ///< root mean square, of the matched with eccentricity above 0.8
-  std::vector<int> found_id;   ///< by true adhesion; 0: none
+  double angle_error_rad = 0;  ///< root mean square, of the matched whose axes' ratio exceeds 1.5
+  std::vector<double> area_errors, centre_errors_um, angle_errors_rad;  ///< of each matched one, magnitudes
+  std::vector<int> found_id;                                            ///< by true adhesion; 0: none
   double f1() const { return 2.0 * n_matched / std::max(1, n_true + n_found); }
 };
 
@@ -66,7 +67,6 @@ inline AdhesionScore score_adhesions(const std::vector<Adhesion>& truth, const s
   s.found_id.assign(truth.size(), 0);
   std::vector<bool> is_taken(found.size());
   double true_area = 0, found_area = 0, squares = 0, angles = 0;
-  int n_long = 0;
   for (const Pair& p : pairs) {
     if (s.found_id[p.t] || is_taken[p.f]) continue;
     s.found_id[p.t] = found[p.f].adhesion_id;
@@ -75,22 +75,53 @@ inline AdhesionScore score_adhesions(const std::vector<Adhesion>& truth, const s
     true_area += truth[p.t].area_um2;
     found_area += found[p.f].area_um2;
     squares += p.distance * p.distance;
-    if (truth[p.t].minor_axis_um < 0.6 * truth[p.t].major_axis_um) {
+    s.area_errors.push_back(std::abs(found[p.f].area_um2 / truth[p.t].area_um2 - 1));
+    s.centre_errors_um.push_back(p.distance);
+    if (truth[p.t].major_axis_um > 1.5 * truth[p.t].minor_axis_um) {
       const double turn = std::asin(std::abs(std::sin(truth[p.t].angle_rad - found[p.f].angle_rad)));
       angles += turn * turn;
-      ++n_long;
+      s.angle_errors_rad.push_back(turn);
     }
   }
   s.area_ratio = found_area / true_area;
   s.centre_error_um = std::sqrt(squares / std::max(1, s.n_matched));
-  s.angle_error_rad = std::sqrt(angles / std::max(1, n_long));
+  s.angle_error_rad = std::sqrt(angles / static_cast<double>(std::max<std::size_t>(1, s.angle_errors_rad.size())));
   return s;
 }
 
+/// The middle value; 0 of none.
+inline double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+/// Of all fibres' length, the shares near a line of the other set.
+struct LineScore {
+  double recall = 0, precision = 0;
+  double f1() const { return recall + precision > 0 ? 2 * recall * precision / (recall + precision) : 0; }
+};
+
+inline double covered_share(const std::vector<Fibre>& lines, const std::vector<Fibre>& others, double tolerance_um) {
+  std::size_t n = 0, n_near = 0;
+  for (const Fibre& line : lines)
+    for (const Vec2 p : densely(line.points_um)) {
+      ++n;
+      n_near += std::any_of(others.begin(), others.end(),
+                            [&](const Fibre& f) { return distance_to_line_um(p, f.points_um) <= tolerance_um; });
+    }
+  return n > 0 ? static_cast<double>(n_near) / static_cast<double>(n) : 1;
+}
+
+inline LineScore score_lines(const std::vector<Fibre>& truth, const std::vector<Fibre>& found, double tolerance_um) {
+  return {covered_share(truth, found, tolerance_um), covered_share(found, truth, tolerance_um)};
+}
+
 struct FibreScore {
-  int n_true = 0;    ///< longer than 4 um
-  int n_traced = 0;  ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
-  int n_typed = 0;   ///< … and has the type, and is held by the very adhesions
+  int n_true = 0;        ///< longer than 4 um
+  int n_traced = 0;      ///< … of which one found fibre covers 80 % and lies on for 80 % of its own length
+  int n_type_right = 0;  ///< … and has the type
+  int n_typed = 0;       ///< … and is held by the very adhesions
   int n_found = 0;
   int n_false = 0;            ///< found, and less than half of it near any true fibre
   std::vector<int> found_id;  ///< by true fibre; 0: none
@@ -115,6 +146,7 @@ inline FibreScore score_fibres(const Cell& truth, const Cell& found, const Adhes
       if (covered_share(t.points_um, f.points_um, kTolerance_um) < 0.8) continue;
       if (covered_share(f.points_um, t.points_um, kTolerance_um) < 0.8) continue;
       ++s.n_traced;
+      s.n_type_right += t.type == f.type;
       const int a = translated(t.start_adhesion_id), b = translated(t.end_adhesion_id);
       const int c = f.start_adhesion_id.value_or(0), d = f.end_adhesion_id.value_or(0);
       if (t.type == f.type && ((a == c && b == d) || (a == d && b == c))) {

@@ -289,7 +289,8 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
                   "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
   const auto cells = find_cells(folder.path());
   ASSERT_EQ(cells.size(), 3u);
-  const auto outcomes = run_batch(cells, {.program = folder / "mbtfm", .arguments = {}, .jobs = 2, .say = nullptr});
+  const auto outcomes =
+      run_batch(cells, {.program = folder / "mbtfm", .arguments = {}, .jobs = 2, .only = {}, .say = nullptr});
   EXPECT_EQ(outcomes[0].exit_code, 0);
   EXPECT_EQ(outcomes[1].exit_code, 3);
   EXPECT_EQ(outcomes[1].message, "mbtfm: error: broken");

@@ -1,0 +1,22 @@
+/// What a batch found, cell by cell.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "pipeline/runner/batch.h"
+
+namespace mbtfm::runner {
+
+/// What the last of the cell's stages that is done has to say: "170 adhesions, 20 fibres (…)"; empty where none is.
+/// @param only  of these stages; empty: of all
+std::string last_summary(const std::filesystem::path& cell, const std::vector<std::string>& only);
+
+/// Write a table with a row for each cell: cell (relative to the folder), exit_code, seconds, message, and every figure
+/// that a stage of any of the cells reports, as stage.figure; a field is empty where a cell has no such figure.
+/// @throws OutputError
+void write_batch_table(const std::filesystem::path& file, const std::filesystem::path& folder,
+                       const std::vector<BatchCell>& cells, const std::vector<std::string>& only);
+
+}  // namespace mbtfm::runner

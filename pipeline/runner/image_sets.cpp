@@ -1,0 +1,118 @@
+#include "pipeline/runner/image_sets.h"
+
+#include <algorithm>
+#include <map>
+#include <regex>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/runner/images.h"
+
+namespace mbtfm::runner {
+namespace fs = std::filesystem;
+namespace {
+
+constexpr std::string_view kCell = "{cell}";
+
+/// The pattern as a regular expression whose one group is the cell.
+std::regex regex_of(const std::string& pattern) {
+  std::string text;
+  for (std::size_t i = 0; i < pattern.size(); ++i) {
+    if (pattern.compare(i, kCell.size(), kCell) == 0) {
+      text += "([^/]+)";
+      i += kCell.size() - 1;
+    } else if (pattern[i] == '*') {
+      text += "[^/]*";
+    } else if (pattern[i] == '?') {
+      text += "[^/]";
+    } else {
+      if (std::string_view("\\^$.|()[]{}+").find(pattern[i]) != std::string_view::npos) text += '\\';
+      text += pattern[i];
+    }
+  }
+  return std::regex(text);
+}
+
+/// Images of one cell: path by key of [images].
+using ImageSet = std::map<std::string, fs::path>;
+
+std::vector<fs::path> files_below(const fs::path& folder) {
+  std::vector<fs::path> files;
+  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
+    if (entry.is_regular_file()) files.push_back(entry.path().lexically_relative(folder));
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+std::map<std::string, ImageSet> group_images(const fs::path& folder, const std::vector<ImagePattern>& patterns) {
+  std::map<std::string, ImageSet> sets;
+  const std::vector<fs::path> files = files_below(folder);
+  for (const ImagePattern& p : patterns) {
+    const std::regex regex = regex_of(p.pattern);
+    const std::size_t n_before = sets.size();
+    bool is_found = false;
+    for (const fs::path& file : files) {
+      std::smatch match;
+      const std::string path = file.generic_string();
+      if (!std::regex_match(path, match, regex)) continue;
+      is_found = true;
+      const auto [place, is_new] = sets[match[1].str()].emplace(p.key, file);
+      if (!is_new) {
+        throw InputError(folder.string(), "one image '" + p.pattern + "' of cell " + match[1].str(),
+                         place->second.string() + " and " + path,
+                         "make the pattern of '" + p.key + "' fit one of them");
+      }
+    }
+    if (!is_found) {
+      throw InputError(folder.string(), "images '" + p.pattern + "'",
+                       "none among " + std::to_string(files.size()) + " files (" + std::to_string(n_before) +
+                           " cells by the patterns before)",
+                       "{cell} stands for the cell's name; sub-folders are written with /");
+    }
+  }
+  return sets;
+}
+
+std::string toml_of(const std::string& settings, const ImageSet& images, const fs::path& folder, const fs::path& cell) {
+  std::string text = settings;
+  if (!text.empty() && text.back() != '\n') text += '\n';
+  text += text.empty() ? "[images]\n" : "\n[images]\n";
+  for (const auto& [key, file] : images)
+    text += key + " = '" + (folder / file).lexically_relative(cell).generic_string() + "'\n";
+  return text;
+}
+
+}  // namespace
+
+ImagePattern parse_pattern(const std::string& text) {
+  const auto equals = text.find('=');
+  const ImagePattern p{text.substr(0, equals), equals == std::string::npos ? "" : text.substr(equals + 1)};
+  ImageNames names;
+  ParameterList list;
+  declare(list, names);
+  parameter_named(list, p.key);  // throws where there is none
+  const auto cell = p.pattern.find(kCell);
+  if (cell == std::string::npos || p.pattern.find(kCell, cell + 1) != std::string::npos)
+    throw UsageError("--pattern " + text + ": expected {cell} once, as in " + p.key + "='{cell}_" + p.key + ".tif'");
+  return p;
+}
+
+std::vector<std::string> make_cell_folders(const fs::path& folder, const std::vector<ImagePattern>& patterns,
+                                           const fs::path& template_toml) {
+  if (!fs::is_directory(folder)) throw InputError(folder.string(), "a folder of images", "none");
+  const std::string settings = template_toml.empty() ? "" : read_text(template_toml);
+  if (std::regex_search(settings, std::regex(R"((^|\n)\s*\[images\])")))
+    throw InputError(template_toml.string(), "settings without [images]", "[images]",
+                     "the images of each cell come from --pattern");
+  std::vector<std::string> cells;
+  for (const auto& [name, images] : group_images(folder, patterns)) {
+    const fs::path cell = folder / name, toml = cell / "cell.toml";
+    cells.push_back(name);
+    if (fs::exists(toml)) continue;
+    fs::create_directories(cell);
+    write_text(toml, toml_of(settings, images, folder, cell));
+  }
+  return cells;
+}
+
+}  // namespace mbtfm::runner

@@ -1,0 +1,63 @@
+/// Simulated cells seen through a microscope of a given quality, and how well a segmentation finds what is in them.
+#pragma once
+
+#include <map>
+#include <string>
+
+#include "samples/draw.h"
+#include "samples/render.h"
+#include "samples/scenario.h"
+#include "segment/segment_cell.h"
+#include "tests/support/segmentation_score.h"
+
+namespace mbtfm::test {
+
+struct SimulatedCell {
+  Cell truth;
+  segment::Channel adhesion, actin;
+};
+
+/// The images that `mbtfm-simulate --scenario … --image_quality … --seed … --images` writes, without the mechanics.
+inline SimulatedCell simulated_cell(const std::string& scenario, const std::string& quality, std::uint64_t seed,
+                                    int image_size_px = 1024) {
+  samples::ScenarioParameters p;
+  ParameterList list;
+  declare(list, p);
+  read_toml(list, samples::scenario_file(scenario));
+  p.microscope.image_quality = quality;
+  p.microscope.image_size_px = image_size_px;
+  const samples::MicroscopeParameters m = at_quality(p.microscope);
+  constexpr int kThreads = 2;
+  SimulatedCell cell{draw_cell(p.cell, p.tension, samples::field_um(m), seed).cell, {}, {}};
+  const auto image = [&](const samples::Image& specimen, int exposure) {
+    return samples::recorded(photons_of(specimen, m, kThreads), m, seed, exposure, kThreads);
+  };
+  cell.adhesion = {"paxillin.tif", image(paxillin_specimen(cell.truth, m, seed, kThreads), 0)};
+  cell.actin = {"actin.tif", image(actin_specimen(cell.truth, p.cell.n_ruffles, m, seed, kThreads), 1)};
+  for (segment::Channel* channel : {&cell.adhesion, &cell.actin}) channel->image.pixel_size_um = m.pixel_size_um;
+  return cell;
+}
+
+/// What is measured of one cell, by name; lengths in um, angles in degrees.
+using Accuracy = std::map<std::string, double>;
+
+inline Accuracy accuracy_of(const Cell& truth, const Cell& found) {
+  const AdhesionScore a = score_adhesions(truth.adhesions, found.adhesions);
+  const FibreScore f = score_fibres(truth, found, a);
+  const LineScore l = score_lines(truth.fibres, found.fibres, 0.25);
+  constexpr double kDegrees = 180 / std::numbers::pi;
+  Accuracy result = {{"adhesion F1", a.f1()},
+                     {"adhesion area bias", a.area_ratio - 1},
+                     {"adhesion area error, median", median(a.area_errors)},
+                     {"adhesion centre error, median (um)", median(a.centre_errors_um)},
+                     {"adhesion orientation error, median (deg)", kDegrees * median(a.angle_errors_rad)},
+                     {"fibre centreline F1 (0.25 um)", l.f1()},
+                     {"fibres in one piece", 1.0 * f.n_traced / std::max(1, f.n_true)},
+                     {"fibre type right", 1.0 * f.n_type_right / std::max(1, f.n_traced)},
+                     {"fibre type and adhesions right", 1.0 * f.n_typed / std::max(1, f.n_traced)},
+                     {"false fibres", 1.0 * f.n_false}};
+  if (!found.outline_um.empty()) result["outline IoU"] = intersection_over_union(truth.outline_um, found.outline_um);
+  return result;
+}
+
+}  // namespace mbtfm::test
