@@ -11,8 +11,8 @@ void declare(ParameterList& list, SegmentParameters& p) {
   list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("segment");
-  list.add("adhesion_page", p.adhesion_page, {.low = 1}, "page of the adhesion image to read, from 1");
-  list.add("actin_page", p.actin_page, {.low = 1}, "page of the actin image to read, from 1");
+  declare(list, p.adhesion_plane, "adhesion", "the adhesion image");
+  declare(list, p.actin_plane, "actin", "the actin image");
   list.add("contact_sheet", p.contact_sheet,
            "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
   declare(list, p.adhesions);
@@ -40,7 +40,7 @@ Segmentation segment_cell(const std::optional<Channel>& adhesion, const std::opt
                            " um² or more that stand out of the noise",
                        "no adhesion",
                        "is this the adhesion channel, in focus? Check pixel_size_um (" + in_um(pixel_um) +
-                           "), adhesion_page, and adhesion_seed_noise for a faint image");
+                           "), adhesion_channel, and adhesion_seed_noise for a faint image");
   }
   const Channel& shape = actin ? *actin : *adhesion;
   result.cell.outline_um =

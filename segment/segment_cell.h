@@ -15,8 +15,7 @@ namespace mbtfm::segment {
 
 struct SegmentParameters {
   std::optional<double> pixel_size_um;  ///< no default: it scales every force; the image's own calibration if unset
-  int adhesion_page = 1;                ///< most cameras write one page a file
-  int actin_page = 1;
+  PlaneChoice adhesion_plane, actin_plane;
   std::string contact_sheet;  ///< none: it takes a segmentation for each of its pictures
   AdhesionParameters adhesions;
   FibreParameters fibres;

@@ -11,10 +11,10 @@ namespace mbtfm::segment {
 
 namespace {
 
-std::optional<Channel> channel(StageContext& context, const std::string& argument, int page) {
+std::optional<Channel> channel(StageContext& context, const std::string& argument, const PlaneChoice& plane) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return Channel{file.string(), read_image(file, page - 1)};
+  return Channel{file.string(), read_image(file, plane)};
 }
 
 std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument) {
@@ -63,8 +63,8 @@ void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
 
 StageReport run(const SegmentParameters& parameters, StageContext& context) {
   cv::setNumThreads(context.threads);
-  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_page);
-  const auto actin = channel(context, "actin-image", parameters.actin_page);
+  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_plane);
+  const auto actin = channel(context, "actin-image", parameters.actin_plane);
   const HandDrawn drawn{roi_set(context, "outline-roi"), roi_set(context, "adhesion-rois"),
                         roi_set(context, "fibre-rois")};
   const Segmentation s = segment_cell(adhesion, actin, parameters, drawn);
