@@ -211,5 +211,28 @@ makeRotatedRectangle(20, 30, 70, 60, 12); save("rotated rectangle");
   }
 }
 
+TEST(ImageJ, a_hyperstack_it_saves_is_read_by_channel_slice_and_frame) {
+  if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
+  const TemporaryFolder folder;
+  for (const char* bits : {"8", "16", "32"}) {
+    const fs::path file = folder / (std::string(bits) + ".tif");
+    run_macro(folder.path(), "newImage('h', '" + std::string(bits) + R"(-bit grayscale-mode', 20, 10, 2, 3, 4);
+run("Properties...", "channels=2 slices=3 frames=4 unit=micron pixel_width=0.125 pixel_height=0.125 voxel_depth=1");
+for (c = 1; c <= 2; c++) for (z = 1; z <= 3; z++) for (t = 1; t <= 4; t++) {
+  Stack.setPosition(c, z, t); run("Set...", "value=" + (100 * (c - 1) + 10 * z + t) + " slice");
+}
+saveAs("Tiff", ")" + file.string() +
+                                 R"(");)");
+    for (int c = 1; c <= 2; ++c)
+      for (int z = 1; z <= 3; ++z)
+        for (int t = 1; t <= 4; ++t) {
+          const segment::Image image =
+              segment::read_image(file, {.channel = std::to_string(c), .z = std::to_string(z), .time = t});
+          EXPECT_EQ(image.pixels, std::vector<float>(200, static_cast<float>(100 * (c - 1) + 10 * z + t)));
+          EXPECT_EQ(image.pixel_size_um, 0.125);
+        }
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm
