@@ -17,8 +17,8 @@ void declare(ParameterList& list, SegmentParameters& p) {
   list.add(
       "cell", p.cell, {.low = 0},
       "which cell of the image, by area from 1, the largest; 0: all, each in a folder cell_1, cell_2, … of its own");
-  list.add("adhesion_page", p.adhesion_page, {.low = 1}, "page of the adhesion image to read, from 1");
-  list.add("actin_page", p.actin_page, {.low = 1}, "page of the actin image to read, from 1");
+  declare(list, p.adhesion_plane, "adhesion", "the adhesion image");
+  declare(list, p.actin_plane, "actin", "the actin image");
   list.add("contact_sheet", p.contact_sheet,
            "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
   declare(list, p.adhesions);
@@ -32,10 +32,11 @@ void require_content(const Channel& channel) {
   const std::string reason = emptiness_of(channel.image);
   if (!reason.empty())
     throw InputError(channel.name, "a picture of a cell", reason,
-                     "is this the right file and page? Was it overexposed?");
+                     "is this the right file, channel and page? Was it overexposed?");
 }
 
 std::vector<Adhesion> adhesions_of(const Channel& channel, double pixel_um, const SegmentParameters& p) {
+  require_content(channel);
   const auto found = find_adhesions(channel.image, pixel_um, p.adhesions);
   if (found.empty())
     throw InputError(
@@ -43,13 +44,14 @@ std::vector<Adhesion> adhesions_of(const Channel& channel, double pixel_um, cons
         "bright spots of " + shortest(p.adhesions.adhesion_smallest_um2) + " um² or more that stand out of the noise",
         "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p.adhesions),
         "is this the adhesion channel, in focus? Check pixel_size_um (" + in_um(pixel_um) +
-            "), adhesion_page, and adhesion_seed_noise for a faint image");
+            "), adhesion_channel, and adhesion_seed_noise for a faint image");
   return found;
 }
 
-/// The cells that the parameters ask for.
-std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& channel, double pixel_um,
-                                const SegmentParameters& p) {
+std::vector<CellOutline> outlines_of(const Channel& channel, const std::vector<Adhesion>& adhesions, double pixel_um,
+                                     const SegmentParameters& p) {
+  require_content(channel);
+  std::vector<CellOutline> cells = find_cells(channel.image, adhesions, pixel_um, p.outline);
   if (cells.empty())
     throw InputError(
         channel.name, "a cell brighter than its surroundings",
@@ -59,6 +61,19 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& c
     throw InputError(
         channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",
         "crop the image to a single cell; outline_largest_um2 is " + shortest(p.outline.outline_largest_um2));
+  return cells;
+}
+
+/// A cell of which a person has drawn all there is.
+CellOutline whole_cell(const Polygon& outline_um) {
+  CellOutline cell;
+  cell.outer_um = outline_um;
+  cell.area_um2 = std::abs(signed_area_um2(outline_um));
+  return cell;
+}
+
+/// The cells that the parameters ask for.
+std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& channel, const SegmentParameters& p) {
   if (p.cell == 0) return cells;
   if (p.cell > static_cast<int>(cells.size()))
     throw InputError(channel.name, "cell " + std::to_string(p.cell), std::to_string(cells.size()) + " in all",
@@ -92,8 +107,9 @@ Crop crop_to(const Image& image, const Polygon& outline_um, double pixel_um) {
   return crop;
 }
 
-std::vector<Fibre> fibres_of(const Image& actin, const Cell& cell, double pixel_um, const FibreParameters& p) {
-  const Crop crop = crop_to(actin, cell.outline_um, pixel_um);
+std::vector<Fibre> fibres_of(const Channel& actin, const Cell& cell, double pixel_um, const FibreParameters& p) {
+  require_content(actin);
+  const Crop crop = crop_to(actin.image, cell.outline_um, pixel_um);
   Polygon outline = cell.outline_um;
   std::vector<Adhesion> adhesions = cell.adhesions;
   for (Vec2& point : outline) point = point - crop.origin_um;
@@ -107,18 +123,22 @@ std::vector<Fibre> fibres_of(const Image& actin, const Cell& cell, double pixel_
 }  // namespace
 
 std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                                        const SegmentParameters& p) {
+                                        const SegmentParameters& p, const HandDrawn& drawn) {
   if (!adhesion && !actin) throw UsageError("an adhesion image or an actin image is needed, best both");
+  if (drawn.fibres && p.cell == 0)
+    throw UsageError("fibres drawn by hand belong to one cell: choose it (cell), not all of them (cell = 0)");
   const Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
   require_equal_sizes(first, second);
   const double pixel_um = common_pixel_size_um(first, second, p.pixel_size_um);
-  for (const Channel* channel : {&first, &second}) require_content(*channel);
-  std::vector<Adhesion> found;
-  if (adhesion) found = adhesions_of(*adhesion, pixel_um, p);
+  const Field field{first.image.width, first.image.height, pixel_um};
+  const auto found = drawn.adhesions ? hand_drawn_adhesions(*drawn.adhesions, adhesion, field)
+                     : adhesion      ? adhesions_of(*adhesion, pixel_um, p)
+                                     : std::vector<Adhesion>{};
   const Channel& shape = actin ? *actin : *adhesion;
-  const auto outlines = find_cells(shape.image, found, pixel_um, p.outline);
+  const auto outlines = drawn.outline ? std::vector{whole_cell(hand_drawn_outline(*drawn.outline, field))}
+                                      : outlines_of(shape, found, pixel_um, p);
   std::vector<Segmentation> result;
-  for (const CellOutline& outline : chosen(outlines, shape, pixel_um, p)) {
+  for (const CellOutline& outline : chosen(outlines, shape, p)) {
     Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um},
                    .pixel_size_um = pixel_um,
                    .n_cells = static_cast<int>(outlines.size()),
@@ -126,19 +146,22 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                    .is_cut_by_border = outline.is_cut_by_border};
     s.cell.adhesions = inside(outline, found);
     s.n_adhesions_outside = static_cast<int>(found.size() - s.cell.adhesions.size());
-    if (adhesion && s.cell.adhesions.empty() && p.cell != 0)
-      throw InputError(adhesion->name, "adhesions inside the cell's outline",
+    if (!found.empty() && s.cell.adhesions.empty() && p.cell != 0)
+      throw InputError(drawn.adhesions ? drawn.adhesions->name : adhesion->name, "adhesions inside the cell's outline",
                        std::to_string(found.size()) + " outside and none inside",
                        "do both channels show the same cell at the same place?");
-    if (actin) s.cell.fibres = fibres_of(actin->image, s.cell, pixel_um, p.fibres);
+    if (drawn.fibres)
+      s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, actin, field, p.fibres);
+    else if (actin)
+      s.cell.fibres = fibres_of(*actin, s.cell, pixel_um, p.fibres);
     result.push_back(std::move(s));
   }
   return result;
 }
 
 Segmentation segment_cell(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                          const SegmentParameters& p) {
-  return segment_cells(adhesion, actin, p).front();
+                          const SegmentParameters& p, const HandDrawn& drawn) {
+  return segment_cells(adhesion, actin, p, drawn).front();
 }
 
 }  // namespace mbtfm::segment

@@ -1,0 +1,382 @@
+#include "segment/roi.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::segment {
+namespace {
+
+// Places in the header (bytes), values of its fields
+constexpr std::size_t kVersion = 4, kType = 6, kTop = 8, kLeft = 10, kBottom = 12, kRight = 14, kPoints = 16,
+                      kFloats = 18, kStrokeWidth = 34, kCompositeSize = 36, kStrokeColour = 40, kSubtype = 48,
+                      kOptions = 50, kAspectRatio = 52, kCornerDiameter = 54, kHeader2 = 60, kCoordinates = 64;
+constexpr std::size_t kNameOffset = 16, kNameLength = 20, kGroup = 30, kFloatStrokeWidth = 36, kHeader2Size = 64;
+constexpr int kSpline = 1, kSubPixel = 128;
+constexpr int kTextSubtype = 1, kEllipseSubtype = 3, kImageSubtype = 4;
+constexpr int kFreehandType = 7;
+constexpr RoiShape kShapes[] = {
+    RoiShape::polygon,  RoiShape::rectangle,          RoiShape::oval,     RoiShape::line,   RoiShape::freehand_line,
+    RoiShape::polyline, RoiShape::point /* "none" */, RoiShape::freehand, RoiShape::traced, RoiShape::angle,
+    RoiShape::point};
+
+/// Big-endian numbers at places of a string; a place beyond its end is an InputError.
+class Bytes {
+ public:
+  Bytes(std::string_view bytes, const std::string& where) : bytes_(bytes), where_(where) {}
+  std::uint32_t number(std::size_t at, int n_bytes) const {
+    require(at, static_cast<std::size_t>(n_bytes));
+    std::uint32_t value = 0;
+    for (int i = 0; i < n_bytes; ++i) value = value << 8 | static_cast<unsigned char>(bytes_[at + i]);
+    return value;
+  }
+  int whole(std::size_t at) const { return static_cast<std::int16_t>(number(at, 2)); }
+  double real(std::size_t at) const {
+    const float value = std::bit_cast<float>(number(at, 4));
+    if (!std::isfinite(value)) throw InputError(where_, "finite coordinates", "NaN or infinity");
+    return value;
+  }
+  void require(std::size_t at, std::size_t n_bytes) const {
+    if (at <= bytes_.size() && n_bytes <= bytes_.size() - at) return;
+    throw InputError(where_, "a whole ImageJ ROI", "only " + std::to_string(bytes_.size()) + " bytes",
+                     "the file may be truncated or damaged: save the selection again");
+  }
+
+ private:
+  std::string_view bytes_;
+  const std::string& where_;
+};
+
+void append_utf8(std::string& text, std::uint32_t c) {
+  const auto put = [&](std::uint32_t byte) { text += static_cast<char>(byte); };
+  if (c < 0x80) return put(c);
+  if (c < 0x800) {
+    put(0xC0 | c >> 6);
+  } else if (c < 0x10000) {
+    put(0xE0 | c >> 12);
+    put(0x80 | (c >> 6 & 0x3F));
+  } else {
+    put(0xF0 | c >> 18);
+    put(0x80 | (c >> 12 & 0x3F));
+    put(0x80 | (c >> 6 & 0x3F));
+  }
+  put(0x80 | (c & 0x3F));
+}
+
+/// The name in UTF-16 as UTF-8; half of a surrogate pair becomes U+FFFD.
+std::string name_in(const Bytes& bytes, std::size_t header2) {
+  const std::size_t at = bytes.number(header2 + kNameOffset, 4), length = bytes.number(header2 + kNameLength, 4);
+  if (at == 0 || length == 0) return {};
+  bytes.require(at, 2 * length);
+  std::string name;
+  for (std::size_t i = 0; i < length; ++i) {
+    std::uint32_t c = bytes.number(at + 2 * i, 2);
+    if (c >= 0xD800 && c < 0xE000) {
+      const std::uint32_t low = c < 0xDC00 && i + 1 < length ? bytes.number(at + 2 * (i + 1), 2) : 0;
+      const bool is_pair = low >= 0xDC00 && low < 0xE000;
+      c = is_pair ? 0x10000 + ((c - 0xD800) << 10) + (low - 0xDC00) : 0xFFFD;
+      i += is_pair;
+    }
+    append_utf8(name, c);
+  }
+  return name;
+}
+
+std::vector<Vec2> points_in(const Bytes& bytes, bool is_sub_pixel, Vec2 corner) {
+  std::size_t n = bytes.number(kPoints, 2);
+  if (n == 0) n = bytes.number(kFloats, 4);  // more than 65535 points
+  const std::size_t n_shorts = kCoordinates + 4 * n;
+  bytes.require(kCoordinates, is_sub_pixel ? 12 * n : 4 * n);
+  std::vector<Vec2> points;
+  points.reserve(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    if (is_sub_pixel) {
+      points.push_back({bytes.real(n_shorts + 4 * i), bytes.real(n_shorts + 4 * (n + i))});
+    } else {
+      const std::size_t at = kCoordinates + 2 * i;
+      points.push_back(corner +
+                       Vec2{static_cast<double>(bytes.whole(at)), static_cast<double>(bytes.whole(at + 2 * n))});
+    }
+  }
+  return points;
+}
+
+RoiShape shape_in(const Bytes& bytes, const std::string& where) {
+  const std::uint32_t type = bytes.number(kType, 1), subtype = bytes.number(kSubtype, 2);
+  if (type >= std::size(kShapes))
+    throw InputError(where, "a selection that ImageJ knows", "type " + std::to_string(type));
+  if (bytes.number(kCompositeSize, 4) > 0) return RoiShape::composite;
+  if (type == 1 && subtype == kTextSubtype) return RoiShape::text;
+  if (type == 1 && subtype == kImageSubtype) return RoiShape::image;
+  return type == kFreehandType && subtype == kEllipseSubtype ? RoiShape::ellipse : kShapes[type];
+}
+
+void read_geometry(Roi& roi, const Bytes& bytes) {
+  // fractions came with version 222, for rectangles and ovals with 223
+  const bool is_box = roi.shape == RoiShape::rectangle || roi.shape == RoiShape::oval;
+  const bool is_sub_pixel =
+      (bytes.number(kOptions, 2) & kSubPixel) != 0 && bytes.whole(kVersion) >= (is_box ? 223 : 222);
+  const auto reals = [&](int i) { return Vec2{bytes.real(kFloats + 8 * i), bytes.real(kFloats + 8 * i + 4)}; };
+  const Vec2 corner{static_cast<double>(bytes.whole(kLeft)), static_cast<double>(bytes.whole(kTop))};
+  const Vec2 far_corner{static_cast<double>(bytes.whole(kRight)), static_cast<double>(bytes.whole(kBottom))};
+  switch (roi.shape) {
+    case RoiShape::rectangle:
+      roi.corner_diameter_px = bytes.whole(kCornerDiameter);
+      [[fallthrough]];
+    case RoiShape::oval:
+      roi.corner_px = is_sub_pixel ? reals(0) : corner;
+      roi.size_px = is_sub_pixel ? reals(1) : far_corner - corner;
+      break;
+    case RoiShape::ellipse:
+      roi.aspect_ratio = bytes.real(kAspectRatio);
+      [[fallthrough]];
+    case RoiShape::line:
+      roi.points_px = {reals(0), reals(1)};
+      break;
+    case RoiShape::composite:
+    case RoiShape::text:
+    case RoiShape::image:
+      break;
+    default:
+      roi.points_px = points_in(bytes, is_sub_pixel, corner);
+      roi.is_spline = (bytes.number(kOptions, 2) & kSpline) != 0;
+  }
+}
+
+/// The natural cubic spline through values at increasing places (Thomas' algorithm for its second derivatives).
+class NaturalSpline {
+ public:
+  NaturalSpline(std::vector<double> places, std::vector<double> values)
+      : places_(std::move(places)), values_(std::move(values)), bends_(values_.size(), 0.0) {
+    const std::size_t n = values_.size();
+    std::vector<double> above(n, 0.0);
+    for (std::size_t i = 1; i + 1 < n; ++i) {
+      const double before = places_[i] - places_[i - 1], after = places_[i + 1] - places_[i];
+      const double pivot = 2 * (before + after) - before * above[i - 1];
+      const double kink = (values_[i + 1] - values_[i]) / after - (values_[i] - values_[i - 1]) / before;
+      above[i] = after / pivot;
+      bends_[i] = (6 * kink - before * bends_[i - 1]) / pivot;
+    }
+    for (std::size_t i = n - 1; i-- > 1;) bends_[i] -= above[i] * bends_[i + 1];
+  }
+  double at(double place) const {
+    const auto next = std::upper_bound(places_.begin() + 1, places_.end() - 1, place);
+    const auto i = static_cast<std::size_t>(next - places_.begin()) - 1;
+    const double h = places_[i + 1] - places_[i], b = (place - places_[i]) / h, a = 1 - b;
+    return a * values_[i] + b * values_[i + 1] +
+           ((a * a * a - a) * bends_[i] + (b * b * b - b) * bends_[i + 1]) * h * h / 6;
+  }
+
+ private:
+  std::vector<double> places_, values_, bends_;
+};
+
+std::vector<Vec2> without_repetition(const std::vector<Vec2>& points) {
+  std::vector<Vec2> different;
+  for (const Vec2 p : points) {
+    if (different.empty() || !(p == different.back())) different.push_back(p);
+  }
+  return different;
+}
+
+/// The curve that ImageJ draws through the nodes: natural cubic splines of x and y over the sum of the square roots of
+/// the nodes' distances; a closed one repeats up to 7 nodes at either end (SplineFitter). A point every two pixels of
+/// the nodes' line, at least 100 (PolygonRoi.fitSpline).
+std::vector<Vec2> spline_through(std::vector<Vec2> nodes, bool is_closed) {
+  nodes = without_repetition(nodes);
+  if (is_closed && !nodes.empty() && !(nodes.front() == nodes.back())) nodes.push_back(nodes.front());
+  const std::size_t n = nodes.size();
+  if (n < 3) return nodes;
+  std::vector<double> own(n, 0.0);
+  for (std::size_t i = 1; i < n; ++i) own[i] = own[i - 1] + std::sqrt(norm(nodes[i] - nodes[i - 1]));
+  const std::size_t n_repeated = is_closed ? std::min<std::size_t>(7, n - 1) : 0;
+  std::vector<double> places, x, y;
+  const auto add = [&](double place, Vec2 node) {
+    places.push_back(place);
+    x.push_back(node.x);
+    y.push_back(node.y);
+  };
+  for (std::size_t i = n - 1 - n_repeated; i + 1 < n; ++i) add(own[i] - own.back(), nodes[i]);
+  for (std::size_t i = 0; i < n; ++i) add(own[i], nodes[i]);
+  for (std::size_t i = 1; i <= n_repeated; ++i) add(own[i] + own.back(), nodes[i]);
+  const NaturalSpline spline_x(places, x), spline_y(places, y);
+  const auto n_points = std::max<std::size_t>(100, static_cast<std::size_t>(length_um(nodes) / 2));
+  std::vector<Vec2> curve;
+  for (std::size_t i = 0; i < n_points; ++i) {
+    const double place = own.back() * static_cast<double>(i) / static_cast<double>(n_points - 1);
+    curve.push_back({spline_x.at(place), spline_y.at(place)});
+  }
+  return curve;
+}
+
+/// Points of the ellipse of semi-axes a along `along` and b across it, from angle `from` over `turn`.
+void add_arc(Polygon& polygon, Vec2 centre, Vec2 along, double a, double b, double from, double turn, int n) {
+  const Vec2 across{-along.y, along.x};
+  for (int i = 0; i < n; ++i) {
+    const double phi = from + turn * i / n;
+    polygon.push_back(centre + a * std::cos(phi) * along + b * std::sin(phi) * across);
+  }
+}
+
+Polygon rectangle_corners(const Roi& roi) {
+  const Vec2 low = roi.corner_px, high = low + roi.size_px;
+  const double r_x = std::min(roi.corner_diameter_px, roi.size_px.x) / 2;
+  const double r_y = std::min(roi.corner_diameter_px, roi.size_px.y) / 2;
+  if (r_x <= 0 || r_y <= 0) return {low, {high.x, low.y}, high, {low.x, high.y}};
+  Polygon polygon;
+  const Vec2 centres[] = {
+      {high.x - r_x, high.y - r_y}, {low.x + r_x, high.y - r_y}, low + Vec2{r_x, r_y}, {high.x - r_x, low.y + r_y}};
+  constexpr int kByCorner = 32;
+  for (int i = 0; i < 4; ++i) {
+    // both ends of the quarter belong to it
+    add_arc(polygon, centres[i], {1, 0}, r_x, r_y, i * std::numbers::pi / 2,
+            std::numbers::pi / 2 * kByCorner / (kByCorner - 1), kByCorner);
+  }
+  return polygon;
+}
+
+// ---- writing
+
+struct Writer {
+  std::string bytes;
+  void number(std::size_t at, std::uint32_t value, int n_bytes) {
+    if (bytes.size() < at + n_bytes) bytes.resize(at + n_bytes);
+    for (int i = 0; i < n_bytes; ++i) bytes[at + i] = static_cast<char>(value >> 8 * (n_bytes - 1 - i));
+  }
+  void real(std::size_t at, double value) { number(at, std::bit_cast<std::uint32_t>(static_cast<float>(value)), 4); }
+};
+
+int type_of(RoiShape shape) {
+  if (shape == RoiShape::ellipse) return kFreehandType;
+  return static_cast<int>(std::find(std::begin(kShapes), std::end(kShapes), shape) - std::begin(kShapes));
+}
+
+void write_points(Writer& out, const std::vector<Vec2>& points) {
+  Vec2 low = points.front(), high = low;
+  for (const Vec2 p : points) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  const auto whole = [](double value) { return static_cast<std::uint32_t>(static_cast<int>(std::floor(value))); };
+  out.number(kTop, whole(low.y), 2);
+  out.number(kLeft, whole(low.x), 2);
+  out.number(kBottom, whole(high.y) + 1, 2);
+  out.number(kRight, whole(high.x) + 1, 2);
+  const std::size_t n = points.size(), n_shorts = kCoordinates + 4 * n;
+  out.number(kPoints, static_cast<std::uint32_t>(n), 2);
+  for (std::size_t i = 0; i < n; ++i) {
+    out.number(kCoordinates + 2 * i, whole(points[i].x) - whole(low.x), 2);
+    out.number(kCoordinates + 2 * (n + i), whole(points[i].y) - whole(low.y), 2);
+    out.real(n_shorts + 4 * i, points[i].x);
+    out.real(n_shorts + 4 * (n + i), points[i].y);
+  }
+}
+
+/// UTF-8 to UTF-16; mbtfm's own names are ASCII.
+void write_name(Writer& out, std::size_t header2, const std::string& name) {
+  out.number(header2 + kNameOffset, static_cast<std::uint32_t>(header2 + kHeader2Size), 4);
+  out.number(header2 + kNameLength, static_cast<std::uint32_t>(name.size()), 4);
+  for (std::size_t i = 0; i < name.size(); ++i) {
+    MBTFM_ASSERT(static_cast<unsigned char>(name[i]) < 0x80);
+    out.number(header2 + kHeader2Size + 2 * i, static_cast<unsigned char>(name[i]), 2);
+  }
+}
+
+}  // namespace
+
+std::string_view name_of(RoiShape shape) {
+  static constexpr std::string_view kNames[] = {
+      "a polygon",       "a freehand area", "a traced area",     "a rectangle",
+      "an oval",         "an ellipse",      "a straight line",   "a segmented line",
+      "a freehand line", "an angle",        "a point selection", "a composite selection (several areas or holes)",
+      "a text",          "an image"};
+  return kNames[static_cast<std::size_t>(shape)];
+}
+
+bool is_area(RoiShape shape) { return shape <= RoiShape::ellipse; }
+bool is_line(RoiShape shape) { return shape >= RoiShape::line && shape <= RoiShape::freehand_line; }
+
+Roi decode_roi(std::string_view data, const std::string& where) {
+  if (!data.starts_with("Iout")) throw InputError(where, "an ImageJ ROI", "bytes of another kind");
+  const Bytes bytes(data, where);
+  bytes.require(0, kCoordinates);
+  Roi roi;
+  roi.shape = shape_in(bytes, where);
+  read_geometry(roi, bytes);
+  roi.stroke_argb = bytes.number(kStrokeColour, 4);
+  roi.stroke_width_px = bytes.whole(kStrokeWidth);
+  const std::size_t header2 = bytes.number(kHeader2, 4);
+  if (header2 == 0) return roi;  // before ImageJ 1.43
+  bytes.require(header2, kHeader2Size);
+  roi.name = name_in(bytes, header2);
+  roi.group = static_cast<int>(bytes.number(header2 + kGroup, 1));
+  const double width_px = bytes.real(header2 + kFloatStrokeWidth);
+  if (width_px > 0) roi.stroke_width_px = width_px;
+  return roi;
+}
+
+std::string encode_roi(const Roi& roi) {
+  MBTFM_ASSERT(roi.shape == RoiShape::polygon || roi.shape == RoiShape::polyline || roi.shape == RoiShape::ellipse);
+  MBTFM_ASSERT(!roi.points_px.empty() && roi.points_px.size() < 65536);
+  constexpr std::uint32_t kWritten = 228;  // the format of ImageJ 1.53
+  Writer out;
+  out.bytes = "Iout";
+  out.number(kVersion, kWritten, 2);
+  out.number(kType, static_cast<std::uint32_t>(type_of(roi.shape)), 1);
+  out.number(kCoordinates - 1, 0, 1);
+  write_points(out, roi.shape == RoiShape::ellipse ? area_px(roi) : roi.points_px);
+  if (roi.shape == RoiShape::ellipse) {
+    out.number(kSubtype, kEllipseSubtype, 2);
+    out.real(kAspectRatio, roi.aspect_ratio);
+    for (int i = 0; i < 2; ++i) {
+      out.real(kFloats + 8 * i, roi.points_px[i].x);
+      out.real(kFloats + 8 * i + 4, roi.points_px[i].y);
+    }
+  }
+  out.number(kStrokeWidth, static_cast<std::uint32_t>(std::lround(roi.stroke_width_px)), 2);
+  out.number(kStrokeColour, roi.stroke_argb, 4);
+  out.number(kOptions, kSubPixel, 2);
+  const std::size_t header2 = out.bytes.size();
+  out.number(kHeader2, static_cast<std::uint32_t>(header2), 4);
+  out.number(header2 + kHeader2Size - 1, 0, 1);
+  out.number(header2 + kGroup, static_cast<std::uint32_t>(roi.group), 1);
+  out.real(header2 + kFloatStrokeWidth, roi.stroke_width_px);
+  write_name(out, header2, roi.name);
+  return out.bytes;
+}
+
+Polyline line_px(const Roi& roi) {
+  MBTFM_ASSERT(is_line(roi.shape));
+  Polyline line = roi.is_spline ? spline_through(roi.points_px, false) : roi.points_px;
+  for (Vec2& point : line) point += {0.5, 0.5};
+  return line;
+}
+
+Polygon area_px(const Roi& roi) {
+  MBTFM_ASSERT(is_area(roi.shape));
+  constexpr int kRound = 360;
+  Polygon polygon;
+  switch (roi.shape) {
+    case RoiShape::rectangle:
+      return rectangle_corners(roi);
+    case RoiShape::oval:
+      add_arc(polygon, roi.corner_px + 0.5 * roi.size_px, {1, 0}, roi.size_px.x / 2, roi.size_px.y / 2, 0,
+              2 * std::numbers::pi, kRound);
+      return polygon;
+    case RoiShape::ellipse: {
+      const Vec2 axis = roi.points_px[1] - roi.points_px[0];
+      const double major = norm(axis);
+      const Vec2 along = major > 0 ? (1 / major) * axis : Vec2{1, 0};
+      add_arc(polygon, roi.points_px[0] + 0.5 * axis, along, major / 2, roi.aspect_ratio * major / 2, 0,
+              2 * std::numbers::pi, kRound);
+      return polygon;
+    }
+    default:
+      return roi.is_spline ? spline_through(roi.points_px, true) : roi.points_px;
+  }
+}
+
+}  // namespace mbtfm::segment
