@@ -23,8 +23,9 @@ constexpr double kSettled = 0.01;  // of one pixel's mean square: a tenth of the
 /// First order in the distance; exact enough to choose pixels by.
 double distance_to_rim(const BlurredEllipse& e, double x, double y) {
   const double c = std::cos(e.angle_rad), s = std::sin(e.angle_rad), a = e.semi_major, b = e.semi_minor;
-  const double u = (x - e.x) * c + (y - e.y) * s, v = -(x - e.x) * s + (y - e.y) * c, q = std::hypot(u / a, v / b);
-  return q < 1e-9 ? -b : (q - 1) * q / std::hypot(u / (a * a), v / (b * b));
+  const double u = (x - e.x) * c + (y - e.y) * s, v = -(x - e.x) * s + (y - e.y) * c;
+  const double q = std::sqrt(u * u / (a * a) + v * v / (b * b));
+  return q < 1e-9 ? -b : (q - 1) * q / std::sqrt(u * u / (a * a * a * a) + v * v / (b * b * b * b));
 }
 
 /// Pixels within `margin` of the ellipse's rim or inside.
@@ -202,12 +203,12 @@ double mean_noise(const cv::Mat& noise, const std::vector<Sample>& samples) {
 
 /// @param window  the ellipse around which pixels are taken
 /// @param from    where the iteration starts
-FittedEllipse fit(const cv::Mat& height, const cv::Mat& noise, const BlurredEllipse& window, const BlurredEllipse& from,
+FittedEllipse fit(const cv::Mat& height, const cv::Mat& noise, const BlurredEllipse& window, const State& from,
                   const std::vector<EllipseModel>& neighbours, const Priors& priors) {
   const auto samples = samples_around(height, window, neighbours);
-  FittedEllipse result{window};
+  FittedEllipse result{window, 0};
   if (samples.size() <= kUnknowns) return result;
-  const Solution s = solve(samples, {from, 0}, Shape::held, priors);
+  const Solution s = solve(samples, from, Shape::held, priors);
   const double n = static_cast<double>(samples.size());
   double mean = 0, variance = 0;
   for (const Sample& p : samples) mean += p.value / n;
@@ -216,7 +217,9 @@ FittedEllipse fit(const cv::Mat& height, const cv::Mat& noise, const BlurredElli
   result.unexplained = signal > 0 ? std::max(0.0, s.scatter - of_noise) / signal : 1;
   result.scatter = s.scatter;
   result.is_settled = s.is_settled && is_plausible(s.state.ellipse, window);
-  if (is_plausible(s.state.ellipse, window)) result.ellipse = in_order(s.state.ellipse);
+  if (!is_plausible(s.state.ellipse, window)) return result;
+  result.ellipse = in_order(s.state.ellipse);
+  result.ground = s.state.ground;
   return result;
 }
 
@@ -353,7 +356,7 @@ std::vector<FittedEllipse> fit_ellipses(const cv::Mat& height, const cv::Mat& no
   std::vector<Priors> priors(start.size());
   for (int round = 0; round < kRounds; ++round) {
     for_each_with_neighbours(height, start, current, [&](int i, const std::vector<EllipseModel>& near) {
-      fitted[i] = fit(height, noise, start[i], current[i], near, priors[i]);
+      fitted[i] = fit(height, noise, start[i], {current[i], fitted[i].ground}, near, priors[i]);
     });
     const auto common = common_brightness(fitted);
     for (std::size_t i = 0; i < current.size(); ++i) {

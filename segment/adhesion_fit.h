@@ -11,6 +11,7 @@ namespace mbtfm::segment {
 
 struct FittedEllipse {
   BlurredEllipse ellipse;
+  double ground = 0;        ///< level around it
   bool is_settled = false;  ///< the iteration ended at a minimum that is an ellipse within the window
   double scatter = 0;       ///< mean square of what the model leaves
   double unexplained = 1;   ///< share of the window's variance, less that of the noise, that the model leaves

@@ -39,8 +39,8 @@ const NormalTable& normal() {
   return table;
 }
 
-constexpr double kNodeSpacing = 1.3;  // in standard deviations: see the header
-constexpr double kReach = 4.5;        // a strip further away than this many deviations adds less than 1e-5
+constexpr double kNodeSpacing = 1.5;  // in standard deviations: see the header
+constexpr double kReach = 4;          // a strip further away than this many deviations adds less than 1e-4
 
 }  // namespace
 
