@@ -59,6 +59,10 @@ TEST(Image, colour_is_read_as_the_mean_of_red_green_and_blue) {
   const Image image = read_image(folder / "a.png");
   EXPECT_EQ(image.pixels, (std::vector<float>{30, 7}));
   EXPECT_EQ(image.full_scale, 255);
+  EXPECT_EQ(read_image(folder / "a.png", {.channel = "green"}).pixels, (std::vector<float>{20, 7}));
+  EXPECT_THROW(read_image(folder / "a.png", {.channel = "cyan"}), InputError);
+  EXPECT_THROW(read_image(folder / "a.png", {.page = 2}), InputError);
+  EXPECT_THROW(read_image(folder / "a.png", {.time = 2}), InputError);
 }
 
 struct CalibrationCase {
