@@ -38,6 +38,9 @@ class Bytes {
     if (!std::isfinite(value)) throw InputError(where_, "finite coordinates", "NaN or infinity");
     return value;
   }
+  [[noreturn]] void refuse(const std::string& expected, const std::string& found) const {
+    throw InputError(where_, expected, found, "the file may be damaged: save the selection again");
+  }
   void require(std::size_t at, std::size_t n_bytes) const {
     if (at <= bytes_.size() && n_bytes <= bytes_.size() - at) return;
     throw InputError(where_, "a whole ImageJ ROI", "only " + std::to_string(bytes_.size()) + " bytes",
@@ -63,6 +66,19 @@ void append_utf8(std::string& text, std::uint32_t c) {
     put(0x80 | (c >> 6 & 0x3F));
   }
   put(0x80 | (c & 0x3F));
+}
+
+/// Add the points of a Bézier curve of these control points, the first of which is there already; one point: itself.
+void append_curve(Polygon& path, std::vector<Vec2> nodes) {
+  if (nodes.size() == 1) path.push_back(nodes.front());
+  constexpr int kSteps = 16;  // a quarter of a circle to 2e-4 of its radius
+  for (int step = 1; step <= kSteps && nodes.size() > 1; ++step) {
+    const double t = static_cast<double>(step) / kSteps;
+    std::vector<Vec2> p = nodes;  // de Casteljau
+    for (std::size_t n = p.size() - 1; n > 0; --n)
+      for (std::size_t i = 0; i < n; ++i) p[i] = (1 - t) * p[i] + t * p[i + 1];
+    path.push_back(p.front());
+  }
 }
 
 /// The name in UTF-16 as UTF-8; half of a surrogate pair becomes U+FFFD.
@@ -103,6 +119,40 @@ std::vector<Vec2> points_in(const Bytes& bytes, bool is_sub_pixel, Vec2 corner) 
   return points;
 }
 
+/// The paths of a composite selection: moves, lines, parabolas, cubics and ends of java.awt.geom.PathIterator.
+std::vector<Polygon> paths_in(const Bytes& bytes) {
+  const std::size_t n = bytes.number(kCompositeSize, 4);
+  bytes.require(kCoordinates, 4 * n);
+  constexpr std::size_t kPointsOf[] = {1, 1, 2, 3, 0};  // by kind of segment
+  std::vector<Polygon> paths;
+  for (std::size_t i = 0; i < n;) {
+    const double kind = bytes.real(kCoordinates + 4 * i++);
+    const bool is_known = kind >= 0 && kind <= 4 && kind == std::floor(kind) && (kind == 0 || !paths.empty());
+    const std::size_t n_points = is_known ? kPointsOf[static_cast<int>(kind)] : 0;
+    if (!is_known || i + 2 * n_points > n) bytes.refuse("a path that ImageJ knows", "a damaged one");
+    if (kind == 0) paths.emplace_back();
+    Polygon nodes;
+    if (n_points > 1) nodes.push_back(paths.back().back());
+    for (std::size_t k = 0; k < n_points; ++k, i += 2)
+      nodes.push_back({bytes.real(kCoordinates + 4 * i), bytes.real(kCoordinates + 4 * i + 4)});
+    append_curve(paths.back(), nodes);
+  }
+  return paths;
+}
+
+/// One closed line through all paths: from the first path's begin to each further one, round it, and back. The ways
+/// there and back cancel in areas, moments and crossings, so that holes, which ImageJ stores in the opposite turn,
+/// count as such.
+Polygon joined(const std::vector<Polygon>& paths) {
+  Polygon line;
+  for (const Polygon& path : paths) {
+    line.insert(line.end(), path.begin(), path.end());
+    line.push_back(path.front());
+    if (&path != &paths.front()) line.push_back(paths.front().front());
+  }
+  return line;
+}
+
 RoiShape shape_in(const Bytes& bytes, const std::string& where) {
   const std::uint32_t type = bytes.number(kType, 1), subtype = bytes.number(kSubtype, 2);
   if (type >= std::size(kShapes))
@@ -135,7 +185,12 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
     case RoiShape::line:
       roi.points_px = {reals(0), reals(1)};
       break;
-    case RoiShape::composite:
+    case RoiShape::composite: {
+      const std::vector<Polygon> paths = paths_in(bytes);
+      roi.n_paths = static_cast<int>(paths.size());
+      roi.points_px = joined(paths);
+      break;
+    }
     case RoiShape::text:
     case RoiShape::image:
       break;
@@ -195,15 +250,40 @@ void write_name(Writer& out, std::size_t header2, const std::string& name) {
 }  // namespace
 
 std::string_view name_of(RoiShape shape) {
-  static constexpr std::string_view kNames[] = {
-      "a polygon",       "a freehand area", "a traced area",     "a rectangle",
-      "an oval",         "an ellipse",      "a straight line",   "a segmented line",
-      "a freehand line", "an angle",        "a point selection", "a composite selection (several areas or holes)",
-      "a text",          "an image"};
-  return kNames[static_cast<std::size_t>(shape)];
+  switch (shape) {
+    case RoiShape::polygon:
+      return "a polygon";
+    case RoiShape::freehand:
+      return "a freehand area";
+    case RoiShape::traced:
+      return "a traced area";
+    case RoiShape::rectangle:
+      return "a rectangle";
+    case RoiShape::oval:
+      return "an oval";
+    case RoiShape::ellipse:
+      return "an ellipse";
+    case RoiShape::composite:
+      return "a composite selection";
+    case RoiShape::line:
+      return "a straight line";
+    case RoiShape::polyline:
+      return "a segmented line";
+    case RoiShape::freehand_line:
+      return "a freehand line";
+    case RoiShape::angle:
+      return "an angle";
+    case RoiShape::point:
+      return "a point selection";
+    case RoiShape::text:
+      return "a text";
+    case RoiShape::image:
+      return "an image";
+  }
+  throw InternalError("unknown shape of a ROI");
 }
 
-bool is_area(RoiShape shape) { return shape <= RoiShape::ellipse; }
+bool is_area(RoiShape shape) { return shape <= RoiShape::composite; }
 bool is_line(RoiShape shape) { return shape >= RoiShape::line && shape <= RoiShape::freehand_line; }
 
 Roi decode_roi(std::string_view data, const std::string& where) {
