@@ -42,13 +42,48 @@ StageReport report_of(const Segmentation& s) {
                     {"n_dorsal", n_of(FibreType::dorsal)},
                     {"n_arc", n_of(FibreType::arc)},
                     {"fibre_length_um", length},
-                    {"cell_area_um2", std::abs(signed_area_um2(s.cell.outline_um))}};
+                    {"cell_area_um2", s.area_um2},
+                    {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
+                    {"is_cut_by_border", s.is_cut_by_border},
+                    {"n_cells_in_image", static_cast<std::int64_t>(s.n_cells)}};
   report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
                    std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
                    " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
   if (s.n_adhesions_outside > 0)
     report.summary += "; " + std::to_string(s.n_adhesions_outside) + " adhesions outside the cell left out";
+  if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
+  if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;
+}
+
+/// Of all cells of an image.
+StageReport report_of(const std::vector<Segmentation>& cells) {
+  std::int64_t n_adhesions = 0, n_fibres = 0, n_cut = 0;
+  for (const Segmentation& s : cells) {
+    n_adhesions += static_cast<std::int64_t>(s.cell.adhesions.size());
+    n_fibres += static_cast<std::int64_t>(s.cell.fibres.size());
+    n_cut += s.is_cut_by_border;
+  }
+  const auto n_cells = static_cast<std::int64_t>(cells.size());
+  return {.summary = std::to_string(n_cells) + " cells, " + std::to_string(n_cut) +
+                     " of them cut by the image's border; " + std::to_string(n_adhesions) + " adhesions, " +
+                     std::to_string(n_fibres) + " fibres",
+          .figures = {{"pixel_size_um", cells.front().pixel_size_um},
+                      {"n_cells", n_cells},
+                      {"n_cells_cut_by_border", n_cut},
+                      {"n_adhesions", n_adhesions},
+                      {"n_fibres", n_fibres}},
+          .effects = {}};
+}
+
+void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay) {
+  const auto out = [&](const char* file) { return context.output("out", folder + file); };
+  write_adhesions(out("adhesions.csv"), s.cell.adhesions);
+  write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
+  write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um);
+  write_cell_vtp(out("cell.vtp"), s.cell);
+  write_png(out("overlay.png"), overlay);
+  write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
 }
 
 void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
@@ -67,16 +102,14 @@ StageReport run(const SegmentParameters& parameters, StageContext& context) {
   const auto actin = channel(context, "actin-image", parameters.actin_plane);
   const HandDrawn drawn{roi_set(context, "outline-roi"), roi_set(context, "adhesion-rois"),
                         roi_set(context, "fibre-rois")};
-  const Segmentation s = segment_cell(adhesion, actin, parameters, drawn);
-  write_adhesions(context.output("out", "adhesions.csv"), s.cell.adhesions);
-  write_fibres(context.output("out", "fibres.csv"), context.output("out", "fibre_points.csv"), s.cell.fibres);
-  write_outline(context.output("out", "outline.csv"), s.cell.outline_um);
-  write_cell_vtp(context.output("out", "cell.vtp"), s.cell);
-  write_png(context.output("out", "overlay.png"), draw_overlay(adhesion, actin, s));
-  write_roi_set(context.output("out", "RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
+  const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
+    write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]));
+  }
   if (!parameters.contact_sheet.empty())
     write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));
-  StageReport report = report_of(s);
+  StageReport report = parameters.cell == 0 ? report_of(cells) : report_of(cells.front());
   add_drawn_by_hand(report, drawn);
   return report;
 }
