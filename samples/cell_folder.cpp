@@ -27,7 +27,7 @@ std::string to_toml(const ParameterList& list, const std::vector<std::string>& t
 void write_segmentation(const Cell& cell, const std::string& folder, const FileNamer& file) {
   write_adhesions(file(folder + "/adhesions.csv"), cell.adhesions);
   write_fibres(file(folder + "/fibres.csv"), file(folder + "/fibre_points.csv"), cell.fibres);
-  write_outline(file(folder + "/outline.csv"), cell.outline_um);
+  write_outline(file(folder + "/outline.csv"), cell.outline_um, cell.holes_um);
 }
 
 /// Where each bead really was in both images (noise and drift included).

@@ -87,7 +87,7 @@ DrawnCell draw_cell(const CellParameters& parameters, const TensionParameters& t
   draw_brightness(sketch, seed);
   check_field(sketch, field_um);
   for (Fibre& f : sketch.fibres) f.points_um = resampled(f.points_um, kPointSpacing_um);
-  drawn.cell = {std::move(sketch.adhesions), std::move(sketch.fibres), std::move(sketch.outline_um)};
+  drawn.cell = {std::move(sketch.adhesions), std::move(sketch.fibres), std::move(sketch.outline_um), {}};
   check(drawn.cell);
   return drawn;
 }

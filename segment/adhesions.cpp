@@ -2,143 +2,73 @@
 
 #include <algorithm>
 #include <cmath>
-#include <opencv2/imgproc.hpp>
 
-#include "segment/adhesion_regions.h"
-#include "segment/ellipse.h"
+#include "pipeline/contract/csv.h"
+#include "segment/adhesion_fit.h"
+#include "segment/adhesion_parts.h"
+#include "segment/emptiness.h"
 #include "segment/grid.h"
 
 namespace mbtfm::segment {
 
 namespace {
 
-/// What an adhesion's pixels are compared to.
-struct Contrast {
-  cv::Mat height;  ///< smoothed image above the local background
-  cv::Mat noise;   ///< standard deviation of `height` where there is no adhesion
-  double floor;    ///< heights below are texture or rounding
-};
+constexpr double kUsualBlur_um = 0.15;  ///< 0.21 · 560 nm / NA 1.2 … 0.9, a little out of focus
+constexpr double kWidestBlur_um = 0.2;  ///< a rim that is softer than any optics in focus is the adhesion's own
+constexpr double kUsualDome = 0.2;      ///< adhesions fade towards their rim
 
-/// Local noise is taken over this many background radii: enough background among dense adhesions.
-constexpr double kNoiseRadius = 2.5;
-
-Contrast contrast_of(const cv::Mat& image, double pixel_um, const AdhesionParameters& p) {
-  const double smoothing_px = std::max(0.5, p.adhesion_smoothing_um / pixel_um);
-  const double radius_px = std::max(3.0, p.adhesion_background_um / pixel_um);
-  const cv::Mat smooth = gaussian(image, smoothing_px);
-  Contrast c;
-  c.height = smooth - local_median(smooth, radius_px);
-  c.noise = cv::max(local_noise(image, kNoiseRadius * radius_px) * noise_gain(smoothing_px),
-                    local_spread(c.height, kNoiseRadius * radius_px));
-  // "bright": the mean height of what stands clearly out of the noise, weighted by the height itself, so that many
-  // faint pixels do not outvote the adhesions
-  double sum = 0, sum_of_squares = 0;
-  for (int y = 0; y < image.rows; ++y)
-    for (int x = 0; x < image.cols; ++x) {
-      const double height = c.height.at<float>(y, x);
-      if (height <= 2 * p.adhesion_seed_noise * c.noise.at<float>(y, x)) continue;
-      sum += height;
-      sum_of_squares += height * height;
-    }
-  const double typical = sum > 0 ? sum_of_squares / sum : 0;
-  // an image without noise still has the rounding of float arithmetic: 1e-5 of its brightest value
-  double darkest = 0, brightest = 0;
-  cv::minMaxLoc(image, &darkest, &brightest);
-  c.floor = std::max(p.adhesion_faintest * typical, 1e-5 * std::max(std::abs(darkest), std::abs(brightest)));
-  return c;
+BlurredEllipse in_pixels(const Adhesion& a, double pixel_um, CommonShape shape) {
+  const cv::Point2d centre = to_pixels(a.position_um, pixel_um);
+  return {.x = centre.x,
+          .y = centre.y,
+          .semi_major = a.major_axis_um / 2 / pixel_um,
+          .semi_minor = a.minor_axis_um / 2 / pixel_um,
+          .angle_rad = a.angle_rad,
+          .brightness = a.mean_intensity,
+          .dome = shape.dome,
+          .blur = shape.blur};
 }
 
-cv::Mat above(const Contrast& c, double n_sigma) {
-  const cv::Mat level = cv::max(c.noise * n_sigma, c.floor);
-  return c.height > level;
+Adhesion with_ellipse(Adhesion a, const BlurredEllipse& e, double pixel_um) {
+  a.position_um = to_um({e.x, e.y}, pixel_um);
+  a.major_axis_um = 2 * e.semi_major * pixel_um;
+  a.minor_axis_um = 2 * e.semi_minor * pixel_um;
+  a.area_um2 = CV_PI / 4 * a.major_axis_um * a.minor_axis_um;
+  a.angle_rad = std::remainder(e.angle_rad, CV_PI);
+  a.eccentricity = std::sqrt(std::max(0.0, 1 - std::pow(a.minor_axis_um / a.major_axis_um, 2)));
+  return a;
 }
 
-/// The pixels of one region and a margin around it.
-struct Patch {
-  cv::Rect box;
-  int label;
-};
-
-std::vector<Patch> patches_of(const cv::Mat& labels, int margin) {
-  double n = 0;
-  cv::minMaxLoc(labels, nullptr, &n);
-  std::vector<cv::Rect> boxes(static_cast<std::size_t>(n) + 1);
-  for (int y = 0; y < labels.rows; ++y)
-    for (int x = 0; x < labels.cols; ++x)
-      if (const int label = labels.at<int>(y, x)) boxes[label] |= cv::Rect(x, y, 1, 1);
-  std::vector<Patch> patches;
-  const cv::Rect frame(cv::Point(0, 0), labels.size());
-  for (int label = 1; label <= static_cast<int>(n); ++label) {
-    const cv::Rect grown =
-        cv::Rect(boxes[label].tl() - cv::Point(margin, margin), boxes[label].br() + cv::Point(margin, margin));
-    patches.push_back({grown & frame, label});
-  }
-  return patches;
+/// The fit is of this region and not of one with its neighbourhood: axes and centre within 30 % of the moments' (a
+/// narrow region's minor axis is too large by its blur, and may shrink).
+bool agrees(const BlurredEllipse& fit, const BlurredEllipse& region) {
+  constexpr double kWithin = 0.3;
+  const double c = std::cos(region.angle_rad), s = std::sin(region.angle_rad);
+  const double dx = fit.x - region.x, dy = fit.y - region.y;
+  const double along = std::abs(dx * c + dy * s) / region.semi_major,
+               across = std::abs(dy * c - dx * s) / region.semi_minor;
+  const double major = fit.semi_major / region.semi_major, minor = fit.semi_minor / region.semi_minor;
+  return std::max(along, across) < kWithin && std::max({major, 1 / major, minor}) < 1 + kWithin;
 }
 
-/// Height above the rim's level, positive inside: the level is a share of the greatest height near, within the region.
-cv::Mat excess_over_rim(const Contrast& c, const cv::Mat& labels, const Patch& patch, double radius_px,
-                        const AdhesionParameters& p) {
-  cv::Mat inside = labels(patch.box) == patch.label, own, greatest;
-  c.height(patch.box).copyTo(own, inside);
-  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
-  const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
-  cv::dilate(own, greatest, disc);
-  const cv::Mat faintest = cv::max(c.noise(patch.box) * p.adhesion_rim_noise, c.floor);
-  return c.height(patch.box) - cv::max(greatest * p.adhesion_rim_level, faintest);
-}
+/// The model explains nine tenths of the variance in the window.
+bool is_elliptical(const FittedEllipse& fit) { return fit.is_settled && fit.unexplained < 0.1; }
 
-/// The share of a pixel on the positive side of the level set: its distance to the pixel's centre, in pixels, plus ½.
-double share_of(const cv::Mat& excess, int x, int y) {
-  const auto at = [&](int column, int row) {
-    return excess.at<float>(std::clamp(row, 0, excess.rows - 1), std::clamp(column, 0, excess.cols - 1));
+std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<AdhesionRegion>& regions, double pixel_um,
+                                     const AdhesionParameters& p) {
+  const auto start = [&](CommonShape shape) {
+    std::vector<BlurredEllipse> ellipses;
+    for (const AdhesionRegion& r : regions) ellipses.push_back(in_pixels(r.adhesion, pixel_um, shape));
+    return ellipses;
   };
-  const double slope = std::hypot((at(x + 1, y) - at(x - 1, y)) / 2, (at(x, y + 1) - at(x, y - 1)) / 2);
-  const double value = at(x, y);
-  if (slope <= 1e-12 * std::abs(value)) return value > 0 ? 1 : 0;
-  return std::clamp(0.5 + value / slope, 0.0, 1.0);
-}
-
-cv::Mat filled(const cv::Mat& mask) {
-  cv::Mat padded, outside;
-  cv::copyMakeBorder(mask, padded, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
-  cv::floodFill(padded, cv::Point(0, 0), 128);
-  return padded(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
-}
-
-/// The region's parts above their rim, each as covered pixels.
-std::vector<std::vector<CoveredPixel>> parts_of(const cv::Mat& image_above_background, const cv::Mat& labels,
-                                                const Patch& patch, const cv::Mat& excess) {
-  cv::Mat core, parts;
-  cv::bitwise_and(labels(patch.box) == patch.label, excess > 0, core);
-  core = filled(core);
-  const int n = cv::connectedComponents(core, parts, 4, CV_32S);
-  std::vector<std::vector<CoveredPixel>> result;
-  for (int part = 1; part < n; ++part) {
-    const cv::Mat inside = parts == part;
-    cv::Mat grown;
-    cv::dilate(inside, grown, cv::getStructuringElement(cv::MORPH_CROSS, cv::Size(3, 3)));
-    std::vector<CoveredPixel> pixels;
-    for (int y = 0; y < core.rows; ++y)
-      for (int x = 0; x < core.cols; ++x) {
-        if (!grown.at<uchar>(y, x)) continue;
-        const bool is_core = inside.at<uchar>(y, x);
-        const int label = labels.at<int>(patch.box.y + y, patch.box.x + x);
-        if (!is_core && label != 0 && label != patch.label) continue;  // a neighbour's
-        // a filled hole counts whole; other pixels by the level set, whose sign says on which side the centre is
-        const double share = is_core && excess.at<float>(y, x) <= 0 ? 1 : share_of(excess, x, y);
-        if (share > 0)
-          pixels.push_back({patch.box.x + x, patch.box.y + y, share,
-                            image_above_background.at<float>(patch.box.y + y, patch.box.x + x)});
-      }
-    result.push_back(std::move(pixels));
+  if (regions.empty()) return {};
+  CommonShape shape{p.adhesion_blur_um.value_or(kUsualBlur_um) / pixel_um, kUsualDome};
+  if (!p.adhesion_blur_um) {
+    shape = common_shape(c.sharp, start(shape));
+    // half a pixel: what sampling alone does
+    shape.blur = std::max(0.5, std::min(shape.blur, kWidestBlur_um / pixel_um));
   }
-  return result;
-}
-
-bool reaches_seed(const std::vector<CoveredPixel>& pixels, const cv::Mat& seeds) {
-  return std::any_of(pixels.begin(), pixels.end(),
-                     [&](const CoveredPixel& p) { return p.share > 0.5 && seeds.at<uchar>(p.row, p.column); });
+  return fit_ellipses(c.sharp, c.sharp_noise, start(shape));
 }
 
 }  // namespace
@@ -157,6 +87,9 @@ void declare(ParameterList& list, AdhesionParameters& p) {
            {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
            "height of the rim as a share of the height near it");
   list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::positive(), "how near (um)");
+  list.add("adhesion_blur_um", p.adhesion_blur_um, Range::positive(),
+           "standard deviation of the blurred rim of an adhesion (um); unset: as the widest adhesions show it, between "
+           "half a pixel and 0.2 um");
   list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
            "dip between two adhesions that touch, as a share of the fainter one's height");
   list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::positive(), "smallest area (um²)");
@@ -165,28 +98,54 @@ void declare(ParameterList& list, AdhesionParameters& p) {
            "least height as a share of the mean height of bright pixels");
 }
 
-std::vector<Adhesion> find_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& p) {
+std::vector<AdhesionRegion> find_adhesion_regions(const Image& image, double pixel_size_um,
+                                                  const AdhesionParameters& p) {
   const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
-  const cv::Mat seeds = above(c, p.adhesion_seed_noise);
-  const double pixel_um2 = pixel_size_um * pixel_size_um, radius_px = p.adhesion_level_radius_um / pixel_size_um;
-  const SplitRule rule{.depth = p.adhesion_split_depth, .smallest_px = p.adhesion_smallest_um2 / pixel_um2 / 2};
-  const cv::Mat labels = split_regions(c.height, c.noise, above(c, p.adhesion_rim_noise), rule);
-  std::vector<Adhesion> adhesions;
-  for (const Patch& patch : patches_of(labels, 2)) {
-    if (cv::countNonZero(seeds(patch.box)) == 0) continue;
-    const cv::Mat excess = excess_over_rim(c, labels, patch, radius_px, p);
-    for (const auto& pixels : parts_of(c.height, labels, patch, excess)) {
-      if (!reaches_seed(pixels, seeds)) continue;
-      const Adhesion adhesion = measure_ellipse(pixels, pixel_size_um);
-      if (adhesion.area_um2 >= p.adhesion_smallest_um2 && adhesion.area_um2 <= p.adhesion_largest_um2)
-        adhesions.push_back(adhesion);
-    }
+  std::vector<AdhesionRegion> regions;
+  for (auto& pixels : adhesion_parts(c, pixel_size_um, p)) {
+    const Adhesion adhesion = measure_ellipse(pixels, pixel_size_um);
+    regions.push_back({adhesion, std::move(pixels)});
   }
-  std::sort(adhesions.begin(), adhesions.end(), [](const Adhesion& a, const Adhesion& b) {
-    return std::pair(a.position_um.y, a.position_um.x) < std::pair(b.position_um.y, b.position_um.x);
+  const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um, p);
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    Adhesion& adhesion = regions[i].adhesion;
+    if (is_elliptical(fitted[i]) && agrees(fitted[i].ellipse, in_pixels(adhesion, pixel_size_um, {})))
+      adhesion = with_ellipse(adhesion, fitted[i].ellipse, pixel_size_um);
+  }
+  std::erase_if(regions, [&](const AdhesionRegion& r) {
+    return r.adhesion.area_um2 < p.adhesion_smallest_um2 || r.adhesion.area_um2 > p.adhesion_largest_um2;
   });
-  for (std::size_t i = 0; i < adhesions.size(); ++i) adhesions[i].adhesion_id = static_cast<int>(i) + 1;
+  std::sort(regions.begin(), regions.end(), [](const AdhesionRegion& a, const AdhesionRegion& b) {
+    const Vec2 here = a.adhesion.position_um, there = b.adhesion.position_um;
+    return std::pair(here.y, here.x) < std::pair(there.y, there.x);
+  });
+  for (std::size_t i = 0; i < regions.size(); ++i) regions[i].adhesion.adhesion_id = static_cast<int>(i) + 1;
+  return regions;
+}
+
+std::vector<Adhesion> find_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& p) {
+  std::vector<Adhesion> adhesions;
+  for (const AdhesionRegion& region : find_adhesion_regions(image, pixel_size_um, p))
+    adhesions.push_back(region.adhesion);
   return adhesions;
+}
+
+std::string why_no_adhesions(const Image& image, double pixel_size_um, const AdhesionParameters& p) {
+  if (std::string reason = emptiness_of(image); !reason.empty()) return reason;
+  const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
+  const auto parts = adhesion_parts(c, pixel_size_um, p);
+  if (!parts.empty())
+    return "of " + std::to_string(parts.size()) +
+           " spots none is larger than adhesion_smallest_um2 = " + shortest(p.adhesion_smallest_um2) +
+           " and smaller than adhesion_largest_um2 = " + shortest(p.adhesion_largest_um2);
+  double highest = 0;
+  for (int y = 0; y < c.height.rows; ++y)
+    for (int x = 0; x < c.height.cols; ++x)
+      if (const double level = c.noise.at<float>(y, x); level > 0)
+        highest = std::max(highest, c.height.at<float>(y, x) / level);
+  return "nothing above the noise, the brightest spot " + brief(highest) +
+         " of its standard deviations over the background, where adhesion_seed_noise asks for " +
+         shortest(p.adhesion_seed_noise);
 }
 
 }  // namespace mbtfm::segment

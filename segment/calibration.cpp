@@ -4,7 +4,9 @@
 #include <map>
 #include <string_view>
 
+#include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
+#include "segment/ome.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -12,14 +14,12 @@ namespace {
 /// Length of a unit in um, by the spellings of OME, ImageJ and its plug-ins; µ as U+00B5, U+03BC, Latin-1 or escaped.
 std::optional<double> unit_um(std::string_view unit) {
   static const std::map<std::string_view, double> known = {
-      {"um", 1},         {"\xC2\xB5m", 1},    {"\xCE\xBCm", 1},    {"\xB5m", 1},         {"\\u00B5m", 1},
-      {"\\u00b5m", 1},   {"\\u03BCm", 1},     {"\\u03bcm", 1},     {"&#181;m", 1},       {"&#xB5;m", 1},
-      {"&#xb5;m", 1},    {"&#956;m", 1},      {"&#x3BC;m", 1},     {"&#x3bc;m", 1},      {"micron", 1},
-      {"microns", 1},    {"micrometer", 1},   {"micrometers", 1},  {"micrometre", 1},    {"micrometres", 1},
-      {"nm", 1e-3},      {"nanometer", 1e-3}, {"nanometre", 1e-3}, {"nanometers", 1e-3}, {"nanometres", 1e-3},
-      {"pm", 1e-6},      {"mm", 1e3},         {"millimeter", 1e3}, {"millimetre", 1e3},  {"cm", 1e4},
-      {"m", 1e6},        {"inch", 25400},     {"inches", 25400},   {"in", 25400},        {"\xC3\x85", 1e-4},
-      {"angstrom", 1e-4}};
+      {"um", 1},           {"\xC2\xB5m", 1},    {"\xCE\xBCm", 1},     {"\xB5m", 1},         {"\\u00B5m", 1},
+      {"\\u00b5m", 1},     {"\\u03BCm", 1},     {"\\u03bcm", 1},      {"micron", 1},        {"microns", 1},
+      {"micrometer", 1},   {"micrometers", 1},  {"micrometre", 1},    {"micrometres", 1},   {"nm", 1e-3},
+      {"nanometer", 1e-3}, {"nanometre", 1e-3}, {"nanometers", 1e-3}, {"nanometres", 1e-3}, {"pm", 1e-6},
+      {"mm", 1e3},         {"millimeter", 1e3}, {"millimetre", 1e3},  {"cm", 1e4},          {"m", 1e6},
+      {"inch", 25400},     {"inches", 25400},   {"in", 25400},        {"\xC3\x85", 1e-4},   {"angstrom", 1e-4}};
   const auto found = known.find(unit);
   return found == known.end() ? std::nullopt : std::optional(found->second);
 }
@@ -31,50 +31,26 @@ std::optional<double> positive_number(std::string_view text) {
   return value;
 }
 
-/// The value of `key=value` at the start of a line; lines end as Unix, DOS or the old Macintosh (Volocity) ends them.
-std::optional<std::string_view> line_value(std::string_view text, std::string_view key) {
-  for (std::size_t at = 0; at < text.size();) {
-    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
-    const std::string_view line = text.substr(at, end - at);
-    if (line.size() > key.size() && line.starts_with(key) && line[key.size()] == '=')
-      return line.substr(key.size() + 1);
-    at = end + 1;
-  }
-  return std::nullopt;
-}
-
-/// The value of an XML attribute, the first of that name.
-std::optional<std::string_view> attribute(std::string_view xml, std::string_view name) {
-  for (std::size_t at = xml.find(name); at != std::string_view::npos; at = xml.find(name, at + 1)) {
-    const std::size_t equals = at + name.size();
-    if (at == 0 || std::string_view(" \t\r\n").find(xml[at - 1]) == std::string_view::npos) continue;
-    if (equals + 2 > xml.size() || xml[equals] != '=') continue;
-    const char quote = xml[equals + 1];
-    if (quote != '"' && quote != '\'') continue;
-    const std::size_t end = xml.find(quote, equals + 2);
-    if (end == std::string_view::npos) return std::nullopt;
-    return xml.substr(equals + 2, end - equals - 2);
-  }
-  return std::nullopt;
-}
-
 struct PixelSize {
   double x_um = 0;
   double y_um = 0;
 };
 
-std::optional<double> ome_size_um(std::string_view xml, const std::string& axis) {
-  const auto size = attribute(xml, "PhysicalSize" + axis);
-  if (!size) return std::nullopt;
-  const auto unit = unit_um(attribute(xml, "PhysicalSize" + axis + "Unit").value_or("um"));
-  const auto number = positive_number(*size);
-  return number && unit ? std::optional(*number * *unit) : std::nullopt;
+std::optional<double> ome_size_um(const std::string& size, const std::string& unit) {
+  const auto number = positive_number(size);
+  const auto in_um = unit_um(unit.empty() ? "um" : unit);
+  return number && in_um ? std::optional(*number * *in_um) : std::nullopt;
 }
 
-std::optional<PixelSize> ome_pixel_size(std::string_view xml) {
-  const auto x_um = ome_size_um(xml, "X");
-  if (!x_um) return std::nullopt;
-  return PixelSize{*x_um, ome_size_um(xml, "Y").value_or(*x_um)};
+std::optional<PixelSize> ome_pixel_size(const std::string& xml) {
+  try {
+    const OmeImage ome = parse_ome(xml);
+    const auto x_um = ome_size_um(ome.size_x, ome.unit_x);
+    if (!x_um) return std::nullopt;
+    return PixelSize{*x_um, ome_size_um(ome.size_y, ome.unit_y).value_or(*x_um)};
+  } catch (const InvalidData&) {
+    return std::nullopt;  // damaged text tells no size: it must be given
+  }
 }
 
 std::optional<PixelSize> imagej_pixel_size(const TiffCalibration& calibration) {
@@ -101,10 +77,21 @@ double without_ratio_noise(double value) {
 
 }  // namespace
 
+std::optional<std::string_view> line_value(std::string_view text, std::string_view key) {
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", at), text.size());
+    const std::string_view line = text.substr(at, end - at);
+    if (line.size() > key.size() && line.starts_with(key) && line[key.size()] == '=')
+      return line.substr(key.size() + 1);
+    at = end + 1;
+  }
+  return std::nullopt;
+}
+
 std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
   const std::string& text = calibration.description;
   std::optional<PixelSize> size;
-  if (text.find("<OME") != std::string::npos) size = ome_pixel_size(text);
+  if (is_ome(text)) size = ome_pixel_size(text);
   if (!size && text.starts_with("ImageJ=")) size = imagej_pixel_size(calibration);
   if (!size) size = volocity_pixel_size(text);
   // half a per cent: what two roundings to three digits may differ by

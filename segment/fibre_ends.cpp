@@ -51,9 +51,9 @@ Vec2 direction_of_end(const Polyline& last) {
   return l > 0 ? (1 / l) * d : Vec2{1, 0};
 }
 
-/// Least effort from the course of the line around its end to the adhesion: `reach_um` back along the line, `reach_um`
+/// Least effort from the course of the line around its end to the adhesion: some way back along the line, as far
 /// straight ahead.
-double effort_to(const Adhesion& adhesion, const Polyline& last, double reach_um) {
+double effort_to(const Adhesion& adhesion, const Polyline& last) {
   constexpr double kAside = 2;    // a fibre goes on ahead, it does not turn aside
   constexpr double kBack = 0.3;   // a line may run on a little over the adhesion that holds it
   constexpr double kAhead = 0.7;  // its end fades: it may be longer than it looks
@@ -86,7 +86,7 @@ Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const
   double least = kInfinite;
   for (const Adhesion& a : adhesions) {
     if (norm(a.position_um - line.back()) > 3 * reach_um + a.major_axis_um) continue;
-    const double effort = effort_to(a, last, reach_um);
+    const double effort = effort_to(a, last);
     // between two that the line touches, the one whose centre it passes nearer
     const double cost = effort + 0.2 * distance_to_line_um({last.back(), last.front()}, a.position_um);
     if (cost < least) {

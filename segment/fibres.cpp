@@ -196,7 +196,7 @@ std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, co
     fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
     fibre.width_um = c.profile.width_px * field.pixel_um;
     fibre.mean_intensity = c.profile.height;
-    fibre.confidence = 1 / (1 + c.expected_false);
+    fibre.confidence = chance_of_fibre(c.expected_false);
     tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
     if (length_um(fibre.points_um) >= p.fibre_shortest_um) fibres.push_back(fibre);
   }

@@ -25,16 +25,22 @@ cv::Mat shrink(const cv::Mat& image, int factor);
 
 cv::Mat gaussian(const cv::Mat& image, double sigma_px);
 
+/// The same to about a hundredth, evaluated on a grid of two fifths of the standard deviation and interpolated.
+cv::Mat wide_gaussian(const cv::Mat& image, double sigma_px);
+
 /// Standard deviation left by `gaussian` of white noise of standard deviation 1.
 double noise_gain(double sigma_px);
 
-/// Median over a disc, evaluated on a grid of a sixth of the radius and interpolated. Edges between two grey levels
+/// Median over a disc, evaluated on a grid of a quarter of the radius and interpolated. Edges between two grey levels
 /// stay where they are; objects that fill less than half of the disc vanish.
 cv::Mat local_median(const cv::Mat& image, double radius_px);
 
 /// Standard deviation of the white noise of each pixel, from second differences in both directions, which cancel
 /// everything smooth (Immerkaer 1996), as a local median over a disc.
 cv::Mat local_noise(const cv::Mat& image, double radius_px);
+
+/// The same over the whole image.
+double overall_noise(const cv::Mat& image);
 
 /// Local robust standard deviation of a matrix of zero mean: 1.4826 times the median of its magnitude over a disc.
 cv::Mat local_spread(const cv::Mat& residual, double radius_px);

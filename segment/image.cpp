@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
+#include "segment/stack.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -66,13 +67,30 @@ void require_plausible_size(const std::filesystem::path& file, std::uint64_t wid
                    "the file is probably damaged: copy or export it again");
 }
 
-Image read_image(const std::filesystem::path& file, int page) {
+void declare(ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {
+  choice.prefix = prefix;
+  list.add(prefix + "_channel", choice.channel,
+           "channel of " + image + ": its number, from 1, or name; must be given where the file has several");
+  list.add(prefix + "_z", choice.z, "slice of " + image + ", from 1; max: the maximum projection of all");
+  list.add(prefix + "_time", choice.time, {.low = 1},
+           "frame of " + image + ", from 1; must be given where the file has several");
+  list.add(prefix + "_page", choice.page, {.low = 1},
+           "page of " + image +
+               " as it lies in the file, from 1, instead of channel, z and time; unset: the first of a "
+               "file that does not state its dimensions");
+}
+
+Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   const std::string head = head_of(file);
-  if (page < 0) throw InputError(file.string(), "a page number from 0", std::to_string(page));
-  if (is_tiff(head)) return read_tiff(file, page);
+  if (choice.page && *choice.page < 1) throw InputError(file.string(), "a page from 1", std::to_string(*choice.page));
+  if (is_tiff(head)) return read_tiff(file, choice);
   if (head.starts_with("\x89PNG")) {
-    if (page > 0) throw InputError(file.string(), "page " + std::to_string(page), "a PNG image, which has only page 0");
-    return read_png(file);
+    PlaneChoice of_page = choice;
+    of_page.channel.clear();
+    chosen_pages(Stack{.channel_names = {""}, .pages = {0}}, of_page, file.string());
+    if (choice.page.value_or(1) > 1)
+      throw InputError(file.string(), "page " + std::to_string(*choice.page), "a PNG image, which has only one");
+    return read_png(file, choice);
   }
   for (const Signature& format : kForeignFormats) {
     if (head.starts_with(format.bytes)) {

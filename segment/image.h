@@ -4,7 +4,10 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
+
+#include "pipeline/contract/parameters.h"
 
 namespace mbtfm::segment {
 
@@ -19,10 +22,28 @@ struct Image {
   float& at(int column, int row) { return pixels[static_cast<std::size_t>(row) * width + column]; }
 };
 
-/// Read one page (0: the first) of a TIFF (8 or 16 bit, float; any libtiff compression) or a PNG.
-/// Calibration: OME PhysicalSizeX, ImageJ unit + resolution, Volocity.
-/// @throws InputError naming the file and what it is instead; reads no more memory than the file can fill
-Image read_image(const std::filesystem::path& file, int page = 0);
+inline const std::string kProjection = "max";
+
+/// Which plane of a file is meant.
+struct PlaneChoice {
+  std::string prefix = "image";  ///< of its parameters' names, for hints
+  std::string channel = {};      ///< number from 1, or name; empty: the only one, and of an RGB image the mean
+  std::string z = kProjection;   ///< a slice from 1, or the brightest of all: what stands out is in focus somewhere
+  std::optional<int> time = {};  ///< frame from 1; unset: the only one
+  std::optional<int> page = {};  ///< from 1, as it lies in the file, whatever it shows; unset: by the other three
+};
+/// <prefix>_channel, <prefix>_z, <prefix>_time and <prefix>_page. @param image  "the adhesion image"
+void declare(ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);
+
+/// Read a plane of a TIFF (8 or 16 bit, float; any libtiff compression) or a PNG.
+///
+/// Dimensions: OME-XML, ImageJ; of a file that states none, page 1. Samples of a pixel that are not red, green and blue
+/// are channels. Calibration: OME PhysicalSizeX, ImageJ unit + resolution, Volocity.
+/// @throws InputError naming the file and what it is instead, and where several channels or frames are there and none
+/// was chosen; reads no more memory than the file can fill
+Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = {});
+/// A page, from 0, as it lies in the file.
+inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
 
 /// 16-bit TIFF, deflate, with ImageJ's calibration. Values are rounded and clamped to 0 … 65535.
 /// @throws OutputError

@@ -5,16 +5,17 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 
 #include "segment/image.h"
 
 namespace mbtfm::segment {
 
-/// Read one page of a file that begins as a TIFF. @throws InputError
-Image read_tiff(const std::filesystem::path& file, int page);
+/// Read a plane of a file that begins as a TIFF. @throws InputError
+Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
 
-/// Read a file that begins as a PNG. @throws InputError
-Image read_png(const std::filesystem::path& file);
+/// Read a file that begins as a PNG; of RGB the mean where no channel is chosen. @throws InputError
+Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
 
 /// Refuse a size that a damaged header makes up, before memory is taken for it.
 ///
@@ -33,5 +34,8 @@ struct TiffCalibration {
 /// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons; nothing
 /// where none of them speaks (a resolution without a unit of ImageJ is a printer's) or where pixels are not square.
 std::optional<double> pixel_size_um(const TiffCalibration& calibration);
+
+/// The value of `key=value` at the start of a line; lines end as Unix, DOS or the old Macintosh (Volocity) ends them.
+std::optional<std::string_view> line_value(std::string_view text, std::string_view key);
 
 }  // namespace mbtfm::segment

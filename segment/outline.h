@@ -1,4 +1,4 @@
-/// The outline of the cell.
+/// The outlines of the cells.
 #pragma once
 
 #include <vector>
@@ -10,25 +10,43 @@
 namespace mbtfm::segment {
 
 struct OutlineParameters {
-  double outline_smoothing_um = 0.3;  ///< just above the resolution of light: more would round the cell's corners
-  double outline_band_um = 3;         ///< brightness inside and outside is compared within this distance
-  double outline_reach_um = 3;        ///< an adhesion up to this far outside is still this cell's
-  double outline_spacing_um = 0.5;    ///< of the polygon's points
-  double outline_smallest_um2 = 50;   ///< less is debris, not a spread cell
+  double outline_smoothing_um = 0.3;      ///< just above the resolution of light: more would round the cell's corners
+  double outline_band_um = 3;             ///< brightness inside and outside is compared within this distance
+  double outline_reach_um = 3;            ///< an adhesion up to this far outside is still this cell's
+  double outline_spacing_um = 0.5;        ///< of the polygon's points
+  double outline_smallest_um2 = 50;       ///< less is debris, not a spread cell
+  double outline_largest_um2 = 30000;     ///< ten spread cells: more is a sheet of cells that touch
+  double outline_smallest_hole_um2 = 10;  ///< less is a gap in the actin mesh, over which the membrane spans
 };
 
 void declare(ParameterList& list, OutlineParameters& parameters);
 
-/// The largest cell's closed outline, without holes, so that it contains the adhesions.
+/// A cell in the image: its outer ring and the gaps in it.
+struct CellOutline {
+  Polygon outer_um;
+  std::vector<Polygon> holes_um;
+  double area_um2 = 0;            ///< without the holes
+  bool is_sheet = false;          ///< larger than any single cell; its holes are left out
+  bool is_cut_by_border = false;  ///< the image ends before the cell does
+};
+
+/// The cells of an image, the largest first. Cells that touch each other count as one.
 ///
 /// A first mask by Otsu's threshold of the smoothed image's logarithm above the darkest region; then each point near
 /// the edge is put to the side, inside or outside, whose mean brightness nearby it resembles more (localised Chan–Vese,
-/// Lankton & Tannenbaum 2008), which follows uneven light and background. Adhesions within the reach are added.
-/// @returns the polygon; empty where there is no cell (constant or noise)
+/// Lankton & Tannenbaum 2008), which follows uneven light and background. Adhesions within the reach are added. Gaps
+/// that are as dark as the surroundings are holes. At last each ring is moved to the edge in the unsmoothed image: see
+/// edge_profile.h.
+/// @returns none where there is no cell (constant or noise)
+std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                                    const OutlineParameters& parameters);
+
+/// The largest cell's outer ring; empty where there is no cell.
 Polygon find_outline(const Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
                      const OutlineParameters& parameters);
 
-/// The adhesions whose centre the outline contains, with their ids renewed.
+/// The adhesions whose centre lies in the cell, with their ids renewed.
+std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions);
 std::vector<Adhesion> inside(const Polygon& outline_um, const std::vector<Adhesion>& adhesions);
 
 }  // namespace mbtfm::segment

@@ -213,6 +213,7 @@ cv::Mat legend(const std::vector<Entry>& entries, int width) {
 
 void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   canvas.line(cell.outline_um, true, kOutline, thickness);
+  for (const Polygon& hole : cell.holes_um) canvas.line(hole, true, kOutline, thickness);
   for (const Adhesion& a : cell.adhesions) canvas.line(ellipse_polygon(a, 32), true, kAdhesion, thickness);
   for (const Fibre& f : cell.fibres) canvas.line(f.points_um, false, colour_of(f.type), thickness + 1);
 }

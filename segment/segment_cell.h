@@ -3,19 +3,21 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/contract/types.h"
 #include "segment/adhesions.h"
 #include "segment/channels.h"
 #include "segment/fibres.h"
+#include "segment/hand_drawn.h"
 #include "segment/outline.h"
 
 namespace mbtfm::segment {
 
 struct SegmentParameters {
   std::optional<double> pixel_size_um;  ///< no default: it scales every force; the image's own calibration if unset
-  int adhesion_page = 1;                ///< most cameras write one page a file
-  int actin_page = 1;
+  int cell = 1;                         ///< most images are of one cell
+  PlaneChoice adhesion_plane, actin_plane;
   std::string contact_sheet;  ///< none: it takes a segmentation for each of its pictures
   AdhesionParameters adhesions;
   FibreParameters fibres;
@@ -27,16 +29,25 @@ void declare(ParameterList& list, SegmentParameters& parameters);
 struct Segmentation {
   Cell cell;
   double pixel_size_um = 0;
-  int n_adhesions_outside = 0;  ///< found beyond the cell and left out
+  int n_cells = 1;                ///< that the image shows
+  double area_um2 = 0;            ///< of the cell, less its holes
+  bool is_cut_by_border = false;  ///< the image ends before the cell does
+  int n_adhesions_outside = 0;    ///< found beyond the cell and left out
 };
 
 /// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions.
-/// Without an adhesion channel there are no adhesions and every fibre is an arc; without actin no fibres.
-/// @throws UsageError without any channel
-/// @throws InputError where sizes or calibrations contradict each other or none tells the pixel size; where no cell, or
-/// in a given adhesion channel no adhesion,
-///         is found
+/// Without an adhesion channel there are no adhesions and every fibre is an arc; without actin no fibres. What is drawn
+/// by hand is used instead of each.
+/// @returns the cell that the parameters name, or all of them, the largest first
+/// @throws UsageError without any channel, or where all cells are asked for and fibres are drawn by hand
+/// @throws InputError where sizes or calibrations contradict each other or none tells the pixel size; where a channel
+/// is constant or saturated; where no cell, fewer cells than asked for, or in a given adhesion channel no adhesion is
+/// found
+std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                                        const SegmentParameters& parameters, const HandDrawn& drawn = {});
+
+/// The first of them.
 Segmentation segment_cell(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                          const SegmentParameters& parameters);
+                          const SegmentParameters& parameters, const HandDrawn& drawn = {});
 
 }  // namespace mbtfm::segment

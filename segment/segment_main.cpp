@@ -2,6 +2,7 @@
 
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
+#include "segment/cell_rois.h"
 #include "segment/contact_sheet.h"
 #include "segment/overlay.h"
 #include "segment/segment_cell.h"
@@ -10,10 +11,16 @@ namespace mbtfm::segment {
 
 namespace {
 
-std::optional<Channel> channel(StageContext& context, const std::string& argument, int page) {
+std::optional<Channel> channel(StageContext& context, const std::string& argument, const PlaneChoice& plane) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return Channel{file.string(), read_image(file, page - 1)};
+  return Channel{file.string(), read_image(file, plane)};
+}
+
+std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument) {
+  if (!context.has_input(argument)) return std::nullopt;
+  const auto file = context.input(argument);
+  return RoiSet{file.string(), read_rois(file)};
 }
 
 StageReport report_of(const Segmentation& s) {
@@ -35,28 +42,76 @@ StageReport report_of(const Segmentation& s) {
                     {"n_dorsal", n_of(FibreType::dorsal)},
                     {"n_arc", n_of(FibreType::arc)},
                     {"fibre_length_um", length},
-                    {"cell_area_um2", std::abs(signed_area_um2(s.cell.outline_um))}};
+                    {"cell_area_um2", s.area_um2},
+                    {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
+                    {"is_cut_by_border", s.is_cut_by_border},
+                    {"n_cells_in_image", static_cast<std::int64_t>(s.n_cells)}};
   report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
                    std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
                    " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
   if (s.n_adhesions_outside > 0)
     report.summary += "; " + std::to_string(s.n_adhesions_outside) + " adhesions outside the cell left out";
+  if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
+  if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;
+}
+
+/// Of all cells of an image.
+StageReport report_of(const std::vector<Segmentation>& cells) {
+  std::int64_t n_adhesions = 0, n_fibres = 0, n_cut = 0;
+  for (const Segmentation& s : cells) {
+    n_adhesions += static_cast<std::int64_t>(s.cell.adhesions.size());
+    n_fibres += static_cast<std::int64_t>(s.cell.fibres.size());
+    n_cut += s.is_cut_by_border;
+  }
+  const auto n_cells = static_cast<std::int64_t>(cells.size());
+  return {.summary = std::to_string(n_cells) + " cells, " + std::to_string(n_cut) +
+                     " of them cut by the image's border; " + std::to_string(n_adhesions) + " adhesions, " +
+                     std::to_string(n_fibres) + " fibres",
+          .figures = {{"pixel_size_um", cells.front().pixel_size_um},
+                      {"n_cells", n_cells},
+                      {"n_cells_cut_by_border", n_cut},
+                      {"n_adhesions", n_adhesions},
+                      {"n_fibres", n_fibres}},
+          .effects = {}};
+}
+
+void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay) {
+  const auto out = [&](const char* file) { return context.output("out", folder + file); };
+  write_adhesions(out("adhesions.csv"), s.cell.adhesions);
+  write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
+  write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um);
+  write_cell_vtp(out("cell.vtp"), s.cell);
+  write_png(out("overlay.png"), overlay);
+  write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
+}
+
+void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
+  const std::pair<std::string, bool> parts[] = {{"outline", drawn.outline.has_value()},
+                                                {"adhesions", drawn.adhesions.has_value()},
+                                                {"fibres", drawn.fibres.has_value()}};
+  for (const auto& [part, is_drawn] : parts) {
+    report.figures.emplace_back(part + "_drawn_by_hand", is_drawn);
+    if (is_drawn) report.summary += "; " + part + " drawn by hand";
+  }
 }
 
 StageReport run(const SegmentParameters& parameters, StageContext& context) {
   cv::setNumThreads(context.threads);
-  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_page);
-  const auto actin = channel(context, "actin-image", parameters.actin_page);
-  const Segmentation s = segment_cell(adhesion, actin, parameters);
-  write_adhesions(context.output("out", "adhesions.csv"), s.cell.adhesions);
-  write_fibres(context.output("out", "fibres.csv"), context.output("out", "fibre_points.csv"), s.cell.fibres);
-  write_outline(context.output("out", "outline.csv"), s.cell.outline_um);
-  write_cell_vtp(context.output("out", "cell.vtp"), s.cell);
-  write_png(context.output("out", "overlay.png"), draw_overlay(adhesion, actin, s));
+  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_plane);
+  const auto actin = channel(context, "actin-image", parameters.actin_plane);
+  const HandDrawn drawn{roi_set(context, "outline-roi"), roi_set(context, "adhesion-rois"),
+                        roi_set(context, "fibre-rois")};
+  const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
+    write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]));
+  }
   if (!parameters.contact_sheet.empty())
     write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));
-  return report_of(s);
+  StageReport report = parameters.cell == 0 ? report_of(cells) : report_of(cells.front());
+  add_drawn_by_hand(report, drawn);
+  return report;
 }
 
 }  // namespace
@@ -72,7 +127,12 @@ int main(int argc, char** argv) {
                   "adhesion channel (TIFF or PNG); without it every fibre counts as an arc"},
                  {"actin-image", FileArgument::Kind::optional_input,
                   "actin channel (TIFF or PNG); without it no fibres, and the outline from the adhesion channel"},
+                 {"outline-roi", FileArgument::Kind::optional_input,
+                  "ImageJ selection used as the cell's outline (.roi)"},
+                 {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas used as adhesions (.roi or .zip)"},
+                 {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines used as fibres (.roi or .zip)"},
                  {"out", FileArgument::Kind::output_folder,
-                  "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png"}}},
+                  "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
+                  "RoiSet.zip"}}},
       argc, argv, mbtfm::segment::run);
 }

@@ -1,55 +1,16 @@
-#include <tiffio.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <cstring>
-#include <memory>
+#include <fstream>
 #include <string>
 
 #include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
+#include "segment/stack.h"
+#include "segment/tiff_handle.h"
 
 namespace mbtfm::segment {
 namespace {
-
-/// libtiff's complaints of one file; the first is the cause.
-struct Messages {
-  std::string first_error;
-};
-
-int keep_error(TIFF*, void* messages, const char*, const char* format, va_list arguments) {
-  char text[512];
-  std::vsnprintf(text, sizeof text, format, arguments);
-  auto& first = static_cast<Messages*>(messages)->first_error;
-  if (first.empty()) first = text;
-  return 1;  // handled: nothing goes to the terminal
-}
-
-/// Warnings are of no concern, but for the one that a file ends within its tags: the calibration may be lost with them.
-int keep_warning_of_early_end(TIFF* tiff, void* messages, const char* module, const char* format, va_list arguments) {
-  char text[512];
-  va_list copy;
-  va_copy(copy, arguments);
-  std::vsnprintf(text, sizeof text, format, copy);
-  va_end(copy);
-  if (std::strstr(text, "IO error during reading")) return keep_error(tiff, messages, module, format, arguments);
-  return 1;
-}
-
-struct Closer {
-  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
-};
-using TiffHandle = std::unique_ptr<TIFF, Closer>;
-
-TiffHandle open(const std::filesystem::path& file, const char* mode, Messages& messages) {
-  const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
-                                                                                 &TIFFOpenOptionsFree);
-  TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_error, &messages);
-  TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_warning_of_early_end, &messages);
-  return TiffHandle(TIFFOpenExt(file.c_str(), mode, options.get()));
-}
 
 /// How the samples of a page are laid out.
 struct Layout {
@@ -57,44 +18,147 @@ struct Layout {
   std::uint32_t height = 0;
   std::uint16_t bits = 1;
   std::uint16_t format = SAMPLEFORMAT_UINT;
-  std::uint16_t samples = 1;  ///< by pixel, alpha included
-  std::uint16_t colours = 1;  ///< of them, the first ones, that make the grey value: 1, or 3 for RGB
+  std::uint16_t samples = 1;     ///< by pixel, alpha included
+  std::uint16_t n_channels = 1;  ///< of them: alpha is none, red, green and blue are three
+  std::uint16_t first = 0;       ///< of those whose mean is the grey value
+  std::uint16_t colours = 1;     ///< how many: 1, or 3 for RGB
+  bool is_rgb = false;
   bool is_planar = false;
   bool is_inverted = false;  ///< 0 is white
 };
 
 class Reader {
  public:
-  Reader(const std::filesystem::path& file, int page) : file_(file), tiff_(open(file, "r", messages_)) {
+  explicit Reader(const std::filesystem::path& file) : file_(file), tiff_(open_tiff(file, "r", messages_)) {
     if (!tiff_ || !messages_.first_error.empty()) fail("a whole TIFF image");
-    const auto of_first_page = calibration();
-    if (page > 0 && !TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(page))) {
-      messages_.first_error = std::to_string(TIFFNumberOfDirectories(tiff_.get())) + " pages";
-      fail("page " + std::to_string(page) + ", counted from 0");
+    of_first_page_ = calibration();
+    calibration_ = pixel_size_um(of_first_page_);
+  }
+
+  Image read(const PlaneChoice& choice) {
+    if (choice.page) return read_page(*choice.page - 1, choice);
+    const Stack stack = dimensions(choice).value_or(Stack{.channel_names = {""}, .pages = {0}});
+    // channels are pages, or else the samples of each pixel
+    PlaneChoice of_stack = choice, of_page = choice;
+    (stack.n_channels > 1 ? of_page : of_stack).channel.clear();
+    const std::vector<int> pages = chosen_pages(stack, of_stack, file_.string());
+    Image image = read_page(pages.front(), of_page);
+    for (std::size_t i = 1; i < pages.size(); ++i) project(image, read_page(pages[i], of_page));
+    return image;
+  }
+
+ private:
+  /// What the description says of channels, slices and frames; nothing of a file of one image.
+  std::optional<Stack> dimensions(const PlaneChoice& choice) {
+    try {
+      return stack_of(of_first_page_.description, file_.filename().string());
+    } catch (const InvalidData& error) {
+      if (n_pages() == 1 && n_imagej_images(of_first_page_.description) == 1) return std::nullopt;
+      throw InputError(file_.string() + ": " + error.element, error.expected, error.found,
+                       "set " + choice.prefix + "_page to the page that is meant");
     }
-    calibration_ = pixel_size_um(calibration());
-    if (!calibration_) calibration_ = pixel_size_um(of_first_page);
+  }
+
+  int n_pages() {
+    const auto n = static_cast<int>(TIFFNumberOfDirectories(tiff_.get()));
+    messages_.first_error.clear();  // of a damaged chain of pages: it counts as far as it goes
+    return n;
+  }
+
+  void project(Image& image, const Image& slice) const {
+    if (slice.width != image.width || slice.height != image.height)
+      refuse("slices of one size", "slices of different sizes");
+    for (std::size_t k = 0; k < image.pixels.size(); ++k) image.pixels[k] = std::max(image.pixels[k], slice.pixels[k]);
+  }
+
+  Image read_page(int page, const PlaneChoice& choice) {
+    const bool is_raw = page > 0 && n_imagej_images(of_first_page_.description) > 1 && n_pages() == 1;
+    if (!TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(is_raw ? 0 : page))) {
+      messages_.first_error = std::to_string(n_pages()) + " pages";
+      fail("page " + std::to_string(page + 1));
+    }
+    if (page > 0) {
+      if (const auto own = pixel_size_um(calibration())) calibration_ = own;
+    }
     layout_ = layout();
+    choose_samples(choice);
+    return is_raw ? read_raw(page) : read();
+  }
+
+  /// The samples of a pixel that the channel means: one of them, or the mean of red, green and blue.
+  void choose_samples(const PlaneChoice& choice) {
+    std::vector<std::string> names(layout_.n_channels);
+    if (layout_.is_rgb) {
+      if (choice.channel.empty()) return;
+      names = kRgbNames;
+    }
+    layout_.first = static_cast<std::uint16_t>(chosen_channel(names, choice, file_.string()));
+    layout_.colours = 1;
   }
 
   Image read() {
+    Image image = empty_image();
+    if (layout_.is_planar) {
+      for (int plane = layout_.first; plane < layout_.first + layout_.colours; ++plane) read_plane(image, plane);
+    } else {
+      read_plane(image, 0);
+    }
+    finish(image);
+    return image;
+  }
+
+  Image empty_image() const {
     Image image;
     image.width = static_cast<int>(layout_.width);
     image.height = static_cast<int>(layout_.height);
     image.pixel_size_um = calibration_;
     image.full_scale = full_scale();
     image.pixels.assign(static_cast<std::size_t>(layout_.width) * layout_.height, 0.0f);
-    const int n_planes = layout_.is_planar ? layout_.colours : 1;
-    for (int plane = 0; plane < n_planes; ++plane) read_plane(image, plane);
+    return image;
+  }
+
+  void finish(Image& image) const {
     for (float& value : image.pixels) {
       if (layout_.colours > 1) value /= static_cast<float>(layout_.colours);
       if (layout_.is_inverted) value = static_cast<float>(image.full_scale) - value;
       if (!std::isfinite(value)) refuse("finite pixel values", "NaN or infinity");
     }
+  }
+
+  /// ImageJ's stacks of more than 4 GB: the planes follow the first page's own without pages of theirs.
+  Image read_raw(int plane) {
+    const bool is_plain = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_NONE &&
+                          !layout_.is_planar && layout_.bits % 8 == 0 && !TIFFIsTiled(tiff_.get());
+    if (!is_plain) refuse("as many pages as ImageJ says, or plain planes after the first", "one page, packed");
+    const std::uint64_t row_bytes = static_cast<std::uint64_t>(layout_.width) * layout_.samples * layout_.bits / 8;
+    const std::uint64_t begin = TIFFGetStrileOffset(tiff_.get(), 0) + plane * row_bytes * layout_.height;
+    const std::uint64_t needed = begin + row_bytes * layout_.height, size = std::filesystem::file_size(file_);
+    if (needed > size) {
+      refuse(
+          "plane " + std::to_string(plane + 1) + " at bytes " + std::to_string(begin) + " to " + std::to_string(needed),
+          "a file of " + std::to_string(size) + " bytes", "it may be truncated: copy or export it again");
+    }
+    std::ifstream stream(file_, std::ios::binary);
+    stream.seekg(static_cast<std::streamoff>(begin));
+    Image image = empty_image();
+    std::vector<unsigned char> bytes(row_bytes);
+    std::vector<float> row(static_cast<std::size_t>(layout_.width) * layout_.samples);
+    for (int j = 0; j < image.height; ++j) {
+      stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      if (!stream) fail("a whole image");
+      if (TIFFIsByteSwapped(tiff_.get())) swap_samples(bytes);
+      unpack(bytes.data(), row);
+      add_row(row, &image.at(0, j), layout_.width);
+    }
+    finish(image);
     return image;
   }
 
- private:
+  void swap_samples(std::vector<unsigned char>& bytes) const {
+    const std::size_t n = layout_.bits / 8;
+    for (std::size_t i = 0; i + n <= bytes.size(); i += n) std::reverse(&bytes[i], &bytes[i] + n);
+  }
+
   [[noreturn]] void refuse(const std::string& expected, const std::string& found, const std::string& hint = {}) const {
     throw InputError(file_.string(), expected, found, hint);
   }
@@ -167,23 +231,28 @@ class Reader {
       refuse("a grey or RGB image", "photometric interpretation " + std::to_string(photometric),
              "convert it to grey: the original of the microscope is best");
     }
-    l.colours = is_grey ? 1 : 3;
+    l.is_rgb = !is_grey;
+    l.colours = l.n_channels = l.is_rgb ? 3 : 1;
     l.is_inverted = photometric == PHOTOMETRIC_MINISWHITE;
     if (l.is_inverted && l.format != SAMPLEFORMAT_UINT) refuse("0 to be black", "0 to be white in signed samples");
-    require_only_alpha_beyond(l);
+    if (l.samples > l.colours) count_channels(l);
+    if (l.samples < l.colours) refuse("three colour channels", std::to_string(l.samples) + " channels");
   }
 
-  /// Further samples that are channels of their own would be lost in silence.
-  void require_only_alpha_beyond(const Layout& l) const {
+  /// Further samples are channels of their own where they are not transparency.
+  void count_channels(Layout& l) const {
     std::uint16_t n_extra = 0;
     std::uint16_t* kinds = nullptr;
     TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_EXTRASAMPLES, &n_extra, &kinds);
-    const bool is_alpha =
-        std::all_of(kinds, kinds + n_extra, [](auto kind) { return kind != EXTRASAMPLE_UNSPECIFIED; });
-    if (l.samples != l.colours + n_extra || (n_extra > 0 && !is_alpha)) {
-      refuse(l.colours == 1 ? "one grey channel a page" : "three colour channels",
-             std::to_string(l.samples) + " channels", "save each channel as a page of its own");
+    const bool is_alpha = l.samples == l.colours + n_extra && std::all_of(kinds, kinds + n_extra, [](auto kind) {
+                            return kind != EXTRASAMPLE_UNSPECIFIED;
+                          });
+    if (is_alpha) return;
+    if (l.is_rgb) {
+      refuse("three colour channels", std::to_string(l.samples) + " channels",
+             "save each channel as a page of its own");
     }
+    l.n_channels = l.samples;
   }
 
   double full_scale() const {
@@ -279,64 +348,23 @@ class Reader {
 
   void add_row(const std::vector<float>& row, float* pixels, std::uint32_t n_columns) const {
     const std::size_t stride = layout_.is_planar ? 1 : layout_.samples;
+    const std::size_t first = layout_.is_planar ? 0 : layout_.first;
     const std::size_t n_summed = layout_.is_planar ? 1 : layout_.colours;
     for (std::uint32_t i = 0; i < n_columns; ++i) {
-      for (std::size_t c = 0; c < n_summed; ++c) pixels[i] += row[i * stride + c];
+      for (std::size_t c = first; c < first + n_summed; ++c) pixels[i] += row[i * stride + c];
     }
   }
 
   std::filesystem::path file_;
   Messages messages_;
   TiffHandle tiff_;
+  TiffCalibration of_first_page_;
   std::optional<double> calibration_;
   Layout layout_;
 };
 
-void set_tags(TIFF* tiff, const Image& image) {
-  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(image.width));
-  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(image.height));
-  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
-  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
-  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-  TIFFSetField(tiff, TIFFTAG_PREDICTOR, PREDICTOR_HORIZONTAL);
-  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(std::min(image.height, 64)));
-  if (!image.pixel_size_um) {
-    TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53t\n");
-    return;
-  }
-  TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53t\nunit=micron\n");
-  TIFFSetField(tiff, TIFFTAG_XRESOLUTION, 1 / *image.pixel_size_um);
-  TIFFSetField(tiff, TIFFTAG_YRESOLUTION, 1 / *image.pixel_size_um);
-  TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
-}
-
 }  // namespace
 
-Image read_tiff(const std::filesystem::path& file, int page) { return Reader(file, page).read(); }
-
-void write_tiff(const std::filesystem::path& file, const Image& image) {
-  MBTFM_ASSERT(image.width > 0 && image.height > 0);
-  Messages messages;
-  const auto require = [&](bool is_done) {
-    if (!is_done) {
-      throw OutputError(file.string() + ": cannot be written" +
-                        (messages.first_error.empty() ? "" : ": " + messages.first_error));
-    }
-  };
-  TiffHandle tiff = open(file, "w", messages);
-  require(tiff != nullptr);
-  set_tags(tiff.get(), image);
-  std::vector<std::uint16_t> row(static_cast<std::size_t>(image.width));
-  for (int j = 0; j < image.height; ++j) {
-    for (int i = 0; i < image.width; ++i) {
-      row[i] = static_cast<std::uint16_t>(std::clamp(std::round(image.at(i, j)), 0.0f, 65535.0f));
-    }
-    require(TIFFWriteScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(j), 0) == 1);
-  }
-  require(TIFFWriteDirectory(tiff.get()) == 1);
-  tiff.reset();
-  require(messages.first_error.empty());
-}
+Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return Reader(file).read(choice); }
 
 }  // namespace mbtfm::segment

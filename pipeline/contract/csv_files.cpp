@@ -82,7 +82,8 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
                    .end_adhesion_id = table.optional_integer(row, "end_adhesion_id", 1),
                    .mean_intensity = table.number(row, "mean_intensity"),
                    .confidence = table.number(row, "confidence", share_of_one()),
-                   .points_um = {}};
+                   .points_um = {},
+                   .type_reason = {}};
     if (table.has("type_confidence"))
       fibres[row].type_confidence = table.number(row, "type_confidence", share_of_one());
     if (table.has("type_reason")) fibres[row].type_reason = table.text(row, "type_reason");
@@ -130,24 +131,39 @@ std::vector<Vec2> read_points(const Path& file) {
   return points;
 }
 
-Polygon read_outline(const Path& file) {
-  Polygon outline = read_points(file);
-  if (outline.size() < 3) {
-    throw InputError(file.string(), "the corners of a closed outline, three at least", std::to_string(outline.size()));
+std::vector<Polygon> read_outline(const Path& file) {
+  CsvTable table(file);
+  std::vector<Polygon> rings(1);
+  for (int row = 0; row < table.n_rows(); ++row) {
+    const int ring = table.has("ring") ? table.integer(row, "ring", 0) : 0;
+    const int current = static_cast<int>(rings.size()) - 1;
+    if (ring != current && ring != current + 1) {
+      table.fail(row, "ring", std::to_string(current) + " or " + std::to_string(current + 1) + ", rings in order");
+    }
+    if (ring > current) rings.emplace_back();
+    rings[ring].push_back({table.number(row, "x_um"), table.number(row, "y_um")});
   }
-  return outline;
+  for (const Polygon& ring : rings) {
+    if (ring.size() >= 3) continue;
+    throw InputError(file.string(), "the corners of a closed outline, three at least", std::to_string(ring.size()));
+  }
+  return rings;
 }
 
-void write_outline(const Path& file, const Polygon& outline_um) {
-  CsvText csv({"x_um", "y_um"});
-  for (const Vec2 p : outline_um) csv.add(p.x).add(p.y).end_row();
+void write_outline(const Path& file, const Polygon& outer_um, const std::vector<Polygon>& holes_um) {
+  CsvText csv({"x_um", "y_um", "ring"});
+  for (const Vec2 p : outer_um) csv.add(p.x).add(p.y).add(0).end_row();
+  for (std::size_t i = 0; i < holes_um.size(); ++i)
+    for (const Vec2 p : holes_um[i]) csv.add(p.x).add(p.y).add(static_cast<int>(i) + 1).end_row();
   write_text(file, csv.str());
 }
 
 Cell read_cell(const Path& folder) {
+  const std::vector<Polygon> rings = read_outline(folder / "outline.csv");
   Cell cell{.adhesions = read_adhesions(folder / "adhesions.csv"),
             .fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv"),
-            .outline_um = read_outline(folder / "outline.csv")};
+            .outline_um = rings.front(),
+            .holes_um = {rings.begin() + 1, rings.end()}};
   check_read(folder, cell);
   return cell;
 }

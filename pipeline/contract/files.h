@@ -22,8 +22,9 @@ void write_adhesions(const Path& file, const std::vector<Adhesion>& adhesions);
 std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file);
 void write_fibres(const Path& fibres_file, const Path& points_file, const std::vector<Fibre>& fibres);
 
-Polygon read_outline(const Path& file);
-void write_outline(const Path& file, const Polygon& outline_um);
+/// Rings of a cell's outline: the outer one, then the holes. A file without the column `ring` is one ring.
+std::vector<Polygon> read_outline(const Path& file);
+void write_outline(const Path& file, const Polygon& outer_um, const std::vector<Polygon>& holes_um = {});
 
 /// What a segmented cell consists of.
 inline const std::vector<std::string> kCellFiles = {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"};

@@ -56,6 +56,7 @@ std::string expectation(const Parameter& p) {
   return std::visit(Overloaded{[&](double*) { return describe("a number", p.range); },
                                [&](std::optional<double>*) { return describe("a number", p.range); },
                                [&](int*) { return describe("an integer", p.range); },
+                               [&](std::optional<int>*) { return describe("an integer", p.range); },
                                [&](std::uint64_t*) { return std::string("an integer >= 0"); },
                                [&](bool*) { return std::string("true or false"); },
                                [&](std::string*) {
@@ -80,14 +81,16 @@ bool try_set(Parameter& p, const std::string& text) {
     *member = value;
     return true;
   };
+  const auto set_whole = [&](auto* member) {
+    int value = 0;
+    if (!read_number(text, value) || !is_inside(p.range, value)) return false;
+    *member = value;
+    return true;
+  };
   return std::visit(Overloaded{[&](double* member) { return set_real(member); },
                                [&](std::optional<double>* member) { return set_real(member); },
-                               [&](int* member) {
-                                 int value = 0;
-                                 if (!read_number(text, value) || !is_inside(p.range, value)) return false;
-                                 *member = value;
-                                 return true;
-                               },
+                               [&](int* member) { return set_whole(member); },
+                               [&](std::optional<int>* member) { return set_whole(member); },
                                [&](std::uint64_t* member) { return read_number(text, *member); },
                                [&](bool* member) {
                                  if (text != "true" && text != "false") return false;
@@ -166,6 +169,9 @@ void ParameterList::add(std::string name, std::optional<double>& member, Range r
 void ParameterList::add(std::string name, int& member, Range range, std::string meaning) {
   add(parameter(std::move(name), member, range, std::move(meaning)));
 }
+void ParameterList::add(std::string name, std::optional<int>& member, Range range, std::string meaning) {
+  add(parameter(std::move(name), member, range, std::move(meaning)));
+}
 void ParameterList::add(std::string name, std::uint64_t& member, std::string meaning) {
   add(parameter(std::move(name), member, Range::not_negative(), std::move(meaning)));
 }
@@ -234,7 +240,9 @@ std::string to_text(const Parameter& p) {
   return std::visit(
       Overloaded{[](double* m) { return shortest(*m); },
                  [](std::optional<double>* m) { return *m ? shortest(**m) : std::string(); },
-                 [](int* m) { return std::to_string(*m); }, [](std::uint64_t* m) { return std::to_string(*m); },
+                 [](int* m) { return std::to_string(*m); },
+                 [](std::optional<int>* m) { return *m ? std::to_string(**m) : std::string(); },
+                 [](std::uint64_t* m) { return std::to_string(*m); },
                  [](bool* m) { return std::string(*m ? "true" : "false"); }, [](std::string* m) { return *m; }},
       p.member);
 }

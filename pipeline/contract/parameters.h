@@ -33,7 +33,7 @@ std::string describe(const std::string& noun, const Range& range);
 struct Parameter {
   std::string table;  ///< of cell.toml; empty: above the first table
   std::string name;   ///< key in the table, and the flag --name
-  std::variant<double*, std::optional<double>*, int*, std::uint64_t*, bool*, std::string*> member;
+  std::variant<double*, std::optional<double>*, int*, std::optional<int>*, std::uint64_t*, bool*, std::string*> member;
   Range range;
   std::vector<std::string> choices;  ///< of a string; empty: any
   std::string meaning;               ///< one sentence, with the unit
@@ -50,6 +50,7 @@ class ParameterList {
   /// May stay unset; `meaning` says what holds then.
   void add(std::string name, std::optional<double>& member, Range range, std::string meaning);
   void add(std::string name, int& member, Range range, std::string meaning);
+  void add(std::string name, std::optional<int>& member, Range range, std::string meaning);
   void add(std::string name, std::uint64_t& member, std::string meaning);
   void add(std::string name, bool& member, std::string meaning);
   void add(std::string name, std::string& member, std::string meaning, std::vector<std::string> choices = {});

@@ -128,7 +128,8 @@ nlohmann::ordered_json parameters_of(const ParameterList& list) {
     auto& table = p.table.empty() ? json : json[p.table];
     table[p.name] = std::visit(
         [](auto* member) -> nlohmann::ordered_json {
-          if constexpr (std::is_same_v<decltype(member), std::optional<double>*>) {
+          if constexpr (std::is_same_v<decltype(member), std::optional<double>*> ||
+                        std::is_same_v<decltype(member), std::optional<int>*>) {
             return *member ? nlohmann::ordered_json(**member) : nlohmann::ordered_json();
           } else {
             return *member;

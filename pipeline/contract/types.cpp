@@ -146,12 +146,27 @@ void check(const std::vector<Fibre>& fibres) {
   }
 }
 
+namespace {
+
+void check_ring(const Polygon& ring, const std::string& element) {
+  require(ring.size() >= 3, element, "at least three points", std::to_string(ring.size()));
+  for (const Vec2 point : ring) require_finite(point, "a point of the " + element);
+  require(std::abs(signed_area_um2(ring)) > 0, element, "an area > 0", "'0'");
+}
+
+}  // namespace
+
 void check(const Cell& cell) {
   check(cell.adhesions);
   check(cell.fibres);
-  require(cell.outline_um.size() >= 3, "outline", "at least three points", std::to_string(cell.outline_um.size()));
-  for (const Vec2 point : cell.outline_um) require_finite(point, "a point of the outline");
-  require(std::abs(signed_area_um2(cell.outline_um)) > 0, "outline", "an area > 0", "'0'");
+  check_ring(cell.outline_um, "outline");
+  for (std::size_t i = 0; i < cell.holes_um.size(); ++i) {
+    const std::string element = "ring " + std::to_string(i + 1) + " of the outline";
+    check_ring(cell.holes_um[i], element);
+    for (const Vec2 point : cell.holes_um[i])
+      require(contains(cell.outline_um, point), element, "a hole inside ring 0",
+              shown(point.x) + ", " + shown(point.y) + " outside");
+  }
   std::set<int> known;
   for (const Adhesion& a : cell.adhesions) known.insert(a.adhesion_id);
   for (const Fibre& f : cell.fibres) {

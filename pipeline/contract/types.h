@@ -65,6 +65,7 @@ struct Cell {
   std::vector<Adhesion> adhesions;
   std::vector<Fibre> fibres;
   Polygon outline_um;
+  std::vector<Polygon> holes_um;  ///< gaps in the cell, inside the outline
 };
 
 /// Displacement (stressed minus relaxed position) of one bead.

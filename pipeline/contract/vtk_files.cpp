@@ -224,10 +224,13 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
     type->InsertNextValue(fibre_type);
     adhesion->InsertNextValue(adhesion_id);
   };
-  Polyline closed = cell.outline_um;
-  closed.push_back(closed.front());
-  shapes.add_line(closed);
-  label(0, 0, 0);
+  std::vector<Polygon> rings = cell.holes_um;
+  rings.insert(rings.begin(), cell.outline_um);
+  for (Polyline& ring : rings) {
+    ring.push_back(ring.front());
+    shapes.add_line(ring);
+    label(0, 0, 0);
+  }
   for (const Fibre& f : cell.fibres) {
     shapes.add_line(f.points_um);
     label(f.fibre_id, 1 + static_cast<int>(f.type), 0);

@@ -15,14 +15,20 @@ void declare(ParameterList& list, ImageNames& names) {
   list.add("actin", names.actin, "image of the actin");
   list.add("beads_stressed", names.beads_stressed, "image of the beads while the cell pulls");
   list.add("beads_relaxed", names.beads_relaxed, "image of the beads after the cell was removed");
+  list.add("outline_roi", names.outline_roi, "ImageJ area used as the cell's outline, where the file is there");
+  list.add("adhesion_rois", names.adhesion_rois, "ImageJ areas used as adhesions, where the file is there");
+  list.add("fibre_rois", names.fibre_rois, "ImageJ lines used as fibres, where the file is there");
 }
 
 const std::string& name_of_image(const ImageNames& names, const std::string& key) {
   if (key == "adhesion") return names.adhesion;
   if (key == "actin") return names.actin;
   if (key == "beads_stressed") return names.beads_stressed;
-  MBTFM_ASSERT(key == "beads_relaxed");
-  return names.beads_relaxed;
+  if (key == "beads_relaxed") return names.beads_relaxed;
+  if (key == "outline_roi") return names.outline_roi;
+  if (key == "adhesion_rois") return names.adhesion_rois;
+  MBTFM_ASSERT(key == "fibre_rois");
+  return names.fibre_rois;
 }
 
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {
@@ -30,6 +36,14 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
   const fs::path exact = folder / name_or_glob;
   if (fs::is_regular_file(exact)) {
     match.files = {exact};
+    return match;
+  }
+  if (const auto bar = name_or_glob.find('|'); bar != std::string::npos) {
+    for (const std::string& part : {name_or_glob.substr(0, bar), name_or_glob.substr(bar + 1)}) {
+      for (fs::path& file : match_image(folder, part).files) match.files.push_back(std::move(file));
+    }
+    std::sort(match.files.begin(), match.files.end());
+    match.files.erase(std::unique(match.files.begin(), match.files.end()), match.files.end());
     return match;
   }
   const fs::path parent = exact.parent_path();
@@ -49,14 +63,21 @@ fs::path resolve_image(const fs::path& folder, const ImageNames& names, const st
   const ImageMatch match = match_image(folder, name_of_image(names, key));
   if (match.files.size() == 1) return match.files.front();
   if (match.files.empty()) {
-    throw InputError(folder.string(), "an image '" + match.pattern + "'", "none",
+    throw InputError(folder.string(), "a file '" + match.pattern + "'", "none",
                      "put it there, or name the file or a glob as '" + key + "' in [images] of cell.toml");
   }
   std::string list;
   for (const fs::path& file : match.files) list += (list.empty() ? "" : ", ") + file.filename().string();
-  throw InputError(folder.string(), "one image '" + match.pattern + "'",
+  throw InputError(folder.string(), "one file '" + match.pattern + "'",
                    std::to_string(match.files.size()) + ": " + list,
                    "make '" + key + "' in [images] of cell.toml fit one of them only");
+}
+
+std::optional<fs::path> resolve_optional_image(const fs::path& folder, const ImageNames& names,
+                                               const std::string& key) {
+  const bool is_default = name_of_image(names, key) == name_of_image(ImageNames{}, key);
+  if (is_default && match_image(folder, name_of_image(names, key)).files.empty()) return std::nullopt;
+  return resolve_image(folder, names, key);
 }
 
 }  // namespace mbtfm::runner

@@ -2,18 +2,24 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
+#include <vector>
 
 #include "pipeline/contract/parameters.h"
 
 namespace mbtfm::runner {
 
-/// File names or globs, relative to the cell folder.
+/// File names or globs, relative to the cell folder; several with | between them.
 struct ImageNames {
   std::string adhesion = "paxillin.tif";  ///< paxillin is the adhesion protein most often tagged
   std::string actin = "actin.tif";
   std::string beads_stressed = "beads_stressed.tif";
   std::string beads_relaxed = "beads_relaxed.tif";
+  // drawn by hand in ImageJ, used where they are there
+  std::string outline_roi = "outline.roi|outline.zip";
+  std::string adhesion_rois = "adhesions.zip|adhesions.roi";
+  std::string fibre_rois = "fibres.zip|fibres.roi";
 };
 void declare(ParameterList& list, ImageNames& names);
 
@@ -24,11 +30,16 @@ struct ImageMatch {
   std::vector<std::filesystem::path> files;  ///< in alphabetical order
   std::string pattern;
 };
-/// Files of `folder` that a name or glob (*, ?, [abc] in its last part) stands for. A file of exactly that name wins.
+/// Files of `folder` that a name or glob (*, ?, [abc] in its last part) stands for, or one of several with | between
+/// them. A file of exactly that name wins over a glob.
 ImageMatch match_image(const std::filesystem::path& folder, const std::string& name_or_glob);
 
 /// The one file that is meant. @throws InputError where there is none, or several: lists them
 std::filesystem::path resolve_image(const std::filesystem::path& folder, const ImageNames& names,
                                     const std::string& key);
+
+/// The same of a file that need not be there where its name is left at the default.
+std::optional<std::filesystem::path> resolve_optional_image(const std::filesystem::path& folder,
+                                                            const ImageNames& names, const std::string& key);
 
 }  // namespace mbtfm::runner

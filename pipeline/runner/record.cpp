@@ -108,12 +108,23 @@ std::string settings_of(const Stage& stage, const fs::path& toml_file) {
   return json::parse(text.str()).dump();
 }
 
-std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, const ImageNames& images) {
+namespace {
+
+std::vector<std::string> files_of(const std::vector<ImageInput>& inputs, const fs::path& cell,
+                                  const ImageNames& images) {
   std::vector<std::string> names;
-  for (const ImageInput& image : stage.images) {
+  for (const ImageInput& image : inputs) {
     const ImageMatch match = match_image(cell, name_of_image(images, image.key));
     for (const fs::path& file : match.files) names.push_back(file.lexically_relative(cell).generic_string());
   }
+  return names;
+}
+
+}  // namespace
+
+std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, const ImageNames& images) {
+  std::vector<std::string> names = files_of(stage.images, cell, images);
+  for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
   return names;
 }
@@ -145,7 +156,8 @@ StageSurroundings surroundings_of(const Stage& stage, const fs::path& cell, cons
   return {.version = version,
           .settings = settings_of(stage, cell / "cell.toml"),
           .inputs = hash_files(cell, inputs_of(stage, cell, images)),
-          .outputs = hash_files(cell, outputs)};
+          .outputs = hash_files(cell, outputs),
+          .has_images = !files_of(stage.images, cell, images).empty()};
 }
 
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now) {
@@ -167,7 +179,7 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
       return {StageState::replaced, name + " was changed by hand: kept"};
     }
   }
-  if (!stage.images.empty() && now.inputs.empty()) return {StageState::given, "its images are gone: outputs kept"};
+  if (!stage.images.empty() && !now.has_images) return {StageState::given, "its images are gone: outputs kept"};
   if (record->version != now.version) return {StageState::must_run, "was made by version " + record->version};
   if (record->settings != now.settings) return {StageState::must_run, "its parameters have changed"};
   const std::string difference = first_difference(record->inputs, now.inputs);

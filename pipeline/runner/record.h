@@ -63,6 +63,7 @@ std::string name_of(StageState state);
 struct StageSurroundings {
   std::string version, settings;
   Hashes inputs, outputs;
+  bool has_images = true;  ///< one at least of those that it must have
 };
 StageSurroundings surroundings_of(const Stage& stage, const std::filesystem::path& cell, const ImageNames& images,
                                   const std::string& version);

@@ -31,6 +31,9 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     command.push_back(value);
   };
   for (const ImageInput& image : stage.images) add(image.flag, resolve_image(cell, images, image.key).string());
+  for (const ImageInput& image : stage.optional_images) {
+    if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
+  }
   for (const PathArgument& argument : stage.arguments) add(argument.flag, (cell / argument.path).string());
   add("config", (cell / "cell.toml").string());
   add(stage.output.flag, (cell / stage.output.path).string());
@@ -80,6 +83,7 @@ void CellRun::check_before_start() const {
     if (now.state != StageState::must_run && !(follows && now.state == StageState::up_to_date)) continue;
     changed.push_back(stage.folder);
     for (const ImageInput& image : stage.images) resolve_image(cell_, images_, image.key);
+    for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
     const ProcessResult check =
         run_process({executable_of(stage, options_), "--check", "--config", (cell_ / "cell.toml").string()});
     if (check.exit_code != 0 || check.signal) {

@@ -22,7 +22,8 @@ struct Stage {
   std::string name;    ///< the executable is mbtfm-<name>
   std::string folder;  ///< of its outputs and its record
   std::vector<ImageInput> images;
-  std::vector<PathArgument> arguments;  ///< further inputs that earlier stages write
+  std::vector<ImageInput> optional_images;  ///< used where they are there
+  std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
   PathArgument output;
   std::vector<std::string> reads;   ///< files behind `arguments`, relative to the cell folder
   std::vector<std::string> writes;  ///< files without which the stage is not done

@@ -1,6 +1,7 @@
 #include "segment/image.h"
 
 #include <gtest/gtest.h>
+#include <tiffio.h>
 
 #include <fstream>
 #include <random>
@@ -19,10 +20,16 @@ std::string bytes_of(const fs::path& file) {
   return {(std::istreambuf_iterator<char>(in)), {}};
 }
 
+/// As a new file: to overwrite an old one, some file systems wait for the disk.
+void write(const fs::path& file, const std::string& bytes) {
+  fs::remove(file);
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
 /// The image, or an InputError; anything else fails the test.
-bool is_read(const fs::path& file) {
+bool is_read(const fs::path& file, const PlaneChoice& choice = {}) {
   try {
-    read_image(file);
+    read_image(file, choice);
     return true;
   } catch (const InputError&) {
     return false;
@@ -43,7 +50,7 @@ TEST(ImageFuzz, a_truncated_file_is_an_input_error_at_every_length) {
   for (const char* name : {"a.tif", "a.png"}) {
     const std::string whole = bytes_of(folder / name);
     for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 150) {
-      std::ofstream(folder / "cut", std::ios::binary) << whole.substr(0, length);
+      write(folder / "cut", whole.substr(0, length));
       EXPECT_FALSE(is_read(folder / "cut")) << name << " cut to " << length << " of " << whole.size() << " bytes";
     }
   }
@@ -65,8 +72,49 @@ TEST(ImageFuzz, changed_bytes_never_crash_the_reader) {
         const std::size_t at = from + random() % std::min<std::size_t>(260, whole.size() - from);
         changed[at] = static_cast<char>(random());
       }
-      std::ofstream(folder / "changed", std::ios::binary) << changed;
+      write(folder / "changed", changed);
       is_read(folder / "changed");
+    }
+  }
+}
+
+/// Pages of 8 x 8 pixels, the first with a description.
+std::string stack(const fs::path& file, const std::string& description) {
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  for (int page = 0; page < 6; ++page) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 8);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 8);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 8);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    if (page == 0) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+    std::string row(8, static_cast<char>(page));
+    for (std::uint32_t j = 0; j < 8; ++j) TIFFWriteScanline(tiff, row.data(), j, 0);
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+  return bytes_of(file);
+}
+
+TEST(ImageFuzz, damaged_descriptions_of_stacks_never_crash_the_reader) {
+  const test::TemporaryFolder folder;
+  std::mt19937 random(11);
+  for (const std::string& description :
+       {std::string("ImageJ=1.53t\nimages=6\nchannels=2\nslices=3\nunit=micron\n"),
+        std::string("<OME UUID='urn:uuid:a'><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='3' SizeT='1' "
+                    "PhysicalSizeX='0.1'><Channel Name='a'/><Channel Name='b'/><TiffData IFD='0' FirstC='1' "
+                    "PlaneCount='3'><UUID FileName='a.tif'>urn:uuid:a</UUID></TiffData></Pixels></Image></OME>")}) {
+    fs::remove(folder / "whole");
+    const std::string whole = stack(folder / "whole", description);
+    const std::size_t from = whole.find(description);
+    ASSERT_NE(from, std::string::npos);
+    for (int round = 0; round < 1500; ++round) {
+      std::string changed = whole;
+      for (std::size_t k = 0; k < 1 + random() % 3; ++k) {
+        const std::size_t at = from + random() % description.size();
+        changed[at] = random() % 2 ? static_cast<char>('0' + random() % 10) : static_cast<char>(random());
+      }
+      write(folder / "changed", changed);
+      is_read(folder / "changed", {.channel = "1"});
     }
   }
 }
@@ -84,7 +132,7 @@ TEST(ImageFuzz, the_files_of_other_programs_decode_or_are_refused) {
       std::string changed = whole.substr(0, whole.size() - (round % 2) * (random() % whole.size()));
       if (changed.size() > 8)
         changed[4 + random() % std::min<std::size_t>(400, changed.size() - 4)] ^= 1 << random() % 8;
-      std::ofstream(folder / "changed", std::ios::binary) << changed;
+      write(folder / "changed", changed);
       is_read(folder / "changed");
     }
   }

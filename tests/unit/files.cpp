@@ -82,6 +82,26 @@ TEST(Files, fibres_drawn_elsewhere_need_no_reasons) {
   EXPECT_TRUE(fibres[0].type_reason.empty());
 }
 
+TEST(Files, an_outline_comes_back_with_its_holes_and_without_the_column_is_one_ring) {
+  const TemporaryFolder folder;
+  const Polygon outer = {{0, 0}, {10, 0}, {10, 10}, {0, 10}}, hole = {{4, 4}, {6, 4}, {5, 6}};
+  write_outline(folder / "outline.csv", outer, {hole});
+  EXPECT_EQ(read_outline(folder / "outline.csv"), (std::vector<Polygon>{outer, hole}));
+  write_text(folder / "plain.csv", "x_um,y_um\n0,0\n1,0\n0,1\n");
+  EXPECT_EQ(read_outline(folder / "plain.csv"), (std::vector<Polygon>{{{0, 0}, {1, 0}, {0, 1}}}));
+  write_text(folder / "gap.csv", "x_um,y_um,ring\n0,0,0\n1,0,0\n0,1,0\n0,0,2\n");
+  EXPECT_NE(message_of([&] { read_outline(folder / "gap.csv"); }).find("rings in order"), std::string::npos);
+}
+
+TEST(Files, a_hole_lies_inside_its_outline) {
+  Cell cell{{}, {}, {{0, 0}, {10, 0}, {10, 10}, {0, 10}}, {{{4, 4}, {6, 4}, {5, 6}}}};
+  EXPECT_NO_THROW(check(cell));
+  cell.holes_um[0][1].x = 11;
+  EXPECT_THROW(check(cell), InvalidData);
+  cell.holes_um[0] = {{4, 4}, {6, 4}};
+  EXPECT_THROW(check(cell), InvalidData);
+}
+
 TEST(Files, a_network_comes_back_as_it_was_written) {
   const TemporaryFolder folder;
   write_network(folder / "network.vtu", network());

@@ -248,6 +248,35 @@ TEST_F(Runner, a_file_whose_name_looks_like_a_glob_is_found) {
   EXPECT_EQ(resolve_image(cell_, names, "actin"), cell_ / "cell[1].tif");
 }
 
+TEST_F(Runner, hand_drawn_rois_are_used_where_they_are_and_a_changed_one_runs_the_segmentation_again) {
+  started();
+  write_text(cell_ / "fibres.zip", "drawn");
+  EXPECT_EQ(started(), "segment");
+  EXPECT_EQ(started(), "");
+  write_text(cell_ / "fibres.zip", "drawn better");
+  EXPECT_EQ(started(), "segment");
+  fs::remove(cell_ / "fibres.zip");
+  EXPECT_EQ(started(), "segment");
+  write_text(cell_ / "outline.roi", "drawn");
+  EXPECT_EQ(started(), "segment");
+  for (const char* image : {"paxillin.tif", "actin.tif"}) fs::remove(cell_ / image);
+  EXPECT_EQ(started(), "");  // its images are gone: outputs kept
+}
+
+TEST_F(Runner, hand_drawn_rois_that_are_asked_for_by_name_must_be_there) {
+  write_parameters("[images]\nfibre_rois = \"drawn.zip\"\n");
+  EXPECT_THROW(run_cell(cell_, options_), InputError);
+  EXPECT_EQ(calls(), "");
+  write_text(cell_ / "drawn.zip", "");
+  EXPECT_EQ(resolve_optional_image(cell_, read_image_names(cell_), "fibre_rois"), cell_ / "drawn.zip");
+  ImageNames names;
+  EXPECT_EQ(resolve_optional_image(cell_, names, "fibre_rois"), std::nullopt);
+  write_text(cell_ / "fibres.roi", "");
+  EXPECT_EQ(resolve_optional_image(cell_, names, "fibre_rois"), cell_ / "fibres.roi");
+  write_text(cell_ / "fibres.zip", "");
+  EXPECT_THROW(resolve_optional_image(cell_, names, "fibre_rois"), InputError);  // which of them?
+}
+
 TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   const TemporaryFolder folder;
   for (const char* name : {"a", "b", "deeper/c"}) {

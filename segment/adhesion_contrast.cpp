@@ -1,0 +1,46 @@
+#include "segment/adhesion_contrast.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "segment/grid.h"
+
+namespace mbtfm::segment {
+
+/// Local noise is taken over this many background radii: enough background among dense adhesions.
+constexpr double kNoiseRadius = 2.5;
+
+Contrast contrast_of(const cv::Mat& image, double pixel_um, const AdhesionParameters& p) {
+  const double smoothing_px = std::max(0.5, p.adhesion_smoothing_um / pixel_um);
+  const double radius_px = std::max(3.0, p.adhesion_background_um / pixel_um);
+  const cv::Mat smooth = gaussian(image, smoothing_px);
+  Contrast c;
+  const cv::Mat background = local_median(smooth, radius_px);
+  c.sharp = image - background;
+  c.height = smooth - background;
+  c.sharp_noise = local_noise(image, kNoiseRadius * radius_px);
+  c.noise = cv::max(c.sharp_noise * noise_gain(smoothing_px), local_spread(c.height, kNoiseRadius * radius_px));
+  // "bright": the mean height of what stands clearly out of the noise, weighted by the height itself, so that many
+  // faint pixels do not outvote the adhesions
+  double sum = 0, sum_of_squares = 0;
+  for (int y = 0; y < image.rows; ++y)
+    for (int x = 0; x < image.cols; ++x) {
+      const double height = c.height.at<float>(y, x);
+      if (height <= 2 * p.adhesion_seed_noise * c.noise.at<float>(y, x)) continue;
+      sum += height;
+      sum_of_squares += height * height;
+    }
+  const double typical = sum > 0 ? sum_of_squares / sum : 0;
+  // an image without noise still has the rounding of float arithmetic: 1e-5 of its brightest value
+  double darkest = 0, brightest = 0;
+  cv::minMaxLoc(image, &darkest, &brightest);
+  c.floor = std::max(p.adhesion_faintest * typical, 1e-5 * std::max(std::abs(darkest), std::abs(brightest)));
+  return c;
+}
+
+cv::Mat above(const Contrast& c, double n_sigma) {
+  const cv::Mat level = cv::max(c.noise * n_sigma, c.floor);
+  return c.height > level;
+}
+
+}  // namespace mbtfm::segment

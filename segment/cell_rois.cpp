@@ -1,0 +1,48 @@
+#include "segment/cell_rois.h"
+
+#include <cmath>
+
+namespace mbtfm::segment {
+namespace {
+
+// Opaque (FF), red, green, blue: the colours of the overlay
+constexpr std::uint32_t kOutline = 0xFFE1E1E1, kAdhesion = 0xFFFFAAEB, kVentral = 0xFF00D68F, kDorsal = 0xFF56B4FF,
+                        kArc = 0xFFFFB728;
+
+std::uint32_t colour_of(FibreType type) {
+  return type == FibreType::ventral ? kVentral : type == FibreType::dorsal ? kDorsal : kArc;
+}
+
+std::vector<Vec2> in_px(const std::vector<Vec2>& points_um, double pixel_um, double shift_px) {
+  std::vector<Vec2> points_px;
+  for (const Vec2 p : points_um) points_px.push_back((1 / pixel_um) * p - Vec2{shift_px, shift_px});
+  return points_px;
+}
+
+}  // namespace
+
+std::vector<Roi> rois_of(const Cell& cell, double pixel_um) {
+  std::vector<Roi> rois;
+  const auto add = [&](RoiShape shape, const std::string& name, std::uint32_t colour) -> Roi& {
+    rois.emplace_back();
+    rois.back().shape = shape;
+    rois.back().name = name;
+    rois.back().stroke_argb = colour;
+    return rois.back();
+  };
+  add(RoiShape::polygon, "outline", kOutline).points_px = in_px(cell.outline_um, pixel_um, 0);
+  for (const Adhesion& a : cell.adhesions) {
+    const Vec2 half = 0.5 * a.major_axis_um * Vec2{std::cos(a.angle_rad), std::sin(a.angle_rad)};
+    Roi& roi = add(RoiShape::ellipse, "adhesion " + std::to_string(a.adhesion_id), kAdhesion);
+    roi.points_px = in_px({a.position_um - half, a.position_um + half}, pixel_um, 0);
+    roi.aspect_ratio = a.minor_axis_um / a.major_axis_um;
+  }
+  constexpr double kCentre_px = 0.5;  // ImageJ counts a line's points from pixel centres
+  for (const Fibre& f : cell.fibres) {
+    const std::string name = std::string(name_of(f.type)) + " " + std::to_string(f.fibre_id);
+    add(RoiShape::polyline, name, colour_of(f.type)).points_px = in_px(f.points_um, pixel_um, kCentre_px);
+  }
+  return rois;
+}
+
+}  // namespace mbtfm::segment

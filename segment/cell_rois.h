@@ -1,0 +1,15 @@
+/// A segmented cell as ImageJ selections, to look at, correct and give back by hand.
+#pragma once
+
+#include <vector>
+
+#include "pipeline/contract/types.h"
+#include "segment/roi.h"
+
+namespace mbtfm::segment {
+
+/// The outline as a polygon `outline`, adhesions as ellipses `adhesion 12`, fibres as segmented lines `ventral 3`, each
+/// in its colour of the overlay. No groups: ImageJ would paint over the colours with its own of the group.
+std::vector<Roi> rois_of(const Cell& cell, double pixel_size_um);
+
+}  // namespace mbtfm::segment

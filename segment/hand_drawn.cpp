@@ -1,0 +1,271 @@
+#include "segment/hand_drawn.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "segment/ellipse.h"
+#include "segment/fibre_ends.h"
+#include "segment/fibre_profile.h"
+#include "segment/grid.h"
+
+namespace mbtfm::segment {
+namespace {
+
+std::string called(const RoiSet& set, const Roi& roi) { return set.name + ": '" + roi.name + "'"; }
+
+/// A selection may touch the border of its image, and by rounding pass it by a pixel; further out it was drawn on
+/// another image.
+void require_inside(const std::vector<Vec2>& points_px, const Field& field, const std::string& where) {
+  constexpr double kSlack_px = 1;
+  for (const Vec2 p : points_px) {
+    if (p.x >= -kSlack_px && p.y >= -kSlack_px && p.x <= field.width_px + kSlack_px &&
+        p.y <= field.height_px + kSlack_px) {
+      continue;
+    }
+    throw InputError(where,
+                     "a selection within the image's " + std::to_string(field.width_px) + " x " +
+                         std::to_string(field.height_px) + " pixels",
+                     "a point at " + std::to_string(std::lround(p.x)) + ", " + std::to_string(std::lround(p.y)),
+                     "was it drawn on this image, not on a larger one or a crop?");
+  }
+}
+
+std::vector<Vec2> in_um(const std::vector<Vec2>& points_px, double pixel_um) {
+  std::vector<Vec2> points_um;
+  for (const Vec2 p : points_px) {
+    if (points_um.empty() || !(pixel_um * p == points_um.back())) points_um.push_back(pixel_um * p);
+  }
+  return points_um;
+}
+
+Polygon area_um(const RoiSet& set, const Roi& roi, const Field& field) {
+  const std::string where = called(set, roi);
+  if (!is_area(roi.shape)) {
+    throw InputError(where, "an area: polygon, freehand, traced, oval, ellipse, rectangle or composite",
+                     std::string(name_of(roi.shape)));
+  }
+  const Polygon polygon_px = area_px(roi);
+  require_inside(polygon_px, field, where);
+  Polygon polygon_um = in_um(polygon_px, field.pixel_um);
+  if (polygon_um.size() > 1 && polygon_um.front() == polygon_um.back()) polygon_um.pop_back();
+  if (polygon_um.size() < 3)
+    throw InputError(where, "at least three points", std::to_string(polygon_um.size()) + " different ones");
+  // a hundredth of a pixel: what the rounding of float coordinates may leave of a line
+  if (!(std::abs(signed_area_um2(polygon_um)) > 0.01 * field.pixel_um * field.pixel_um))
+    throw InputError(where, "an area > 0", "none between its points");
+  return polygon_um;
+}
+
+/// Ovals and ellipses are known exactly.
+std::optional<Adhesion> drawn_ellipse(const Roi& roi, double pixel_um) {
+  Vec2 centre, axis;
+  double other = 0;
+  if (roi.shape == RoiShape::oval) {
+    centre = roi.corner_px + 0.5 * roi.size_px;
+    axis = {roi.size_px.x, 0};
+    other = std::abs(roi.size_px.y);
+  } else if (roi.shape == RoiShape::ellipse) {
+    centre = 0.5 * (roi.points_px[0] + roi.points_px[1]);
+    axis = roi.points_px[1] - roi.points_px[0];
+    other = std::abs(roi.aspect_ratio) * norm(axis);
+  } else {
+    return std::nullopt;
+  }
+  if (other > norm(axis)) {
+    const double longer = other / norm(axis);
+    other = norm(axis);
+    axis = longer * Vec2{-axis.y, axis.x};
+  }
+  Adhesion adhesion;
+  adhesion.position_um = pixel_um * centre;
+  adhesion.major_axis_um = pixel_um * norm(axis);
+  adhesion.minor_axis_um = pixel_um * other;
+  adhesion.angle_rad = std::atan(axis.y / axis.x);  // of an axis without direction: -90° to 90°
+  adhesion.area_um2 = std::numbers::pi / 4 * adhesion.major_axis_um * adhesion.minor_axis_um;
+  adhesion.eccentricity = std::sqrt(std::max(0.0, 1 - std::pow(other / norm(axis), 2)));
+  return adhesion;
+}
+
+Adhesion ellipse_of(const Roi& roi, const Polygon& polygon_um, const Field& field, const std::string& where) {
+  if (const auto ellipse = drawn_ellipse(roi, field.pixel_um)) return *ellipse;
+  try {
+    return ellipse_of_polygon(polygon_um);
+  } catch (const InvalidData& error) {
+    throw InputError(where, error.expected, error.found, "draw it again");
+  }
+}
+
+/// See `hand_drawn_adhesions`. An area without a pixel's centre is as bright as the pixel at its own.
+double height_within(const Polygon& area_um, const Adhesion& adhesion, const Image& image, double pixel_um) {
+  constexpr double kBlur_um = 0.3, kRing_um = 1;  // the ring begins where the resolution of light has faded
+  const double reach_um = adhesion.major_axis_um / 2 + kRing_um;
+  const auto pixel_at = [&](double at_um, int n) {
+    return std::clamp(static_cast<int>(std::floor(at_um / pixel_um)), 0, n - 1);
+  };
+  const Vec2 c = adhesion.position_um;
+  double sum = 0;
+  int n_inside = 0;
+  std::vector<float> around;
+  for (int j = pixel_at(c.y - reach_um, image.height); j <= pixel_at(c.y + reach_um, image.height); ++j) {
+    for (int i = pixel_at(c.x - reach_um, image.width); i <= pixel_at(c.x + reach_um, image.width); ++i) {
+      const Vec2 centre_um{(i + 0.5) * pixel_um, (j + 0.5) * pixel_um};
+      const double distance_um = distance_to_ellipse_um(adhesion, centre_um);
+      if (contains(area_um, centre_um)) {
+        sum += image.at(i, j);
+        ++n_inside;
+      } else if (distance_um >= kBlur_um && distance_um <= kRing_um) {
+        around.push_back(image.at(i, j));
+      }
+    }
+  }
+  const double inside =
+      n_inside > 0 ? sum / n_inside : image.at(pixel_at(c.x, image.width), pixel_at(c.y, image.height));
+  if (around.empty()) return inside;
+  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
+  std::nth_element(around.begin(), middle, around.end());
+  return inside - *middle;
+}
+
+/// The type that a name's words or the group state; none where neither does.
+std::optional<FibreType> stated_type(const Roi& roi, const std::string& where) {
+  std::optional<FibreType> type;
+  std::string word;
+  for (const char c : roi.name + " ") {
+    if (std::isalpha(static_cast<unsigned char>(c))) {
+      word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+      continue;
+    }
+    const std::optional<FibreType> named = fibre_type_of(word);
+    if (named && type && *named != *type) throw InputError(where, "one fibre type in its name", "two");
+    if (named) type = named;
+    word.clear();
+  }
+  const bool is_type = roi.group >= 1 && roi.group <= static_cast<int>(std::size(kFibreTypes));
+  if (!type && is_type) type = kFibreTypes[roi.group - 1];
+  return type;
+}
+
+/// Matrix points on the line, a pixel apart, and its end.
+std::vector<cv::Point2d> pixels_along(const Polyline& line_um, double pixel_um) {
+  std::vector<cv::Point2d> points;
+  double ahead_um = 0;  // from the segment's begin to the next point
+  for (std::size_t i = 0; i + 1 < line_um.size(); ++i) {
+    const Vec2 step = line_um[i + 1] - line_um[i];
+    for (; ahead_um < norm(step); ahead_um += pixel_um)
+      points.push_back(to_pixels(line_um[i] + (ahead_um / norm(step)) * step, pixel_um));
+    ahead_um -= norm(step);
+  }
+  points.push_back(to_pixels(line_um.back(), pixel_um));
+  return points;
+}
+
+void set_profile(Fibre& fibre, const Roi& roi, const std::optional<Channel>& actin, double pixel_um,
+                 const FibreParameters& p) {
+  fibre.width_um = roi.stroke_width_px > 0 ? roi.stroke_width_px * pixel_um : p.fibre_width_um;
+  if (!actin) return;
+  const Profile profile = profile_across(matrix_of(actin->image), pixels_along(fibre.points_um, pixel_um),
+                                         1.5 * p.fibre_width_um / pixel_um);
+  fibre.mean_intensity = profile.height;
+  if (profile.height > 0 && profile.width_px > 0) fibre.width_um = profile.width_px * pixel_um;
+}
+
+Fibre drawn_fibre(const RoiSet& set, const Roi& roi, const Field& field) {
+  const std::string where = called(set, roi);
+  if (!is_line(roi.shape)) {
+    throw InputError(where, "a line: straight, segmented or freehand", std::string(name_of(roi.shape)),
+                     is_area(roi.shape) ? "areas belong to adhesions.zip or outline.roi" : "");
+  }
+  const Polyline line = line_px(roi);
+  require_inside(line, field, where);
+  Fibre fibre;
+  fibre.points_um = in_um(line, field.pixel_um);
+  if (fibre.points_um.size() < 2)
+    throw InputError(where, "at least two points", std::to_string(fibre.points_um.size()) + " different ones");
+  if (length_um(fibre.points_um) < field.pixel_um)
+    throw InputError(where, "a line of at least a pixel's length", mbtfm::segment::in_um(length_um(fibre.points_um)));
+  return fibre;
+}
+
+}  // namespace
+
+Polygon hand_drawn_outline(const RoiSet& set, const Field& field) {
+  if (set.rois.size() != 1)
+    throw InputError(set.name, "one selection, the cell's outline", std::to_string(set.rois.size()));
+  const Roi& roi = set.rois.front();
+  if (roi.n_paths > 1) {
+    throw InputError(called(set, roi), "an outline in one piece", std::to_string(roi.n_paths) + " closed lines",
+                     "fill its holes, or keep one part of it: ROI manager, More, Split");
+  }
+  return area_um(set, roi, field);
+}
+
+std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optional<Channel>& adhesion,
+                                           const Field& field) {
+  std::vector<Adhesion> adhesions;
+  for (const Roi& roi : set.rois) {
+    const Polygon polygon_um = area_um(set, roi, field);
+    Adhesion a = ellipse_of(roi, polygon_um, field, called(set, roi));
+    a.adhesion_id = static_cast<int>(adhesions.size()) + 1;
+    if (adhesion) a.mean_intensity = height_within(polygon_um, a, adhesion->image, field.pixel_um);
+    adhesions.push_back(a);
+  }
+  return adhesions;
+}
+
+std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
+                                     const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
+                                     const FibreParameters& p) {
+  std::vector<Fibre> fibres;
+  for (const Roi& roi : set.rois) {
+    const std::string where = called(set, roi);
+    Fibre fibre = drawn_fibre(set, roi, field);
+    const std::optional<FibreType> stated = stated_type(roi, where);
+    set_profile(fibre, roi, actin, field.pixel_um, p);
+    tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+    if (fibre.points_um.size() < 2)
+      throw InputError(where, "a line from one adhesion to another or beyond", "one within a single adhesion");
+    fibre.confidence = 1;  // a person says that it is one
+    if (stated) {
+      fibre.type = *stated;
+      fibre.type_confidence = 1;
+      fibre.type_reason = "named or grouped so by hand";
+    }
+    fibre.fibre_id = static_cast<int>(fibres.size()) + 1;
+    fibres.push_back(std::move(fibre));
+  }
+  return fibres;
+}
+
+Adhesion ellipse_of_polygon(const Polygon& polygon) {
+  const Vec2 origin = polygon.front();  // near, so that no digits are lost
+  double area = 0, x = 0, y = 0, xx = 0, xy = 0, yy = 0;
+  for (std::size_t i = 0; i < polygon.size(); ++i) {
+    const Vec2 a = polygon[i] - origin, b = polygon[(i + 1) % polygon.size()] - origin;
+    const double c = cross(a, b);
+    area += c / 2;
+    x += c * (a.x + b.x) / 6;
+    y += c * (a.y + b.y) / 6;
+    xx += c * (a.x * a.x + a.x * b.x + b.x * b.x) / 12;
+    yy += c * (a.y * a.y + a.y * b.y + b.y * b.y) / 12;
+    xy += c * (a.x * b.y + 2 * a.x * a.y + 2 * b.x * b.y + b.x * a.y) / 24;
+  }
+  MBTFM_ASSERT(area != 0);
+  const Vec2 centre{x / area, y / area};
+  const double m_xx = xx / area - centre.x * centre.x, m_yy = yy / area - centre.y * centre.y,
+               m_xy = xy / area - centre.x * centre.y;
+  const double mean = (m_xx + m_yy) / 2, half_difference = std::hypot((m_xx - m_yy) / 2, m_xy);
+  const double ratio = std::sqrt((mean - half_difference) / (mean + half_difference));
+  if (!(ratio > 0)) throw InvalidData("polygon", "a line that does not cross itself", "negative second moments");
+  Adhesion adhesion;
+  adhesion.position_um = origin + centre;
+  adhesion.area_um2 = std::abs(area);
+  adhesion.major_axis_um = std::sqrt(adhesion.area_um2 / ratio * 4 / std::numbers::pi);
+  adhesion.minor_axis_um = ratio * adhesion.major_axis_um;
+  adhesion.angle_rad = std::atan2(2 * m_xy, m_xx - m_yy) / 2;
+  adhesion.eccentricity = std::sqrt(std::max(0.0, 1 - ratio * ratio));
+  return adhesion;
+}
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,101 @@
+/// Outlines lie on the edges of drawn cells.
+#include <gtest/gtest.h>
+
+#include "segment/ellipse.h"
+#include "segment/outline.h"
+#include "tests/support/drawn_image.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+constexpr double kPixel_um = 0.1;
+const Adhesion kDisc = ellipse(1, {20, 20}, 24, 18, 0.4);
+
+Image drawn_disc(double noise, std::uint64_t seed) {
+  Image image = even_image(400, 400, 100);
+  draw_ellipse(image, kDisc, 200, 0.15, kPixel_um);
+  add_noise(image, noise, seed);
+  return image;
+}
+
+/// Mean distance outside of an ellipse.
+double mean_offset_um(const Polygon& ring, const Adhesion& ellipse) {
+  double sum = 0;
+  for (const Vec2 p : ring) sum += distance_to_ellipse_um(ellipse, p);
+  return sum / static_cast<double>(ring.size());
+}
+
+TEST(Outline, lies_on_a_blurred_step) {
+  for (const double noise : {2.0, 10.0, 40.0}) {
+    SCOPED_TRACE(noise);
+    const Polygon outline = find_outline(drawn_disc(noise, 1), {}, kPixel_um, {});
+    ASSERT_GE(outline.size(), 8u);
+    EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.05);
+    EXPECT_GT(intersection_over_union(outline, ellipse_polygon(kDisc, 200)), 0.98);
+  }
+}
+
+TEST(Outline, lies_in_the_middle_of_a_cortex_that_the_microscope_cannot_resolve) {
+  for (const double width_um : {0.35, 0.6}) {
+    SCOPED_TRACE(width_um);
+    Image image = drawn_disc(5, 2);
+    Polyline edge = ellipse_polygon(kDisc, 100);
+    edge.push_back(edge.front());
+    draw_line(image, edge, 300, width_um, kPixel_um);
+    const Polygon outline = find_outline(image, {}, kPixel_um, {});
+    EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.1);  // its half-height is 0.2 and 0.3 um further out
+    EXPECT_GT(intersection_over_union(outline, ellipse_polygon(kDisc, 200)), 0.98);
+  }
+}
+
+TEST(Outline, contains_every_adhesion_it_owns) {
+  const DrawnScene scene = drawn_scene(10, 5);
+  std::vector<Adhesion> adhesions = scene.adhesions;
+  adhesions.push_back(ellipse(6, {12.8, 23.6}, 1, 0.5, 0));  // 0.8 um outside
+  const auto cells = find_cells(scene.actin_image, adhesions, scene.kPixel_um, {});
+  ASSERT_EQ(cells.size(), 1u);
+  EXPECT_EQ(inside(cells[0], adhesions).size(), adhesions.size());
+}
+
+TEST(Outline, a_gap_as_dark_as_outside_is_a_hole_and_what_lies_in_it_is_not_in_the_cell) {
+  Image image = drawn_disc(5, 3);
+  const Adhesion gap = ellipse(1, {21, 19}, 6, 4, 1);
+  draw_ellipse(image, gap, -200, 0.15, kPixel_um);
+  const auto cells = find_cells(image, {}, kPixel_um, {});
+  ASSERT_EQ(cells.size(), 1u);
+  ASSERT_EQ(cells[0].holes_um.size(), 1u);
+  EXPECT_GT(intersection_over_union(cells[0].holes_um[0], ellipse_polygon(gap, 100)), 0.9);
+  EXPECT_NEAR(cells[0].area_um2, kDisc.area_um2 - gap.area_um2, 0.02 * kDisc.area_um2);
+  const auto kept = inside(cells[0], {ellipse(1, {21, 19}, 1, 0.5, 0), ellipse(2, {13, 19}, 1, 0.5, 0)});
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept[0].position_um.x, 13);
+}
+
+TEST(Outline, a_dim_middle_is_no_hole) {
+  Image image = drawn_disc(5, 4);
+  draw_ellipse(image, ellipse(1, {21, 19}, 6, 4, 1), -100, 0.15, kPixel_um);  // half as bright as the cell
+  const auto cells = find_cells(image, {}, kPixel_um, {});
+  ASSERT_EQ(cells.size(), 1u);
+  EXPECT_TRUE(cells[0].holes_um.empty());
+}
+
+TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
+  Image image = even_image(600, 400, 100);
+  const Adhesion small = ellipse(1, {12, 12}, 14, 10, 0.2), large = ellipse(2, {40, 22}, 24, 20, 1),
+                 cut = ellipse(3, {8, 38}, 12, 12, 0);
+  for (const Adhesion& a : {small, large, cut}) draw_ellipse(image, a, 200, 0.15, kPixel_um);
+  add_noise(image, 10, 5);
+  const auto cells = find_cells(image, {}, kPixel_um, {});
+  ASSERT_EQ(cells.size(), 3u);
+  EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_polygon(large, 200)), 0.98);
+  EXPECT_GT(intersection_over_union(cells[1].outer_um, ellipse_polygon(small, 200)), 0.97);
+  EXPECT_FALSE(cells[0].is_cut_by_border);
+  EXPECT_FALSE(cells[1].is_cut_by_border);
+  EXPECT_TRUE(cells[2].is_cut_by_border);
+  for (const Vec2 p : cells[2].outer_um) EXPECT_LE(p.y, 40);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

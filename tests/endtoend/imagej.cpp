@@ -1,0 +1,246 @@
+// A real ImageJ (Debian's `imagej`, under `xvfb-run`) reads what mbtfm writes, and mbtfm reads what it writes.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <sstream>
+
+#include "pipeline/contract/files.h"
+#include "segment/ellipse.h"
+#include "segment/roi.h"
+#include "tests/support/drawn_image.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using segment::Roi;
+using test::TemporaryFolder;
+
+bool has_imagej() { return std::system("command -v imagej xvfb-run > /dev/null") == 0; }
+
+/// Run a macro; its output. ImageJ's exit code says nothing.
+std::string run_macro(const fs::path& folder, const std::string& macro) {
+  std::ofstream(folder / "macro.ijm") << macro << "\nrun('Quit');\n";
+  const fs::path log = folder / "imagej.log";
+  const std::string command = "timeout 120 xvfb-run -a imagej -b '" + (folder / "macro.ijm").string() + "' > '" +
+                              log.string() + "' 2>&1 < /dev/null";
+  [[maybe_unused]] const int ignored = std::system(command.c_str());
+  return read_text(log);
+}
+
+struct Measured {
+  std::string type, colour;
+  double area = 0, length = 0;  ///< as ImageJ measures them, in px² and px
+  Vec2 corner_px, size_px;      ///< of its box
+  double shoelace = 0;          ///< area of the coordinates it gives, px²
+  std::vector<Vec2> points_px;
+};
+
+/// Lines `name|type|colour|area|length|left top width height x1,y1 x2,y2 …` of a macro's table.
+std::map<std::string, Measured> measured_in(const fs::path& table) {
+  std::map<std::string, Measured> result;
+  std::ifstream in(table);
+  for (std::string line; std::getline(in, line);) {
+    std::stringstream fields(line);
+    std::string name, field;
+    std::getline(fields, name, '|');
+    Measured& m = result[name];
+    std::getline(fields, m.type, '|');
+    std::getline(fields, m.colour, '|');
+    std::getline(fields, field, '|');
+    m.area = std::stod(field);
+    std::getline(fields, field, '|');
+    m.length = std::stod(field);
+    fields >> m.corner_px.x >> m.corner_px.y >> m.size_px.x >> m.size_px.y;
+    for (std::string point; fields >> point;) {
+      m.points_px.push_back({std::stod(point), std::stod(point.substr(point.find(',') + 1))});
+    }
+    m.shoelace = std::abs(signed_area_um2(m.points_px));
+  }
+  return result;
+}
+
+/// ImageJ measures areas by counting pixels: it is asked on a canvas on which the selection is some hundreds of pixels
+/// wide.
+constexpr const char* kReportFunction = R"(
+function report(table) {
+  name = Roi.getName; type = Roi.getType; colour = Roi.getStrokeColor; area = 0; length = 0;
+  getSelectionCoordinates(x, y);
+  Roi.getFloatBounds(left, top, width, height);
+  points = " " + left + " " + top + " " + width + " " + height;
+  for (i = 0; i < x.length; i++) points = points + " " + d2s(x[i], 6) + "," + d2s(y[i], 6);
+  if (type == "composite") {
+    List.setMeasurements; area = List.getValue("Area");
+  } else if (indexOf(type, "line") >= 0) {
+    List.setMeasurements; length = List.getValue("Length");
+  } else {
+    Array.getStatistics(x, x0, x1, mean, sd); Array.getStatistics(y, y0, y1, mean, sd);
+    k = 2000 / maxOf(x1 - x0, y1 - y0);
+    xs = newArray(x.length); ys = newArray(x.length);
+    for (i = 0; i < x.length; i++) { xs[i] = 20 + k * (x[i] - x0); ys[i] = 20 + k * (y[i] - y0); }
+    source = getImageID(); selectImage("canvas");
+    makeSelection("polygon", xs, ys); List.setMeasurements; area = List.getValue("Area") / (k * k);
+    selectImage(source);
+  }
+  File.append(name + "|" + type + "|" + colour + "|" + d2s(area, 9) + "|" + d2s(length, 9) + "|" + points, table);
+}
+newImage("canvas", "8-bit", 2040, 2040, 1);
+newImage("image", "8-bit", 256, 256, 1);
+)";
+
+TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_writes) {
+  if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
+  const TemporaryFolder folder;
+  const test::DrawnScene scene = test::drawn_scene(10, 1);
+  const double pixel_um = scene.kPixel_um;
+  segment::write_tiff(folder / "paxillin.tif", scene.adhesion_image);
+  segment::write_tiff(folder / "actin.tif", scene.actin_image);
+  const test::Outcome outcome = test::run_program(
+      "mbtfm-segment --pixel_size_um 0.1 --adhesion-image '" + (folder / "paxillin.tif").string() +
+      "' --actin-image '" + (folder / "actin.tif").string() + "' --out '" + folder.path().string() + "'");
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  const fs::path table = folder / "measured";
+  run_macro(folder.path(), std::string(kReportFunction) + "roiManager('Open', '" + (folder / "RoiSet.zip").string() +
+                               "');\nn = roiManager('count');\nfor (r = 0; r < n; r++) {\n" +
+                               "  selectImage('image'); roiManager('select', r); report('" + table.string() + "');\n}");
+  const Cell cell = read_cell(folder.path());
+  std::map<std::string, Measured> by_name = measured_in(table);
+  ASSERT_EQ(by_name.size(), 1 + cell.adhesions.size() + cell.fibres.size());
+  ASSERT_GE(cell.adhesions.size(), 4u);
+  ASSERT_GE(cell.fibres.size(), 2u);
+
+  const Measured& outline = by_name["outline"];
+  const double outline_px2 = std::abs(signed_area_um2(cell.outline_um)) / (pixel_um * pixel_um);
+  EXPECT_NEAR(outline.area, outline_px2, 1e-3 * outline_px2);
+  EXPECT_EQ(outline.type, "polygon");
+  EXPECT_EQ(outline.colour, "#e1e1e1");
+  for (const Adhesion& a : cell.adhesions) {
+    const Measured& m = by_name["adhesion " + std::to_string(a.adhesion_id)];
+    const double area_px2 = a.area_um2 / (pixel_um * pixel_um);
+    // ImageJ draws an ellipse by 72 corners, which lack 1.3e-3 of its area
+    EXPECT_NEAR(m.area, area_px2, 2.3e-3 * area_px2);
+    EXPECT_NEAR(m.shoelace, area_px2, 2.3e-3 * area_px2);
+    EXPECT_EQ(m.colour, "#ffaaeb");
+    for (const Vec2 p : m.points_px) EXPECT_NEAR(segment::distance_to_ellipse_um(a, pixel_um * p), 0, 0.01 * pixel_um);
+  }
+  for (const Fibre& f : cell.fibres) {
+    const Measured& m = by_name[std::string(name_of(f.type)) + " " + std::to_string(f.fibre_id)];
+    const double length_px = length_um(f.points_um) / pixel_um;
+    EXPECT_NEAR(m.length, length_px, 1e-4 * length_px);
+    EXPECT_EQ(m.type, "polyline");
+    ASSERT_EQ(m.points_px.size(), f.points_um.size());
+    for (std::size_t i = 0; i < f.points_um.size(); ++i) {
+      EXPECT_NEAR(norm(pixel_um * (m.points_px[i] + Vec2{0.5, 0.5}) - f.points_um[i]), 0, 1e-4);
+    }
+  }
+}
+
+TEST(ImageJ, a_line_it_profiles_lies_where_mbtfm_reads_it) {
+  if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
+  const TemporaryFolder folder;
+  // the grey value of a pixel is its column: a profile's first value tells where the line begins
+  const std::string output = run_macro(folder.path(), R"(
+newImage("ramp", "32-bit", 100, 80, 1);
+run("Macro...", "code=v=x");
+makeSelection("polyline", newArray(10.25, 30.5, 50.75), newArray(20, 20, 20)); p = getProfile();
+saveAs("Selection", ")" + (folder / "a.roi").string() + R"("); print("begins", p[0]);)");
+  const auto at = output.find("begins ");
+  ASSERT_NE(at, std::string::npos) << output;
+  const double centre_of_column = std::stod(output.substr(at + 7)) + 0.5;  // from the outer corner
+  EXPECT_NEAR(segment::line_px(segment::read_rois(folder / "a.roi").front()).front().x, centre_of_column, 1e-3);
+}
+
+TEST(ImageJ, selections_it_saves_are_read_as_it_draws_them) {
+  if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
+  const TemporaryFolder folder;
+  const fs::path table = folder / "drawn";
+  const std::string save = "save('";
+  std::ostringstream macro;
+  macro << kReportFunction << R"(
+function save(name) { Roi.setName(name); saveAs("Selection", ")"
+        << folder.path().string() << R"(/" + name + ".roi"); report(")" << table.string() << R"("); }
+x = newArray(10.25, 30.5, 50.75, 70.125); y = newArray(20.5, 40.125, 20.25, 90);
+makeLine(10.25, 20.5, 50.75, 40.125); save("line");
+makeLine(10, 20, 30, 40, 50, 20); save("whole polyline");
+makeSelection("polyline", x, y); save("polyline");
+makeSelection("freeline", x, y); save("freehand line");
+makeLine(10, 20, 30, 40, 50, 20, 60, 70, 120, 30); run("Fit Spline"); save("spline");
+makePolygon(10, 20, 30, 40, 50, 20); save("whole polygon");
+makeSelection("polygon", x, y); save("polygon");
+makeSelection("freehand", x, y); save("freehand");
+makeSelection("traced", newArray(10, 30, 30, 10), newArray(20, 20, 40, 40)); save("traced");
+makePolygon(10, 20, 30, 40, 50, 20); run("Fit Spline"); save("closed spline of 3");
+makePolygon(10,20,30,10,50,20,60,70,20,90,15,80,5,60,3,50,2,40,4,30); run("Fit Spline"); save("closed spline of 10");
+makeOval(10, 20, 30, 17); save("oval");
+makeOval(10.25, 20.5, 30.5, 17.75); save("shifted oval");
+makeEllipse(20, 30, 70, 60, 0.4); save("ellipse");
+makeRectangle(10, 20, 30, 17); save("rectangle");
+makeRectangle(10.25, 20.5, 30.5, 17.75); save("shifted rectangle");
+makeRectangle(10, 20, 40, 30, 12); save("rounded rectangle");
+makeRotatedRectangle(20, 30, 70, 60, 12); save("rotated rectangle");
+makeRectangle(10, 20, 60, 50); setKeyDown("alt"); makeRectangle(20, 30, 15, 10); save("composite with a hole");
+makeRectangle(10, 20, 30, 17); setKeyDown("shift"); makeRectangle(60, 25, 20, 40); save("composite of two");
+)";
+  run_macro(folder.path(), macro.str());
+  const auto drawn = measured_in(table);
+  EXPECT_EQ(drawn.size(), 20u);
+  for (const auto& [name, m] : drawn) {
+    SCOPED_TRACE(name);
+    const Roi roi = segment::read_rois(folder / (name + ".roi")).front();
+    EXPECT_EQ(roi.name, name);
+    if (segment::is_line(roi.shape)) {
+      const Polyline line = segment::line_px(roi);
+      ASSERT_EQ(line.size(), m.points_px.size());
+      for (std::size_t i = 0; i < line.size(); ++i)
+        EXPECT_NEAR(norm(line[i] - m.points_px[i] - Vec2{0.5, 0.5}), 0, 1e-3);
+      if (roi.shape != segment::RoiShape::freehand_line) {  // which ImageJ smooths before it measures
+        EXPECT_NEAR(length_um(line), m.length, 1e-4 * m.length);
+      }
+      continue;
+    }
+    if (roi.shape == segment::RoiShape::composite) {  // ImageJ counts its pixels
+      EXPECT_EQ(std::abs(signed_area_um2(segment::area_px(roi))), m.area);
+      continue;
+    }
+    if (roi.shape == segment::RoiShape::oval) {  // which ImageJ widens to whole pixels before it draws and measures
+      EXPECT_EQ(roi.corner_px, m.corner_px);
+      EXPECT_EQ(roi.size_px, m.size_px);
+      continue;
+    }
+    const Polygon area = segment::area_px(roi);
+    const double found_px2 = std::abs(signed_area_um2(area));
+    // ImageJ draws curves by straight steps: what lies between them and the curve is below a tenth of a pixel
+    const bool is_round = name == "ellipse" || name == "rounded rectangle";
+    EXPECT_NEAR(found_px2, m.shoelace, (is_round ? 3e-3 : 1e-5) * found_px2);
+    for (const Vec2 p : m.points_px) EXPECT_LT(distance_to_boundary_um(area, p), is_round ? 0.1 : 1e-3);
+  }
+}
+
+TEST(ImageJ, a_hyperstack_it_saves_is_read_by_channel_slice_and_frame) {
+  if (!has_imagej()) GTEST_SKIP() << "imagej and xvfb-run are not installed";
+  const TemporaryFolder folder;
+  for (const char* bits : {"8", "16", "32"}) {
+    const fs::path file = folder / (std::string(bits) + ".tif");
+    run_macro(folder.path(), "newImage('h', '" + std::string(bits) + R"(-bit grayscale-mode', 20, 10, 2, 3, 4);
+run("Properties...", "channels=2 slices=3 frames=4 unit=micron pixel_width=0.125 pixel_height=0.125 voxel_depth=1");
+for (c = 1; c <= 2; c++) for (z = 1; z <= 3; z++) for (t = 1; t <= 4; t++) {
+  Stack.setPosition(c, z, t); run("Set...", "value=" + (100 * (c - 1) + 10 * z + t) + " slice");
+}
+saveAs("Tiff", ")" + file.string() +
+                                 R"(");)");
+    for (int c = 1; c <= 2; ++c)
+      for (int z = 1; z <= 3; ++z)
+        for (int t = 1; t <= 4; ++t) {
+          const segment::Image image =
+              segment::read_image(file, {.channel = std::to_string(c), .z = std::to_string(z), .time = t});
+          EXPECT_EQ(image.pixels, std::vector<float>(200, static_cast<float>(100 * (c - 1) + 10 * z + t)));
+          EXPECT_EQ(image.pixel_size_um, 0.125);
+        }
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm

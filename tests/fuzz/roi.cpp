@@ -1,0 +1,110 @@
+#include "segment/roi.h"
+
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <random>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::segment {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::string bytes_of(const fs::path& file) {
+  std::ifstream in(file, std::ios::binary);
+  return {(std::istreambuf_iterator<char>(in)), {}};
+}
+
+/// Reads bytes as a file would be, and draws what was read; an InputError is the only thing that may be thrown.
+bool is_read(const fs::path& file) {
+  try {
+    for (const Roi& roi : read_rois(file)) {
+      if (is_area(roi.shape)) area_px(roi);
+      if (is_line(roi.shape)) line_px(roi);
+    }
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+/// Our own of each kind, and all that other programs wrote where they are at hand.
+std::vector<std::string> samples(const fs::path& folder) {
+  std::vector<std::string> result;
+  Roi roi;
+  roi.name = "ventral 1";
+  roi.shape = RoiShape::polyline;
+  for (int i = 0; i < 40; ++i) roi.points_px.push_back({10.0 + i, 20 + 0.5 * i * i});
+  result.push_back(encode_roi(roi));
+  std::vector<Roi> set = {roi};
+  roi.name = "adhesion 1";
+  roi.shape = RoiShape::ellipse;
+  roi.points_px.resize(2);
+  roi.aspect_ratio = 0.4;
+  result.push_back(encode_roi(roi));
+  set.push_back(roi);
+  write_roi_set(folder / "set.zip", set);
+  result.push_back(bytes_of(folder / "set.zip"));
+  const fs::path shared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data/roi";
+  if (!fs::exists(shared)) return result;
+  for (const auto& entry : fs::recursive_directory_iterator(shared)) {
+    if (entry.path().extension() == ".roi") result.push_back(bytes_of(entry.path()));
+  }
+  return result;
+}
+
+/// As a new file: to overwrite an old one, some file systems wait for the disk.
+void write(const fs::path& file, const std::string& bytes) {
+  fs::remove(file);
+  std::ofstream(file, std::ios::binary) << bytes;
+}
+
+TEST(RoiFuzz, a_truncated_set_or_geometry_is_an_input_error_at_every_length) {
+  const test::TemporaryFolder folder;
+  for (const std::string& whole : samples(folder.path())) {
+    const bool is_zip = whole.starts_with("PK");
+    for (std::size_t length = 0; length < whole.size(); length += 1 + whole.size() / 200) {
+      write(folder / "cut", whole.substr(0, length));
+      // a .roi may lose what follows the second header (names, properties) and still be whole
+      const bool is_read_now = is_read(folder / "cut");
+      if (is_zip || length < 64) {
+        EXPECT_FALSE(is_read_now) << length << " of " << whole.size() << " bytes";
+      }
+    }
+  }
+}
+
+TEST(RoiFuzz, changed_bytes_never_crash_the_reader) {
+  const test::TemporaryFolder folder;
+  std::mt19937 random(5);
+  for (const std::string& whole : samples(folder.path())) {
+    for (int round = 0; round < 150; ++round) {
+      std::string changed = whole;
+      const std::size_t n_changes = 1 + random() % 4;
+      // the header and the counts in it are where damage hurts most
+      const std::size_t range = round % 2 ? changed.size() : std::min<std::size_t>(changed.size(), 80);
+      for (std::size_t k = 0; k < n_changes; ++k) changed[random() % range] = static_cast<char>(random());
+      write(folder / "changed", changed);
+      is_read(folder / "changed");
+    }
+  }
+}
+
+TEST(RoiFuzz, counts_beyond_the_bytes_take_no_memory) {
+  const test::TemporaryFolder folder;
+  std::string bytes = samples(folder.path()).front();
+  for (const std::size_t at : {16u, 18u, 60u}) {  // points, points beyond 65535, place of the second header
+    std::string changed = bytes;
+    if (at == 18) changed[16] = changed[17] = 0;
+    changed.replace(at, at == 16 ? 2 : 4, at == 16 ? 2 : 4, '\x7F');
+    write(folder / "changed", changed);
+    EXPECT_FALSE(is_read(folder / "changed")) << at;
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

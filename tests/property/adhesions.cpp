@@ -1,0 +1,123 @@
+/// What must not change the adhesions and the outline, or change them in a known way.
+#include <gtest/gtest.h>
+
+#include <opencv2/core/utility.hpp>
+
+#include "segment/adhesions.h"
+#include "segment/outline.h"
+#include "tests/support/drawn_image.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+constexpr double kPixel_um = DrawnScene::kPixel_um, kSide_um = 25.6;
+
+template <class Map>
+Image mapped(const Image& image, Map map) {
+  Image result = image;
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const auto [c, r] = map(column, row);
+      result.at(c, r) = image.at(column, row);
+    }
+  return result;
+}
+
+struct Found {
+  std::vector<Adhesion> adhesions;
+  Polygon outline_um;
+};
+
+Found found_in(const Image& adhesion, const Image& actin) {
+  const auto adhesions = find_adhesions(adhesion, kPixel_um, {});
+  return {adhesions, find_outline(actin, adhesions, kPixel_um, {})};
+}
+
+/// `b` is `a` after `move`, a turn by `turn_rad` or a reflection.
+template <class Move>
+void expect_moved(const Found& a, const Found& b, Move move) {
+  std::vector<Adhesion> expected = a.adhesions;
+  for (Adhesion& adhesion : expected) {
+    const Vec2 tip = adhesion.position_um + Vec2{std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
+    const Vec2 along = move(tip) - move(adhesion.position_um);
+    adhesion.position_um = move(adhesion.position_um);
+    adhesion.angle_rad = std::atan2(along.y, along.x);
+  }
+  const AdhesionScore score = score_adhesions(expected, b.adhesions);
+  EXPECT_EQ(score.n_matched, score.n_true);
+  EXPECT_EQ(score.n_found, score.n_true);
+  // the background is taken on a grid of five pixels that does not turn with the image: it moves the level by a share
+  // of the noise
+  EXPECT_LT(score.centre_error_um, 0.01);
+  EXPECT_NEAR(score.area_ratio, 1, 0.02);
+  EXPECT_LT(score.angle_error_rad, 0.03);
+  Polygon outline = a.outline_um;
+  for (Vec2& p : outline) p = move(p);
+  EXPECT_GT(intersection_over_union(outline, b.outline_um), 0.99);
+}
+
+TEST(Adhesions, turn_and_mirror_with_the_image) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    const DrawnScene s = drawn_scene(20, seed);
+    const Found upright = found_in(s.adhesion_image, s.actin_image);
+    const auto expect_same = [&](auto map, auto move) {
+      expect_moved(upright, found_in(mapped(s.adhesion_image, map), mapped(s.actin_image, map)), move);
+    };
+    expect_same([](int c, int r) { return std::pair(255 - r, c); }, [](Vec2 p) { return Vec2{kSide_um - p.y, p.x}; });
+    expect_same([](int c, int r) { return std::pair(255 - c, 255 - r); },
+                [](Vec2 p) {
+                  return Vec2{kSide_um - p.x, kSide_um - p.y};
+                });
+    expect_same([](int c, int r) { return std::pair(255 - c, r); }, [](Vec2 p) { return Vec2{kSide_um - p.x, p.y}; });
+    expect_same([](int c, int r) { return std::pair(r, c); }, [](Vec2 p) { return Vec2{p.y, p.x}; });
+  }
+}
+
+TEST(Adhesions, move_with_the_image_by_whole_pixels) {
+  const DrawnScene s = drawn_scene(20, 4);
+  const Found before = found_in(s.adhesion_image, s.actin_image);
+  for (const int by : {1, 6, 13}) {
+    SCOPED_TRACE(by);
+    const auto shift = [by](int c, int r) { return std::pair((c + by) % 256, r); };
+    expect_moved(before, found_in(mapped(s.adhesion_image, shift), mapped(s.actin_image, shift)), [by](Vec2 p) {
+      return Vec2{p.x + by * kPixel_um, p.y};
+    });
+  }
+}
+
+TEST(Adhesions, do_not_depend_on_gain_and_offset) {
+  const DrawnScene s = drawn_scene(20, 5);
+  Image adhesion = s.adhesion_image, actin = s.actin_image;
+  for (Image* image : {&adhesion, &actin})
+    for (float& value : image->pixels) value = 4 * value + 1024;  // powers of two: exact but for the last bits
+  const Found a = found_in(s.adhesion_image, s.actin_image), b = found_in(adhesion, actin);
+  expect_moved(a, b, [](Vec2 p) { return p; });
+  for (std::size_t i = 0; i < a.adhesions.size(); ++i)
+    EXPECT_NEAR(a.adhesions[i].area_um2, b.adhesions[i].area_um2, 1e-3 * a.adhesions[i].area_um2);
+}
+
+TEST(Adhesions, are_the_same_to_the_last_bit_for_any_number_of_threads) {
+  const DrawnScene s = drawn_scene(20, 6);
+  const int usual = cv::getNumThreads();
+  std::vector<Found> found;
+  for (const int threads : {1, 2, 4}) {
+    cv::setNumThreads(threads);
+    found.push_back(found_in(s.adhesion_image, s.actin_image));
+  }
+  cv::setNumThreads(usual);
+  for (const Found& other : found) {
+    ASSERT_EQ(other.adhesions.size(), found[0].adhesions.size());
+    for (std::size_t i = 0; i < other.adhesions.size(); ++i) {
+      const Adhesion &a = other.adhesions[i], &b = found[0].adhesions[i];
+      EXPECT_TRUE(a.position_um == b.position_um && a.area_um2 == b.area_um2 && a.angle_rad == b.angle_rad &&
+                  a.mean_intensity == b.mean_intensity);
+    }
+    EXPECT_EQ(other.outline_um, found[0].outline_um);
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

@@ -1,0 +1,108 @@
+/// Images that show no adhesion give none, and say why.
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "pipeline/contract/errors.h"
+#include "segment/emptiness.h"
+#include "segment/segment_cell.h"
+#include "tests/support/drawn_image.h"
+
+namespace mbtfm::segment {
+namespace {
+
+using namespace mbtfm::test;
+
+TEST(Adhesions, names_a_pixel_that_is_no_number) {
+  Image image = even_image(20, 20, 1);
+  image.at(3, 4) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_THROW(find_adhesions(image, 0.1, AdhesionParameters{}), InvalidData);
+}
+
+TEST(Adhesions, takes_saturated_adhesions) {
+  DrawnScene s = drawn_scene(10, 7);
+  for (float& value : s.adhesion_image.pixels) value = std::min(value, 400.0f);
+  const auto found = find_adhesions(s.adhesion_image, s.kPixel_um, AdhesionParameters{});
+  EXPECT_EQ(score_adhesions(s.adhesions, found).n_matched, 5);
+}
+
+/// The error of a segmentation that finds nothing.
+std::string finding(const std::optional<Image>& adhesion, const std::optional<Image>& actin) {
+  SegmentParameters p;
+  p.pixel_size_um = 0.1;
+  const auto channel = [](const std::optional<Image>& image) {
+    return image ? std::optional(Channel{"image", *image}) : std::nullopt;
+  };
+  try {
+    segment_cell(channel(adhesion), channel(actin), p);
+  } catch (const InputError& error) {
+    return error.found;
+  }
+  return "a cell";
+}
+
+Image noisy(float level, double noise, std::uint64_t seed) {
+  Image image = even_image(400, 300, level);
+  add_noise(image, noise, seed);
+  return image;
+}
+
+TEST(Emptiness, a_constant_image_is_called_so) {
+  EXPECT_EQ(emptiness_of(even_image(20, 20, 100)), "every pixel is 100");
+  EXPECT_EQ(finding(even_image(200, 150, 0), std::nullopt), "every pixel is 0");
+  EXPECT_EQ(finding(std::nullopt, even_image(200, 150, 65535)), "every pixel is 65535");
+}
+
+TEST(Emptiness, a_saturated_image_is_called_so) {
+  DrawnScene s = drawn_scene(10, 1);
+  for (float& value : s.adhesion_image.pixels) value = std::min(value, 190.0f);  // into the cytosol
+  const std::string found = finding(s.adhesion_image, s.actin_image);
+  EXPECT_NE(found.find("% of the pixels at 190"), std::string::npos) << found;
+  EXPECT_NE(found.find("saturated"), std::string::npos) << found;
+}
+
+TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    const std::string found = finding(noisy(200, 15, seed), std::nullopt);
+    EXPECT_NE(found.find("nothing above the noise, the brightest spot 4."), std::string::npos) << found;
+    const std::string no_cell = finding(std::nullopt, noisy(200, 15, seed));
+    EXPECT_NE(no_cell.find("no cell"), std::string::npos) << no_cell;
+  }
+}
+
+TEST(Emptiness, spots_of_the_wrong_size_are_called_so) {
+  Image image = noisy(100, 5, 4);
+  draw_ellipse(image, ellipse(1, {20, 15}, 0.8, 0.5, 0), 500, 0.15, 0.1);
+  AdhesionParameters p;
+  p.adhesion_smallest_um2 = 1;
+  EXPECT_TRUE(find_adhesions(image, 0.1, p).empty());
+  EXPECT_EQ(why_no_adhesions(image, 0.1, p),
+            "of 1 spots none is larger than adhesion_smallest_um2 = 1 and smaller than adhesion_largest_um2 = 25");
+}
+
+TEST(Emptiness, a_picture_is_not_called_empty) {
+  const DrawnScene s = drawn_scene(0, 1);  // few grey levels: an even ground, an even cell
+  EXPECT_EQ(emptiness_of(s.adhesion_image), "");
+  EXPECT_EQ(emptiness_of(s.actin_image), "");
+}
+
+TEST(Emptiness, a_sheet_of_cells_is_called_so) {
+  Image image = even_image(900, 900, 100);
+  for (int i = 0; i < 16; ++i)
+    draw_ellipse(image, ellipse(1, {45.0 * (i % 4) + 22, 45.0 * (i / 4) + 22}, 52, 47, 0.3 * i), 100, 0.2, 0.2);
+  for (float& value : image.pixels) value = std::min(value, 300.0f);
+  add_noise(image, 5, 1);
+  SegmentParameters p;
+  p.pixel_size_um = 0.2;
+  p.outline.outline_largest_um2 = 20000;
+  try {
+    segment_cell(std::nullopt, Channel{"sheet", image}, p);
+    FAIL() << "a sheet of cells passes as one";
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.expected, "single cells");
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

@@ -1,0 +1,206 @@
+#include "segment/hand_drawn.h"
+
+#include <gtest/gtest.h>
+
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "segment/cell_rois.h"
+#include "segment/ellipse.h"
+#include "segment/segment_cell.h"
+#include "tests/support/drawn_image.h"
+
+namespace mbtfm::segment {
+namespace {
+
+constexpr Field kField{256, 256, 0.1};
+
+Roi area(std::vector<Vec2> points_px, const std::string& name = "area") {
+  Roi roi;
+  roi.name = name;
+  roi.points_px = std::move(points_px);
+  return roi;
+}
+
+Roi line(std::vector<Vec2> points_px, const std::string& name = "line", int group = 0) {
+  Roi roi = area(std::move(points_px), name);
+  roi.shape = RoiShape::polyline;
+  roi.group = group;
+  return roi;
+}
+
+Roi oval(Vec2 corner_px, Vec2 size_px) {
+  Roi roi;
+  roi.shape = RoiShape::oval;
+  roi.name = "oval";
+  roi.corner_px = corner_px;
+  roi.size_px = size_px;
+  return roi;
+}
+
+RoiSet set_of(std::vector<Roi> rois) { return {"rois.zip", std::move(rois)}; }
+
+TEST(HandDrawn, a_polygon_has_the_ellipse_of_its_second_moments) {
+  // a rectangle of sides a, b has the moments a²/12, b²/12: axes' ratio a/b, turned with it
+  for (const double angle : {0.0, 0.3, 1.2, -0.9}) {
+    const Vec2 e{std::cos(angle), std::sin(angle)}, n{-e.y, e.x}, centre{40, 70};
+    const Polygon box = {centre + 3.0 * e + 1.0 * n, centre - 3.0 * e + 1.0 * n, centre - 3.0 * e - 1.0 * n,
+                         centre + 3.0 * e - 1.0 * n};
+    const Adhesion a = ellipse_of_polygon(box);
+    EXPECT_NEAR(a.area_um2, 12, 1e-9);
+    EXPECT_NEAR(norm(a.position_um - centre), 0, 1e-9);
+    EXPECT_NEAR(a.major_axis_um / a.minor_axis_um, 3, 1e-9);
+    EXPECT_NEAR(std::numbers::pi / 4 * a.major_axis_um * a.minor_axis_um, 12, 1e-9);
+    EXPECT_NEAR(std::sin(a.angle_rad - angle), 0, 1e-9);
+  }
+}
+
+TEST(HandDrawn, a_polygon_around_an_ellipse_has_this_ellipse) {
+  const Adhesion truth = test::ellipse(1, {12, 7}, 2.4, 0.9, 0.8);
+  const Adhesion a = ellipse_of_polygon(ellipse_polygon(truth, 400));
+  EXPECT_NEAR(a.area_um2, truth.area_um2, 1e-4 * truth.area_um2);  // 400 corners lack 4e-5
+  EXPECT_NEAR(a.major_axis_um, truth.major_axis_um, 1e-4 * truth.major_axis_um);
+  EXPECT_NEAR(a.angle_rad, truth.angle_rad, 1e-9);
+}
+
+TEST(HandDrawn, ovals_and_ellipses_are_known_exactly) {
+  Roi ellipse = area({{100, 60}, {140, 90}}, "ellipse");
+  ellipse.shape = RoiShape::ellipse;
+  ellipse.aspect_ratio = 0.4;
+  const auto found = hand_drawn_adhesions(set_of({oval({10, 20}, {8, 30}), ellipse}), std::nullopt, kField);
+  ASSERT_EQ(found.size(), 2u);
+  EXPECT_NEAR(norm(found[0].position_um - Vec2{1.4, 3.5}), 0, 1e-12);
+  EXPECT_NEAR(found[0].major_axis_um, 3, 1e-12);
+  EXPECT_NEAR(found[0].minor_axis_um, 0.8, 1e-12);
+  EXPECT_NEAR(std::abs(found[0].angle_rad), std::numbers::pi / 2, 1e-12);
+  EXPECT_NEAR(norm(found[1].position_um - Vec2{12, 7.5}), 0, 1e-12);
+  EXPECT_NEAR(found[1].major_axis_um, 5, 1e-12);
+  EXPECT_NEAR(found[1].minor_axis_um, 2, 1e-12);
+  EXPECT_NEAR(found[1].angle_rad, std::atan2(3, 4), 1e-12);
+}
+
+TEST(HandDrawn, an_adhesions_intensity_is_its_height_above_its_surroundings) {
+  Image image = test::even_image(256, 256, 100);
+  for (int j = 40; j < 46; ++j)
+    for (int i = 50; i < 70; ++i) image.at(i, j) = 400;
+  const Channel channel{"paxillin.tif", image};
+  const auto found = hand_drawn_adhesions(set_of({area({{50, 40}, {70, 40}, {70, 46}, {50, 46}})}), channel, kField);
+  EXPECT_NEAR(found.front().mean_intensity, 300, 1e-9);
+}
+
+TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_ends) {
+  const std::vector<Adhesion> adhesions = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
+  const std::vector<Vec2> tied = {{50, 50}, {150, 50}}, loose = {{80, 200}, {180, 200}};
+  const auto type_of = [&](const Roi& roi) {
+    return hand_drawn_fibres(set_of({roi}), adhesions, {}, std::nullopt, kField, {}).front().type;
+  };
+  EXPECT_EQ(type_of(line(tied)), FibreType::ventral);
+  EXPECT_EQ(type_of(line(loose)), FibreType::arc);
+  EXPECT_EQ(type_of(line(tied, "dorsal 3")), FibreType::dorsal);
+  EXPECT_EQ(type_of(line(loose, "Ventral-12")), FibreType::ventral);
+  EXPECT_EQ(type_of(line(tied, "ARC_1")), FibreType::arc);
+  EXPECT_EQ(type_of(line(tied, "0012-0034", 1)), FibreType::dorsal);
+  EXPECT_EQ(type_of(line(tied, "0012-0034", 2)), FibreType::arc);
+  EXPECT_EQ(type_of(line(loose, "0012-0034", 3)), FibreType::ventral);
+  EXPECT_EQ(type_of(line(tied, "dorsal", 3)), FibreType::dorsal);
+  EXPECT_EQ(type_of(line(tied, "archive 4", 9)), FibreType::ventral);  // neither says a type
+}
+
+TEST(HandDrawn, a_named_fibre_is_still_tied_to_the_adhesions_it_reaches) {
+  const std::vector<Adhesion> adhesions = {test::ellipse(7, {5, 5}, 1, 0.5, 0)};
+  const Fibre f =
+      hand_drawn_fibres(set_of({line({{50, 50}, {150, 50}}, "ventral 1")}), adhesions, {}, std::nullopt, kField, {})
+          .front();
+  EXPECT_EQ(f.start_adhesion_id, 7);
+  EXPECT_FALSE(f.end_adhesion_id);
+  EXPECT_EQ(f.type, FibreType::ventral);
+  EXPECT_EQ(f.confidence, 1);
+  EXPECT_NEAR(norm(f.points_um.back() - Vec2{15.05, 5.05}), 0, 1e-12);  // from the pixel's centre
+}
+
+TEST(HandDrawn, a_fibres_width_is_measured_in_the_image) {
+  Image image = test::even_image(256, 256, 100);
+  test::draw_line(image, {{5, 12.8}, {20, 12.8}}, 500, 0.8, 0.1);
+  const RoiSet set = set_of({line({{60, 127.5}, {190, 127.5}})});
+  const Fibre f = hand_drawn_fibres(set, {}, {}, Channel{"actin.tif", image}, kField, {}).front();
+  EXPECT_NEAR(f.width_um, 0.8, 0.1);  // a pixel
+  EXPECT_NEAR(f.mean_intensity, 500, 25);
+}
+
+std::string error_of(const auto& body) {
+  try {
+    body();
+  } catch (const InputError& error) {
+    return error.where + ": " + error.found;
+  }
+  return "no error";
+}
+
+TEST(HandDrawn, what_cannot_be_used_is_named) {
+  const auto adhesion = [](const Roi& roi) {
+    return error_of([&] { hand_drawn_adhesions(set_of({roi}), std::nullopt, kField); });
+  };
+  const auto fibre = [](const Roi& roi) {
+    return error_of([&] { hand_drawn_fibres(set_of({roi}), {}, {}, std::nullopt, kField, {}); });
+  };
+  const Roi square = area({{10, 10}, {20, 10}, {20, 20}, {10, 20}}, "a 1");
+  EXPECT_EQ(adhesion(square), "no error");
+  EXPECT_EQ(adhesion(line({{10, 10}, {20, 20}}, "a 1")), "rois.zip: 'a 1': a segmented line");
+  EXPECT_EQ(adhesion(area({{10, 10}, {20, 10}}, "a 1")), "rois.zip: 'a 1': 2 different ones");
+  EXPECT_EQ(adhesion(area({{10, 10}, {20, 10}, {30, 10}}, "a 1")), "rois.zip: 'a 1': none between its points");
+  EXPECT_EQ(adhesion(area({{10, 10}, {300, 10}, {30, 30}}, "a 1")), "rois.zip: 'a 1': a point at 300, 10");
+  EXPECT_EQ(adhesion(area({{0, 0}, {20, 20}, {20, 0}, {0, 19}}, "a 1")), "rois.zip: 'a 1': negative second moments");
+  Roi point = square, composite = square;
+  point.shape = RoiShape::point;
+  composite.shape = RoiShape::composite;
+  composite.n_paths = 2;
+  EXPECT_EQ(adhesion(point), "rois.zip: 'a 1': a point selection");
+  EXPECT_EQ(error_of([&] { hand_drawn_outline(set_of({composite}), kField); }), "rois.zip: 'a 1': 2 closed lines");
+  EXPECT_EQ(fibre(square), "rois.zip: 'a 1': a polygon");
+  EXPECT_EQ(fibre(point), "rois.zip: 'a 1': a point selection");
+  EXPECT_EQ(fibre(line({{10, 10}, {10, 10}}, "f")), "rois.zip: 'f': 1 different ones");
+  EXPECT_EQ(fibre(line({{0, 10}, {0.5, 10}}, "f")), "rois.zip: 'f': 0.05 um");
+  EXPECT_EQ(fibre(line({{10, 10}, {-9, 10}}, "f")), "rois.zip: 'f': a point at -9, 11");
+  EXPECT_EQ(fibre(line({{10, 10}, {20, 10}}, "dorsal or arc")), "rois.zip: 'dorsal or arc': two");
+  EXPECT_EQ(error_of([&] { hand_drawn_outline(set_of({square, square}), kField); }), "rois.zip: 2");
+}
+
+TEST(HandDrawn, what_the_program_found_given_back_by_hand_gives_the_same_cell) {
+  const test::DrawnScene scene = test::drawn_scene(10, 1);
+  const Channel adhesion{"paxillin.tif", scene.adhesion_image}, actin{"actin.tif", scene.actin_image};
+  SegmentParameters parameters;
+  parameters.pixel_size_um = scene.kPixel_um;
+  const Segmentation found = segment_cell(adhesion, actin, parameters);
+  HandDrawn drawn;
+  for (const Roi& roi : rois_of(found.cell, found.pixel_size_um)) {
+    auto& set = roi.shape == RoiShape::polygon   ? drawn.outline
+                : roi.shape == RoiShape::ellipse ? drawn.adhesions
+                                                 : drawn.fibres;
+    if (!set) set = RoiSet{"rois.zip", {}};
+    set->rois.push_back(decode_roi(encode_roi(roi), "rois.zip"));
+  }
+  const Segmentation again = segment_cell(adhesion, actin, parameters, drawn);
+  constexpr double kFloat_um = 1e-5;  // rounding of coordinates to float: 1e-5 px of 256
+  ASSERT_EQ(again.cell.adhesions.size(), found.cell.adhesions.size());
+  for (std::size_t i = 0; i < found.cell.adhesions.size(); ++i) {
+    const Adhesion &a = again.cell.adhesions[i], &b = found.cell.adhesions[i];
+    EXPECT_NEAR(norm(a.position_um - b.position_um), 0, kFloat_um);
+    EXPECT_NEAR(a.area_um2, b.area_um2, 1e-4 * b.area_um2);
+    EXPECT_NEAR(a.minor_axis_um, b.minor_axis_um, 1e-4);
+    EXPECT_NEAR(std::sin(a.angle_rad - b.angle_rad), 0, 1e-4);
+  }
+  ASSERT_EQ(again.cell.fibres.size(), found.cell.fibres.size());
+  for (std::size_t i = 0; i < found.cell.fibres.size(); ++i) {
+    const Fibre &a = again.cell.fibres[i], &b = found.cell.fibres[i];
+    EXPECT_EQ(a.type, b.type);
+    EXPECT_EQ(a.start_adhesion_id, b.start_adhesion_id);
+    EXPECT_EQ(a.end_adhesion_id, b.end_adhesion_id);
+    EXPECT_NEAR(length_um(a.points_um), length_um(b.points_um), 1e-3);
+    EXPECT_NEAR(a.width_um, b.width_um, 0.1);
+  }
+  ASSERT_EQ(again.cell.outline_um.size(), found.cell.outline_um.size());
+  EXPECT_NEAR(signed_area_um2(again.cell.outline_um), signed_area_um2(found.cell.outline_um), 1e-3);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
