@@ -87,6 +87,45 @@ TEST(RealFibres, are_the_same_in_brighter_turned_and_mirrored_images) {
             0.9);
 }
 
+/// Share of the pixels of `a` within two pixels of one of `b`.
+double near_share(const Image& a, const Image& b) {
+  int n = 0, n_near = 0;
+  for (int row = 0; row < a.height; ++row)
+    for (int column = 0; column < a.width; ++column) {
+      if (a.at(column, row) == 0) continue;
+      bool is_near = false;
+      for (int dy = -2; dy <= 2; ++dy)
+        for (int dx = -2; dx <= 2; ++dx) {
+          const int x = column + dx, y = row + dy;
+          is_near |= dx * dx + dy * dy <= 4 && x >= 0 && y >= 0 && x < b.width && y < b.height && b.at(x, y) > 0;
+        }
+      ++n;
+      n_near += is_near;
+    }
+  return 1.0 * n_near / std::max(1, n);
+}
+
+/// A carpet of 1 000 straight sticks of 1 to 2 pixels' width, 20 pixels long. No pixel size is known: 0.3 um makes them
+/// as wide as fibres are. By default most of a carpet is meshwork, of which any number is allowed here.
+TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
+  REQUIRE_DATA();
+  constexpr double kAssumedPixel_um = 0.3;
+  const Image image = read_image(kActin / "synthetic_segmentfibers/SBXIQ_gauss.tif");
+  const Image truth = read_image(kActin / "synthetic_segmentfibers/SBXIQ_binary.tif");
+  FibreParameters p;
+  p.fibre_false_per_cell = 1e12;
+  p.fibre_shortest_um = 2;
+  p.fibre_gap_um = 0.5;
+  Image lines = truth;
+  std::fill(lines.pixels.begin(), lines.pixels.end(), 0.0f);
+  for (const Fibre& f : find_fibres(image, {}, {}, kAssumedPixel_um, p))
+    for (const Vec2 u : densely(f.points_um))
+      lines.at(std::min(image.width - 1, static_cast<int>(u.x / kAssumedPixel_um)),
+               std::min(image.height - 1, static_cast<int>(u.y / kAssumedPixel_um))) = 1;
+  const double recall = near_share(truth, lines), precision = near_share(lines, truth);
+  EXPECT_GE(2 * recall * precision / (recall + precision), 0.97) << recall << ' ' << precision;
+}
+
 TEST(RealFibres, of_a_layer_of_many_cells_are_found_without_an_outline) {
   REQUIRE_DATA();
   const Image image = read_image(kActin / "bronchial_monolayer/U13_72_P1_5_SF.tif");
