@@ -12,7 +12,7 @@ namespace mbtfm::segment {
 /// Mean of neighbours over ± half a window that shrinks towards the ends, which stay.
 std::vector<cv::Point2d> smoothed(const std::vector<cv::Point2d>& points, int half_window);
 
-/// The longest pieces of the line that do not run along the outline: within `distance_um` of it at less than 30°.
+/// The longest piece of the line that does not run along the outline: within `distance_um` of it at less than 30°.
 /// What lies outside runs along it. @param points_um  one a trace's point; empty outline: the whole line
 struct Piece {
   std::size_t first = 0, n = 0;  ///< of the line's points

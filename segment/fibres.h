@@ -28,9 +28,11 @@ struct FibreParameters {
 
 void declare(ParameterList& list, FibreParameters& parameters);
 
-/// Find stress fibres: oriented ridge filters at three widths, lines traced along the ridges through crossings and
-/// gaps, collinear pieces joined, lines that fall on one side only (the cell's edge) rejected, ends tied to the
-/// adhesions they reach, type by the number of tied ends (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006).
+/// Find stress fibres: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
+/// collinear pieces joined. A line is a fibre where its mean height over the texture around it is so significant that
+/// the meshwork of the whole cell would make fewer than `fibre_false_per_cell` such lines by chance; steps (the cell's
+/// edge) and folds near the edge are left out. Ends are tied to the adhesions they reach, and their number is the type
+/// (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006), with its chance to be right and its reason.
 ///
 /// A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
 /// `mean_intensity` the mean height above both sides in grey levels. Sorted by length, longest first, ids from 1.
