@@ -43,9 +43,8 @@ std::vector<Vec2> in_um(const std::vector<Vec2>& points_px, double pixel_um) {
 Polygon area_um(const RoiSet& set, const Roi& roi, const Field& field) {
   const std::string where = called(set, roi);
   if (!is_area(roi.shape)) {
-    throw InputError(where, "an area: polygon, freehand, traced, oval, ellipse or rectangle",
-                     std::string(name_of(roi.shape)),
-                     roi.shape == RoiShape::composite ? "split it in ImageJ's ROI manager (More » Split)" : "");
+    throw InputError(where, "an area: polygon, freehand, traced, oval, ellipse, rectangle or composite",
+                     std::string(name_of(roi.shape)));
   }
   const Polygon polygon_px = area_px(roi);
   require_inside(polygon_px, field, where);
@@ -194,7 +193,12 @@ Fibre drawn_fibre(const RoiSet& set, const Roi& roi, const Field& field) {
 Polygon hand_drawn_outline(const RoiSet& set, const Field& field) {
   if (set.rois.size() != 1)
     throw InputError(set.name, "one selection, the cell's outline", std::to_string(set.rois.size()));
-  return area_um(set, set.rois.front(), field);
+  const Roi& roi = set.rois.front();
+  if (roi.n_paths > 1) {
+    throw InputError(called(set, roi), "an outline in one piece", std::to_string(roi.n_paths) + " closed lines",
+                     "fill its holes, or keep one part of it: ROI manager, More, Split");
+  }
+  return area_um(set, roi, field);
 }
 
 std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optional<Channel>& adhesion,

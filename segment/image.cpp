@@ -85,10 +85,12 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   if (choice.page && *choice.page < 1) throw InputError(file.string(), "a page from 1", std::to_string(*choice.page));
   if (is_tiff(head)) return read_tiff(file, choice);
   if (head.starts_with("\x89PNG")) {
-    chosen_pages({.channel_names = {""}, .pages = {0}}, choice, file.string());
+    PlaneChoice of_page = choice;
+    of_page.channel.clear();
+    chosen_pages(Stack{.channel_names = {""}, .pages = {0}}, of_page, file.string());
     if (choice.page.value_or(1) > 1)
       throw InputError(file.string(), "page " + std::to_string(*choice.page), "a PNG image, which has only one");
-    return read_png(file);
+    return read_png(file, choice);
   }
   for (const Signature& format : kForeignFormats) {
     if (head.starts_with(format.bytes)) {

@@ -14,8 +14,8 @@ namespace mbtfm::segment {
 /// Read a plane of a file that begins as a TIFF. @throws InputError
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
 
-/// Read a file that begins as a PNG. @throws InputError
-Image read_png(const std::filesystem::path& file);
+/// Read a file that begins as a PNG; of RGB the mean where no channel is chosen. @throws InputError
+Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
 
 /// Refuse a size that a damaged header makes up, before memory is taken for it.
 ///

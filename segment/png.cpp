@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
+#include "segment/stack.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -71,18 +72,18 @@ bool read_rows(Reading& r) {
   return true;
 }
 
-Image to_image(const Reading& r) {
+/// The mean of `n_colours` samples of each pixel from `first` on.
+Image to_image(const Reading& r, int first, int n_colours) {
   Image image;
   image.width = static_cast<int>(r.width);
   image.height = static_cast<int>(r.height);
   image.full_scale = static_cast<double>((1u << r.bits) - 1);
   image.pixels.resize(static_cast<std::size_t>(r.width) * r.height);
   const int sample_bytes = r.bits == 16 ? 2 : 1;
-  const int n_colours = r.channels >= 3 ? 3 : 1;
   for (std::size_t k = 0; k < image.pixels.size(); ++k) {
     const unsigned char* pixel = r.bytes.data() + k * r.channels * sample_bytes;
     float sum = 0;
-    for (int c = 0; c < n_colours; ++c) {
+    for (int c = first; c < first + n_colours; ++c) {
       const unsigned char* sample = pixel + c * sample_bytes;
       sum += static_cast<float>(sample_bytes == 2 ? sample[0] << 8 | sample[1] : sample[0]);  // PNG is big-endian
     }
@@ -109,7 +110,7 @@ bool write_all(png_structp png, png_infop info, std::FILE* stream, const Picture
 
 }  // namespace
 
-Image read_png(const std::filesystem::path& file) {
+Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
   const FileHandle stream(std::fopen(file.c_str(), "rb"));
   Reading r;
   if (!stream || !r.info) throw InputError(file.string(), "a readable PNG image", "a file that cannot be opened");
@@ -122,8 +123,12 @@ Image read_png(const std::filesystem::path& file) {
   const std::size_t row_bytes = static_cast<std::size_t>(r.width) * r.channels * (r.bits == 16 ? 2 : 1);
   r.bytes.resize(row_bytes * r.height);
   for (std::size_t j = 0; j < r.height; ++j) r.rows.push_back(r.bytes.data() + j * row_bytes);
+  const bool is_rgb = r.channels >= 3;
+  const bool is_mean = is_rgb && choice.channel.empty();
+  const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};
+  const int first = is_mean ? 0 : chosen_channel(names, choice, file.string());
   if (!read_rows(r)) fail();
-  return to_image(r);
+  return to_image(r, first, is_mean ? 3 : 1);
 }
 
 void write_png(const std::filesystem::path& file, const Picture& picture) {

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <numbers>
 
 #include "pipeline/contract/errors.h"
 
@@ -39,6 +38,9 @@ class Bytes {
     if (!std::isfinite(value)) throw InputError(where_, "finite coordinates", "NaN or infinity");
     return value;
   }
+  [[noreturn]] void refuse(const std::string& expected, const std::string& found) const {
+    throw InputError(where_, expected, found, "the file may be damaged: save the selection again");
+  }
   void require(std::size_t at, std::size_t n_bytes) const {
     if (at <= bytes_.size() && n_bytes <= bytes_.size() - at) return;
     throw InputError(where_, "a whole ImageJ ROI", "only " + std::to_string(bytes_.size()) + " bytes",
@@ -64,6 +66,19 @@ void append_utf8(std::string& text, std::uint32_t c) {
     put(0x80 | (c >> 6 & 0x3F));
   }
   put(0x80 | (c & 0x3F));
+}
+
+/// Add the points of a Bézier curve of these control points, the first of which is there already; one point: itself.
+void append_curve(Polygon& path, std::vector<Vec2> nodes) {
+  if (nodes.size() == 1) path.push_back(nodes.front());
+  constexpr int kSteps = 16;  // a quarter of a circle to 2e-4 of its radius
+  for (int step = 1; step <= kSteps && nodes.size() > 1; ++step) {
+    const double t = static_cast<double>(step) / kSteps;
+    std::vector<Vec2> p = nodes;  // de Casteljau
+    for (std::size_t n = p.size() - 1; n > 0; --n)
+      for (std::size_t i = 0; i < n; ++i) p[i] = (1 - t) * p[i] + t * p[i + 1];
+    path.push_back(p.front());
+  }
 }
 
 /// The name in UTF-16 as UTF-8; half of a surrogate pair becomes U+FFFD.
@@ -104,6 +119,40 @@ std::vector<Vec2> points_in(const Bytes& bytes, bool is_sub_pixel, Vec2 corner) 
   return points;
 }
 
+/// The paths of a composite selection: moves, lines, parabolas, cubics and ends of java.awt.geom.PathIterator.
+std::vector<Polygon> paths_in(const Bytes& bytes) {
+  const std::size_t n = bytes.number(kCompositeSize, 4);
+  bytes.require(kCoordinates, 4 * n);
+  constexpr std::size_t kPointsOf[] = {1, 1, 2, 3, 0};  // by kind of segment
+  std::vector<Polygon> paths;
+  for (std::size_t i = 0; i < n;) {
+    const double kind = bytes.real(kCoordinates + 4 * i++);
+    const bool is_known = kind >= 0 && kind <= 4 && kind == std::floor(kind) && (kind == 0 || !paths.empty());
+    const std::size_t n_points = is_known ? kPointsOf[static_cast<int>(kind)] : 0;
+    if (!is_known || i + 2 * n_points > n) bytes.refuse("a path that ImageJ knows", "a damaged one");
+    if (kind == 0) paths.emplace_back();
+    Polygon nodes;
+    if (n_points > 1) nodes.push_back(paths.back().back());
+    for (std::size_t k = 0; k < n_points; ++k, i += 2)
+      nodes.push_back({bytes.real(kCoordinates + 4 * i), bytes.real(kCoordinates + 4 * i + 4)});
+    append_curve(paths.back(), nodes);
+  }
+  return paths;
+}
+
+/// One closed line through all paths: from the first path's begin to each further one, round it, and back. The ways
+/// there and back cancel in areas, moments and crossings, so that holes, which ImageJ stores in the opposite turn,
+/// count as such.
+Polygon joined(const std::vector<Polygon>& paths) {
+  Polygon line;
+  for (const Polygon& path : paths) {
+    line.insert(line.end(), path.begin(), path.end());
+    line.push_back(path.front());
+    if (&path != &paths.front()) line.push_back(paths.front().front());
+  }
+  return line;
+}
+
 RoiShape shape_in(const Bytes& bytes, const std::string& where) {
   const std::uint32_t type = bytes.number(kType, 1), subtype = bytes.number(kSubtype, 2);
   if (type >= std::size(kShapes))
@@ -136,7 +185,12 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
     case RoiShape::line:
       roi.points_px = {reals(0), reals(1)};
       break;
-    case RoiShape::composite:
+    case RoiShape::composite: {
+      const std::vector<Polygon> paths = paths_in(bytes);
+      roi.n_paths = static_cast<int>(paths.size());
+      roi.points_px = joined(paths);
+      break;
+    }
     case RoiShape::text:
     case RoiShape::image:
       break;
@@ -144,98 +198,6 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
       roi.points_px = points_in(bytes, is_sub_pixel, corner);
       roi.is_spline = (bytes.number(kOptions, 2) & kSpline) != 0;
   }
-}
-
-/// The natural cubic spline through values at increasing places (Thomas' algorithm for its second derivatives).
-class NaturalSpline {
- public:
-  NaturalSpline(std::vector<double> places, std::vector<double> values)
-      : places_(std::move(places)), values_(std::move(values)), bends_(values_.size(), 0.0) {
-    const std::size_t n = values_.size();
-    std::vector<double> above(n, 0.0);
-    for (std::size_t i = 1; i + 1 < n; ++i) {
-      const double before = places_[i] - places_[i - 1], after = places_[i + 1] - places_[i];
-      const double pivot = 2 * (before + after) - before * above[i - 1];
-      const double kink = (values_[i + 1] - values_[i]) / after - (values_[i] - values_[i - 1]) / before;
-      above[i] = after / pivot;
-      bends_[i] = (6 * kink - before * bends_[i - 1]) / pivot;
-    }
-    for (std::size_t i = n - 1; i-- > 1;) bends_[i] -= above[i] * bends_[i + 1];
-  }
-  double at(double place) const {
-    const auto next = std::upper_bound(places_.begin() + 1, places_.end() - 1, place);
-    const auto i = static_cast<std::size_t>(next - places_.begin()) - 1;
-    const double h = places_[i + 1] - places_[i], b = (place - places_[i]) / h, a = 1 - b;
-    return a * values_[i] + b * values_[i + 1] +
-           ((a * a * a - a) * bends_[i] + (b * b * b - b) * bends_[i + 1]) * h * h / 6;
-  }
-
- private:
-  std::vector<double> places_, values_, bends_;
-};
-
-std::vector<Vec2> without_repetition(const std::vector<Vec2>& points) {
-  std::vector<Vec2> different;
-  for (const Vec2 p : points) {
-    if (different.empty() || !(p == different.back())) different.push_back(p);
-  }
-  return different;
-}
-
-/// The curve that ImageJ draws through the nodes: natural cubic splines of x and y over the sum of the square roots of
-/// the nodes' distances; a closed one repeats up to 7 nodes at either end (SplineFitter). A point every two pixels of
-/// the nodes' line, at least 100 (PolygonRoi.fitSpline).
-std::vector<Vec2> spline_through(std::vector<Vec2> nodes, bool is_closed) {
-  nodes = without_repetition(nodes);
-  if (is_closed && !nodes.empty() && !(nodes.front() == nodes.back())) nodes.push_back(nodes.front());
-  const std::size_t n = nodes.size();
-  if (n < 3) return nodes;
-  std::vector<double> own(n, 0.0);
-  for (std::size_t i = 1; i < n; ++i) own[i] = own[i - 1] + std::sqrt(norm(nodes[i] - nodes[i - 1]));
-  const std::size_t n_repeated = is_closed ? std::min<std::size_t>(7, n - 1) : 0;
-  std::vector<double> places, x, y;
-  const auto add = [&](double place, Vec2 node) {
-    places.push_back(place);
-    x.push_back(node.x);
-    y.push_back(node.y);
-  };
-  for (std::size_t i = n - 1 - n_repeated; i + 1 < n; ++i) add(own[i] - own.back(), nodes[i]);
-  for (std::size_t i = 0; i < n; ++i) add(own[i], nodes[i]);
-  for (std::size_t i = 1; i <= n_repeated; ++i) add(own[i] + own.back(), nodes[i]);
-  const NaturalSpline spline_x(places, x), spline_y(places, y);
-  const auto n_points = std::max<std::size_t>(100, static_cast<std::size_t>(length_um(nodes) / 2));
-  std::vector<Vec2> curve;
-  for (std::size_t i = 0; i < n_points; ++i) {
-    const double place = own.back() * static_cast<double>(i) / static_cast<double>(n_points - 1);
-    curve.push_back({spline_x.at(place), spline_y.at(place)});
-  }
-  return curve;
-}
-
-/// Points of the ellipse of semi-axes a along `along` and b across it, from angle `from` over `turn`.
-void add_arc(Polygon& polygon, Vec2 centre, Vec2 along, double a, double b, double from, double turn, int n) {
-  const Vec2 across{-along.y, along.x};
-  for (int i = 0; i < n; ++i) {
-    const double phi = from + turn * i / n;
-    polygon.push_back(centre + a * std::cos(phi) * along + b * std::sin(phi) * across);
-  }
-}
-
-Polygon rectangle_corners(const Roi& roi) {
-  const Vec2 low = roi.corner_px, high = low + roi.size_px;
-  const double r_x = std::min(roi.corner_diameter_px, roi.size_px.x) / 2;
-  const double r_y = std::min(roi.corner_diameter_px, roi.size_px.y) / 2;
-  if (r_x <= 0 || r_y <= 0) return {low, {high.x, low.y}, high, {low.x, high.y}};
-  Polygon polygon;
-  const Vec2 centres[] = {
-      {high.x - r_x, high.y - r_y}, {low.x + r_x, high.y - r_y}, low + Vec2{r_x, r_y}, {high.x - r_x, low.y + r_y}};
-  constexpr int kByCorner = 32;
-  for (int i = 0; i < 4; ++i) {
-    // both ends of the quarter belong to it
-    add_arc(polygon, centres[i], {1, 0}, r_x, r_y, i * std::numbers::pi / 2,
-            std::numbers::pi / 2 * kByCorner / (kByCorner - 1), kByCorner);
-  }
-  return polygon;
 }
 
 // ---- writing
@@ -288,15 +250,40 @@ void write_name(Writer& out, std::size_t header2, const std::string& name) {
 }  // namespace
 
 std::string_view name_of(RoiShape shape) {
-  static constexpr std::string_view kNames[] = {
-      "a polygon",       "a freehand area", "a traced area",     "a rectangle",
-      "an oval",         "an ellipse",      "a straight line",   "a segmented line",
-      "a freehand line", "an angle",        "a point selection", "a composite selection (several areas or holes)",
-      "a text",          "an image"};
-  return kNames[static_cast<std::size_t>(shape)];
+  switch (shape) {
+    case RoiShape::polygon:
+      return "a polygon";
+    case RoiShape::freehand:
+      return "a freehand area";
+    case RoiShape::traced:
+      return "a traced area";
+    case RoiShape::rectangle:
+      return "a rectangle";
+    case RoiShape::oval:
+      return "an oval";
+    case RoiShape::ellipse:
+      return "an ellipse";
+    case RoiShape::composite:
+      return "a composite selection";
+    case RoiShape::line:
+      return "a straight line";
+    case RoiShape::polyline:
+      return "a segmented line";
+    case RoiShape::freehand_line:
+      return "a freehand line";
+    case RoiShape::angle:
+      return "an angle";
+    case RoiShape::point:
+      return "a point selection";
+    case RoiShape::text:
+      return "a text";
+    case RoiShape::image:
+      return "an image";
+  }
+  throw InternalError("unknown shape of a ROI");
 }
 
-bool is_area(RoiShape shape) { return shape <= RoiShape::ellipse; }
+bool is_area(RoiShape shape) { return shape <= RoiShape::composite; }
 bool is_line(RoiShape shape) { return shape >= RoiShape::line && shape <= RoiShape::freehand_line; }
 
 Roi decode_roi(std::string_view data, const std::string& where) {
@@ -346,37 +333,6 @@ std::string encode_roi(const Roi& roi) {
   out.real(header2 + kFloatStrokeWidth, roi.stroke_width_px);
   write_name(out, header2, roi.name);
   return out.bytes;
-}
-
-Polyline line_px(const Roi& roi) {
-  MBTFM_ASSERT(is_line(roi.shape));
-  Polyline line = roi.is_spline ? spline_through(roi.points_px, false) : roi.points_px;
-  for (Vec2& point : line) point += {0.5, 0.5};
-  return line;
-}
-
-Polygon area_px(const Roi& roi) {
-  MBTFM_ASSERT(is_area(roi.shape));
-  constexpr int kRound = 360;
-  Polygon polygon;
-  switch (roi.shape) {
-    case RoiShape::rectangle:
-      return rectangle_corners(roi);
-    case RoiShape::oval:
-      add_arc(polygon, roi.corner_px + 0.5 * roi.size_px, {1, 0}, roi.size_px.x / 2, roi.size_px.y / 2, 0,
-              2 * std::numbers::pi, kRound);
-      return polygon;
-    case RoiShape::ellipse: {
-      const Vec2 axis = roi.points_px[1] - roi.points_px[0];
-      const double major = norm(axis);
-      const Vec2 along = major > 0 ? (1 / major) * axis : Vec2{1, 0};
-      add_arc(polygon, roi.points_px[0] + 0.5 * axis, along, major / 2, roi.aspect_ratio * major / 2, 0,
-              2 * std::numbers::pi, kRound);
-      return polygon;
-    }
-    default:
-      return roi.is_spline ? spline_through(roi.points_px, true) : roi.points_px;
-  }
 }
 
 }  // namespace mbtfm::segment

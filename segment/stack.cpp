@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <charconv>
-#include <numeric>
 
 #include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
@@ -56,7 +55,7 @@ Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
   if (axes != "CTXYZ" || !ome.order.starts_with("XY"))
     throw InvalidData("OME-XML", "DimensionOrder of X, Y and C, Z, T", "'" + ome.order + "'");
   const std::vector<int> planes = stored_order(s, ome.order);
-  s.pages.assign(planes.size(), Stack::kElsewhere);
+  s.pages.assign(planes.size(), std::nullopt);
   if (ome.pages.empty()) {
     for (std::size_t i = 0; i < planes.size(); ++i) s.pages[planes[i]] = static_cast<int>(i);
     return s;
@@ -102,7 +101,7 @@ std::optional<Stack> stack_of_imagej(const std::string& description) {
   if (n == 1) return std::nullopt;
   s.channel_names.resize(static_cast<std::size_t>(s.n_channels));
   s.pages.resize(static_cast<std::size_t>(n));
-  std::iota(s.pages.begin(), s.pages.end(), 0);
+  for (int i = 0; i < n; ++i) s.pages[i] = i;
   return s;
 }
 
@@ -180,11 +179,12 @@ std::vector<int> chosen_pages(const Stack& s, const PlaneChoice& choice, const s
   }
   std::vector<int> pages;
   for (int slice = low; slice < high; ++slice) {
-    pages.push_back(s.pages[(frame * s.n_slices + slice) * s.n_channels + channel]);
-    if (pages.back() == Stack::kElsewhere) {
+    const auto page = s.pages[(frame * s.n_slices + slice) * s.n_channels + channel];
+    if (!page) {
       throw InputError(file, "all planes of an OME-TIFF in one file", "this one in another file of the set",
                        "give the file that holds it, or export the image as one file");
     }
+    pages.push_back(*page);
   }
   return pages;
 }

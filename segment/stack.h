@@ -15,9 +15,10 @@ namespace mbtfm::segment {
 struct Stack {
   int n_channels = 1, n_slices = 1, n_frames = 1;
   std::vector<std::string> channel_names;  ///< one a channel; empty where it has none
-  std::vector<int> pages;                  ///< by plane; kElsewhere: not in this file
-  static constexpr int kElsewhere = -1;
+  std::vector<std::optional<int>> pages;   ///< by plane; none: it is in another file
 };
+
+inline const std::vector<std::string> kRgbNames = {"red", "green", "blue"};
 
 /// What the description says: OME-XML or ImageJ's list. None where it says nothing of dimensions.
 /// @param file_name  without its folder, to tell it from the others of an OME set

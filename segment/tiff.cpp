@@ -1,57 +1,16 @@
-#include <tiffio.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdarg>
-#include <cstdio>
 #include <cstring>
 #include <fstream>
-#include <memory>
 #include <string>
 
 #include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
 #include "segment/stack.h"
+#include "segment/tiff_handle.h"
 
 namespace mbtfm::segment {
 namespace {
-
-/// libtiff's complaints of one file; the first is the cause.
-struct Messages {
-  std::string first_error;
-};
-
-int keep_error(TIFF*, void* messages, const char*, const char* format, va_list arguments) {
-  char text[512];
-  std::vsnprintf(text, sizeof text, format, arguments);
-  auto& first = static_cast<Messages*>(messages)->first_error;
-  if (first.empty()) first = text;
-  return 1;  // handled: nothing goes to the terminal
-}
-
-/// Warnings are of no concern, but for the one that a file ends within its tags: the calibration may be lost with them.
-int keep_warning_of_early_end(TIFF* tiff, void* messages, const char* module, const char* format, va_list arguments) {
-  char text[512];
-  va_list copy;
-  va_copy(copy, arguments);
-  std::vsnprintf(text, sizeof text, format, copy);
-  va_end(copy);
-  if (std::strstr(text, "IO error during reading")) return keep_error(tiff, messages, module, format, arguments);
-  return 1;
-}
-
-struct Closer {
-  void operator()(TIFF* tiff) const { TIFFClose(tiff); }
-};
-using TiffHandle = std::unique_ptr<TIFF, Closer>;
-
-TiffHandle open(const std::filesystem::path& file, const char* mode, Messages& messages) {
-  const std::unique_ptr<TIFFOpenOptions, decltype(&TIFFOpenOptionsFree)> options(TIFFOpenOptionsAlloc(),
-                                                                                 &TIFFOpenOptionsFree);
-  TIFFOpenOptionsSetErrorHandlerExtR(options.get(), keep_error, &messages);
-  TIFFOpenOptionsSetWarningHandlerExtR(options.get(), keep_warning_of_early_end, &messages);
-  return TiffHandle(TIFFOpenExt(file.c_str(), mode, options.get()));
-}
 
 /// How the samples of a page are laid out.
 struct Layout {
@@ -70,7 +29,7 @@ struct Layout {
 
 class Reader {
  public:
-  explicit Reader(const std::filesystem::path& file) : file_(file), tiff_(open(file, "r", messages_)) {
+  explicit Reader(const std::filesystem::path& file) : file_(file), tiff_(open_tiff(file, "r", messages_)) {
     if (!tiff_ || !messages_.first_error.empty()) fail("a whole TIFF image");
     of_first_page_ = calibration();
     calibration_ = pixel_size_um(of_first_page_);
@@ -131,7 +90,7 @@ class Reader {
     std::vector<std::string> names(layout_.n_channels);
     if (layout_.is_rgb) {
       if (choice.channel.empty()) return;
-      names = {"red", "green", "blue"};
+      names = kRgbNames;
     }
     layout_.first = static_cast<std::uint16_t>(chosen_channel(names, choice, file_.string()));
     layout_.colours = 1;
@@ -404,51 +363,8 @@ class Reader {
   Layout layout_;
 };
 
-void set_tags(TIFF* tiff, const Image& image) {
-  TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, static_cast<std::uint32_t>(image.width));
-  TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, static_cast<std::uint32_t>(image.height));
-  TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
-  TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
-  TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
-  TIFFSetField(tiff, TIFFTAG_COMPRESSION, COMPRESSION_ADOBE_DEFLATE);
-  TIFFSetField(tiff, TIFFTAG_PREDICTOR, PREDICTOR_HORIZONTAL);
-  TIFFSetField(tiff, TIFFTAG_ROWSPERSTRIP, static_cast<std::uint32_t>(std::min(image.height, 64)));
-  if (!image.pixel_size_um) {
-    TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53t\n");
-    return;
-  }
-  TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, "ImageJ=1.53t\nunit=micron\n");
-  TIFFSetField(tiff, TIFFTAG_XRESOLUTION, 1 / *image.pixel_size_um);
-  TIFFSetField(tiff, TIFFTAG_YRESOLUTION, 1 / *image.pixel_size_um);
-  TIFFSetField(tiff, TIFFTAG_RESOLUTIONUNIT, RESUNIT_NONE);
-}
-
 }  // namespace
 
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return Reader(file).read(choice); }
-
-void write_tiff(const std::filesystem::path& file, const Image& image) {
-  MBTFM_ASSERT(image.width > 0 && image.height > 0);
-  Messages messages;
-  const auto require = [&](bool is_done) {
-    if (!is_done) {
-      throw OutputError(file.string() + ": cannot be written" +
-                        (messages.first_error.empty() ? "" : ": " + messages.first_error));
-    }
-  };
-  TiffHandle tiff = open(file, "w", messages);
-  require(tiff != nullptr);
-  set_tags(tiff.get(), image);
-  std::vector<std::uint16_t> row(static_cast<std::size_t>(image.width));
-  for (int j = 0; j < image.height; ++j) {
-    for (int i = 0; i < image.width; ++i) {
-      row[i] = static_cast<std::uint16_t>(std::clamp(std::round(image.at(i, j)), 0.0f, 65535.0f));
-    }
-    require(TIFFWriteScanline(tiff.get(), row.data(), static_cast<std::uint32_t>(j), 0) == 1);
-  }
-  require(TIFFWriteDirectory(tiff.get()) == 1);
-  tiff.reset();
-  require(messages.first_error.empty());
-}
 
 }  // namespace mbtfm::segment

@@ -32,6 +32,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"tiff", {"segment"}},
     {"png", {"segment"}},
     {"zip", {"segment"}},
+    {"expat", {"segment"}},
     {"CGAL/", {"network"}},
     {"Eigen/", {"network", "substrate", "mbtfm", "samples"}},
     {"deal.II/", {"substrate"}},

@@ -72,7 +72,9 @@ function report(table) {
   Roi.getFloatBounds(left, top, width, height);
   points = " " + left + " " + top + " " + width + " " + height;
   for (i = 0; i < x.length; i++) points = points + " " + d2s(x[i], 6) + "," + d2s(y[i], 6);
-  if (type == "line" || indexOf(type, "line") >= 0) {
+  if (type == "composite") {
+    List.setMeasurements; area = List.getValue("Area");
+  } else if (indexOf(type, "line") >= 0) {
     List.setMeasurements; length = List.getValue("Length");
   } else {
     Array.getStatistics(x, x0, x1, mean, sd); Array.getStatistics(y, y0, y1, mean, sd);
@@ -179,10 +181,12 @@ makeRectangle(10, 20, 30, 17); save("rectangle");
 makeRectangle(10.25, 20.5, 30.5, 17.75); save("shifted rectangle");
 makeRectangle(10, 20, 40, 30, 12); save("rounded rectangle");
 makeRotatedRectangle(20, 30, 70, 60, 12); save("rotated rectangle");
+makeRectangle(10, 20, 60, 50); setKeyDown("alt"); makeRectangle(20, 30, 15, 10); save("composite with a hole");
+makeRectangle(10, 20, 30, 17); setKeyDown("shift"); makeRectangle(60, 25, 20, 40); save("composite of two");
 )";
   run_macro(folder.path(), macro.str());
   const auto drawn = measured_in(table);
-  EXPECT_EQ(drawn.size(), 18u);
+  EXPECT_EQ(drawn.size(), 20u);
   for (const auto& [name, m] : drawn) {
     SCOPED_TRACE(name);
     const Roi roi = segment::read_rois(folder / (name + ".roi")).front();
@@ -195,6 +199,10 @@ makeRotatedRectangle(20, 30, 70, 60, 12); save("rotated rectangle");
       if (roi.shape != segment::RoiShape::freehand_line) {  // which ImageJ smooths before it measures
         EXPECT_NEAR(length_um(line), m.length, 1e-4 * m.length);
       }
+      continue;
+    }
+    if (roi.shape == segment::RoiShape::composite) {  // ImageJ counts its pixels
+      EXPECT_EQ(std::abs(signed_area_um2(segment::area_px(roi))), m.area);
       continue;
     }
     if (roi.shape == segment::RoiShape::oval) {  // which ImageJ widens to whole pixels before it draws and measures

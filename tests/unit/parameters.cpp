@@ -11,6 +11,7 @@ struct Example {
   double length_um = 1.5;
   std::optional<double> pixel_size_um;
   int count = 3;
+  std::optional<int> page;
   bool is_on = false;
   std::string method = "fast";
   std::uint64_t seed = 1;
@@ -22,6 +23,7 @@ void declare(ParameterList& list, Example& e) {
   list.table("network");
   list.add("length_um", e.length_um, Range::positive(), "length (um)");
   list.add("count", e.count, Range::between(1, 10), "how many");
+  list.add("page", e.page, {.low = 1}, "which page");
   list.add("is_on", e.is_on, "whether");
   list.add("method", e.method, "which way", {"fast", "exact"});
   list.add("seed", e.seed, "seed");
@@ -49,6 +51,9 @@ TEST(Parameters, values_are_read_from_their_table) {
   EXPECT_EQ(e.method, "exact");
   EXPECT_TRUE(e.is_on);
   EXPECT_EQ(e.seed, 7u);
+  EXPECT_FALSE(e.page);
+  read_toml(list, "[network]\npage = 4\n", "t");
+  EXPECT_EQ(e.page, 4);
   EXPECT_EQ(e.count, 3) << "what is not given keeps its default";
 }
 
@@ -66,6 +71,8 @@ TEST(Parameters, keys_of_other_stages_are_left_to_them) { EXPECT_EQ(message_of("
 
 TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refused) {
   EXPECT_NE(message_of("[network]\ncount = 2\ncount = 3\n").find("cell.toml:3"), std::string::npos);
+  EXPECT_NE(message_of("[network]\npage = 0\n").find("expected an integer >= 1, found '0'"), std::string::npos);
+  EXPECT_NE(message_of("[network]\npage = 1.5\n").find("expected an integer >= 1, found '1.5'"), std::string::npos);
   EXPECT_NE(message_of("[network]\ncount = 'two'\n").find("expected an integer >= 1 and <= 10, found 'two'"),
             std::string::npos);
   EXPECT_NE(message_of("[network]\nlength_um = -2\n").find("expected a number > 0, found '-2'"), std::string::npos);

@@ -160,6 +160,14 @@ void expect_coordinates(const Roi& roi, const json& answer) {
     expect_equal(roi.points_px, expected, answer["x"][0].is_number_integer() ? 0 : 1e-3);
   } else {
     EXPECT_EQ(roi.shape, RoiShape::composite);
+    EXPECT_EQ(roi.n_paths, static_cast<int>(answer["paths"].size()));
+    std::vector<Vec2> expected;
+    for (const json& path : answer["paths"]) {
+      for (const json& point : path) expected.push_back({point[0], point[1]});
+      expected.push_back({path[0][0], path[0][1]});
+      if (path != answer["paths"][0]) expected.push_back({answer["paths"][0][0][0], answer["paths"][0][0][1]});
+    }
+    expect_equal(roi.points_px, expected, 1e-3);
   }
 }
 
@@ -177,6 +185,15 @@ TEST(Roi, files_of_imagej_are_read_as_another_reader_does) {
     ++n_compared;
   }
   EXPECT_GE(n_compared, 20);
+}
+
+TEST(Roi, holes_of_a_composite_are_not_of_its_area) {
+  if (!fs::exists(kShared)) GTEST_SKIP() << "the ROIs of other programs are not here";
+  const Polygon area = area_px(read_rois(kShared / "read_roi/composite-rect-in-rect.roi").front());
+  EXPECT_DOUBLE_EQ(std::abs(signed_area_um2(area)), 61 * 42 - 31 * 18);
+  EXPECT_TRUE(contains(area, {45, 90}));
+  EXPECT_FALSE(contains(area, {60, 90}));
+  EXPECT_FALSE(contains(area, {30, 90}));
 }
 
 TEST(Roi, files_of_a_third_program_are_read_as_imagej_does) {

@@ -1,0 +1,119 @@
+// mbtfm-segment on images of several channels and on selections drawn by hand.
+
+#include <gtest/gtest.h>
+#include <tiffio.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/files.h"
+#include "segment/image.h"
+#include "segment/roi.h"
+#include "tests/support/drawn_image.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using segment::Roi;
+using segment::RoiShape;
+
+/// A 16-bit TIFF of one page an image.
+void write_pages(const fs::path& file, const std::vector<segment::Image>& pages, const std::string& description) {
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  for (const segment::Image& page : pages) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, page.width);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, page.height);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    if (&page == &pages.front()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+    std::vector<std::uint16_t> row(static_cast<std::size_t>(page.width));
+    for (int j = 0; j < page.height; ++j) {
+      for (int i = 0; i < page.width; ++i) row[i] = static_cast<std::uint16_t>(std::lround(page.at(i, j)));
+      TIFFWriteScanline(tiff, row.data(), static_cast<std::uint32_t>(j), 0);
+    }
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+}
+
+class Segment : public testing::Test {
+ protected:
+  const test::TemporaryFolder folder_;
+  test::DrawnScene scene_ = test::drawn_scene(10, 1);
+
+  void SetUp() override {
+    for (auto* image : {&scene_.adhesion_image, &scene_.actin_image}) image->pixel_size_um = scene_.kPixel_um;
+    segment::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
+    segment::write_tiff(folder_ / "actin.tif", scene_.actin_image);
+  }
+  std::string path(const std::string& name) const { return "'" + (folder_ / name).string() + "'"; }
+  test::Outcome segment(const std::string& out, const std::string& arguments) const {
+    return test::run_program("mbtfm-segment --out " + path(out) + " " + arguments);
+  }
+  std::string both() const {
+    return "--adhesion-image " + path("paxillin.tif") + " --actin-image " + path("actin.tif");
+  }
+};
+
+TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
+  const std::string ome =
+      "<OME><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='2' SizeT='1' PhysicalSizeX='100' "
+      "PhysicalSizeXUnit='nm'><Channel Name='paxillin'/><Channel Name='actin'/></Pixels></Image></OME>";
+  const segment::Image dark = test::even_image(256, 256, 0);  // a slice that adds nothing to the projection
+  write_pages(folder_ / "both.ome.tif", {dark, scene_.adhesion_image, dark, scene_.actin_image}, ome);
+  const std::string file = path("both.ome.tif");
+  const test::Outcome one = segment(
+      "one", "--adhesion-image " + file + " --actin-image " + file + " --adhesion_channel paxillin --actin_channel 2");
+  ASSERT_EQ(one.code, 0) << one.output;
+  ASSERT_EQ(segment("two", both()).code, 0);
+  for (const char* name : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv", "RoiSet.zip"})
+    EXPECT_EQ(read_text(folder_ / "one" / name), read_text(folder_ / "two" / name)) << name;
+
+  const test::Outcome unnamed = segment("none", "--actin-image " + file);
+  EXPECT_EQ(unnamed.code, 3);
+  EXPECT_NE(unnamed.output.find("2 channels: 1 'paxillin', 2 'actin'"), std::string::npos) << unnamed.output;
+  EXPECT_NE(unnamed.output.find("actin_channel"), std::string::npos) << unnamed.output;
+  EXPECT_FALSE(fs::exists(folder_ / "none"));
+}
+
+TEST_F(Segment, channels_of_different_pixel_sizes_are_an_error) {
+  scene_.actin_image.pixel_size_um = 0.11;
+  segment::write_tiff(folder_ / "actin.tif", scene_.actin_image);
+  const test::Outcome outcome = segment("out", both());
+  EXPECT_EQ(outcome.code, 3);
+  EXPECT_NE(outcome.output.find("0.11 um"), std::string::npos) << outcome.output;
+  EXPECT_EQ(segment("out", both() + " --pixel_size_um 0.1").code, 0);
+}
+
+TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
+  Roi fibre, outline, adhesion;
+  fibre.name = "dorsal 1";
+  fibre.shape = RoiShape::polyline;
+  fibre.points_px = {{70, 80}, {120, 128}, {184, 180}};
+  adhesion.name = "mine";
+  adhesion.points_px = {{60, 75}, {80, 75}, {80, 85}, {60, 85}};
+  outline.name = "outline";
+  outline.points_px = {{20, 20}, {236, 20}, {236, 236}, {20, 236}};
+  segment::write_roi_set(folder_ / "fibres.zip", {fibre});
+  segment::write_roi_set(folder_ / "adhesions.zip", {adhesion});
+  segment::write_roi_set(folder_ / "outline.zip", {outline});
+  const test::Outcome outcome = segment("out", both() + " --fibre-rois " + path("fibres.zip") + " --adhesion-rois " +
+                                                   path("adhesions.zip") + " --outline-roi " + path("outline.zip"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("fibres drawn by hand"), std::string::npos) << outcome.output;
+  const Cell cell = read_cell(folder_ / "out");
+  ASSERT_EQ(cell.fibres.size(), 1u);
+  EXPECT_EQ(cell.fibres[0].type, FibreType::dorsal);
+  EXPECT_EQ(cell.fibres[0].start_adhesion_id, 1);
+  ASSERT_EQ(cell.adhesions.size(), 1u);
+  EXPECT_NEAR(cell.adhesions[0].area_um2, 2, 1e-9);
+  EXPECT_NEAR(norm(cell.adhesions[0].position_um - Vec2{7, 8}), 0, 1e-9);
+  EXPECT_NEAR(signed_area_um2(cell.outline_um), 21.6 * 21.6, 1e-9);
+
+  const test::Outcome swapped = segment("swapped", both() + " --fibre-rois " + path("adhesions.zip"));
+  EXPECT_EQ(swapped.code, 3);
+  EXPECT_NE(swapped.output.find("'mine': expected a line"), std::string::npos) << swapped.output;
+}
+
+}  // namespace
+}  // namespace mbtfm

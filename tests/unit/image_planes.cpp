@@ -1,0 +1,253 @@
+/// Which plane of a file is read. Each page of the files made here is filled with its own number.
+#include <gtest/gtest.h>
+#include <tiffio.h>
+
+#include <fstream>
+
+#include "pipeline/contract/errors.h"
+#include "segment/image.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::segment {
+namespace {
+
+namespace fs = std::filesystem;
+using test::TemporaryFolder;
+
+/// A TIFF of 8-bit pages of 4 x 3 pixels, page k filled with k; the first has the description.
+void write_pages(const fs::path& file, int n_pages, const std::string& description, int n_samples = 1) {
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  for (int page = 0; page < n_pages; ++page) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, 4);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, 3);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 8);
+    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, n_samples);
+    TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    if (page == 0 && !description.empty()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+    std::vector<unsigned char> row(4 * static_cast<std::size_t>(n_samples));
+    for (std::size_t i = 0; i < row.size(); ++i) row[i] = static_cast<unsigned char>(page + 100 * (i % n_samples));
+    for (std::uint32_t j = 0; j < 3; ++j) TIFFWriteScanline(tiff, row.data(), j, 0);
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+}
+
+/// The one value of the image that is read.
+float value_of(const fs::path& file, const PlaneChoice& choice) {
+  const Image image = read_image(file, choice);
+  for (const float value : image.pixels) EXPECT_EQ(value, image.pixels.front());
+  return image.pixels.front();
+}
+
+std::string refusal(const fs::path& file, const PlaneChoice& choice) {
+  try {
+    read_image(file, choice);
+  } catch (const InputError& error) {
+    return error.expected + ", found " + error.found + "; " + error.hint;
+  }
+  return "no error";
+}
+
+TEST(ImagePlanes, imagej_stores_channels_fastest_then_slices_then_frames) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.tif";
+  write_pages(file, 24, "ImageJ=1.53t\nimages=24\nchannels=2\nslices=3\nframes=4\nhyperstack=true\n");
+  for (int t = 0; t < 4; ++t)
+    for (int z = 0; z < 3; ++z)
+      for (int c = 0; c < 2; ++c)
+        EXPECT_EQ(value_of(file, {.channel = std::to_string(c + 1), .z = std::to_string(z + 1), .time = t + 1}),
+                  static_cast<float>((t * 3 + z) * 2 + c));
+  EXPECT_EQ(value_of(file, {.channel = "2", .time = 4}), 23);  // the brightest slice
+  EXPECT_EQ(value_of(file, {.page = 8}), 7);
+}
+
+TEST(ImagePlanes, an_imagej_stack_without_dimensions_is_one_of_slices) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.tif", 5, "ImageJ=1.53t\nimages=5\n");
+  EXPECT_EQ(value_of(folder / "a.tif", {}), 4);
+  EXPECT_EQ(value_of(folder / "a.tif", {.z = "2"}), 1);
+}
+
+TEST(ImagePlanes, a_file_that_states_no_dimensions_is_read_by_pages) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.tif", 5, "");
+  EXPECT_EQ(value_of(folder / "a.tif", {}), 0);
+  EXPECT_EQ(value_of(folder / "a.tif", {.page = 4}), 3);
+  EXPECT_EQ(read_image(folder / "a.tif", 3).pixels.front(), 3);
+  EXPECT_NE(refusal(folder / "a.tif", {.page = 6}).find("found 5 pages"), std::string::npos);
+  EXPECT_NE(refusal(folder / "a.tif", {.time = 2}).find("found 1 frame"), std::string::npos);
+}
+
+std::string ome(const std::string& pixels, const std::string& inside) {
+  return "<?xml version=\"1.0\"?><OME UUID=\"urn:uuid:a\"><Image ID=\"Image:0\"><Pixels " + pixels + ">" + inside +
+         "</Pixels></Image><Image ID=\"Image:1\"><Pixels SizeC=\"1\" SizeZ=\"1\" SizeT=\"1\"/></Image></OME>";
+}
+
+TEST(ImagePlanes, ome_states_which_dimension_runs_fastest) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.ome.tif";
+  const int sizes[3] = {2, 3, 2};  // C, Z, T
+  for (const std::string order : {"XYCZT", "XYCTZ", "XYZCT", "XYZTC", "XYTCZ", "XYTZC"}) {
+    fs::remove(file);
+    write_pages(file, 12, ome("DimensionOrder='" + order + "' SizeC='2' SizeZ='3' SizeT='2'", ""));
+    for (int c = 0; c < 2; ++c)
+      for (int z = 0; z < 3; ++z)
+        for (int t = 0; t < 2; ++t) {
+          int page = 0, step = 1;
+          for (const char axis : order.substr(2)) {
+            page += step * (axis == 'C' ? c : axis == 'Z' ? z : t);
+            step *= sizes[axis == 'C' ? 0 : axis == 'Z' ? 1 : 2];
+          }
+          EXPECT_EQ(value_of(file, {.channel = std::to_string(c + 1), .z = std::to_string(z + 1), .time = t + 1}),
+                    static_cast<float>(page))
+              << order;
+        }
+  }
+}
+
+TEST(ImagePlanes, ome_pages_may_lie_in_any_order) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.ome.tif";
+  write_pages(
+      file, 4,
+      ome("DimensionOrder='XYCZT' SizeC='2' SizeZ='2' SizeT='1'",
+          "<TiffData FirstC='1' IFD='0'/><TiffData FirstC='0' IFD='3'/>"
+          "<TiffData FirstZ='1' IFD='1' PlaneCount='2'><UUID FileName='other.tif'>urn:uuid:a</UUID></TiffData>"));
+  EXPECT_EQ(value_of(file, {.channel = "2", .z = "1"}), 0);
+  EXPECT_EQ(value_of(file, {.channel = "1", .z = "1"}), 3);
+  EXPECT_EQ(value_of(file, {.channel = "1", .z = "2"}), 1);
+  EXPECT_EQ(value_of(file, {.channel = "2"}), 2);
+}
+
+TEST(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.ome.tif", 1,
+              ome("SizeC='2' SizeZ='1' SizeT='1'",
+                  "<TiffData IFD='0'><UUID FileName='a.ome.tif'>urn:uuid:a</UUID></TiffData>"
+                  "<TiffData FirstC='1' IFD='0'><UUID FileName='b.ome.tif'>urn:uuid:b</UUID></TiffData>"));
+  EXPECT_EQ(value_of(folder / "a.ome.tif", {.channel = "1"}), 0);
+  EXPECT_NE(refusal(folder / "a.ome.tif", {.channel = "2"}).find("another file of the set"), std::string::npos);
+}
+
+TEST(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.ome.tif";
+  write_pages(
+      file, 3,
+      ome("SizeC='3' SizeZ='1' SizeT='1'", "<Channel Name='Paxillin'/><Channel Name='actin &amp; more'/><Channel/>"));
+  EXPECT_EQ(value_of(file, {.channel = "actin & more"}), 1);
+  EXPECT_EQ(value_of(file, {.channel = "paxillin"}), 0);
+  EXPECT_EQ(value_of(file, {.channel = "3"}), 2);
+  EXPECT_EQ(refusal(file, {.prefix = "actin"}),
+            "the channel to be chosen, found 3 channels: 1 'Paxillin', 2 'actin & more', 3; set actin_channel to the "
+            "number or name of one");
+  EXPECT_NE(refusal(file, {.channel = "dapi"}).find("3 channels: 1 'Paxillin'"), std::string::npos);
+  EXPECT_NE(refusal(file, {.channel = "4"}).find("3 channels"), std::string::npos);
+}
+
+TEST(ImagePlanes, frames_must_be_chosen_and_slices_be_there) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.tif";
+  write_pages(file, 6, "ImageJ=1.53t\nimages=6\nslices=3\nframes=2\n");
+  EXPECT_NE(refusal(file, {.prefix = "actin"}).find("2 frames; set actin_time"), std::string::npos);
+  EXPECT_NE(refusal(file, {.time = 3}).find("2 frames"), std::string::npos);
+  EXPECT_NE(refusal(file, {.z = "4", .time = 1}).find("3 slices"), std::string::npos);
+  EXPECT_NE(refusal(file, {.z = "mean", .time = 1}).find("3 slices"), std::string::npos);
+  EXPECT_EQ(value_of(file, {.time = 2}), 5);
+}
+
+TEST(ImagePlanes, samples_of_a_pixel_are_channels) {
+  const TemporaryFolder folder;
+  write_pages(folder / "a.tif", 1, "", 2);
+  EXPECT_EQ(value_of(folder / "a.tif", {.channel = "2"}), 100);
+  EXPECT_NE(refusal(folder / "a.tif", {}).find("2 channels"), std::string::npos);
+}
+
+TEST(ImagePlanes, contradicting_dimensions_are_an_error_but_pages_can_still_be_read) {
+  const TemporaryFolder folder;
+  int n = 0;
+  for (const std::string& description :
+       {std::string("ImageJ=1.53t\nimages=4\nchannels=3\n"), std::string("ImageJ=1.53t\nimages=4\nchannels=x\n"),
+        ome("SizeC='2' SizeZ='x'", ""), ome("SizeC='4194304' SizeZ='4194304'", ""), ome("DimensionOrder='XYCCC'", ""),
+        std::string("<OME><Image><Pixels SizeC='2'"),
+        std::string("<OME><BinaryOnly MetadataFile='a.companion'/></OME>")}) {
+    const fs::path file = folder / (std::to_string(n++) + ".tif");
+    write_pages(file, 4, description);
+    EXPECT_NE(refusal(file, {}).find("set image_page"), std::string::npos) << description;
+    EXPECT_EQ(value_of(file, {.page = 3}), 2);
+  }
+}
+
+TEST(ImagePlanes, more_than_4_GB_of_imagej_are_planes_after_the_only_page) {
+  // as ij.io.TiffEncoder writes it: big-endian, tags first, then the planes without pages of their own
+  const TemporaryFolder folder;
+  const auto stack = [&](int bits, int n_planes_there) {
+    const std::string description = "ImageJ=1.53t\nimages=6\nchannels=2\nslices=3\nhyperstack=true\n";
+    std::string bytes = {'M', 'M', 0, 42, 0, 0, 0, 8};
+    const auto number = [&](std::uint32_t value, int n_bytes) {
+      for (int i = n_bytes - 1; i >= 0; --i) bytes += static_cast<char>(value >> 8 * i);
+    };
+    const std::uint32_t n_tags = 8, at_text = 8 + 2 + 12 * n_tags + 4,
+                        at_pixels = at_text + static_cast<std::uint32_t>(description.size()) + 1;
+    const auto tag = [&](std::uint32_t name, std::uint32_t value, std::uint32_t type = 4, std::uint32_t count = 1) {
+      number(name, 2);
+      number(type, 2);
+      number(count, 4);
+      number(value, 4);
+    };
+    number(n_tags, 2);
+    tag(TIFFTAG_IMAGEWIDTH, 4);
+    tag(TIFFTAG_IMAGELENGTH, 3);
+    tag(TIFFTAG_BITSPERSAMPLE, static_cast<std::uint32_t>(bits));
+    tag(TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    tag(TIFFTAG_IMAGEDESCRIPTION, at_text, 2, static_cast<std::uint32_t>(description.size()) + 1);
+    tag(TIFFTAG_STRIPOFFSETS, at_pixels);
+    tag(TIFFTAG_ROWSPERSTRIP, 3);
+    tag(TIFFTAG_STRIPBYTECOUNTS, static_cast<std::uint32_t>(12 * bits / 8));
+    number(0, 4);
+    bytes += description + '\0';
+    for (std::uint32_t plane = 0; plane < static_cast<std::uint32_t>(n_planes_there); ++plane)
+      for (int i = 0; i < 12; ++i) number(plane + (bits == 16 ? 1000 : 0), bits / 8);
+    const fs::path file = folder / (std::to_string(bits) + "_" + std::to_string(n_planes_there) + ".tif");
+    std::ofstream(file, std::ios::binary) << bytes;
+    return file;
+  };
+  for (const int bits : {8, 16, 32}) {
+    const float base = bits == 16 ? 1000 : 0;
+    for (int z = 0; z < 3; ++z)
+      for (int c = 0; c < 2; ++c)
+        EXPECT_EQ(value_of(stack(bits, 6), {.channel = std::to_string(c + 1), .z = std::to_string(z + 1)}),
+                  base + static_cast<float>(2 * z + c));
+    EXPECT_EQ(value_of(stack(bits, 6), {.page = 5}), base + 4);
+    EXPECT_NE(refusal(stack(bits, 5), {.channel = "2", .z = "3"}).find("plane 6 at bytes"), std::string::npos);
+  }
+}
+
+const fs::path kShared = fs::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+
+TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
+  if (!fs::exists(kShared / "tiff")) GTEST_SKIP() << "the images of other programs are not here";
+  struct Case {
+    const char* file;
+    PlaneChoice choice;
+    double sum;  // of the maximum over the slices, by tifffile and numpy
+  };
+  const fs::path hyperstack = "tiff/imagej153t/hyperstack_c2z3t4_16bit_micron.tif",
+                 series = "tiff/vips/multi-channel-z-series.ome.tif";
+  const Case cases[] = {{hyperstack.c_str(), {.channel = "1", .time = 1}, 167070},
+                        {hyperstack.c_str(), {.channel = "2", .time = 1}, 264070},
+                        {hyperstack.c_str(), {.channel = "2", .time = 4}, 266980},
+                        {series.c_str(), {.channel = "1"}, 3462130},
+                        {series.c_str(), {.channel = "2"}, 3461875},
+                        {series.c_str(), {.channel = "3"}, 3461744},
+                        {"tiff/derived_tiffcp/beads_2ch.ome.tif", {.channel = "ch A"}, 4415260968}};
+  for (const Case& c : cases) {
+    double sum = 0;
+    for (const float value : read_image(kShared / c.file, c.choice).pixels) sum += value;
+    EXPECT_EQ(sum, c.sum) << c.file << " channel " << c.choice.channel;
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
