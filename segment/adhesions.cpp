@@ -144,6 +144,8 @@ std::string why_no_adhesions(const Image& image, double pixel_size_um, const Adh
     for (int x = 0; x < c.height.cols; ++x)
       if (const double level = c.noise.at<float>(y, x); level > 0)
         highest = std::max(highest, c.height.at<float>(y, x) / level);
+  if (highest > p.adhesion_seed_noise)
+    return "bright areas and edges, but no spot higher than the steps of its background";
   return "nothing above the noise, the brightest spot " + brief(highest) +
          " of its standard deviations over the background, where adhesion_seed_noise asks for " +
          shortest(p.adhesion_seed_noise);

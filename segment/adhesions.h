@@ -35,7 +35,8 @@ struct AdhesionRegion {
   std::vector<CoveredPixel> pixels;
 };
 
-/// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis, split at
+/// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis (and above
+/// what the edge of a bright cell leaves), split at
 /// intensity dips (watershed), put the rim of each at a share of its own height; then fit each as an elliptical disc
 /// behind the microscope's blur, which gives centre, axes and angle without what the blur adds to them. Where the disc
 /// leaves more than a tenth of the variance unexplained or departs from the region by 30 %, the adhesion is no ellipse,
