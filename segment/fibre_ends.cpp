@@ -2,64 +2,99 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
-#include <optional>
+#include <string>
 
+#include "pipeline/contract/polyline.h"
 #include "segment/ellipse.h"
 
 namespace mbtfm::segment {
 
 namespace {
 
+constexpr double kInfinite = std::numeric_limits<double>::infinity();
+
 /// The adhesion that an end reaches best.
 struct Hold {
   const Adhesion* adhesion = nullptr;
-  double distance_um = std::numeric_limits<double>::infinity();  ///< from the end, or its straight continuation
+  double effort_um = kInfinite;  ///< way ahead to it and twice the way aside
+  double gap_um = kInfinite;     ///< from the line's end to its rim, 0 inside
+  double reach_um = 0;           ///< the effort up to which this end is held
+  bool is_held() const { return adhesion != nullptr && effort_um <= reach_um; }
+  /// That it is held, or not held as the case may be: 1 far from the limit, ½ on it. The place of an end is known to a
+  /// third of the reach.
+  double certainty() const {
+    if (adhesion == nullptr) return 1;
+    return 0.5 * (1 + std::erf(std::abs(effort_um - reach_um) / (reach_um / 3) / std::sqrt(2.0)));
+  }
 };
 
-double squared_distance_to_segment(Vec2 p, Vec2 a, Vec2 b) {
-  const Vec2 d = b - a;
-  const double t = std::clamp(dot(p - a, d) / std::max(dot(d, d), 1e-300), 0.0, 1.0);
-  const Vec2 r = p - (a + t * d);
-  return dot(r, r);
-}
-
-/// Distance to the ellipse of the nearest point on the course of the line around its last point: `reach_um` back along
-/// the line, `reach_um` straight ahead; what lies ahead counts with the way there.
-double distance_on_course(const Adhesion& adhesion, const Polyline& line, double reach_um) {
-  constexpr double kStep = 0.1;  // um
-  const std::size_t n = line.size();
-  Vec2 back = line[n - 1];
-  double nearest = std::max(0.0, distance_to_ellipse_um(adhesion, back));
-  double gone = 0;
-  for (std::size_t i = n - 1; i-- > 0 && gone < reach_um;) {
-    const double l = norm(line[i] - line[i + 1]);
-    for (double s = kStep; s < l && gone + s < reach_um; s += kStep)
-      nearest = std::min(
-          nearest, std::max(0.0, distance_to_ellipse_um(adhesion, line[i + 1] + (s / l) * (line[i] - line[i + 1]))) +
-                       0.3 * (gone + s));
+/// The line's last point and those before it, 0.1 um apart over a length, the last first.
+Polyline last_part(const Polyline& line, double length_um) {
+  constexpr double kStep_um = 0.1;
+  Polyline points{line.back()};
+  double gone = 0, next = kStep_um;
+  for (std::size_t i = line.size() - 1; i-- > 0 && next < length_um;) {
+    const Vec2 d = line[i] - line[i + 1];
+    const double l = norm(d);
+    for (; next <= gone + l && next < length_um; next += kStep_um)
+      points.push_back(line[i + 1] + ((next - gone) / l) * d);
     gone += l;
-    back = line[i];
   }
-  const double l = norm(line[n - 1] - back);
-  if (l <= 0) return nearest;
-  const Vec2 ahead = (1 / l) * (line[n - 1] - back);
-  for (double s = kStep; s <= reach_um; s += kStep)
-    nearest = std::min(nearest, std::max(0.0, distance_to_ellipse_um(adhesion, line[n - 1] + s * ahead)) + 0.7 * s);
-  return nearest;
+  return points;
 }
 
-Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, double reach_um) {
-  Hold best;
-  for (const Adhesion& a : adhesions) {
-    const double far = 2 * reach_um + a.major_axis_um;
-    if (norm(a.position_um - line.back()) > far) continue;
-    const double distance = distance_on_course(a, line, reach_um);
-    // between two that the line touches, the one whose centre it passes nearer
-    const double centre = std::sqrt(squared_distance_to_segment(a.position_um, line[line.size() - 2], line.back()));
-    const double cost = distance + 0.2 * std::min(centre, norm(a.position_um - line.back()));
-    if (cost < best.distance_um) best = {&a, cost};
+Vec2 direction_of_end(const Polyline& last) {
+  const Vec2 d = last.front() - last.back();
+  const double l = norm(d);
+  return l > 0 ? (1 / l) * d : Vec2{1, 0};
+}
+
+/// Least effort from the course of the line around its end to the adhesion: some way back along the line, as far
+/// straight ahead.
+double effort_to(const Adhesion& adhesion, const Polyline& last) {
+  constexpr double kAside = 2;    // a fibre goes on ahead, it does not turn aside
+  constexpr double kBack = 0.3;   // a line may run on a little over the adhesion that holds it
+  constexpr double kAhead = 0.7;  // its end fades: it may be longer than it looks
+  const Vec2 ahead = direction_of_end(last);
+  double least = kInfinite;
+  for (std::size_t i = 0; i < last.size(); ++i) {
+    const double s = 0.1 * static_cast<double>(i);
+    const auto aside = [&](Vec2 p) { return kAside * std::max(0.0, distance_to_ellipse_um(adhesion, p)); };
+    least = std::min({least, aside(last[i]) + kBack * s, aside(last.front() + s * ahead) + kAhead * s});
   }
+  return least;
+}
+
+/// 1 for an end that points at the nearest edge and lies near to it, −1 for one that runs along it, 0 far away.
+double outwardness(const Polyline& last, const Polygon& outline_um) {
+  if (outline_um.empty()) return 0;
+  constexpr double kPeriphery_um = 6;  // beyond it few adhesions lie, and the nearest edge means little
+  const Vec2 to_edge = nearest_on_boundary_um(outline_um, last.front()) - last.front();
+  const double distance = norm(to_edge);
+  if (distance < 1e-9) return 1;
+  const double cosine = std::abs(dot(to_edge, direction_of_end(last))) / distance;
+  return (2 * cosine * cosine - 1) * std::exp(-distance / kPeriphery_um);
+}
+
+/// The adhesion at the line's last point.
+Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
+  constexpr double kDirectionCounts = 0.3;  // of the reach: it decides near the limit and nowhere else
+  const Polyline last = last_part(line, reach_um);
+  Hold best;
+  double least = kInfinite;
+  for (const Adhesion& a : adhesions) {
+    if (norm(a.position_um - line.back()) > 3 * reach_um + a.major_axis_um) continue;
+    const double effort = effort_to(a, last);
+    // between two that the line touches, the one whose centre it passes nearer
+    const double cost = effort + 0.2 * distance_to_line_um({last.back(), last.front()}, a.position_um);
+    if (cost < least) {
+      least = cost;
+      best = {&a, effort, std::max(0.0, distance_to_ellipse_um(a, line.back())), 0};
+    }
+  }
+  best.reach_um = reach_um * (1 + kDirectionCounts * outwardness(last, outline_um));
   return best;
 }
 
@@ -75,30 +110,47 @@ void lead_to(Polyline& line, const Adhesion& adhesion) {
   line.push_back(centre);
 }
 
-/// 1 far from the decision's border, ½ on it.
-double certainty(double distance_um, double reach_um) {
-  const double margin = std::abs(distance_um - reach_um) / (reach_um / 3);
-  return std::isfinite(margin) ? 0.5 * (1 + std::erf(margin / std::sqrt(2.0))) : 1;
+std::string in_words(const char* end, const Hold& hold) {
+  char text[96];
+  if (hold.adhesion == nullptr)
+    std::snprintf(text, sizeof text, "%s far from any adhesion", end);
+  else
+    std::snprintf(text, sizeof text, "%s %s %.1f um from adhesion %d", end, hold.is_held() ? "held" : "free",
+                  hold.gap_um, hold.adhesion->adhesion_id);
+  return text;
+}
+
+/// Adhesions under the line between its ends: it may be two fibres, or held there too.
+std::string under(const Polyline& line, const Hold& start, const Hold& end, const std::vector<Adhesion>& adhesions) {
+  std::string text;
+  for (const Adhesion& a : adhesions) {
+    if (&a == start.adhesion || &a == end.adhesion) continue;
+    // not a mere touch: it passes within half of the minor axis' half
+    if (distance_to_line_um(line, a.position_um) < a.minor_axis_um / 4)
+      text += (text.empty() ? "; over adhesion " : " and ") + std::to_string(a.adhesion_id);
+  }
+  return text;
 }
 
 }  // namespace
 
-void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, double reach_um) {
+void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
   Polyline& line = fibre.points_um;
-  Hold end = hold_of(line, adhesions, reach_um);
+  Hold end = hold_of(line, adhesions, outline_um, reach_um);
   std::reverse(line.begin(), line.end());
-  Hold start = hold_of(line, adhesions, reach_um);
-  fibre.confidence = certainty(start.distance_um, reach_um) * certainty(end.distance_um, reach_um);
+  Hold start = hold_of(line, adhesions, outline_um, reach_um);
   if (start.adhesion == end.adhesion && start.adhesion != nullptr)
-    (start.distance_um <= end.distance_um ? end : start) = Hold{};
+    (start.effort_um <= end.effort_um ? end : start) = Hold{};
+  fibre.type_confidence = start.certainty() * end.certainty();
+  fibre.type_reason = in_words("start", start) + "; " + in_words("end", end) + under(line, start, end, adhesions);
   fibre.start_adhesion_id.reset();
   fibre.end_adhesion_id.reset();
-  if (start.adhesion && start.distance_um <= reach_um) {
+  if (start.is_held()) {
     lead_to(line, *start.adhesion);
     fibre.start_adhesion_id = start.adhesion->adhesion_id;
   }
   std::reverse(line.begin(), line.end());
-  if (end.adhesion && end.distance_um <= reach_um) {
+  if (end.is_held()) {
     lead_to(line, *end.adhesion);
     fibre.end_adhesion_id = end.adhesion->adhesion_id;
   }

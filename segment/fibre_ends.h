@@ -1,4 +1,4 @@
-/// Which adhesions hold a fibre.
+/// Which adhesions hold a fibre, and what type that makes it.
 #pragma once
 
 #include <vector>
@@ -7,10 +7,15 @@
 
 namespace mbtfm::segment {
 
-/// Tie each end to the adhesion it reaches: an adhesion near the end, on the line's own course, whose rim is not
-/// further than `reach_um`; nearest first. A tied end is led to the adhesion's centre. Sets the type by the number of
-/// tied ends and its confidence: the chance that neither end's decision would change if the end moved by a third of the
-/// reach. Both ends never share an adhesion; the nearer one has it.
-void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, double reach_um);
+/// Tie each end to the adhesion it reaches: on the line's own course, at most `reach_um` ahead of the end or half of it
+/// aside; the nearest. A tied end is led to the adhesion's centre. Both ends never share an adhesion; the nearer one
+/// has it.
+///
+/// Where an end stops about as short of an adhesion as the reach, its direction decides: adhesions hold fibres that
+/// run across the nearest edge of the cell, arcs run along it, so the reach is longer for the former and shorter for
+/// the latter. Sets the type by the number of tied ends (Hotulainen & Lappalainen 2006), the chance that it is right,
+/// and the reason in words.
+/// @param outline_um  of the cell; empty: direction tells nothing
+void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um);
 
 }  // namespace mbtfm::segment

@@ -2,10 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 
 #include "segment/fibre_ends.h"
+#include "segment/fibre_line.h"
 #include "segment/fibre_profile.h"
+#include "segment/fibre_significance.h"
 #include "segment/grid.h"
 #include "segment/trace.h"
 
@@ -16,34 +21,54 @@ namespace {
 /// Full width at half maximum of a Gaussian in standard deviations.
 constexpr double kFwhm = 2.3548;
 
-/// The image shrunk until the narrowest filter spans no more pixels than it needs.
-struct Working {
+/// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
+struct Field {
   cv::Mat image;
-  double pixel_um;
+  cv::Mat is_inside;  ///< CV_8U: of the cell's outline
+  double pixel_um = 0;
+  Vec2 origin_um;  ///< outer corner of its first pixel
+
+  Vec2 in_um(cv::Point2d point) const { return origin_um + to_um(point, pixel_um); }
 };
 
-Working working_image(const cv::Mat& image, double pixel_size_um, double narrowest_sigma_um) {
-  // a Gaussian of 1.2 pixels is sampled to within 1e-3 of its spectrum
-  const int factor = std::max(1, static_cast<int>(narrowest_sigma_um / (1.2 * pixel_size_um)));
-  return {shrink(image, factor), pixel_size_um * factor};
+cv::Rect box_of(const Polygon& outline_um, cv::Size size, double pixel_um, double margin_um) {
+  const cv::Rect whole(cv::Point(0, 0), size);
+  if (outline_um.empty()) return whole;
+  const auto [left, right] = std::ranges::minmax(outline_um, {}, &Vec2::x);
+  const auto [top, bottom] = std::ranges::minmax(outline_um, {}, &Vec2::y);
+  const cv::Point first(cvFloor((left.x - margin_um) / pixel_um), cvFloor((top.y - margin_um) / pixel_um));
+  const cv::Point last(cvCeil((right.x + margin_um) / pixel_um), cvCeil((bottom.y + margin_um) / pixel_um));
+  const cv::Rect box = cv::Rect(first, last) & whole;
+  return box.empty() ? whole : box;
 }
 
-/// Height that only a tenth of the clear ridge points exceed; 0 without any.
-double bright_height(const Ridges& ridges, double start_noise) {
-  std::vector<float> heights;
-  for (int y = 0; y < ridges.noise.rows; ++y)
-    for (int x = 0; x < ridges.noise.cols; ++x)
-      if (ridges.strongest.at<float>(y, x) > 2 * start_noise * ridges.noise.at<float>(y, x))
-        heights.push_back(ridges.strongest.at<float>(y, x));
-  return heights.empty() ? 0 : quantile(cv::Mat(heights), 0.9);
+Field field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
+  const cv::Rect box = box_of(outline_um, image.size(), pixel_um, 2 * p.fibre_averaging_um);
+  // at 0.85 pixels 3 % of a Gaussian's spectrum lie beyond what the pixels carry
+  const double narrowest_px = p.fibre_width_um / kFwhm / std::numbers::sqrt2 / pixel_um;
+  const int factor = std::max(1, static_cast<int>(narrowest_px / 0.85));
+  Field field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
+  field.is_inside = cv::Mat(field.image.size(), CV_8U, cv::Scalar(outline_um.empty() ? 255 : 0));
+  if (outline_um.empty()) return field;
+  std::vector<std::vector<cv::Point>> corners(1);
+  for (const Vec2 u : outline_um) corners[0].emplace_back(to_pixels(u - field.origin_um, field.pixel_um));
+  cv::fillPoly(field.is_inside, corners, cv::Scalar(255));
+  return field;
 }
 
-TraceRule rule_of(const FibreParameters& p, double bright, double pixel_um) {
+RidgeScales scales_of(const FibreParameters& p, double pixel_um) {
+  RidgeScales scales;
+  for (const double s : {1 / std::numbers::sqrt2, std::numbers::sqrt2})
+    scales.width_sigma_px.push_back(s * p.fibre_width_um / kFwhm / pixel_um);
+  scales.length_sigma_px = p.fibre_averaging_um / pixel_um;
+  scales.noise_radius_px = std::max(6.0, 8 * p.fibre_width_um / pixel_um);
+  return scales;
+}
+
+TraceRule rule_of(const FibreParameters& p, double pixel_um) {
   TraceRule rule;
   rule.start_noise = p.fibre_start_noise;
   rule.follow_noise = p.fibre_follow_noise;
-  rule.floor = p.fibre_faintest * bright;
-  rule.memory_px = 4 * p.fibre_averaging_um / pixel_um;
   rule.gap_px = p.fibre_gap_um / pixel_um;
   rule.smallest_radius_px = p.fibre_smallest_radius_um / pixel_um;
   rule.line_radius_px = 0.75 * p.fibre_width_um / pixel_um;
@@ -53,69 +78,81 @@ TraceRule rule_of(const FibreParameters& p, double bright, double pixel_um) {
   return rule;
 }
 
-/// Mean of neighbours over ± half a window that shrinks towards the ends, which stay.
-std::vector<cv::Point2d> smoothed(const std::vector<cv::Point2d>& points, int half_window) {
-  const int n = static_cast<int>(points.size());
-  std::vector<cv::Point2d> result(points.size());
-  for (int i = 0; i < n; ++i) {
-    const int h = std::min({half_window, i, n - 1 - i});
-    cv::Point2d sum(0, 0);
-    for (int k = i - h; k <= i + h; ++k) sum += points[static_cast<std::size_t>(k)];
-    result[static_cast<std::size_t>(i)] = sum / (2 * h + 1);
-  }
-  return result;
-}
-
-/// Douglas–Peucker between first and last, both kept.
-void simplify(const Polyline& line, std::size_t first, std::size_t last, double tolerance_um, Polyline& kept) {
-  const Vec2 d = line[last] - line[first];
-  const double l = norm(d);
-  std::size_t farthest = first;
-  double greatest = tolerance_um;
-  for (std::size_t i = first + 1; i < last; ++i) {
-    const Vec2 r = line[i] - line[first];
-    const double distance = l > 0 ? std::abs(cross(d, r)) / l : norm(r);
-    if (distance > greatest) greatest = distance, farthest = i;
-  }
-  if (farthest != first) {
-    simplify(line, first, farthest, tolerance_um, kept);
-    simplify(line, farthest, last, tolerance_um, kept);
-  } else {
-    kept.push_back(line[last]);
-  }
-}
-
-Polyline simplified(const Polyline& line, double tolerance_um) {
-  Polyline kept{line.front()};
-  simplify(line, 0, line.size() - 1, tolerance_um, kept);
-  return kept;
-}
-
 bool falls_on_both_sides(const Profile& profile, double ratio) {
   return profile.lower_drop >= ratio * profile.upper_drop && profile.lower_drop > 3 * profile.noise;
 }
 
-/// Does the line run along the outline at this point?
-bool hugs(const Polygon& outline_um, Vec2 point, Vec2 along, double distance_um) {
-  if (outline_um.empty()) return false;
-  const Vec2 nearest = nearest_on_boundary_um(outline_um, point);
-  if (!contains(outline_um, point)) return true;
-  const Vec2 away = point - nearest;
-  constexpr double kParallel = 0.5;  // sine of 30°
-  return norm(away) < distance_um && std::abs(dot(away, along)) <= kParallel * norm(away) * norm(along);
+/// Folds of the membrane lie within a lamellipodium's width of the edge and wind.
+bool is_ruffle(const Polyline& line_um, const Polygon& outline_um, double lamellipodium_um) {
+  if (outline_um.empty() || !winds(line_um)) return false;
+  return distance_to_boundary_um(outline_um, line_um[line_um.size() / 2]) < lamellipodium_um;
 }
 
-/// The longest piece of the line that does not run along the outline.
-Polyline without_edge(const Polyline& line, const Polygon& outline_um, double distance_um) {
-  std::size_t best_first = 0, best_n = 0, first = 0;
-  for (std::size_t i = 0; i <= line.size(); ++i) {
-    const std::size_t a = i > 2 ? i - 3 : 0, b = std::min(i + 3, line.size() - 1);
-    if (i < line.size() && !hugs(outline_um, line[i], line[b] - line[a], distance_um)) continue;
-    if (i - first > best_n) best_first = first, best_n = i - first;
-    first = i + 1;
+/// A traced line that may be a fibre.
+struct Candidate {
+  Polyline points_um;
+  Profile profile;
+  double expected_false = 0;  ///< lines as significant as this one that chance would make
+};
+
+/// Looks at one traced line after another.
+struct Judge {
+  const Field& field;
+  const Ridges& ridges;
+  const Polygon& outline_um;
+  const FibreParameters& p;
+
+  /// What is left of a line away from the cell's edge; nothing where that is no fibre.
+  std::optional<Candidate> candidate(const Trace& trace, double edge_um) const {
+    auto points = smoothed(trace.points, cvRound(p.fibre_averaging_um / field.pixel_um));
+    Candidate c;
+    for (const cv::Point2d& point : points) c.points_um.push_back(field.in_um(point));
+    const Piece piece = without_edge(c.points_um, outline_um, edge_um);
+    if (static_cast<double>(piece.n) * field.pixel_um < p.fibre_shortest_um) return std::nullopt;
+    const auto cut = [&](const auto& all) {
+      const auto first = all.begin() + static_cast<std::ptrdiff_t>(piece.first);
+      return std::decay_t<decltype(all)>(first, first + static_cast<std::ptrdiff_t>(piece.n));
+    };
+    c.points_um = cut(c.points_um);
+    points = cut(points);
+    // noise through a Gaussian of deviation s correlates over 2 sqrt(pi) s
+    const double independent_px = 2 * std::sqrt(std::numbers::pi) * p.fibre_averaging_um / field.pixel_um;
+    const double area_um2 = cv::countNonZero(field.is_inside) * field.pixel_um * field.pixel_um;
+    c.expected_false = expected_false_lines(significance(ridges, points, cut(trace.height), independent_px), area_um2);
+    if (c.expected_false > p.fibre_false_per_cell) return std::nullopt;
+    c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
+    if (!falls_on_both_sides(c.profile, p.fibre_side_ratio)) return std::nullopt;
+    if (is_ruffle(c.points_um, outline_um, p.fibre_lamellipodium_um)) return std::nullopt;
+    return c;
   }
-  return {line.begin() + static_cast<std::ptrdiff_t>(best_first),
-          line.begin() + static_cast<std::ptrdiff_t>(best_first + best_n)};
+};
+
+double upper_tenth(std::vector<double> values) {
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(0.9 * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+/// All lines that are fibres. Along the edge these are only lines as bright as those in the cell.
+std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& judge) {
+  std::vector<std::optional<Candidate>> inner;
+  std::vector<double> heights;
+  for (const Trace& trace : traces) {
+    inner.push_back(judge.candidate(trace, judge.p.fibre_edge_um));
+    if (inner.back()) heights.push_back(inner.back()->profile.height);
+  }
+  constexpr std::size_t kEnough = 5;  // fewer do not tell what bright is
+  const double bright = heights.size() < kEnough ? std::numeric_limits<double>::infinity()
+                                                 : judge.p.fibre_edge_height * upper_tenth(heights);
+  std::vector<Candidate> kept;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    auto whole = judge.candidate(traces[i], 0);
+    if (whole && whole->profile.height >= bright)
+      kept.push_back(std::move(*whole));
+    else if (inner[i])
+      kept.push_back(std::move(*inner[i]));
+  }
+  return kept;
 }
 
 }  // namespace
@@ -130,16 +167,16 @@ void declare(ParameterList& list, FibreParameters& p) {
            "height a fibre reaches somewhere (standard deviations of the filtered noise)");
   list.add("fibre_follow_noise", p.fibre_follow_noise, Range::positive(),
            "height it may fall to (standard deviations of the filtered noise)");
-  list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
-           "least height as a share of the height of bright fibres");
-  list.add("fibre_contrast", p.fibre_contrast, Range::not_negative(),
-           "least height as a share of the brightness beside the fibre");
+  list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::positive(),
+           "lines of the meshwork that may pass for fibres, expected number in a cell");
   list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::positive(),
            "smallest radius of curvature (um)");
   list.add("fibre_edge_um", p.fibre_edge_um, Range::not_negative(),
            "a line along the outline this near to it is the cell's edge, not a fibre (um)");
   list.add("fibre_edge_height", p.fibre_edge_height, Range::not_negative(),
            "unless it reaches this share of the height of bright fibres");
+  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::not_negative(),
+           "a line that winds this near to the outline is a ruffle, not a fibre (um)");
   list.add("fibre_gap_um", p.fibre_gap_um, Range::not_negative(), "length over which a fibre may be invisible (um)");
   list.add("fibre_shortest_um", p.fibre_shortest_um, Range::positive(), "shortest fibre (um)");
   list.add("fibre_side_ratio", p.fibre_side_ratio, Range::between(0, 1),
@@ -151,33 +188,18 @@ void declare(ParameterList& list, FibreParameters& p) {
 
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
                                double pixel_size_um, const FibreParameters& p) {
-  const cv::Mat full = matrix_of(image);
-  const double typical_sigma_um = p.fibre_width_um / kFwhm;
-  const Working working = working_image(full, pixel_size_um, typical_sigma_um / std::sqrt(2.0));
-  RidgeScales scales;
-  for (const double s : {1 / std::sqrt(2.0), std::sqrt(2.0)})
-    scales.width_sigma_px.push_back(s * typical_sigma_um / working.pixel_um);
-  scales.length_sigma_px = p.fibre_averaging_um / working.pixel_um;
-  scales.noise_radius_px = std::max(6.0, 8 * p.fibre_width_um / working.pixel_um);
-  const Ridges ridges = find_ridges(working.image, scales);
-  const double bright = bright_height(ridges, p.fibre_start_noise), dark = quantile(working.image, 0.01);
-  const int window = static_cast<int>(std::lround(p.fibre_averaging_um / working.pixel_um));
+  const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
+  const Ridges ridges = find_ridges(field.image, field.is_inside, scales_of(p, field.pixel_um));
+  const auto traces = trace_lines(ridges, field.is_inside, rule_of(p, field.pixel_um));
   std::vector<Fibre> fibres;
-  for (const Trace& trace : trace_lines(ridges, rule_of(p, bright, working.pixel_um))) {
-    const auto points = smoothed(trace.points, window);
-    const Profile profile = profile_across(working.image, points, 1.5 * p.fibre_width_um / working.pixel_um);
-    if (!falls_on_both_sides(profile, p.fibre_side_ratio)) continue;
-    if (profile.height < p.fibre_contrast * (profile.side - dark)) continue;
+  for (const Candidate& c : judged(traces, Judge{field, ridges, outline_um, p})) {
     Fibre fibre;
-    for (const cv::Point2d& point : points) fibre.points_um.push_back(to_um(point, working.pixel_um));
-    const bool is_bright = profile.height >= p.fibre_edge_height * bright;
-    fibre.points_um = without_edge(fibre.points_um, outline_um, is_bright ? 0 : p.fibre_edge_um);
-    if (fibre.points_um.size() < 2) continue;
-    fibre.points_um = simplified(fibre.points_um, p.fibre_simplify_um);
-    fibre.width_um = profile.width_px * working.pixel_um;
-    fibre.mean_intensity = profile.height;
-    tie_ends(fibre, adhesions, p.fibre_reach_um);
-    if (fibre.points_um.size() >= 2 && length_um(fibre.points_um) >= p.fibre_shortest_um) fibres.push_back(fibre);
+    fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
+    fibre.width_um = c.profile.width_px * field.pixel_um;
+    fibre.mean_intensity = c.profile.height;
+    fibre.confidence = 1 / (1 + c.expected_false);
+    tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+    if (length_um(fibre.points_um) >= p.fibre_shortest_um) fibres.push_back(fibre);
   }
   std::stable_sort(fibres.begin(), fibres.end(),
                    [](const Fibre& a, const Fibre& b) { return length_um(a.points_um) > length_um(b.points_um); });

@@ -14,14 +14,14 @@ struct FibreParameters {
   double fibre_averaging_um = 0.7;      ///< along the fibre: straight over this length, long enough to beat noise
   double fibre_start_noise = 6;         ///< no line of noise in 10^6 pixels
   double fibre_follow_noise = 2.5;      ///< once begun a fibre may fade into the noise's upper per cent
-  double fibre_faintest = 0.2;          ///< relative to the bright ones: what is fainter is single filaments
-  double fibre_contrast = 0.25;         ///< relative to the cytosol beside it: the meshwork varies by less
+  double fibre_false_per_cell = 0.5;    ///< lines of the meshwork taken for fibres: one in every second cell
   double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
   double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
   double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture
   double fibre_side_ratio = 0.25;       ///< a step (the cell's edge) falls on one side only, a fibre on both
   double fibre_edge_um = 1.0;           ///< a line along the outline this near to it is the cortex of the edge …
   double fibre_edge_height = 0.8;       ///< … unless it is as bright as the cell's bright fibres
+  double fibre_lamellipodium_um = 3;    ///< its width: this near to the edge a line that winds is a ruffle
   double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
   double fibre_simplify_um = 0.05;      ///< points are left out where the line moves less: half a pixel
 };

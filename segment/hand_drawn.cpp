@@ -215,7 +215,7 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
 }
 
 std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
-                                     const std::optional<Channel>& actin, const Field& field,
+                                     const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
                                      const FibreParameters& p) {
   std::vector<Fibre> fibres;
   for (const Roi& roi : set.rois) {
@@ -223,12 +223,14 @@ std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesi
     Fibre fibre = drawn_fibre(set, roi, field);
     const std::optional<FibreType> stated = stated_type(roi, where);
     set_profile(fibre, roi, actin, field.pixel_um, p);
-    tie_ends(fibre, adhesions, p.fibre_reach_um);
+    tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
     if (fibre.points_um.size() < 2)
       throw InputError(where, "a line from one adhesion to another or beyond", "one within a single adhesion");
+    fibre.confidence = 1;  // a person says that it is one
     if (stated) {
       fibre.type = *stated;
-      fibre.confidence = 1;
+      fibre.type_confidence = 1;
+      fibre.type_reason = "named or grouped so by hand";
     }
     fibre.fibre_id = static_cast<int>(fibres.size()) + 1;
     fibres.push_back(std::move(fibre));

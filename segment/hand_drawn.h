@@ -41,12 +41,12 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
                                            const Field& field);
 
 /// Each line as a fibre, its ends tied to the adhesions they reach. The type is that of its name ("dorsal 3",
-/// "Ventral-12", "arc_1") or of its group (1 dorsal, 2 arc, 3 ventral), with confidence 1, else that of its ends. Width
+/// "Ventral-12", "arc_1") or of its group (1 dorsal, 2 arc, 3 ventral), with certainty, else that of its ends. Width
 /// and intensity from the image across the line, else its stroke or the typical width.
 /// @throws InputError naming the selection that is no line, lies outside, is shorter than a pixel or is named for two
 /// types
 std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
-                                     const std::optional<Channel>& actin, const Field& field,
+                                     const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
                                      const FibreParameters& parameters);
 
 /// Area, centroid and the ellipse of equal second moments of a polygon, scaled to its area.

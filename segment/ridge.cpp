@@ -24,62 +24,84 @@ double transfer(double wx, double wy, cv::Point2d e, double w, double l) {
          std::exp(-(w * w * across * across + l * l * along * along) / 2);
 }
 
-/// Root of the kernel's sum of squares: white noise of deviation 1 becomes this. From Parseval with Gaussian integrals:
-/// ∫ (2√2 w²)² n⁴ exp(−w²n² − l²t²) dn dt / 4π² = 8 w⁴ · (3√π / 4w⁵) · (√π / l) / 4π² = 3 / (2π w l)
-double norm_of_filter(double w, double l) { return std::sqrt(3 / (2 * pi * w * l)); }
+/// The filters of two directions as H₁ + i H₂ on a tile's frequencies: both kernels are real and even, so their
+/// responses are real, and the spectrum times this goes back to response 1 + i response 2 in one transform.
+cv::Mat pair_of_filters(int side, cv::Point2d e1, cv::Point2d e2, double w, double l) {
+  cv::Mat filters(side, side, CV_32FC2);
+  const auto frequency = [&](int i) { return 2 * pi * (i <= side / 2 ? i : i - side) / side; };
+  for (int y = 0; y < side; ++y)
+    for (int x = 0; x < side; ++x)
+      filters.at<std::complex<float>>(y, x) = {static_cast<float>(transfer(frequency(x), frequency(y), e1, w, l)),
+                                               static_cast<float>(transfer(frequency(x), frequency(y), e2, w, l))};
+  return filters;
+}
 
-struct Spectrum {
-  cv::Mat values;  ///< CV_32FC2 of the padded image
-  int margin;
+/// What white noise of deviation 1 becomes through the first filter of a pair (Parseval).
+double noise_gain_of(const cv::Mat& filters) {
+  double sum = 0;
+  for (int y = 0; y < filters.rows; ++y)
+    for (int x = 0; x < filters.cols; ++x) {
+      const double h = filters.at<std::complex<float>>(y, x).real();
+      sum += h * h;
+    }
+  return std::sqrt(sum / static_cast<double>(filters.total()));
+}
+
+struct FilterBank {
+  int margin = 0, side = 0;                   ///< of a tile, in pixels; the margin is inside the side
+  std::vector<std::vector<cv::Mat>> filters;  ///< [pair of directions][width]
+  double noise_gain = 0;                      ///< greatest of the widths
 };
 
-Spectrum spectrum_of(const cv::Mat& image, int margin) {
-  const int rows = cv::getOptimalDFTSize(image.rows + 2 * margin),
-            columns = cv::getOptimalDFTSize(image.cols + 2 * margin);
-  cv::Mat padded;
-  cv::copyMakeBorder(image, padded, margin, rows - image.rows - margin, margin, columns - image.cols - margin,
-                     cv::BORDER_REFLECT_101);
-  Spectrum s{.values = {}, .margin = margin};
-  cv::dft(padded, s.values, cv::DFT_COMPLEX_OUTPUT);
-  return s;
+cv::Point2d along(int k, int n) { return {std::cos(pi * k / n), std::sin(pi * k / n)}; }
+
+FilterBank bank_of(const RidgeScales& scales, int n_directions) {
+  FilterBank bank;
+  const double l = scales.length_sigma_px;
+  // beyond 3.5 standard deviations lies 5e-4 of the weight
+  bank.margin = static_cast<int>(std::ceil(3.5 * std::max(l, scales.width_sigma_px.back())));
+  bank.side = 128;  // a transform of this side stays in a processor's cache
+  while (bank.side < 6 * bank.margin) bank.side *= 2;
+  bank.filters.resize(static_cast<std::size_t>(n_directions / 2));
+  cv::parallel_for_(cv::Range(0, n_directions / 2), [&](const cv::Range& pairs) {
+    for (int i = pairs.start; i < pairs.end; ++i)
+      for (const double w : scales.width_sigma_px)
+        bank.filters[static_cast<std::size_t>(i)].push_back(
+            pair_of_filters(bank.side, along(2 * i, n_directions), along(2 * i + 1, n_directions), w, l));
+  });
+  for (const cv::Mat& filters : bank.filters[0]) bank.noise_gain = std::max(bank.noise_gain, noise_gain_of(filters));
+  return bank;
 }
 
-double frequency(int i, int n) { return 2 * pi * (i <= n / 2 ? i : i - n) / n; }
-
-/// Two directions in one inverse transform: both kernels are real and even, so their responses are real, and the
-/// spectrum times (H₁ + i H₂) goes back to response 1 + i response 2.
-void filter_pair(const Spectrum& s, cv::Point2d e1, cv::Point2d e2, double w, double l, cv::Mat& both) {
-  const int rows = s.values.rows, columns = s.values.cols;
-  cv::Mat product(rows, columns, CV_32FC2);
-  for (int y = 0; y < rows; ++y) {
-    const double wy = frequency(y, rows);
-    const auto* from = s.values.ptr<std::complex<float>>(y);
-    auto* to = product.ptr<std::complex<float>>(y);
-    for (int x = 0; x < columns; ++x) {
-      const double wx = frequency(x, columns);
-      // exp(−20) and less does not reach single precision
-      if (w * w * (wx * wx + wy * wy) > 40)
-        to[x] = 0;
-      else
-        to[x] = from[x] * std::complex<float>(static_cast<float>(transfer(wx, wy, e1, w, l)),
-                                              static_cast<float>(transfer(wx, wy, e2, w, l)));
+/// The responses of one tile of the padded image into `ridges`, whose pixel `at` is the tile's first beyond its margin.
+void filter_tile(const cv::Mat& padded, const FilterBank& bank, cv::Point at, Ridges& ridges) {
+  cv::Mat spectrum, product, both, parts[2];
+  cv::dft(padded(cv::Rect(at, cv::Size(bank.side, bank.side))), spectrum, cv::DFT_COMPLEX_OUTPUT);
+  const int step = bank.side - 2 * bank.margin;
+  const cv::Size size = ridges.strongest.size();
+  const cv::Rect there(at, cv::Size(std::min(step, size.width - at.x), std::min(step, size.height - at.y)));
+  const cv::Rect here(cv::Point(bank.margin, bank.margin), there.size());
+  for (std::size_t pair = 0; pair < bank.filters.size(); ++pair)
+    for (std::size_t width = 0; width < bank.filters[pair].size(); ++width) {
+      cv::mulSpectrums(spectrum, bank.filters[pair][width], product, 0);
+      cv::dft(product, both, cv::DFT_INVERSE | cv::DFT_SCALE);
+      cv::split(both(here), parts);
+      for (std::size_t i = 0; i < 2; ++i) {
+        cv::Mat response = ridges.response[2 * pair + i](there);
+        if (width == 0)
+          parts[i].copyTo(response);
+        else
+          cv::max(parts[i], response, response);
+      }
     }
+  cv::Mat strongest = ridges.strongest(there), direction = ridges.direction(there);
+  ridges.response[0](there).copyTo(strongest);
+  direction.setTo(0);
+  for (std::size_t k = 1; k < ridges.response.size(); ++k) {
+    const cv::Mat response = ridges.response[k](there);
+    direction.setTo(static_cast<double>(k), response > strongest);
+    cv::max(response, strongest, strongest);
   }
-  cv::dft(product, both, cv::DFT_INVERSE | cv::DFT_SCALE);
-}
-
-cv::Mat noise_of(const std::vector<cv::Mat>& responses, const cv::Mat& image, const RidgeScales& scales) {
-  double gain = 0;
-  for (const double w : scales.width_sigma_px) gain = std::max(gain, norm_of_filter(w, scales.length_sigma_px));
-  const cv::Mat white = local_noise(image, scales.noise_radius_px) * gain;
-  // four directions tell the texture; lines fill less than half of the disc in most of them
-  constexpr int kSampled = 4;
-  cv::Mat texture = cv::Mat::zeros(image.size(), CV_32F);
-  const std::size_t step = std::max<std::size_t>(1, responses.size() / kSampled);
-  int n = 0;
-  for (std::size_t k = 0; k < responses.size(); k += step, ++n)
-    texture += local_spread(responses[k], scales.noise_radius_px);
-  return cv::max(white, texture / n);
 }
 
 }  // namespace
@@ -94,36 +116,72 @@ double Ridges::at(cv::Point2d point, double angle_rad) const {
          u * sample(response[static_cast<std::size_t>((k + 1) % n)], point);
 }
 
-Ridges find_ridges(const cv::Mat& image, const RidgeScales& scales, int n_directions) {
-  const double l = scales.length_sigma_px;
-  const Spectrum spectrum = spectrum_of(image, static_cast<int>(std::ceil(3 * l)));
+Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions) {
+  const FilterBank bank = bank_of(scales, n_directions);
+  const int step = bank.side - 2 * bank.margin;
+  const int columns = (image.cols + step - 1) / step, rows = (image.rows + step - 1) / step;
+  cv::Mat padded;
+  cv::copyMakeBorder(image, padded, bank.margin, bank.margin + rows * step - image.rows, bank.margin,
+                     bank.margin + columns * step - image.cols, cv::BORDER_REFLECT_101);
   Ridges ridges;
-  ridges.response.resize(static_cast<std::size_t>(n_directions));
-  const cv::Rect inner(cv::Point(spectrum.margin, spectrum.margin), image.size());
-  const auto along = [&](int k) {
-    return cv::Point2d(std::cos(pi * k / n_directions), std::sin(pi * k / n_directions));
+  for (int k = 0; k < n_directions; ++k) ridges.response.emplace_back(image.size(), CV_32F);
+  ridges.strongest.create(image.size(), CV_32F);
+  ridges.direction.create(image.size(), CV_8U);
+  cv::parallel_for_(cv::Range(0, rows * columns), [&](const cv::Range& tiles) {
+    for (int i = tiles.start; i < tiles.end; ++i)
+      filter_tile(padded, bank, {i % columns * step, i / columns * step}, ridges);
+  });
+  ridges.noise = cv::max(local_noise(image, scales.noise_radius_px) * bank.noise_gain,
+                         texture_of(ridges.response, is_inside, scales.noise_radius_px));
+  return ridges;
+}
+
+cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px) {
+  // a disc of six grid cells' radius holds 113 values; every second direction tells the spread of all
+  constexpr int kCellsInRadius = 6;
+  const int factor = std::max(1, static_cast<int>(radius_px / kCellsInRadius));
+  const int radius = static_cast<int>(std::lround(radius_px / factor));
+  const cv::Size size = is_inside.size();
+  const cv::Size coarse((size.width + factor - 1) / factor, (size.height + factor - 1) / factor);
+  const auto place = [&](int i, int n) { return std::min(i * factor + factor / 2, n - 1); };
+  std::vector<cv::Mat> picked;
+  for (std::size_t k = 0; k < responses.size(); k += 2) {
+    picked.emplace_back(coarse, CV_32F);
+    for (int y = 0; y < coarse.height; ++y)
+      for (int x = 0; x < coarse.width; ++x)
+        picked.back().at<float>(y, x) = std::abs(responses[k].at<float>(place(y, size.height), place(x, size.width)));
+  }
+  const auto is_texture = [&](int y, int x) {
+    return y >= 0 && x >= 0 && y < coarse.height && x < coarse.width &&
+           is_inside.at<std::uint8_t>(place(y, size.height), place(x, size.width)) != 0;
   };
-  cv::parallel_for_(cv::Range(0, n_directions / 2), [&](const cv::Range& pairs) {
-    for (int pair = pairs.start; pair < pairs.end; ++pair)
-      for (const double w : scales.width_sigma_px) {
-        cv::Mat both, parts[2];
-        filter_pair(spectrum, along(2 * pair), along(2 * pair + 1), w, l, both);
-        cv::split(both(inner), parts);
-        for (int i = 0; i < 2; ++i) {
-          cv::Mat& response = ridges.response[static_cast<std::size_t>(2 * pair + i)];
-          response = response.empty() ? parts[i] : cv::Mat(cv::max(response, parts[i]));
+  const auto median = [](std::vector<float>& values) {
+    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+    std::nth_element(values.begin(), middle, values.end());
+    return *middle;
+  };
+  cv::Mat spread(coarse, CV_32F, cv::Scalar(0));
+  cv::parallel_for_(cv::Range(0, coarse.height), [&](const cv::Range& rows) {
+    std::vector<cv::Point> around;
+    std::vector<float> values, medians(picked.size());
+    for (int y = rows.start; y < rows.end; ++y)
+      for (int x = 0; x < coarse.width; ++x) {
+        around.clear();
+        for (int dy = -radius; dy <= radius; ++dy)
+          for (int dx = -radius; dx <= radius; ++dx)
+            if (dx * dx + dy * dy <= radius * radius && is_texture(y + dy, x + dx)) around.emplace_back(x + dx, y + dy);
+        if (around.empty()) continue;
+        for (std::size_t k = 0; k < picked.size(); ++k) {
+          values.clear();
+          for (const cv::Point p : around) values.push_back(picked[k].at<float>(p));
+          medians[k] = median(values);
         }
+        spread.at<float>(y, x) = 1.4826f * median(medians);  // normal: the median magnitude is 0.6745 deviations
       }
   });
-  ridges.noise = noise_of(ridges.response, image, scales);
-  ridges.strongest = ridges.response[0].clone();
-  ridges.direction = cv::Mat::zeros(image.size(), CV_32S);
-  for (int k = 1; k < n_directions; ++k) {
-    const cv::Mat& response = ridges.response[static_cast<std::size_t>(k)];
-    ridges.direction.setTo(k, response > ridges.strongest);
-    ridges.strongest = cv::max(ridges.strongest, response);
-  }
-  return ridges;
+  cv::Mat fine;
+  cv::resize(spread, fine, cv::Size(coarse.width * factor, coarse.height * factor), 0, 0, cv::INTER_LINEAR);
+  return fine(cv::Rect(cv::Point(0, 0), size)).clone();
 }
 
 }  // namespace mbtfm::segment

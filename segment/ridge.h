@@ -9,9 +9,9 @@ namespace mbtfm::segment {
 /// Responses to a bright line through each pixel, by direction.
 struct Ridges {
   std::vector<cv::Mat> response;  ///< [k]: lines along k·π/n from +x towards +y, in grey levels of the line's height
-  cv::Mat noise;                  ///< standard deviation of a response where there is no line
+  cv::Mat noise;                  ///< standard deviation of a response where there is no fibre
   cv::Mat strongest;              ///< greatest response over the directions
-  cv::Mat direction;              ///< its index (CV_32S)
+  cv::Mat direction;              ///< its index (CV_8U)
 
   int n_directions() const { return static_cast<int>(response.size()); }
   /// Response at a point for lines along `angle_rad`, interpolated in position and direction.
@@ -26,7 +26,13 @@ struct RidgeScales {
 
 /// Second derivative of a Gaussian across, Gaussian along, normalised so that a straight line of Gaussian profile with
 /// the filter's own width and height 1 gives 1; for each direction the greatest response over the widths. The noise is
-/// the greater of the camera's white noise through the filter and the local robust spread of the responses (texture).
-Ridges find_ridges(const cv::Mat& image, const RidgeScales& scales, int n_directions = 16);
+/// the greater of the camera's white noise through the filter and the spread of the responses in the texture around.
+/// Filtered by tiles: time grows with the pixels and nothing else.
+/// @param is_inside  CV_8U, not 0 where the texture is the cell's; nothing outside of it counts as texture
+Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions = 16);
+
+/// Robust standard deviation of the responses within a disc, of zero mean and from what lies inside alone: the median
+/// over the directions, so that bundles that run alike in a whole neighbourhood do not count as its texture.
+cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px);
 
 }  // namespace mbtfm::segment

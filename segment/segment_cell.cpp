@@ -151,7 +151,7 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                        std::to_string(found.size()) + " outside and none inside",
                        "do both channels show the same cell at the same place?");
     if (drawn.fibres)
-      s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, actin, field, p.fibres);
+      s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres);
     else if (actin)
       s.cell.fibres = fibres_of(*actin, s.cell, pixel_um, p.fibres);
     result.push_back(std::move(s));

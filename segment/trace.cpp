@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
 #include "segment/grid.h"
+#include "segment/trace_join.h"
 
 namespace mbtfm::segment {
 
@@ -48,10 +48,12 @@ class Claims {
   int n_;
 };
 
-/// Offset of the maximum of a parabola through three equidistant values, within ±1; 0 where it has none.
+/// Offset of the maximum of a parabola through three equidistant values, within ±1; where it has none, on a far flank
+/// of a peak, a whole step uphill.
 double peak_offset(double before, double at, double after) {
   const double curvature = before - 2 * at + after;
-  return curvature < 0 ? std::clamp((before - after) / (2 * curvature), -1.0, 1.0) : 0;
+  if (curvature < 0) return std::clamp((before - after) / (2 * curvature), -1.0, 1.0);
+  return after > before ? 1 : after < before ? -1 : 0;
 }
 
 struct Step {
@@ -76,7 +78,7 @@ Step settle(const Ridges& ridges, const TraceRule& rule, Step s) {
   return s;
 }
 
-bool is_inside(const cv::Mat& image, cv::Point2d p) {
+bool is_on(const cv::Mat& image, cv::Point2d p) {
   return p.x >= 0 && p.y >= 0 && p.x <= image.cols - 1 && p.y <= image.rows - 1;
 }
 
@@ -89,16 +91,17 @@ std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const Trace
   double height_so_far = start.height;
   for (int i = 0; i < longest; ++i) {
     now.point += unit(now.angle);
-    if (!is_inside(ridges.noise, now.point)) break;
+    if (!is_on(ridges.noise, now.point)) break;
     now = settle(ridges, rule, now);
     steps.push_back(now);
-    const double level = std::max<double>(
-        {rule.follow_noise * sample(ridges.noise, now.point), rule.floor, rule.follow_share * height_so_far});
+    const double level =
+        std::max(rule.follow_noise * sample(ridges.noise, now.point), rule.follow_share * height_so_far);
     if (now.height >= level) {
       last_seen = steps.size();
-      height_so_far += (now.height - height_so_far) / rule.memory_px;
+      height_so_far += (now.height - height_so_far) / static_cast<double>(steps.size() + 1);
     }
-    if (!claims.has(now.point, now.angle)) last_free = steps.size();
+    const cv::Point2d way = now.point - steps[steps.size() - std::min<std::size_t>(steps.size(), 4)].point;
+    if (steps.size() < 4 || !claims.has(now.point, std::atan2(way.y, way.x))) last_free = steps.size();
     if (static_cast<double>(steps.size() - last_seen) > rule.gap_px) break;
     if (static_cast<double>(steps.size() - last_free) > 2 * rule.line_radius_px) break;
   }
@@ -131,14 +134,14 @@ void claim(Claims& claims, const Trace& trace, double radius_px) {
 }
 
 /// Local maxima across their own direction that a line may start from, strongest first.
-std::vector<Step> seeds_of(const Ridges& ridges, const TraceRule& rule) {
+std::vector<Step> seeds_of(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule) {
   std::vector<Step> seeds;
   for (int y = 1; y + 1 < ridges.strongest.rows; ++y)
     for (int x = 1; x + 1 < ridges.strongest.cols; ++x) {
       const double height = ridges.strongest.at<float>(y, x);
-      if (height < std::max<double>(rule.start_noise * ridges.noise.at<float>(y, x), rule.floor) || height <= 0)
-        continue;
-      const double angle = pi * ridges.direction.at<int>(y, x) / ridges.n_directions();
+      if (height < rule.start_noise * ridges.noise.at<float>(y, x) || height <= 0) continue;
+      if (is_inside.at<std::uint8_t>(y, x) == 0) continue;
+      const double angle = pi * ridges.direction.at<std::uint8_t>(y, x) / ridges.n_directions();
       const cv::Point2d across = left_of(unit(angle)), p(x, y);
       if (ridges.at(p - across, angle) <= height && ridges.at(p + across, angle) < height)
         seeds.push_back({p, angle, height});
@@ -147,14 +150,24 @@ std::vector<Step> seeds_of(const Ridges& ridges, const TraceRule& rule) {
   return seeds;
 }
 
-/// How many points to cut from the front: up to where the height first reaches a share of the plateau behind it.
+double height_at(std::vector<double> values, double share) {
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+/// How many points to cut from the front: up to where the height first reaches a share of the plateau behind it, and
+/// the share of the whole line's that it may fall to.
 std::size_t faded_points(const std::vector<double>& height, const TraceRule& rule) {
   const std::size_t window = std::min(height.size(), static_cast<std::size_t>(rule.end_window_px));
-  std::vector<double> plateau(height.begin(), height.begin() + static_cast<std::ptrdiff_t>(window));
-  const auto upper = plateau.begin() + static_cast<std::ptrdiff_t>(3 * (window - 1) / 4);
-  std::nth_element(plateau.begin(), upper, plateau.end());
+  const double whole = rule.follow_share * height_at(height, 0.5);
   std::size_t n = 0;
-  while (n < window && height[n] < rule.end_level * *upper) ++n;
+  while (n < height.size() && height[n] < whole) ++n;
+  const std::size_t first = n, last = std::min(height.size(), first + window);
+  if (first == last) return n;
+  const auto from = height.begin() + static_cast<std::ptrdiff_t>(first);
+  const double plateau = height_at({from, from + static_cast<std::ptrdiff_t>(last - first)}, 0.75);
+  while (n < last && height[n] < rule.end_level * plateau) ++n;
   return n;
 }
 
@@ -168,48 +181,6 @@ void cut_faded_ends(Trace& trace, const TraceRule& rule) {
   }
 }
 
-/// How badly two ends fit to one line; nothing where they do not.
-std::optional<double> mismatch(const Trace& a, LineEnd end_a, const Trace& b, LineEnd end_b, const TraceRule& rule) {
-  const double reach = rule.end_window_px / 2;
-  const cv::Point2d pa = end_a == LineEnd::first ? a.points.front() : a.points.back();
-  const cv::Point2d pb = end_b == LineEnd::first ? b.points.front() : b.points.back();
-  const cv::Point2d gap = pb - pa, ea = outward(a.points, end_a, reach), eb = outward(b.points, end_b, reach);
-  const double distance = length(gap), sideways = std::max(std::abs(gap.cross(ea)), std::abs(gap.cross(eb)));
-  constexpr double kStraight = 0.94;  // cosine of 20°
-  if (distance > rule.join_gap_px || ea.dot(eb) > -kStraight) return std::nullopt;
-  if (gap.dot(ea) < -rule.line_radius_px || sideways > rule.line_radius_px / 2 + 0.15 * distance) return std::nullopt;
-  return distance + 4 * sideways;
-}
-
-void append(Trace& to, Trace from, LineEnd to_end, LineEnd from_end) {
-  const auto turn = [](Trace& t) {
-    std::reverse(t.points.begin(), t.points.end());
-    std::reverse(t.height.begin(), t.height.end());
-  };
-  if (to_end == LineEnd::first) turn(to);
-  if (from_end == LineEnd::last) turn(from);
-  to.points.insert(to.points.end(), from.points.begin(), from.points.end());
-  to.height.insert(to.height.end(), from.height.begin(), from.height.end());
-}
-
-/// Join the best-fitting pair of ends until none fits. Each round ends one line.
-void join_collinear(std::vector<Trace>& traces, const TraceRule& rule) {
-  for (;;) {
-    double best = std::numeric_limits<double>::infinity();
-    std::size_t first = 0, second = 0;
-    LineEnd end_first{}, end_second{};
-    for (std::size_t i = 0; i < traces.size(); ++i)
-      for (std::size_t j = i + 1; j < traces.size(); ++j)
-        for (const LineEnd a : {LineEnd::first, LineEnd::last})
-          for (const LineEnd b : {LineEnd::first, LineEnd::last})
-            if (const auto m = mismatch(traces[i], a, traces[j], b, rule); m && *m < best)
-              best = *m, first = i, second = j, end_first = a, end_second = b;
-    if (first == second) return;
-    append(traces[first], std::move(traces[second]), end_first, end_second);
-    traces.erase(traces.begin() + static_cast<std::ptrdiff_t>(second));
-  }
-}
-
 }  // namespace
 
 cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach) {
@@ -219,17 +190,17 @@ cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double 
   return l > 0 ? d / l : cv::Point2d(1, 0);
 }
 
-std::vector<Trace> trace_lines(const Ridges& ridges, const TraceRule& rule) {
+std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule) {
   Claims claims(ridges.noise.size(), ridges.n_directions());
   std::vector<Trace> traces;
-  for (const Step& seed : seeds_of(ridges, rule)) {
+  for (const Step& seed : seeds_of(ridges, is_inside, rule)) {
     if (claims.has(seed.point, seed.angle)) continue;
     Trace trace = trace_from(ridges, claims, rule, seed);
-    claim(claims, trace, rule.line_radius_px);
+    claim(claims, trace, 1.33 * rule.line_radius_px);
     cut_faded_ends(trace, rule);
     if (trace.points.size() >= 3) traces.push_back(std::move(trace));
   }
-  join_collinear(traces, rule);
+  traces = joined(std::move(traces), rule);
   std::erase_if(traces, [&](const Trace& t) { return static_cast<double>(t.points.size()) < rule.shortest_px; });
   return traces;
 }

@@ -17,9 +17,7 @@ struct Trace {
 struct TraceRule {
   double start_noise = 6;          ///< standard deviations a line must reach somewhere
   double follow_noise = 2.5;       ///< and those it may fall to
-  double floor = 0;                ///< least height
-  double follow_share = 0.4;       ///< and the share of its height so far that it may fall to
-  double memory_px = 20;           ///< "so far": over about this length
+  double follow_share = 0.4;       ///< or this share of its height so far, where that is more
   double gap_px = 10;              ///< a line may be invisible for this long
   double smallest_radius_px = 30;  ///< of curvature
   double line_radius_px = 3;       ///< a second line of the same direction within it is the same
@@ -32,7 +30,8 @@ struct TraceRule {
 /// Follow lines from the strongest ridge points down, both ways, in steps of a pixel, re-centred across the line and
 /// turned to the best direction near the present one: other lines that cross have another direction and are not seen.
 /// Then cut ends that fade, join collinear pieces, drop the short ones.
-std::vector<Trace> trace_lines(const Ridges& ridges, const TraceRule& rule);
+/// @param is_inside  CV_8U, not 0 where a line may start
+std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule);
 
 /// Unit vector from the inside of the line to its first or last point, over `reach` pixels.
 enum class LineEnd { first, last };

@@ -82,7 +82,11 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
                    .end_adhesion_id = table.optional_integer(row, "end_adhesion_id", 1),
                    .mean_intensity = table.number(row, "mean_intensity"),
                    .confidence = table.number(row, "confidence", share_of_one()),
-                   .points_um = {}};
+                   .points_um = {},
+                   .type_reason = {}};
+    if (table.has("type_confidence"))
+      fibres[row].type_confidence = table.number(row, "type_confidence", share_of_one());
+    if (table.has("type_reason")) fibres[row].type_reason = table.text(row, "type_reason");
     index_of[fibres[row].fibre_id] = row;
   }
   CsvTable points(points_file);
@@ -104,11 +108,12 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
 void write_fibres(const Path& fibres_file, const Path& points_file, const std::vector<Fibre>& fibres) {
   check(fibres);
   CsvText csv({"fibre_id", "type", "length_um", "width_um", "start_adhesion_id", "end_adhesion_id", "mean_intensity",
-               "confidence"});
+               "confidence", "type_confidence", "type_reason"});
   CsvText points({"fibre_id", "point", "x_um", "y_um"});
   for (const Fibre& f : fibres) {
     csv.add(f.fibre_id).add(name_of(f.type)).add(length_um(f.points_um)).add(f.width_um);
-    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.mean_intensity).add(f.confidence).end_row();
+    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.mean_intensity).add(f.confidence);
+    csv.add(f.type_confidence).add(f.type_reason).end_row();
     for (std::size_t i = 0; i < f.points_um.size(); ++i) {
       points.add(f.fibre_id).add(static_cast<int>(i)).add(f.points_um[i].x).add(f.points_um[i].y).end_row();
     }

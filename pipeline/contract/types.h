@@ -54,8 +54,10 @@ struct Fibre {
   std::optional<int> start_adhesion_id;  ///< the adhesion that holds points_um.front()
   std::optional<int> end_adhesion_id;    ///< the adhesion that holds points_um.back()
   double mean_intensity = 0;
-  double confidence = 1;  ///< of the type, 0 to 1
-  Polyline points_um;     ///< at least two, no two in a row equal
+  double confidence = 1;       ///< that it is a fibre, 0 to 1
+  Polyline points_um;          ///< at least two, no two in a row equal
+  double type_confidence = 1;  ///< that its type is right, 0 to 1
+  std::string type_reason;     ///< in words; empty: none given
 };
 
 /// A segmented cell.

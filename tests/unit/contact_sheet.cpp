@@ -9,7 +9,7 @@ namespace mbtfm::segment {
 namespace {
 
 TEST(ContactSheet, has_the_first_parameter_in_columns_and_the_second_in_rows) {
-  const auto axes = parse_axes("adhesion_seed_noise=3,4.5  fibre_contrast=0.1");
+  const auto axes = parse_axes("adhesion_seed_noise=3,4.5  fibre_false_per_cell=0.1");
   ASSERT_EQ(axes.size(), 2u);
   EXPECT_EQ(axes[0].parameter, "adhesion_seed_noise");
   EXPECT_EQ(axes[0].values, (std::vector<std::string>{"3", "4.5"}));

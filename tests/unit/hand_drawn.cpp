@@ -92,7 +92,7 @@ TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_
   const std::vector<Adhesion> adhesions = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
   const std::vector<Vec2> tied = {{50, 50}, {150, 50}}, loose = {{80, 200}, {180, 200}};
   const auto type_of = [&](const Roi& roi) {
-    return hand_drawn_fibres(set_of({roi}), adhesions, std::nullopt, kField, {}).front().type;
+    return hand_drawn_fibres(set_of({roi}), adhesions, {}, std::nullopt, kField, {}).front().type;
   };
   EXPECT_EQ(type_of(line(tied)), FibreType::ventral);
   EXPECT_EQ(type_of(line(loose)), FibreType::arc);
@@ -109,7 +109,7 @@ TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_
 TEST(HandDrawn, a_named_fibre_is_still_tied_to_the_adhesions_it_reaches) {
   const std::vector<Adhesion> adhesions = {test::ellipse(7, {5, 5}, 1, 0.5, 0)};
   const Fibre f =
-      hand_drawn_fibres(set_of({line({{50, 50}, {150, 50}}, "ventral 1")}), adhesions, std::nullopt, kField, {})
+      hand_drawn_fibres(set_of({line({{50, 50}, {150, 50}}, "ventral 1")}), adhesions, {}, std::nullopt, kField, {})
           .front();
   EXPECT_EQ(f.start_adhesion_id, 7);
   EXPECT_FALSE(f.end_adhesion_id);
@@ -122,7 +122,7 @@ TEST(HandDrawn, a_fibres_width_is_measured_in_the_image) {
   Image image = test::even_image(256, 256, 100);
   test::draw_line(image, {{5, 12.8}, {20, 12.8}}, 500, 0.8, 0.1);
   const RoiSet set = set_of({line({{60, 127.5}, {190, 127.5}})});
-  const Fibre f = hand_drawn_fibres(set, {}, Channel{"actin.tif", image}, kField, {}).front();
+  const Fibre f = hand_drawn_fibres(set, {}, {}, Channel{"actin.tif", image}, kField, {}).front();
   EXPECT_NEAR(f.width_um, 0.8, 0.1);  // a pixel
   EXPECT_NEAR(f.mean_intensity, 500, 25);
 }
@@ -141,7 +141,7 @@ TEST(HandDrawn, what_cannot_be_used_is_named) {
     return error_of([&] { hand_drawn_adhesions(set_of({roi}), std::nullopt, kField); });
   };
   const auto fibre = [](const Roi& roi) {
-    return error_of([&] { hand_drawn_fibres(set_of({roi}), {}, std::nullopt, kField, {}); });
+    return error_of([&] { hand_drawn_fibres(set_of({roi}), {}, {}, std::nullopt, kField, {}); });
   };
   const Roi square = area({{10, 10}, {20, 10}, {20, 20}, {10, 20}}, "a 1");
   EXPECT_EQ(adhesion(square), "no error");

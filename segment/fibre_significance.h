@@ -1,0 +1,25 @@
+/// What tells a bundle from the meshwork of the cortex. Internal to segment/ (OpenCV types).
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "pipeline/contract/types.h"
+#include "segment/ridge.h"
+
+namespace mbtfm::segment {
+
+/// Signal to noise of a whole line: its mean height in standard deviations of the texture around, times the root of the
+/// number of independent pieces in its length. Texture averages out along a line, a bundle persists.
+double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
+                    double independent_px);
+
+/// How many lines at least as significant one finds by chance in the meshwork of a cell of this area: the number of
+/// false alarms (Desolneux, Moisan & Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
+double expected_false_lines(double significance, double area_um2);
+
+/// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond
+/// its net turning, by length.
+bool winds(const Polyline& line_um);
+
+}  // namespace mbtfm::segment
