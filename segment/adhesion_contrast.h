@@ -14,6 +14,7 @@ struct Contrast {
   cv::Mat height;       ///< `sharp`, smoothed
   cv::Mat noise;        ///< standard deviation of `height` where there is no adhesion
   double floor;         ///< heights below are texture or rounding
+  cv::Mat least_seed;   ///< heights below may be a step of the background, as at the edge of a bright cell
 };
 
 Contrast contrast_of(const cv::Mat& image, double pixel_size_um, const AdhesionParameters& parameters);

@@ -152,6 +152,14 @@ struct Solution {
   double scatter = 0;  ///< mean square of the residuals
 };
 
+/// Axes and blur stay within a factor of four of where they began: beyond, the window shows no such ellipse.
+bool is_in_range(const BlurredEllipse& e, const BlurredEllipse& start) {
+  constexpr double kFactor = 4;
+  const double widest = kFactor * std::max(start.semi_major, start.blur);
+  return std::max(e.semi_major, e.semi_minor) < widest && std::min(e.semi_major, e.semi_minor) > start.blur / 20 &&
+         e.blur < kFactor * start.blur && e.blur > start.blur / kFactor;
+}
+
 /// Levenberg–Marquardt (Marquardt 1963).
 Solution solve(const std::vector<Sample>& samples, const State& start, Shape shape, const Priors& priors) {
   Solution s{start, normal_equations(samples, start, priors)};
@@ -167,6 +175,10 @@ Solution solve(const std::vector<Sample>& samples, const State& start, Shape sha
       continue;
     }
     const State next = moved(s.state, step);
+    if (!is_in_range(next.ellipse, start.ellipse)) {
+      damping *= 10;
+      continue;
+    }
     const Normal there = normal_equations(samples, next, priors);
     s.is_settled = std::abs(n.squares - there.squares) < kSettled * n.squares / n_samples;
     if (there.squares <= n.squares) {

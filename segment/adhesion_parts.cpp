@@ -102,7 +102,7 @@ bool reaches_seed(const std::vector<CoveredPixel>& pixels, const cv::Mat& seeds)
 
 std::vector<std::vector<CoveredPixel>> adhesion_parts(const Contrast& c, double pixel_size_um,
                                                       const AdhesionParameters& p) {
-  const cv::Mat seeds = above(c, p.adhesion_seed_noise);
+  const cv::Mat seeds = above(c, p.adhesion_seed_noise) & (c.height > c.least_seed);
   const double pixel_um2 = pixel_size_um * pixel_size_um, radius_px = p.adhesion_level_radius_um / pixel_size_um;
   const SplitRule rule{.depth = p.adhesion_split_depth, .smallest_px = p.adhesion_smallest_um2 / pixel_um2 / 2};
   const cv::Mat labels = split_regions(c.height, c.noise, above(c, p.adhesion_rim_noise), rule);

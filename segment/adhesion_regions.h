@@ -7,7 +7,7 @@
 namespace mbtfm::segment {
 
 struct SplitRule {
-  double depth = 0.2;      ///< share of the lower of two maxima
+  double depth = 0.25;     ///< share of the lower of two maxima
   double smallest_px = 1;  ///< a region with fewer pixels joins its neighbour
 };
 

@@ -65,9 +65,9 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
   CommonShape shape{p.adhesion_blur_um.value_or(kUsualBlur_um) / pixel_um, kUsualDome};
   if (!p.adhesion_blur_um) {
     shape = common_shape(c.sharp, start(shape));
-    // half a pixel: what sampling alone does
-    shape.blur = std::max(0.5, std::min(shape.blur, kWidestBlur_um / pixel_um));
+    shape.blur = std::min(shape.blur, kWidestBlur_um / pixel_um);
   }
+  shape.blur = std::max(shape.blur, 0.5);  // px: what sampling alone does
   return fit_ellipses(c.sharp, c.sharp_noise, start(shape));
 }
 
@@ -87,7 +87,7 @@ void declare(ParameterList& list, AdhesionParameters& p) {
            {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
            "height of the rim as a share of the height near it");
   list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::positive(), "how near (um)");
-  list.add("adhesion_blur_um", p.adhesion_blur_um, Range::positive(),
+  list.add("adhesion_blur_um", p.adhesion_blur_um, {.low = 0, .high = 1, .excludes_low = true},
            "standard deviation of the blurred rim of an adhesion (um); unset: as the widest adhesions show it, between "
            "half a pixel and 0.2 um");
   list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
@@ -104,7 +104,8 @@ std::vector<AdhesionRegion> find_adhesion_regions(const Image& image, double pix
   std::vector<AdhesionRegion> regions;
   for (auto& pixels : adhesion_parts(c, pixel_size_um, p)) {
     const Adhesion adhesion = measure_ellipse(pixels, pixel_size_um);
-    regions.push_back({adhesion, std::move(pixels)});
+    // with the blur on it an adhesion is larger, never smaller
+    if (adhesion.area_um2 <= p.adhesion_largest_um2) regions.push_back({adhesion, std::move(pixels)});
   }
   const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um, p);
   for (std::size_t i = 0; i < regions.size(); ++i) {
@@ -143,6 +144,8 @@ std::string why_no_adhesions(const Image& image, double pixel_size_um, const Adh
     for (int x = 0; x < c.height.cols; ++x)
       if (const double level = c.noise.at<float>(y, x); level > 0)
         highest = std::max(highest, c.height.at<float>(y, x) / level);
+  if (highest > p.adhesion_seed_noise)
+    return "bright areas and edges, but no spot higher than the steps of its background";
   return "nothing above the noise, the brightest spot " + brief(highest) +
          " of its standard deviations over the background, where adhesion_seed_noise asks for " +
          shortest(p.adhesion_seed_noise);

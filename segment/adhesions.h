@@ -14,12 +14,12 @@ namespace mbtfm::segment {
 
 struct AdhesionParameters {
   double adhesion_background_um = 2.0;  ///< larger than half of the widest adhesion, smaller than illumination changes
-  double adhesion_smoothing_um = 0.08;  ///< below the resolution of light (0.2 um), so that it costs no detail
+  double adhesion_smoothing_um = 0.05;  ///< a third of the microscope's blur, which it widens by 6 %
   double adhesion_seed_noise = 5;       ///< five standard deviations: less than one false seed in 10^6 pixels
   double adhesion_rim_noise = 2.5;      ///< the rim may be fainter than the seed, but still out of the noise
   double adhesion_rim_level =
       0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
-  double adhesion_level_radius_um = 0.6;   ///< height is taken this near: a long adhesion may fade along its length
+  double adhesion_level_radius_um = 0.4;   ///< three deviations of the blur: a bright neighbour further off is none
   std::optional<double> adhesion_blur_um;  ///< unset: as the image shows it
   double adhesion_split_depth = 0.25;      ///< the dip between two points that the optics just resolve (Rayleigh: 26 %)
   double adhesion_smallest_um2 = 0.08;     ///< about one resolution element
@@ -35,7 +35,8 @@ struct AdhesionRegion {
   std::vector<CoveredPixel> pixels;
 };
 
-/// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis, split at
+/// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis (and above
+/// what the edge of a bright cell leaves), split at
 /// intensity dips (watershed), put the rim of each at a share of its own height; then fit each as an elliptical disc
 /// behind the microscope's blur, which gives centre, axes and angle without what the blur adds to them. Where the disc
 /// leaves more than a tenth of the variance unexplained or departs from the region by 30 %, the adhesion is no ellipse,

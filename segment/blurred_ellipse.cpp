@@ -39,7 +39,7 @@ const NormalTable& normal() {
   return table;
 }
 
-constexpr double kNodeSpacing = 1.5;  // in standard deviations: see the header
+constexpr double kNodeSpacing = 1.2;  // in standard deviations: see the header
 constexpr double kReach = 4;          // a strip further away than this many deviations adds less than 1e-4
 
 }  // namespace

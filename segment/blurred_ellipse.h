@@ -30,7 +30,7 @@ struct EllipseValue {
 ///
 /// u, v along the axes, φ the Gaussian: the disc cut into strips across its major axis, of which each is blurred
 /// exactly (the shade is a polynomial). The integrand is smooth and periodic, so that the midpoint rule with nodes no
-/// further apart than 1.5 standard deviations is right to 3e-4.
+/// further apart than 1.2 standard deviations is right to 2e-6.
 class EllipseModel {
  public:
   explicit EllipseModel(const BlurredEllipse& ellipse);

@@ -31,6 +31,8 @@ std::vector<Roi> rois_of(const Cell& cell, double pixel_um) {
     return rois.back();
   };
   add(RoiShape::polygon, "outline", kOutline).points_px = in_px(cell.outline_um, pixel_um, 0);
+  for (std::size_t i = 0; i < cell.holes_um.size(); ++i)
+    add(RoiShape::polygon, "hole " + std::to_string(i + 1), kOutline).points_px = in_px(cell.holes_um[i], pixel_um, 0);
   for (const Adhesion& a : cell.adhesions) {
     const Vec2 half = 0.5 * a.major_axis_um * Vec2{std::cos(a.angle_rad), std::sin(a.angle_rad)};
     Roi& roi = add(RoiShape::ellipse, "adhesion " + std::to_string(a.adhesion_id), kAdhesion);

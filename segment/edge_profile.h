@@ -13,9 +13,8 @@ namespace mbtfm::segment {
 /// so that its image is a line centred on the edge. (The half-height of that line lies 1.2 of its standard deviations
 /// outside.) The squared residuals of all places are the cost, and the ring takes the places of least total cost plus
 /// (d − d')² of neighbours over (0.1 um)², by dynamic programming (Amini, Weymouth & Jain 1990).
-/// @param ring       px; its inside lies to the right of its direction where `is_inside_right`
-/// @param may_move   by point
-/// @param pixel_um   side of a pixel
+/// @param ring      px, at equal distances
+/// @param may_move  by point
 std::vector<cv::Point2d> on_edge(const cv::Mat& image, const std::vector<cv::Point2d>& ring,
                                  const std::vector<bool>& may_move, double pixel_um);
 

@@ -119,6 +119,17 @@ cv::Mat local_noise(const cv::Mat& image, double radius_px) {
 
 double overall_noise(const cv::Mat& image) { return 1.4826 * quantile(noise_magnitude(image), 0.5); }
 
+cv::Mat local_range(const cv::Mat& image, double radius_px) {
+  const int factor = factor_for(radius_px);
+  const int radius = std::max(1, static_cast<int>(std::lround(radius_px / factor)));
+  const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(2 * radius + 1, 2 * radius + 1));
+  cv::Mat least, greatest;
+  const cv::Mat coarse = shrink(image, factor);
+  cv::erode(coarse, least, square);
+  cv::dilate(coarse, greatest, square);
+  return enlarge(greatest - least, factor, image.size());
+}
+
 cv::Mat local_spread(const cv::Mat& residual, double radius_px) {
   const int factor = factor_for(radius_px);
   const int radius = std::max(1, static_cast<int>(std::lround(radius_px / factor)));

@@ -42,6 +42,9 @@ cv::Mat local_noise(const cv::Mat& image, double radius_px);
 /// The same over the whole image.
 double overall_noise(const cv::Mat& image);
 
+/// Difference of the greatest and the least block mean over a square of this half side, on a grid of a quarter of it.
+cv::Mat local_range(const cv::Mat& image, double radius_px);
+
 /// Local robust standard deviation of a matrix of zero mean: 1.4826 times the median of its magnitude over a disc.
 cv::Mat local_spread(const cv::Mat& residual, double radius_px);
 

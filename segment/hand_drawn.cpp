@@ -190,15 +190,38 @@ Fibre drawn_fibre(const RoiSet& set, const Roi& roi, const Field& field) {
 
 }  // namespace
 
-Polygon hand_drawn_outline(const RoiSet& set, const Field& field) {
-  if (set.rois.size() != 1)
-    throw InputError(set.name, "one selection, the cell's outline", std::to_string(set.rois.size()));
-  const Roi& roi = set.rois.front();
-  if (roi.n_paths > 1) {
-    throw InputError(called(set, roi), "an outline in one piece", std::to_string(roi.n_paths) + " closed lines",
-                     "fill its holes, or keep one part of it: ROI manager, More, Split");
+CellOutline hand_drawn_outline(const RoiSet& set, const Field& field) {
+  std::vector<Polygon> rings_um;
+  for (const Roi& roi : set.rois) {
+    if (roi.shape != RoiShape::composite) rings_um.push_back(area_um(set, roi, field));
+    for (const Polygon& path_px : roi.paths_px) {
+      Roi path;
+      path.name = roi.name;
+      path.points_px = path_px;
+      rings_um.push_back(area_um(set, path, field));
+    }
   }
-  return area_um(set, roi, field);
+  const auto area_of = [](const Polygon& ring) { return std::abs(signed_area_um2(ring)); };
+  const auto largest = std::max_element(rings_um.begin(), rings_um.end(),
+                                        [&](const Polygon& a, const Polygon& b) { return area_of(a) < area_of(b); });
+  if (largest == rings_um.end()) throw InputError(set.name, "an area, the cell's outline", "none");
+  CellOutline cell;
+  std::swap(cell.outer_um, *largest);
+  rings_um.erase(largest);
+  cell.holes_um = std::move(rings_um);
+  cell.area_um2 = area_of(cell.outer_um);
+  for (const Polygon& hole : cell.holes_um) {
+    cell.area_um2 -= area_of(hole);
+    if (!contains(cell.outer_um, hole.front())) {
+      throw InputError(set.name, "one outline, and in it any holes", "areas beside each other",
+                       "keep the cell's alone: an image of several cells is segmented cell by cell");
+    }
+  }
+  const double far_x_um = field.width_px * field.pixel_um, far_y_um = field.height_px * field.pixel_um;
+  cell.is_cut_by_border = std::any_of(cell.outer_um.begin(), cell.outer_um.end(), [&](Vec2 p) {
+    return std::min({p.x, p.y, far_x_um - p.x, far_y_um - p.y}) < field.pixel_um;
+  });
+  return cell;
 }
 
 std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optional<Channel>& adhesion,

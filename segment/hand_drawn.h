@@ -7,6 +7,7 @@
 
 #include "segment/channels.h"
 #include "segment/fibres.h"
+#include "segment/outline.h"
 #include "segment/roi.h"
 
 namespace mbtfm::segment {
@@ -29,9 +30,9 @@ struct Field {
   double pixel_um = 0;
 };
 
-/// The one area of the set. @throws InputError where there are several selections, none of them an area, outside the
-/// field, or of no area
-Polygon hand_drawn_outline(const RoiSet& set, const Field& field);
+/// The set's largest area, and as holes the others, which lie within it: paths of one composite selection or selections
+/// of their own. @throws InputError where one lies beside it, is no area, lies outside the field or has no area
+CellOutline hand_drawn_outline(const RoiSet& set, const Field& field);
 
 /// Each area as the ellipse of equal second moments, scaled to the area; of polygons by Green's theorem, without a
 /// raster. `mean_intensity` is the mean grey value of the pixels with their centre inside above the median of those

@@ -140,19 +140,6 @@ std::vector<Polygon> paths_in(const Bytes& bytes) {
   return paths;
 }
 
-/// One closed line through all paths: from the first path's begin to each further one, round it, and back. The ways
-/// there and back cancel in areas, moments and crossings, so that holes, which ImageJ stores in the opposite turn,
-/// count as such.
-Polygon joined(const std::vector<Polygon>& paths) {
-  Polygon line;
-  for (const Polygon& path : paths) {
-    line.insert(line.end(), path.begin(), path.end());
-    line.push_back(path.front());
-    if (&path != &paths.front()) line.push_back(paths.front().front());
-  }
-  return line;
-}
-
 RoiShape shape_in(const Bytes& bytes, const std::string& where) {
   const std::uint32_t type = bytes.number(kType, 1), subtype = bytes.number(kSubtype, 2);
   if (type >= std::size(kShapes))
@@ -185,12 +172,9 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
     case RoiShape::line:
       roi.points_px = {reals(0), reals(1)};
       break;
-    case RoiShape::composite: {
-      const std::vector<Polygon> paths = paths_in(bytes);
-      roi.n_paths = static_cast<int>(paths.size());
-      roi.points_px = joined(paths);
+    case RoiShape::composite:
+      roi.paths_px = paths_in(bytes);
       break;
-    }
     case RoiShape::text:
     case RoiShape::image:
       break;

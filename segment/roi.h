@@ -45,7 +45,7 @@ struct Roi {
   Vec2 corner_px, size_px;        ///< of a rectangle or an oval: top left, width and height
   double corner_diameter_px = 0;  ///< of a rounded rectangle's corners
   double aspect_ratio = 1;        ///< of an ellipse: minor over major axis
-  int n_paths = 1;                ///< of a composite: closed lines joined in `points_px`, several areas or holes
+  std::vector<Polygon> paths_px;  ///< of a composite: several areas, or holes, which turn the other way
   bool is_spline = false;         ///< the points are the nodes of a cubic spline
   int group = 0;                  ///< ImageJ's group, 1 to 255; 0: none
   std::uint32_t stroke_argb = 0;  ///< 0: ImageJ's own colour
@@ -70,8 +70,8 @@ void write_roi_set(const std::filesystem::path& file, const std::vector<Roi>& ro
 Polyline line_px(const Roi& roi);
 
 /// The boundary of an area selection, origin likewise; of a composite one closed line through all its paths, by which
-/// areas and moments are right and a point's crossings even or odd; ovals and ellipses with 360 corners, rounded
-/// corners with 32.
+/// areas and moments are right and a point's crossings even or odd: the ways from path to path and back cancel; ovals
+/// and ellipses with 360 corners, rounded corners with 32.
 /// @throws InternalError for another selection
 Polygon area_px(const Roi& roi);
 

@@ -100,6 +100,17 @@ Polygon rectangle_corners(const Roi& roi) {
   return polygon;
 }
 
+/// From the first path's begin to each further one, round it, and back.
+Polygon joined(const std::vector<Polygon>& paths) {
+  Polygon line;
+  for (const Polygon& path : paths) {
+    line.insert(line.end(), path.begin(), path.end());
+    line.push_back(path.front());
+    if (&path != &paths.front()) line.push_back(paths.front().front());
+  }
+  return line;
+}
+
 }  // namespace
 
 Polyline line_px(const Roi& roi) {
@@ -116,6 +127,8 @@ Polygon area_px(const Roi& roi) {
   switch (roi.shape) {
     case RoiShape::rectangle:
       return rectangle_corners(roi);
+    case RoiShape::composite:
+      return joined(roi.paths_px);
     case RoiShape::oval:
       add_arc(polygon, roi.corner_px + 0.5 * roi.size_px, {1, 0}, roi.size_px.x / 2, roi.size_px.y / 2, 0,
               2 * std::numbers::pi, kRound);

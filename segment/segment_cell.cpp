@@ -64,14 +64,6 @@ std::vector<CellOutline> outlines_of(const Channel& channel, const std::vector<A
   return cells;
 }
 
-/// A cell of which a person has drawn all there is.
-CellOutline whole_cell(const Polygon& outline_um) {
-  CellOutline cell;
-  cell.outer_um = outline_um;
-  cell.area_um2 = std::abs(signed_area_um2(outline_um));
-  return cell;
-}
-
 /// The cells that the parameters ask for.
 std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& channel, const SegmentParameters& p) {
   if (p.cell == 0) return cells;
@@ -135,8 +127,8 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                      : adhesion      ? adhesions_of(*adhesion, pixel_um, p)
                                      : std::vector<Adhesion>{};
   const Channel& shape = actin ? *actin : *adhesion;
-  const auto outlines = drawn.outline ? std::vector{whole_cell(hand_drawn_outline(*drawn.outline, field))}
-                                      : outlines_of(shape, found, pixel_um, p);
+  const auto outlines =
+      drawn.outline ? std::vector{hand_drawn_outline(*drawn.outline, field)} : outlines_of(shape, found, pixel_um, p);
   std::vector<Segmentation> result;
   for (const CellOutline& outline : chosen(outlines, shape, p)) {
     Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um},

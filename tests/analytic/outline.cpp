@@ -1,8 +1,9 @@
 /// Outlines lie on the edges of drawn cells.
 #include <gtest/gtest.h>
 
+#include "pipeline/contract/errors.h"
 #include "segment/ellipse.h"
-#include "segment/outline.h"
+#include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
 namespace mbtfm::segment {
@@ -95,6 +96,31 @@ TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
   EXPECT_FALSE(cells[1].is_cut_by_border);
   EXPECT_TRUE(cells[2].is_cut_by_border);
   for (const Vec2 p : cells[2].outer_um) EXPECT_LE(p.y, 40);
+}
+
+TEST(Outline, the_cell_asked_for_is_the_one_segmented) {
+  const DrawnScene s = drawn_scene(10, 6);
+  Image adhesion = even_image(520, 256, 100), actin = adhesion;
+  for (int row = 0; row < 256; ++row)
+    for (int column = 0; column < 256; ++column) {
+      adhesion.at(column, row) = s.adhesion_image.at(column, row);
+      actin.at(column, row) = s.actin_image.at(column, row);
+    }
+  draw_ellipse(adhesion, ellipse(1, {39, 13}, 1.6, 0.6, 0.3), 500, 0.13, s.kPixel_um);
+  draw_ellipse(actin, ellipse(1, {39, 13}, 12, 12, 0), 200, 0.15, s.kPixel_um);
+  SegmentParameters p;
+  p.pixel_size_um = s.kPixel_um;
+  const auto segmented = [&](int cell) {
+    p.cell = cell;
+    return segment_cells(Channel{"adhesion", adhesion}, Channel{"actin", actin}, p);
+  };
+  ASSERT_EQ(segmented(1).size(), 1u);
+  EXPECT_EQ(segmented(1)[0].n_cells, 2);
+  EXPECT_EQ(segmented(1)[0].cell.adhesions.size(), 5u);
+  ASSERT_EQ(segmented(2)[0].cell.adhesions.size(), 1u);
+  EXPECT_NEAR(segmented(2)[0].cell.adhesions[0].position_um.x, 39, 0.1);
+  EXPECT_EQ(segmented(0).size(), 2u);
+  EXPECT_THROW(segmented(3), InputError);
 }
 
 }  // namespace

@@ -104,5 +104,37 @@ TEST(Emptiness, a_sheet_of_cells_is_called_so) {
   }
 }
 
+TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
+  for (const std::uint64_t seed : {1, 2, 3}) {
+    SCOPED_TRACE(seed);
+    // noise summed over 7 x 7 pixels twice: clouds of all shapes, which no ellipse fits
+    Image image = noisy(0, 100, seed);
+    for (int round = 0; round < 2; ++round) {
+      Image sums = image;
+      for (int row = 0; row < image.height; ++row)
+        for (int column = 0; column < image.width; ++column) {
+          float sum = 0;
+          for (int dy = -3; dy <= 3; ++dy)
+            for (int dx = -3; dx <= 3; ++dx)
+              sum += image.at(std::clamp(column + dx, 0, image.width - 1), std::clamp(row + dy, 0, image.height - 1));
+          sums.at(column, row) = sum / 7;
+        }
+      image = sums;
+    }
+    add_noise(image, 1, seed + 10);
+    const auto found = find_adhesions(image, 0.1, {});
+    EXPECT_NO_THROW(check(found));
+    for (const Adhesion& a : found) EXPECT_LE(a.area_um2, AdhesionParameters{}.adhesion_largest_um2);
+  }
+}
+
+TEST(Adhesions, are_not_the_bright_body_of_a_cell) {
+  Image image = noisy(100, 5, 5);
+  draw_ellipse(image, ellipse(1, {20, 15}, 24, 16, 0.5), 1000, 0.15, 0.1);
+  EXPECT_TRUE(find_adhesions(image, 0.1, {}).empty());
+  EXPECT_EQ(why_no_adhesions(image, 0.1, {}),
+            "bright areas and edges, but no spot higher than the steps of its background");
+}
+
 }  // namespace
 }  // namespace mbtfm::segment

@@ -127,6 +127,23 @@ TEST(HandDrawn, a_fibres_width_is_measured_in_the_image) {
   EXPECT_NEAR(f.mean_intensity, 500, 25);
 }
 
+TEST(HandDrawn, areas_within_the_outline_are_its_holes) {
+  const std::vector<Vec2> outer = {{10, 10}, {110, 10}, {110, 60}, {10, 60}},
+                          hole = {{20, 20}, {20, 30}, {40, 30}, {40, 20}};
+  Roi composite = area({}, "cell");
+  composite.shape = RoiShape::composite;
+  composite.paths_px = {hole, outer};
+  for (const RoiSet& set : {set_of({area(hole), area(outer)}), set_of({composite})}) {
+    const CellOutline cell = hand_drawn_outline(set, kField);
+    EXPECT_NEAR(std::abs(signed_area_um2(cell.outer_um)), 50, 1e-9);
+    ASSERT_EQ(cell.holes_um.size(), 1u);
+    EXPECT_NEAR(std::abs(signed_area_um2(cell.holes_um[0])), 2, 1e-9);
+    EXPECT_NEAR(cell.area_um2, 48, 1e-9);
+    EXPECT_FALSE(cell.is_cut_by_border);
+  }
+  EXPECT_TRUE(hand_drawn_outline(set_of({area({{0, 0}, {100, 0}, {100, 90}})}), kField).is_cut_by_border);
+}
+
 std::string error_of(const auto& body) {
   try {
     body();
@@ -153,16 +170,19 @@ TEST(HandDrawn, what_cannot_be_used_is_named) {
   Roi point = square, composite = square;
   point.shape = RoiShape::point;
   composite.shape = RoiShape::composite;
-  composite.n_paths = 2;
+  composite.paths_px = {square.points_px, {{50, 50}, {70, 50}, {70, 70}, {50, 70}}};
   EXPECT_EQ(adhesion(point), "rois.zip: 'a 1': a point selection");
-  EXPECT_EQ(error_of([&] { hand_drawn_outline(set_of({composite}), kField); }), "rois.zip: 'a 1': 2 closed lines");
+  EXPECT_EQ(error_of([&] { hand_drawn_outline(set_of({composite}), kField); }), "rois.zip: areas beside each other");
   EXPECT_EQ(fibre(square), "rois.zip: 'a 1': a polygon");
   EXPECT_EQ(fibre(point), "rois.zip: 'a 1': a point selection");
   EXPECT_EQ(fibre(line({{10, 10}, {10, 10}}, "f")), "rois.zip: 'f': 1 different ones");
   EXPECT_EQ(fibre(line({{0, 10}, {0.5, 10}}, "f")), "rois.zip: 'f': 0.05 um");
   EXPECT_EQ(fibre(line({{10, 10}, {-9, 10}}, "f")), "rois.zip: 'f': a point at -9, 11");
   EXPECT_EQ(fibre(line({{10, 10}, {20, 10}}, "dorsal or arc")), "rois.zip: 'dorsal or arc': two");
-  EXPECT_EQ(error_of([&] { hand_drawn_outline(set_of({square, square}), kField); }), "rois.zip: 2");
+  EXPECT_EQ(error_of([&] {
+              hand_drawn_outline(set_of({square, point}), kField);
+            }),
+            "rois.zip: 'a 1': a point selection");
 }
 
 TEST(HandDrawn, what_the_program_found_given_back_by_hand_gives_the_same_cell) {
