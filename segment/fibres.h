@@ -10,11 +10,12 @@
 namespace mbtfm::segment {
 
 struct FibreParameters {
-  double fibre_width_um = 0.6;          ///< typical bundle seen through a microscope; half to twice of it is found
-  double fibre_averaging_um = 0.7;      ///< along the fibre: straight over this length, long enough to beat noise
-  double fibre_start_noise = 6;         ///< no line of noise in 10^6 pixels
-  double fibre_follow_noise = 2.5;      ///< once begun a fibre may fade into the noise's upper per cent
-  double fibre_false_per_cell = 0.5;    ///< lines of the meshwork taken for fibres: one in every second cell
+  double fibre_width_um = 0.6;      ///< typical bundle seen through a microscope; half to twice of it is found
+  double fibre_averaging_um = 0.7;  ///< along the fibre: straight over this length, long enough to beat noise
+  double fibre_start_noise = 6;     ///< no line of noise in 10^6 pixels
+  double fibre_follow_noise = 2.5;  ///< once begun a fibre may fade into the noise's upper per cent
+  double fibre_false_per_cell =
+      5;  ///< of meshwork: a fibre too many changes no other tension, one missed does (thesis 3.3)
   double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
   double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
   double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture

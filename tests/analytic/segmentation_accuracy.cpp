@@ -48,12 +48,5 @@ TEST(SegmentationAccuracy, of_good_images) {
   EXPECT_GE(a["outline IoU"], 0.98);
 }
 
-TEST(SegmentationAccuracy, finds_no_fibres_where_there_is_the_meshwork_alone) {
-  for (const char* quality : {"poor", "ordinary", "good"}) {
-    SCOPED_TRACE(quality);
-    EXPECT_LE(mean_accuracy("no-fibres", quality)["false fibres"], 2);
-  }
-}
-
 }  // namespace
 }  // namespace mbtfm::test
