@@ -11,16 +11,6 @@
 namespace mbtfm::segment {
 namespace {
 
-/// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
-Plane compressed(const Plane& plane) {
-  std::vector<double> sample;
-  for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
-  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
-  Plane result = plane;
-  for (float& value : result.values) value = value / (std::abs(value) + level);
-  return result;
-}
-
 /// A square of the plane, zero beyond the border; `margin` px of it on each side are blank.
 cv::Mat cut(const Plane& plane, int left, int top, int side, int margin) {
   cv::Mat result = cv::Mat::zeros(side, side, CV_32F);
@@ -152,6 +142,15 @@ GridField grid_over(const Plane& plane, double spacing) {
 }
 
 }  // namespace
+
+Plane compressed(const Plane& plane) {
+  std::vector<double> sample;
+  for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
+  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
+  Plane result = plane;
+  for (float& value : result.values) value = value / (std::abs(value) + level);
+  return result;
+}
 
 Motion GridField::at(Vec2 place) const {
   const auto split = [&](double offset, int n) {

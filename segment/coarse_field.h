@@ -16,6 +16,9 @@ struct GridField {
   Motion at(Vec2 place) const;
 };
 
+/// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
+Plane compressed(const Plane& plane);
+
 /// Shift of the target as a whole: phase correlation.
 Vec2 drift_of(const Plane& reference, const Plane& target);
 
