@@ -115,6 +115,8 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     const Registered returned = registered(scene.stressed.image, scene.relaxed->image.spline, there, *back, window);
     const double missed = norm(returned.motion.u + forward.u);
     if (missed > 0.5 + 4 * std::hypot(track.found.sigma_px, returned.sigma_px)) track.flag = "ambiguous";
+    // Both ways see the same noise: what they differ by is what the registration itself is unsure of.
+    track.found.sigma_px = std::hypot(track.found.sigma_px, missed / 2);
   });
 }
 
@@ -176,11 +178,11 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
     const Motion& guess = track.found.motion;
     const Registered measured =
         registered(scene.relaxed->image, scene.stressed.image.spline, scene.position(k), guess, scene.narrow);
-    if (measured.is_converged && norm(measured.motion.u - guess.u) < 2 * scene.bead_sigma()) {
-      track.found = measured;
-    } else {
+    if (!measured.is_converged || norm(measured.motion.u - guess.u) > 2 * scene.bead_sigma()) {
       track.flag = "no partner";
+      return;
     }
+    track.found = measured;
   });
   flag_dissimilar(least_similarity, tracks);
 }

@@ -17,47 +17,66 @@ struct Prediction {
   std::vector<int> from;
   Vec2 u;
   double noise_share = 0;  ///< of its variance over a neighbour's
-  double misfit = -1;      ///< mean square of a component of own minus predicted; < 0: no prediction
+  double reach_px = 0;
+  double gradient = 0;
+  double misfit = -1;  ///< mean square of a component of own minus predicted; < 0: no prediction
 };
 
 std::vector<Prediction> predictions(const Scene& scene, const std::vector<Track>& tracks) {
   const std::vector<Motion> motions = motions_of(tracks);
   std::vector<Prediction> result(tracks.size());
   // nearer ones share the bead's own pixels and errors
-  const double gap = 2.5 * scene.bead_sigma();
+  const double gap = 4 * scene.bead_sigma();
   for_each_bead(scene, [&](int k) {
     if (!tracks[k].is_good()) return;
     std::vector<int> from = good_around(scene, tracks, k, kNeighbours, gap);
     if (from.size() < kFewest) return;
     const auto local = local_motion(scene.position(k), from, scene.relaxed->positions, motions);
-    const Vec2 misfit = motions[k].u - local->motion.u;
+    const Motion& g = local->motion;
+    const Vec2 misfit = motions[k].u - g.u;
     result[k] = {.from = std::move(from),
-                 .u = local->motion.u,
+                 .u = g.u,
                  .noise_share = local->noise_share,
+                 .reach_px = local->reach_px,
+                 .gradient = std::hypot(g.ux_x, g.ux_y, std::hypot(g.uy_x, g.uy_y)),
                  .misfit = 0.5 * dot(misfit, misfit)};
   });
   return result;
 }
 
-/// The s for which the median of misfit² / (sigma² + s²) is that of a two-dimensional normal variable, ln 2 of a
-/// component's mean square.
-double scatter_of(const std::vector<Prediction>& predicted, const std::vector<Track>& tracks) {
+struct ErrorCheck {
+  double scale = 1;    ///< of the registrations' variances
+  double scatter = 0;  ///< px, beyond them
+};
+
+/// Compare the registrations' standard errors with what the neighbours see of them: the median of misfit² / variance
+/// must be that of a two-dimensional normal variable, ln 2 of a component's mean square. Where it is larger, single
+/// beads scatter; where it is smaller, the errors were stated too large. Only the half of the beads counts around which
+/// the field changes least: elsewhere it is the field that affine predictions miss.
+ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vector<Track>& tracks) {
+  std::vector<double> gradients;
+  for (const Prediction& p : predicted) {
+    if (p.misfit >= 0) gradients.push_back(p.gradient);
+  }
+  const double calm = quantile(std::move(gradients), 0.5);
   const auto median_ratio = [&](double scatter) {
     std::vector<double> ratios;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
       const double variance = tracks[k].found.sigma_px * tracks[k].found.sigma_px + scatter * scatter;
-      if (predicted[k].misfit < 0 || !(variance > 0)) continue;
+      if (predicted[k].misfit < 0 || predicted[k].gradient > calm || !(variance > 0)) continue;
       ratios.push_back(predicted[k].misfit / ((1 + predicted[k].noise_share) * variance));
     }
-    return quantile(std::move(ratios), 0.5);
+    return quantile(std::move(ratios), 0.5) / std::numbers::ln2;
   };
+  const double as_stated = median_ratio(0);
+  constexpr double kLeast = 0.5;  // less would be a field too few beads tell of
+  if (as_stated <= 1) return {.scale = std::max(kLeast, as_stated)};
   double low = 0, high = 10;
-  if (median_ratio(low) <= std::numbers::ln2) return 0;
   for (int step = 0; step < 20; ++step) {
     const double middle = 0.5 * (low + high);
-    (median_ratio(middle) > std::numbers::ln2 ? low : high) = middle;
+    (median_ratio(middle) > 1 ? low : high) = middle;
   }
-  return high;
+  return {.scatter = high};
 }
 
 }  // namespace
@@ -65,14 +84,15 @@ double scatter_of(const std::vector<Prediction>& predicted, const std::vector<Tr
 Pooling pooled(const Scene& scene, const std::vector<Track>& tracks) {
   const std::vector<Prediction> predicted = predictions(scene, tracks);
   Pooling result;
-  result.scatter_px = scatter_of(predicted, tracks);
+  const ErrorCheck errors = check_errors(predicted, tracks);
+  result.scatter_px = errors.scatter;
   result.beads.resize(tracks.size());
   const auto own_variance = [&](std::size_t k) {
-    return tracks[k].found.sigma_px * tracks[k].found.sigma_px + result.scatter_px * result.scatter_px;
+    return errors.scale * tracks[k].found.sigma_px * tracks[k].found.sigma_px + errors.scatter * errors.scatter;
   };
   for_each_bead(scene, [&](int k) {
     const Prediction& here = predicted[k];
-    const double own = own_variance(k);
+    double own = own_variance(k);
     result.beads[k] = {tracks[k].found.motion.u, std::sqrt(own)};
     if (here.misfit < 0 || !(own > 0)) return;
     double beyond = 0, variance = 0;
@@ -85,6 +105,10 @@ Pooling pooled(const Scene& scene, const std::vector<Track>& tracks) {
     }
     if (n < static_cast<int>(kFewest)) return;
     const double missed = here.noise_share * variance / n + std::max(0.0, beyond / n);
+    // What an affine motion misses grows with the square of the distance: the share of it that the window sees
+    const double within = 2 * scene.narrow.sigma / here.reach_px;  // weights fall to 1/e² at the reach
+    own += std::pow(within, 4) * missed;
+    result.beads[k].sigma_px = std::sqrt(own);
     if (here.misfit > 4.5 * (own + missed)) return;  // three standard deviations: the bead knows better
     constexpr double kFineEnough = 0.02;             // px
     const double weight = std::min(1 / missed, std::max(0.0, 1 / (kFineEnough * kFineEnough) - 1 / own));
