@@ -43,6 +43,7 @@ std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& 
   }
   Window window = scene.wide;
   window.sigma = std::max(2.2 * scene.bead_sigma(), 0.6 * scene.wide.sigma);
+  window.is_thinned = false;
   std::optional<Registered> best;
   for (const Motion& guess : guesses) {
     const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guess, window);

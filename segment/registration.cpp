@@ -92,7 +92,8 @@ struct Patch {
   double total_weight = 0, total_squared = 0, variance = 0;
 };
 
-Patch patch_around(const SmoothImage& reference, Vec2 place, double sigma) {
+Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& window) {
+  const double sigma = window.sigma;
   Patch patch;
   const int reach = static_cast<int>(std::ceil(2 * sigma));
   const int ci = static_cast<int>(std::lround(place.x)), cj = static_cast<int>(std::lround(place.y));
@@ -104,7 +105,7 @@ Patch patch_around(const SmoothImage& reference, Vec2 place, double sigma) {
     for (int i = std::max(0, ci - reach); i <= std::min(reference.plane.width - 1, ci + reach); ++i) {
       const float x = static_cast<float>(i - place.x), y = static_cast<float>(j - place.y);
       const float squared = (x * x + y * y) / static_cast<float>(sigma * sigma);
-      if (squared > 4.5f) continue;
+      if (squared > 4.5f || (window.is_thinned && (i + j + ci + cj) % 2 != 0)) continue;
       const float weight = std::exp(-0.5f * squared);
       const float gx = reference.slope_x.at(i, j), gy = reference.slope_y.at(i, j);
       patch.x.push_back(x), patch.y.push_back(y), patch.weight.push_back(weight);
@@ -297,7 +298,7 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
                       const Window& window) {
   Registered result;
   result.motion = guess;
-  Patch patch = patch_around(reference, place, window.sigma);
+  Patch patch = patch_around(reference, place, window);
   complete(patch);
   if (!(patch.variance > 0)) return result;
   Mat6 prior;

@@ -36,6 +36,7 @@ struct Window {
   double gradient_sd = 0.2;  ///< how far the gradient may be from the expected one (prior standard deviation)
   double noise = 1;          ///< standard deviation of the difference of two pixels, to weigh the prior with
   int max_steps = 15;
+  bool is_thinned = false;   ///< every other pixel, as on a chessboard: enough to find what is measured later
   double settled_px = 2e-3;  ///< the last step: a tenth of the best standard errors
 };
 
