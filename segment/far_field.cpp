@@ -143,6 +143,9 @@ FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& 
   };
   const double everywhere = about_own_motion(all);
   result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;
+  const std::vector<int>& far = result.is_at_rest ? frame : all;
+  result.turn_rad =
+      fitted_motion(positions, displacements, far, result.drift.centre, scale, Drift::rotation).turn_rad;
   if (!result.is_at_rest) {
     result.drift = fitted_motion(positions, displacements, all, result.drift.centre, scale, kind);
     result.rms = result.noise = everywhere;

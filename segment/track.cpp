@@ -189,7 +189,7 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   const GlobalMotion& drift = far.drift;
   const Vec2 centre = drift.centre + drift.shift;
   result.drift_um = pixel_size_um * ((turn ? turn->of(centre) : centre) - drift.centre);
-  result.turn_rad = drift.turn_rad + (turn ? turn->angle_rad : 0);
+  result.turn_rad = turn ? drift.turn_rad + turn->angle_rad : far.turn_rad;
   result.growth = drift.growth;
   return result;
 }

@@ -15,14 +15,22 @@ void declare(ParameterList& list, ImageNames& names) {
   list.add("actin", names.actin, "image of the actin");
   list.add("beads_stressed", names.beads_stressed, "image of the beads while the cell pulls");
   list.add("beads_relaxed", names.beads_relaxed, "image of the beads after the cell was removed");
+  list.add("displacement", names.displacement,
+           "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]");
 }
 
 const std::string& name_of_image(const ImageNames& names, const std::string& key) {
   if (key == "adhesion") return names.adhesion;
   if (key == "actin") return names.actin;
   if (key == "beads_stressed") return names.beads_stressed;
+  if (key == "displacement") return names.displacement;
   MBTFM_ASSERT(key == "beads_relaxed");
   return names.beads_relaxed;
+}
+
+std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
+  if (stage.name != "track" || names.displacement.empty()) return stage.images;
+  return {{"displacement", "displacement"}};
 }
 
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {

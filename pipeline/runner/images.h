@@ -3,8 +3,10 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "pipeline/contract/parameters.h"
+#include "pipeline/runner/stages.h"
 
 namespace mbtfm::runner {
 
@@ -14,11 +16,15 @@ struct ImageNames {
   std::string actin = "actin.tif";
   std::string beads_stressed = "beads_stressed.tif";
   std::string beads_relaxed = "beads_relaxed.tif";
+  std::string displacement;  ///< a field from another program, instead of the beads' images
 };
 void declare(ParameterList& list, ImageNames& names);
 
 /// The name or glob of a key of [images]. @throws InternalError for any other key
 const std::string& name_of_image(const ImageNames& names, const std::string& key);
+
+/// The inputs of a stage: its images, or, for tracking, the displacement field that is given instead.
+std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names);
 
 struct ImageMatch {
   std::vector<std::filesystem::path> files;  ///< in alphabetical order

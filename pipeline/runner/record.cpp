@@ -110,7 +110,7 @@ std::string settings_of(const Stage& stage, const fs::path& toml_file) {
 
 std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, const ImageNames& images) {
   std::vector<std::string> names;
-  for (const ImageInput& image : stage.images) {
+  for (const ImageInput& image : images_of(stage, images)) {
     const ImageMatch match = match_image(cell, name_of_image(images, image.key));
     for (const fs::path& file : match.files) names.push_back(file.lexically_relative(cell).generic_string());
   }
