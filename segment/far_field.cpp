@@ -144,8 +144,13 @@ FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& 
   const double everywhere = about_own_motion(all);
   result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;
   const std::vector<int>& far = result.is_at_rest ? frame : all;
-  result.turn_rad =
-      fitted_motion(positions, displacements, far, result.drift.centre, scale, Drift::rotation).turn_rad;
+  const auto rms_of = [&](Drift what) {
+    const GlobalMotion motion = fitted_motion(positions, displacements, far, result.drift.centre, scale, what);
+    result.turn_rad = motion.turn_rad;
+    return rms_about(positions, displacements, far, motion);
+  };
+  const double shifted = rms_of(Drift::translation), turned = rms_of(Drift::rotation);
+  result.is_turned = turned < 0.5 * shifted && std::abs(result.turn_rad) * scale > 1;
   if (!result.is_at_rest) {
     result.drift = fitted_motion(positions, displacements, all, result.drift.centre, scale, kind);
     result.rms = result.noise = everywhere;

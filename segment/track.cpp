@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "segment/alignment.h"
 #include "segment/beads.h"
@@ -30,12 +32,29 @@ int search_window(const Scene& scene, const TrackParameters& parameters, double 
   return window;
 }
 
+void require_numbers(const Image& image, const char* which) {
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      if (std::isfinite(image.at(i, j))) continue;
+      throw InvalidData(std::string("the ") + which + " image", "a number in every pixel",
+                        "none at column " + std::to_string(i + 1) + ", row " + std::to_string(j + 1));
+    }
+  }
+}
+
 /// Chance lets one bead in twenty of unrelated pictures be "found again".
 void require_common_beads(int n_good, int n_beads) {
   constexpr double kFewest = 0.2;
   if (n_good >= kFewest * n_beads) return;
   throw InvalidData("the stressed image", "the beads of the relaxed image, displaced",
                     std::to_string(n_good) + " of " + std::to_string(n_beads) + " of them");
+}
+
+/// A turn that is taken for displacement is a wrong field, however well its beads were found.
+void require_no_turn(const FarField& far, Drift kind) {
+  if (kind != Drift::translation || !far.is_turned) return;
+  throw InvalidData("the stressed image", "a far field that is shifted at most (drift = translation)",
+                    "one turned by " + brief(far.turn_rad * 180 / std::numbers::pi) + " degrees");
 }
 
 FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, const Pooling& pooling,
@@ -147,6 +166,7 @@ void declare(ParameterList& list, TrackParameters& p) {
 
 RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& parameters, int threads)
     : parameters_(parameters), threads_(threads) {
+  require_numbers(relaxed, "relaxed");
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
   const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
   side_ = std::make_shared<const Side>(side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads));
@@ -162,6 +182,7 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
     throw InvalidData("the stressed image", "the relaxed image's " + size(plane.width, plane.height) + " pixels",
                       size(stressed.width, stressed.height));
   }
+  require_numbers(stressed, "stressed");
   tell(0, "finding beads");
   std::optional<Turn> turn;
   if (drift_kind(parameters_.drift) != Drift::translation) {
@@ -184,6 +205,7 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   const std::vector<Track>& tracks = measured.tracks;
   const Pooling& pooling = measured.pooling;
   const FarField far = far_field_of(scene, tracks, pooling, parameters_);
+  require_no_turn(far, drift_kind(parameters_.drift));
   Tracking result = tracking_of(scene, tracks, pooling, far, pixel_size_um);
   require_common_beads(result.n_good, scene.n_beads());
   const GlobalMotion& drift = far.drift;

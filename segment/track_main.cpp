@@ -70,7 +70,7 @@ StageReport report_of(const DisplacementField& field) {
   return report;
 }
 
-StageReport report_of(const Tracking& tracking, const TrackParameters& parameters, double pixel_size_um) {
+StageReport report_of(const Tracking& tracking, double pixel_size_um) {
   StageReport report = report_of(tracking.field);
   report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(tracking.field.size()) + " beads tracked" +
                    report.summary;
@@ -86,11 +86,6 @@ StageReport report_of(const Tracking& tracking, const TrackParameters& parameter
                         {"noise_um", tracking.noise_um},
                         {"scatter_um", tracking.scatter_um}};
   report.figures.insert(report.figures.end(), more.begin(), more.end());
-  // over half the image such a turn moves a bead by twenty times its error or more
-  if (parameters.drift == "translation" && std::abs(tracking.turn_rad) > 0.005) {
-    report.summary += "; WARNING: the far field is turned by " + brief(tracking.turn_rad * kRadian_deg) +
-                      " degrees: set drift = rotation";
-  }
   return report;
 }
 
@@ -151,7 +146,7 @@ StageReport track(const TrackParameters& parameters, StageContext& context) {
     }
     if (k == 0) {
       write_field(context, tracking.field, "displacement");
-      report = report_of(tracking, parameters, pixel_size_um);
+      report = report_of(tracking, pixel_size_um);
     }
     if (frames.size() == 1) return report;
     char number[16];
