@@ -87,6 +87,32 @@ void flag_dissimilar(double least_similarity, std::vector<Track>& tracks) {
   }
 }
 
+/// A bead keeps its light. One whose gain differs from its neighbours' by more than eight robust standard deviations
+/// (of the picture's beads, each in units of its own error, which is that of its place over its width) took another's
+/// place, or lies on top of another that moved away.
+void flag_changed_light(const Scene& scene, std::vector<Track>& tracks) {
+  constexpr double kMost = 8, kFloor = 0.02;  // the floor: light is no better known than that
+  std::vector<double> deviation(tracks.size(), 0);
+  for_each_bead(scene, [&](int k) {
+    const Registered& found = tracks[k].found;
+    if (!tracks[k].is_good() || !(found.gain > 0)) return;
+    std::vector<double> around;
+    for (const int j : good_around(scene, tracks, k, 12))
+      around.push_back(std::log(std::max(1e-3, tracks[j].found.gain)));
+    if (around.size() < 5) return;
+    const double error = std::hypot(found.sigma_px / scene.bead_sigma(), kFloor);
+    deviation[k] = std::abs(std::log(found.gain) - quantile(std::move(around), 0.5)) / error;
+  });
+  std::vector<double> sizes;
+  for (const double size : deviation) {
+    if (size > 0) sizes.push_back(size);
+  }
+  const double most = kMost * quantile(std::move(sizes), 0.5) / 0.6745;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (tracks[k].is_good() && deviation[k] > most) tracks[k].flag = "ambiguous";
+  }
+}
+
 /// The motion from the target back to the reference; nothing where it folds the surface.
 std::optional<Motion> inverse(const Motion& forward) {
   const double xx = 1 + forward.ux_x, yy = 1 + forward.uy_y, xy = forward.ux_y, yx = forward.uy_x;
@@ -186,6 +212,7 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
     track.found = measured;
   });
   flag_dissimilar(least_similarity, tracks);
+  flag_changed_light(scene, tracks);
 }
 
 void verify(const Scene& scene, std::vector<Track>& tracks) {

@@ -322,6 +322,7 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
     }
   }
   result.similarity = now.similarity;
+  result.gain = now.gain;
   result.sigma_px = std::sqrt(std::max(
       0.0, variance_of(patch, Warp(place, result.motion), inverse, now, stiffness * window.noise * window.noise)));
   return result;

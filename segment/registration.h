@@ -44,6 +44,7 @@ struct Registered {
   Motion motion;           ///< at the bead
   double sigma_px = 0;     ///< standard error of a component of u
   double similarity = -1;  ///< weighted correlation of the two windows
+  double gain = 0;         ///< of the target's light over the reference's
   bool is_converged = false;
 };
 
