@@ -87,11 +87,11 @@ void flag_dissimilar(double least_similarity, std::vector<Track>& tracks) {
   }
 }
 
-/// A bead keeps its light. One whose gain differs from its neighbours' by more than eight robust standard deviations
+/// A bead keeps its light. One whose gain differs from its neighbours' by more than five robust standard deviations
 /// (of the picture's beads, each in units of its own error, which is that of its place over its width) took another's
 /// place, or lies on top of another that moved away.
 void flag_changed_light(const Scene& scene, std::vector<Track>& tracks) {
-  constexpr double kMost = 8, kFloor = 0.02;  // the floor: light is no better known than that
+  constexpr double kMost = 5, kFloor = 0.02;  // the floor: light is no better known than that
   std::vector<double> deviation(tracks.size(), 0);
   for_each_bead(scene, [&](int k) {
     const Registered& found = tracks[k].found;
