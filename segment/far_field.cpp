@@ -126,7 +126,7 @@ void fit_frame(FarField& result, const std::vector<Vec2>& positions, const std::
 }  // namespace
 
 FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
-                   double height, double margin, Drift kind) {
+                   double height, double margin, Drift kind, double noise) {
   FarField result;
   const double scale = 0.5 * std::min(width, height);
   result.drift.centre = {0.5 * (width - 1), 0.5 * (height - 1)};
@@ -138,8 +138,9 @@ FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& 
     if (std::min({p.x, p.y, width - 1 - p.x, height - 1 - p.y}) < margin) frame.push_back(k);
   }
   const auto about_own_motion = [&](const std::vector<int>& used) {
-    return rms_about(positions, displacements, used,
-                     fitted_motion(positions, displacements, used, result.drift.centre, scale, kind));
+    const double rms = rms_about(positions, displacements, used,
+                                 fitted_motion(positions, displacements, used, result.drift.centre, scale, kind));
+    return std::sqrt(std::max(0.0, rms * rms - noise * noise));
   };
   const double everywhere = about_own_motion(all);
   result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;

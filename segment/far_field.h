@@ -40,9 +40,10 @@ struct FarField {
 ///   u(x) = d(x) + Σ_k K(x − x_k) f_k,   Σ f_k = 0,   K = [ (1−nu) 1 + nu e eᵀ ] / r  (Cerruti, nu = 1/2)
 ///
 /// with the x_k on a grid of a twelfth of the inner field, 1/r softened within a patch; ridge regression.
+/// Whether it moves less than the rest is asked beyond `noise` (px), the standard deviation of a bead's component.
 /// Where the frame moves as much as the rest (a layer of cells fills the picture) no place is at rest: the forces in
 /// the picture balance, more or less, and the drift is fitted to all beads alike.
 FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
-                   double height, double margin, Drift kind);
+                   double height, double margin, Drift kind, double noise);
 
 }  // namespace mbtfm::segment

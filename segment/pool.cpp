@@ -87,14 +87,14 @@ Pooling pooled(const Scene& scene, const std::vector<Track>& tracks) {
   const ErrorCheck errors = check_errors(predicted, tracks);
   result.scatter_px = errors.scatter;
   result.beads.resize(tracks.size());
+  const double loose = errors.scatter * errors.scatter;
   const auto own_variance = [&](std::size_t k) {
-    return errors.scale * tracks[k].found.sigma_px * tracks[k].found.sigma_px + errors.scatter * errors.scatter;
+    return errors.scale * tracks[k].found.sigma_px * tracks[k].found.sigma_px + loose;
   };
   for_each_bead(scene, [&](int k) {
     const Prediction& here = predicted[k];
-    double own = own_variance(k);
-    result.beads[k] = {tracks[k].found.motion.u, std::sqrt(own)};
-    if (here.misfit < 0 || !(own > 0)) return;
+    result.beads[k] = {tracks[k].found.motion.u, std::sqrt(own_variance(k))};
+    if (here.misfit < 0 || !(own_variance(k) > 0)) return;
     double beyond = 0, variance = 0;
     int n = 0;
     for (const int j : here.from) {
@@ -107,14 +107,15 @@ Pooling pooled(const Scene& scene, const std::vector<Track>& tracks) {
     const double missed = here.noise_share * variance / n + std::max(0.0, beyond / n);
     // What an affine motion misses grows with the square of the distance: the share of it that the window sees
     const double within = 2 * scene.narrow.sigma / here.reach_px;  // weights fall to 1/e² at the reach
-    own += std::pow(within, 4) * missed;
-    result.beads[k].sigma_px = std::sqrt(own);
-    if (here.misfit > 4.5 * (own + missed)) return;  // three standard deviations: the bead knows better
-    constexpr double kFineEnough = 0.02;             // px
-    const double weight = std::min(1 / missed, std::max(0.0, 1 / (kFineEnough * kFineEnough) - 1 / own));
+    const double own = own_variance(k) - loose + std::pow(within, 4) * missed;
+    result.beads[k].sigma_px = std::sqrt(own + loose);
+    if (!(own > 0) || here.misfit > 4.5 * (own + loose + missed)) return;  // three standard deviations: it knows better
+    constexpr double kFineEnough = 0.02;                                   // px
+    const double weight = std::min(1 / (missed + loose), std::max(0.0, 1 / (kFineEnough * kFineEnough) - 1 / own));
     const double total = 1 / own + weight;
+    const double variance_of_mean = (1 / own + weight * weight * (missed + loose)) / (total * total);
     result.beads[k] = {(1 / (own * total)) * tracks[k].found.motion.u + (weight / total) * here.u,
-                       std::sqrt(1 / own + weight * weight * missed) / total};
+                       std::sqrt(variance_of_mean + loose)};
   });
   return result;
 }

@@ -22,9 +22,9 @@ struct Pooling {
 ///   u = (u_own/s² + u_predicted/T²) / (1/s² + 1/T²),   1/sigma² = 1/s² + 1/T²
 ///
 /// The prediction is an affine motion through them; T² is how far such predictions miss there, beyond the measurements'
-/// own errors, from the neighbours' misfits: large where the field is steep, where a bead is left to itself, small
-/// where noise is all there is. Nothing is pooled beyond a standard error of 0.02 px, which is small against what a
-/// field is used for, so that beads keep errors of their own.
+/// own errors, from the neighbours' misfits, and how far single beads scatter: large where the field is steep, where a
+/// bead is left to itself, small where noise is all there is. Nothing is pooled beyond a standard error of 0.02 px,
+/// which is small against what a field is used for, so that beads keep errors of their own.
 Pooling pooled(const Scene& scene, const std::vector<Track>& tracks);
 
 }  // namespace mbtfm::segment

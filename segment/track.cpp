@@ -60,14 +60,18 @@ void require_no_turn(const FarField& far, Drift kind) {
 FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, const Pooling& pooling,
                       const TrackParameters& parameters) {
   std::vector<Vec2> positions, displacements;
+  double squares = 0;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (!tracks[k].is_good()) continue;
+    squares += pooling.beads[k].sigma_px * pooling.beads[k].sigma_px;
     positions.push_back(scene.relaxed->positions[k]);
     displacements.push_back(pooling.beads[k].u);
   }
   const Plane& plane = scene.relaxed->image.plane;
+  const double noise = std::sqrt(squares / std::max<double>(1, static_cast<double>(positions.size())));
   return far_field(positions, displacements, plane.width, plane.height,
-                   parameters.far_field_share * std::min(plane.width, plane.height), drift_kind(parameters.drift));
+                   parameters.far_field_share * std::min(plane.width, plane.height), drift_kind(parameters.drift),
+                   noise);
 }
 
 /// The beads that left the stressed image when it was turned.
