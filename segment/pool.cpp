@@ -50,33 +50,35 @@ struct ErrorCheck {
 };
 
 /// Compare the registrations' standard errors with what the neighbours see of them: the median of misfit² / variance
-/// must be that of a two-dimensional normal variable, ln 2 of a component's mean square. Where it is larger, single
-/// beads scatter; where it is smaller, the errors were stated too large. Only the half of the beads counts around which
-/// the field changes least: elsewhere it is the field that affine predictions miss.
+/// must be that of a two-dimensional normal variable, ln 2 of a component's mean square. A registration may be wrong
+/// about its own variance by half of it, to either side; what is beyond that is scatter of single beads. Only the half
+/// of the beads counts around which the field changes least: elsewhere it is the field that affine predictions miss.
 ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vector<Track>& tracks) {
   std::vector<double> gradients;
   for (const Prediction& p : predicted) {
     if (p.misfit >= 0) gradients.push_back(p.gradient);
   }
   const double calm = quantile(std::move(gradients), 0.5);
+  ErrorCheck result;
   const auto median_ratio = [&](double scatter) {
     std::vector<double> ratios;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
-      const double variance = tracks[k].found.sigma_px * tracks[k].found.sigma_px + scatter * scatter;
+      const double own = result.scale * tracks[k].found.sigma_px * tracks[k].found.sigma_px;
+      const double variance = (1 + predicted[k].noise_share) * (own + scatter * scatter);
       if (predicted[k].misfit < 0 || predicted[k].gradient > calm || !(variance > 0)) continue;
-      ratios.push_back(predicted[k].misfit / ((1 + predicted[k].noise_share) * variance));
+      ratios.push_back(predicted[k].misfit / variance);
     }
     return quantile(std::move(ratios), 0.5) / std::numbers::ln2;
   };
-  const double as_stated = median_ratio(0);
-  constexpr double kLeast = 0.5;  // less would be a field too few beads tell of
-  if (as_stated <= 1) return {.scale = std::max(kLeast, as_stated)};
+  result.scale = std::clamp(median_ratio(0), 0.5, 1.5);
+  if (median_ratio(0) <= 1) return result;
   double low = 0, high = 10;
   for (int step = 0; step < 20; ++step) {
     const double middle = 0.5 * (low + high);
     (median_ratio(middle) > 1 ? low : high) = middle;
   }
-  return {.scatter = high};
+  result.scatter = high;
+  return result;
 }
 
 }  // namespace
