@@ -90,25 +90,16 @@ struct Measured {
   Pooling pooling;
 };
 
-/// Measured in the narrow window. Where single spots scatter by more than twice what the noise explains, they are no
-/// beads of their own but the interference of unresolved ones: the window grows until it holds enough of them.
-Measured measured_beads(Scene& scene, const std::vector<Track>& followed, const std::optional<Turn>& turn,
+/// Measured in the narrow window, even where beads are loose or not resolved and single ones scatter: a wider window
+/// would hide the scatter and flatten the peaks.
+Measured measured_beads(const Scene& scene, std::vector<Track> tracks, const std::optional<Turn>& turn,
                         const TrackParameters& parameters) {
-  constexpr double kGrowth = 1.5, kWidest = 6;  // of a bead's sigma: beyond it a window averages over what it measures
-  for (;; scene.narrow.sigma *= kGrowth) {
-    Measured result{.tracks = followed, .pooling = {}};
-    measure(scene, parameters.least_similarity, result.tracks);
-    verify(scene, result.tracks);
-    if (turn) flag_turned_out(scene, *turn, result.tracks);
-    flag_outliers(scene, parameters.outlier_threshold, result.tracks);
-    result.pooling = pooled(scene, result.tracks);
-    std::vector<double> sigmas;
-    for (const Track& track : result.tracks) {
-      if (track.is_good()) sigmas.push_back(track.found.sigma_px);
-    }
-    const bool is_resolved = result.pooling.scatter_px <= 2 * quantile(std::move(sigmas), 0.5);
-    if (is_resolved || kGrowth * scene.narrow.sigma > kWidest * scene.bead_sigma()) return result;
-  }
+  measure(scene, parameters.least_similarity, tracks);
+  verify(scene, tracks);
+  if (turn) flag_turned_out(scene, *turn, tracks);
+  flag_outliers(scene, parameters.outlier_threshold, tracks);
+  Pooling pooling = pooled(scene, tracks);
+  return {std::move(tracks), std::move(pooling)};
 }
 
 Tracking tracking_of(const Scene& scene, const std::vector<Track>& tracks, const Pooling& pooling, const FarField& far,
@@ -194,18 +185,18 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
     turn = turn_between(plane, light, side_->bead_sigma, threads_);
     if (!turn) require_common_beads(0, static_cast<int>(side_->beads.size()));
   }
-  Scene scene = scene_of(side_,
-                         side_of(turn ? turned_back(stressed, *turn, threads_) : stressed, side_->bead_sigma,
-                                 parameters_.detection_snr, "stressed", threads_),
-                         threads_);
+  const Scene scene = scene_of(side_,
+                               side_of(turn ? turned_back(stressed, *turn, threads_) : stressed, side_->bead_sigma,
+                                       parameters_.detection_snr, "stressed", threads_),
+                               threads_);
   tell(0.3, "correlating windows");
   const Plane& moved = scene.stressed.image.plane;
   const GridField grid =
       coarse_field(plane, moved, drift_of(plane, moved), search_window(scene, parameters_, pixel_size_um), threads_);
   tell(0.5, "registering beads");
-  const std::vector<Track> followed = follow(scene, grid, parameters_);
+  std::vector<Track> followed = follow(scene, grid, parameters_);
   tell(0.7, "measuring beads");
-  const Measured measured = measured_beads(scene, followed, turn, parameters_);
+  const Measured measured = measured_beads(scene, std::move(followed), turn, parameters_);
   const std::vector<Track>& tracks = measured.tracks;
   const Pooling& pooling = measured.pooling;
   const FarField far = far_field_of(scene, tracks, pooling, parameters_);
