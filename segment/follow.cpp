@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <optional>
 
+#include "pipeline/contract/errors.h"
 #include "segment/local_motion.h"
 
 namespace mbtfm::segment {
@@ -172,10 +174,19 @@ void check_claims(const Scene& scene, std::vector<Track>& tracks) {
 
 }  // namespace
 
+void require_common_beads(int n_found, int n_beads) {
+  constexpr double kFewest = 0.2;
+  if (n_found >= kFewest * n_beads) return;
+  throw InvalidData("the stressed image", "the beads of the relaxed image, displaced",
+                    std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
+}
+
 std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
   std::vector<Track> tracks(scene.relaxed->beads.size());
   follow_grid(scene, grid, parameters.least_similarity, tracks);
   flag_outliers(scene, parameters.outlier_threshold, tracks);
+  require_common_beads(static_cast<int>(std::count_if(tracks.begin(), tracks.end(), std::mem_fn(&Track::is_good))),
+                       scene.n_beads());
   follow_neighbours(scene, parameters, tracks);
   return tracks;
 }

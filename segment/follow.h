@@ -6,8 +6,13 @@
 
 namespace mbtfm::segment {
 
+/// With the wide window chance finds one bead in twenty of unrelated pictures "again", of related ones most.
+/// @throws InvalidData where it is less than one in five
+void require_common_beads(int n_found, int n_beads);
+
 /// Find the beads with the wide window: from the grid's prediction, then, where that fails, from the motion of the
 /// beads already tracked around, again and again.
+/// @throws InvalidData where the two images do not show the same beads
 std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
 
 /// Flag tracks that contradict those around them "neighbours disagree"; how many.

@@ -42,14 +42,6 @@ void require_numbers(const Image& image, const char* which) {
   }
 }
 
-/// Chance lets one bead in twenty of unrelated pictures be "found again".
-void require_common_beads(int n_good, int n_beads) {
-  constexpr double kFewest = 0.2;
-  if (n_good >= kFewest * n_beads) return;
-  throw InvalidData("the stressed image", "the beads of the relaxed image, displaced",
-                    std::to_string(n_good) + " of " + std::to_string(n_beads) + " of them");
-}
-
 /// A turn that is taken for displacement is a wrong field, however well its beads were found.
 void require_no_turn(const FarField& far, Drift kind) {
   if (kind != Drift::translation || !far.is_turned) return;
@@ -202,7 +194,6 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   const FarField far = far_field_of(scene, tracks, pooling, parameters_);
   require_no_turn(far, drift_kind(parameters_.drift));
   Tracking result = tracking_of(scene, tracks, pooling, far, pixel_size_um);
-  require_common_beads(result.n_good, scene.n_beads());
   const GlobalMotion& drift = far.drift;
   const Vec2 centre = drift.centre + drift.shift;
   result.drift_um = pixel_size_um * ((turn ? turn->of(centre) : centre) - drift.centre);
