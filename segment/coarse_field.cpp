@@ -11,16 +11,6 @@
 namespace mbtfm::segment {
 namespace {
 
-/// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
-Plane compressed(const Plane& plane) {
-  std::vector<double> sample;
-  for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
-  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
-  Plane result = plane;
-  for (float& value : result.values) value = value / (std::abs(value) + level);
-  return result;
-}
-
 /// A square of the plane, zero beyond the border; `margin` px of it on each side are blank.
 cv::Mat cut(const Plane& plane, int left, int top, int side, int margin) {
   cv::Mat result = cv::Mat::zeros(side, side, CV_32F);
@@ -140,6 +130,17 @@ void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherw
   }
 }
 
+/// Every `scale` pixels a side made one.
+Plane reduced(const Plane& plane, int scale) {
+  if (scale == 1) return plane;
+  Plane result{plane.width / scale, plane.height / scale, {}};
+  result.values.resize(static_cast<std::size_t>(result.width) * result.height);
+  cv::Mat small(result.height, result.width, CV_32F, result.values.data());
+  const cv::Mat whole(plane.height, plane.width, CV_32F, const_cast<float*>(plane.values.data()));
+  cv::resize(whole({0, 0, scale * result.width, scale * result.height}), small, small.size(), 0, 0, cv::INTER_AREA);
+  return result;
+}
+
 GridField grid_over(const Plane& plane, double spacing) {
   GridField field;
   field.spacing = spacing;
@@ -152,6 +153,15 @@ GridField grid_over(const Plane& plane, double spacing) {
 }
 
 }  // namespace
+
+Plane compressed(const Plane& plane) {
+  std::vector<double> sample;
+  for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
+  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
+  Plane result = plane;
+  for (float& value : result.values) value = value / (std::abs(value) + level);
+  return result;
+}
 
 Motion GridField::at(Vec2 place) const {
   const auto split = [&](double offset, int n) {
@@ -188,13 +198,18 @@ GridField coarse_field(const Plane& reference, const Plane& target, Vec2 drift, 
   GridField field;
   field.u = {drift};
   field.nx = field.ny = 1;
-  for (int pass = 0; pass < 2; ++pass, window /= 2) {
-    GridField finer = grid_over(a, pass == 0 ? window / 2.0 : 0.75 * window);
+  for (const int scale : {2, 1}) {
+    const Plane from = reduced(a, scale), to = reduced(b, scale);
+    // the second pass, at half the size, looks around what the first has found
+    const double spacing = scale == 2 ? window / 2.0 : 0.375 * window;
+    GridField finer = grid_over(a, spacing);
     std::vector<std::optional<Vec2>> found(finer.u.size());
     parallel_for(finer.ny, threads, [&](int j) {
       for (int i = 0; i < finer.nx; ++i) {
         const Vec2 centre = finer.first + finer.spacing * Vec2{1.0 * i, 1.0 * j};
-        found[static_cast<std::size_t>(j) * finer.nx + i] = window_shift(a, b, centre, field.at(centre).u, window);
+        const auto shift =
+            window_shift(from, to, (1.0 / scale) * centre, (1.0 / scale) * field.at(centre).u, window / 2);
+        if (shift) found[static_cast<std::size_t>(j) * finer.nx + i] = 1.0 * scale * *shift;
       }
     });
     clean(finer, std::move(found), drift);

@@ -7,8 +7,13 @@
 namespace mbtfm::segment {
 namespace {
 
+struct Fitted {
+  Motion motion;
+  double noise_share = 1;
+};
+
 /// Weighted least squares of u = u₀ + G d, the gradient held by a small ridge where beads lie on a line.
-Motion weighted_fit(const std::vector<Vec2>& offsets, const std::vector<Vec2>& u, const std::vector<double>& weights,
+Fitted weighted_fit(const std::vector<Vec2>& offsets, const std::vector<Vec2>& u, const std::vector<double>& weights,
                     double reach) {
   cv::Matx33d normal;
   cv::Vec3d x, y;
@@ -21,13 +26,21 @@ Motion weighted_fit(const std::vector<Vec2>& offsets, const std::vector<Vec2>& u
     }
   }
   const double total = normal(0, 0);
-  if (offsets.size() < 6) return {{x[0] / total, y[0] / total}, 0, 0, 0, 0};
+  double squares = 0;
+  if (offsets.size() < 6) {
+    for (const double weight : weights) squares += weight * weight;
+    return {{{x[0] / total, y[0] / total}, 0, 0, 0, 0}, squares / (total * total)};
+  }
   constexpr double kRidge = 0.01;  // of the weight at full reach
   normal(1, 1) += kRidge * total * reach * reach;
   normal(2, 2) += kRidge * total * reach * reach;
   const cv::Matx33d inverse = normal.inv(cv::DECOMP_CHOLESKY);
   const cv::Vec3d a = inverse * x, b = inverse * y;
-  return {{a[0], b[0]}, a[1], a[2], b[1], b[2]};
+  for (std::size_t k = 0; k < offsets.size(); ++k) {
+    const double share = weights[k] * (inverse(0, 0) + inverse(0, 1) * offsets[k].x + inverse(0, 2) * offsets[k].y);
+    squares += share * share;
+  }
+  return {{{a[0], b[0]}, a[1], a[2], b[1], b[2]}, squares};
 }
 
 }  // namespace
@@ -50,7 +63,9 @@ std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& othe
   }
   std::vector<double> weights = near;
   for (int round = 0; round < 3; ++round) {
-    result.motion = weighted_fit(offsets, u, weights, result.reach_px);
+    const Fitted fitted = weighted_fit(offsets, u, weights, result.reach_px);
+    result.motion = fitted.motion;
+    result.noise_share = fitted.noise_share;
     std::vector<double> misfits;
     for (std::size_t k = 0; k < u.size(); ++k) misfits.push_back(norm(u[k] - result.motion.at(offsets[k])));
     // the median of a two-dimensional normal's length is 1.18 sd; a fit of three numbers uses up half of six beads

@@ -10,8 +10,9 @@ namespace mbtfm::segment {
 
 struct LocalMotion {
   Motion motion;
-  double spread_px = 0;  ///< robust standard deviation of a component about the fit
-  double reach_px = 0;   ///< distance of the furthest bead used
+  double spread_px = 0;    ///< robust standard deviation of a component about the fit
+  double reach_px = 0;     ///< distance of the furthest bead used
+  double noise_share = 1;  ///< variance of the motion's u over that of a bead's, for equal and independent errors
   int n_beads = 0;
 };
 

@@ -1,6 +1,7 @@
 /// Inside of the bead tracker: grey values as floats, and a search for neighbours.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -33,17 +34,21 @@ double bead_sigma_of(const Plane& plane);
 /// Points sorted into square cells.
 class Neighbours {
  public:
-  Neighbours(const std::vector<Vec2>& points, double cell);
+  Neighbours() = default;
+  Neighbours(std::vector<Vec2> points, double cell);
   /// Indices of the points within `radius` of a place, nearest first, at most `n`.
   std::vector<int> within(Vec2 place, double radius, int n) const;
 
  private:
-  const std::vector<Vec2>& points_;
-  double cell_;
-  double left_ = 0, top_ = 0;
+  std::vector<Vec2> points_;
+  double cell_ = 1, left_ = 0, top_ = 0;
   int nx_ = 1, ny_ = 1;
-  std::vector<std::vector<int>> cells_;
+  std::vector<int> first_ = {0, 0};  ///< of each cell in order_
+  std::vector<int> order_;
 };
+
+/// Call body(from, to) for strips of 0 … n; the strips do not depend on the threads.
+void in_strips(int n, int threads, const std::function<void(int from, int to)>& body);
 
 /// The p-quantile (0 to 1); 0 of nothing.
 double quantile(std::vector<double> values, double p);

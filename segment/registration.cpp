@@ -12,37 +12,53 @@ namespace {
 using Vec6 = cv::Vec<double, 6>;
 using Mat6 = cv::Matx<double, 6, 6>;
 
-/// Catmull–Rom weights of four neighbouring pixels at a fraction of the way between the middle two.
+/// Weights of the cubic B-spline's four coefficients at a fraction of the way between the middle two
+/// (Unser, IEEE Signal Process Mag 16(6):22, 1999).
 struct Weights {
   float w[4];
   explicit Weights(float t) {
-    const float t2 = t * t, t3 = t2 * t;
-    w[0] = 0.5f * (-t + 2 * t2 - t3);
-    w[1] = 0.5f * (2 - 5 * t2 + 3 * t3);
-    w[2] = 0.5f * (t + 4 * t2 - 3 * t3);
-    w[3] = 0.5f * (t3 - t2);
+    const float rest = 1 - t, t2 = t * t, rest2 = rest * rest;
+    w[0] = rest2 * rest * (1.0f / 6);
+    w[1] = (2.0f / 3) - t2 * (1 - 0.5f * t);
+    w[2] = (2.0f / 3) - rest2 * (1 - 0.5f * rest);
+    w[3] = t2 * t * (1.0f / 6);
   }
 };
 
 /// Beyond the border the last pixel goes on.
-float interpolated(const Plane& plane, float x, float y) {
-  x = std::clamp(x, 0.0f, static_cast<float>(plane.width - 1));
-  y = std::clamp(y, 0.0f, static_cast<float>(plane.height - 1));
-  const int i = std::min(static_cast<int>(x), plane.width - 2), j = std::min(static_cast<int>(y), plane.height - 2);
+float interpolated(const Spline& spline, float x, float y) {
+  x = std::clamp(x, 0.0f, spline.last_x);
+  y = std::clamp(y, 0.0f, spline.last_y);
+  const int i = static_cast<int>(x), j = static_cast<int>(y);
   const Weights wx(x - static_cast<float>(i)), wy(y - static_cast<float>(j));
-  if (i >= 1 && j >= 1 && i + 2 < plane.width && j + 2 < plane.height) {
-    const float* row = plane.row(j - 1) + i - 1;
-    cv::v_float32x4 column = cv::v_load(row) * cv::v_setall_f32(wy.w[0]);
-    for (int b = 1; b < 4; ++b)
-      column = cv::v_muladd(cv::v_load(row + b * plane.width), cv::v_setall_f32(wy.w[b]), column);
-    return cv::v_reduce_sum(column * cv::v_load(wx.w));
+  const float* row = spline.coefficients.row(j) + i;  // one pixel before: the margin
+  const int width = spline.coefficients.width;
+  cv::v_float32x4 column = cv::v_load(row) * cv::v_setall_f32(wy.w[0]);
+  for (int b = 1; b < 4; ++b) column = cv::v_muladd(cv::v_load(row + b * width), cv::v_setall_f32(wy.w[b]), column);
+  return cv::v_reduce_sum(column * cv::v_load(wx.w));
+}
+
+/// Turns a line of values into the coefficients of the cubic spline through them, mirrored at its ends
+/// (Unser's recursion; the pole's 16th power is below single precision). `step` apart, `n` long, `lanes` side by side.
+void to_coefficients(float* values, std::ptrdiff_t step, int n, int lanes) {
+  const float pole = std::sqrt(3.0f) - 2;
+  const auto line = [&](int k) { return values + k * step; };
+  std::vector<float> start(static_cast<std::size_t>(lanes), 0.0f);
+  for (int k = std::min(16, n - 1); k >= 0; --k) {
+    for (int l = 0; l < lanes; ++l) start[l] = pole * start[l] + line(k)[l];
   }
-  float sum = 0;
-  for (int b = 0; b < 4; ++b) {
-    const float* row = plane.row(std::clamp(j - 1 + b, 0, plane.height - 1));
-    for (int a = 0; a < 4; ++a) sum += wy.w[b] * wx.w[a] * row[std::clamp(i - 1 + a, 0, plane.width - 1)];
+  for (int l = 0; l < lanes; ++l) line(0)[l] = start[l];
+  for (int k = 1; k < n; ++k) {
+    for (int l = 0; l < lanes; ++l) line(k)[l] += pole * line(k - 1)[l];
   }
-  return sum;
+  const float end = pole / (pole * pole - 1);
+  for (int l = 0; l < lanes; ++l) line(n - 1)[l] = end * (line(n - 1)[l] + pole * line(n - 2)[l]);
+  for (int k = n - 2; k >= 0; --k) {
+    for (int l = 0; l < lanes; ++l) line(k)[l] = pole * (line(k + 1)[l] - line(k)[l]);
+  }
+  for (int k = 0; k < n; ++k) {
+    for (int l = 0; l < lanes; ++l) line(k)[l] *= 6;
+  }
 }
 
 /// Of the value at a pixel by u and G; two zeros fill it up to what the processor adds at once.
@@ -76,7 +92,8 @@ struct Patch {
   double total_weight = 0, total_squared = 0, variance = 0;
 };
 
-Patch patch_around(const Reference& reference, Vec2 place, double sigma) {
+Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& window) {
+  const double sigma = window.sigma;
   Patch patch;
   const int reach = static_cast<int>(std::ceil(2 * sigma));
   const int ci = static_cast<int>(std::lround(place.x)), cj = static_cast<int>(std::lround(place.y));
@@ -88,7 +105,7 @@ Patch patch_around(const Reference& reference, Vec2 place, double sigma) {
     for (int i = std::max(0, ci - reach); i <= std::min(reference.plane.width - 1, ci + reach); ++i) {
       const float x = static_cast<float>(i - place.x), y = static_cast<float>(j - place.y);
       const float squared = (x * x + y * y) / static_cast<float>(sigma * sigma);
-      if (squared > 4.5f) continue;
+      if (squared > 4.5f || (window.is_thinned && (i + j + ci + cj) % 2 != 0)) continue;
       const float weight = std::exp(-0.5f * squared);
       const float gx = reference.slope_x.at(i, j), gy = reference.slope_y.at(i, j);
       patch.x.push_back(x), patch.y.push_back(y), patch.weight.push_back(weight);
@@ -129,6 +146,20 @@ void complete(Patch& patch) {
   patch.normal = products.matrix();
 }
 
+/// The sampled place of pixel k of a patch in the target.
+struct Warp {
+  float ux, uy, xx, xy, yx, yy;
+  Warp(Vec2 place, const Motion& motion)
+      : ux(static_cast<float>(place.x + motion.u.x)),
+        uy(static_cast<float>(place.y + motion.u.y)),
+        xx(static_cast<float>(1 + motion.ux_x)),
+        xy(static_cast<float>(motion.ux_y)),
+        yx(static_cast<float>(motion.uy_x)),
+        yy(static_cast<float>(1 + motion.uy_y)) {}
+  float x_of(float x, float y) const { return ux + xx * x + xy * y; }
+  float y_of(float x, float y) const { return uy + yx * x + yy * y; }
+};
+
 /// What the target shows under the window moved by a motion.
 struct Compared {
   Vec6 mismatch;    ///< Σ w s target
@@ -137,16 +168,14 @@ struct Compared {
   double mean = 0;  ///< of the target
 };
 
-Compared compared(Patch& patch, const Plane& target, Vec2 place, const Motion& motion) {
+Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& motion) {
   Compared result;
   Slope mismatch{};
   double sum = 0, squares = 0, products = 0;
-  const float ux = static_cast<float>(place.x + motion.u.x), uy = static_cast<float>(place.y + motion.u.y);
-  const float xx = static_cast<float>(1 + motion.ux_x), xy = static_cast<float>(motion.ux_y);
-  const float yx = static_cast<float>(motion.uy_x), yy = static_cast<float>(1 + motion.uy_y);
+  const Warp warp(place, motion);
   for (std::size_t k = 0; k < patch.value.size(); ++k) {
     const float x = patch.x[k], y = patch.y[k];
-    const float value = interpolated(target, ux + xx * x + xy * y, uy + yx * x + yy * y);
+    const float value = interpolated(target, warp.x_of(x, y), warp.y_of(x, y));
     patch.target[k] = value;
     const float weighted = patch.weight[k] * value;
     sum += weighted;
@@ -164,20 +193,25 @@ Compared compared(Patch& patch, const Plane& target, Vec2 place, const Motion& m
   return result;
 }
 
-/// Σ w² s sᵀ r² / (1 − h): what the residual's scatter, pixel by pixel as it is (shot noise is largest on the beads,
-/// where the slopes are), does to the mismatch. h is the share of a pixel's own noise that the fit follows
-/// (MacKinnon & White, J Econometrics 29:305, 1985, estimator HC2).
-Mat6 spread_of_residual(const Patch& patch, const Mat6& inverse, const Compared& now) {
-  // Interpolation at a random place leaves 0.64 of the target's noise variance in the residual, but takes nothing from
-  // its slow part, which moves the answer: with equal noise in both images the residual shows (1 + 0.64) / 2 of it.
-  constexpr double kInterpolation = 2 / 1.64;
+/// Share of white noise's variance that the spline has left at a fraction t of the way between two pixels: within
+/// 0.002.
+float noise_left(float t) {
+  const float p = t * (1 - t);
+  return 1 - p * p * (3 + 3.7f * p);
+}
+
+/// Variance of a component of u, mean of both: H⁻¹ (Σ w² s sᵀ r² / (1 − h) + prior) H⁻¹. The residual's scatter r²
+/// counts pixel by pixel as it is (shot noise is largest on the beads, where the slopes are); h is the share of a
+/// pixel's own noise that the fit follows (MacKinnon & White, J Econometrics 29:305, 1985, estimator HC2).
+double variance_of(const Patch& patch, const Warp& warp, const Mat6& inverse, const Compared& now, double prior) {
   std::array<Slope, 6> single{};
   for (int a = 0; a < 6; ++a) {
     for (int b = 0; b < 6; ++b) single[a][b] = static_cast<float>(inverse(a, b));
   }
   const float per_weight = static_cast<float>(1 / patch.total_weight);
   const float per_power = static_cast<float>(1 / (patch.variance * patch.total_weight));
-  Products spread;
+  const float mean = static_cast<float>(now.mean), per_gain = static_cast<float>(1 / now.gain);
+  double sum = 0;
   for (std::size_t k = 0; k < patch.value.size(); ++k) {
     const Slope& slope = patch.slope[k];
     Slope solved{};
@@ -187,11 +221,15 @@ Mat6 spread_of_residual(const Patch& patch, const Mat6& inverse, const Compared&
     float followed = per_weight + per_power * patch.value[k] * patch.value[k];
     for (int a = 0; a < 6; ++a) followed += slope[a] * solved[a];
     const float own = std::min(0.9f, patch.weight[k] * followed);
-    const float residual = static_cast<float>((patch.target[k] - now.mean) / now.gain) - patch.value[k];
-    const float weighted = patch.weight[k] * residual;
-    spread.add(static_cast<float>(kInterpolation) * weighted * weighted / (1 - own), slope);
+    const float weighted = patch.weight[k] * ((patch.target[k] - mean) * per_gain - patch.value[k]);
+    // Interpolation takes from the target's noise, but nothing from its slow part, which moves the answer: of equal
+    // noise in both images the residual shows (1 + left) / 2.
+    const float x = warp.x_of(patch.x[k], patch.y[k]), y = warp.y_of(patch.x[k], patch.y[k]);
+    const float left = noise_left(x - std::floor(x)) * noise_left(y - std::floor(y));
+    sum += 2 / (1 + left) * weighted * weighted / (1 - own) * (solved[0] * solved[0] + solved[1] * solved[1]);
   }
-  return spread.matrix();
+  for (int a = 2; a < 6; ++a) sum += prior * (inverse(0, a) * inverse(0, a) + inverse(1, a) * inverse(1, a));
+  return 0.5 * sum;
 }
 
 /// x → W(V⁻¹(x)), with V(x) = x + step(x).
@@ -208,25 +246,59 @@ Vec6 gradient_difference(const Motion& a, const Motion& b) {
 
 }  // namespace
 
-Reference with_slopes(Plane plane) {
-  Reference result{plane, plane, plane};
-  for (int j = 0; j < plane.height; ++j) {
-    for (int i = 0; i < plane.width; ++i) {
-      const std::size_t k = static_cast<std::size_t>(j) * plane.width + i;
-      const int left = std::max(i - 1, 0), right = std::min(i + 1, plane.width - 1);
-      const int above = std::max(j - 1, 0), below = std::min(j + 1, plane.height - 1);
-      result.slope_x.values[k] = 0.5f * (plane.at(right, j) - plane.at(left, j));
-      result.slope_y.values[k] = 0.5f * (plane.at(i, below) - plane.at(i, above));
-    }
+Spline spline_through(const Plane& plane, int threads) {
+  const int width = plane.width, height = plane.height;
+  Plane inner = plane;
+  float* values = inner.values.data();
+  in_strips(width, threads, [&](int from, int to) { to_coefficients(values + from, width, height, to - from); });
+  in_strips(height, threads, [&](int from, int to) {
+    for (int j = from; j < to; ++j) to_coefficients(values + static_cast<std::size_t>(j) * width, 1, width, 1);
+  });
+  const auto mirrored = [](int k, int n) { return k < 0 ? -k : k >= n ? 2 * n - 2 - k : k; };
+  Spline result{.coefficients = {width + 3, height + 3, {}},
+                .last_x = static_cast<float>(width - 1),
+                .last_y = static_cast<float>(height - 1)};
+  std::vector<float>& padded = result.coefficients.values;
+  padded.resize(static_cast<std::size_t>(width + 3) * (height + 3));
+  for (int j = 0; j < height + 3; ++j) {
+    const float* from = inner.row(mirrored(j - 1, height));
+    float* to = padded.data() + static_cast<std::size_t>(j) * (width + 3);
+    std::copy(from, from + width, to + 1);
+    to[0] = from[1], to[width + 1] = from[width - 2], to[width + 2] = from[width - 3];
   }
   return result;
 }
 
-Registered registered(const Reference& reference, const Plane& target, Vec2 place, const Motion& guess,
+float value_at(const Spline& spline, Vec2 place) {
+  return interpolated(spline, static_cast<float>(place.x), static_cast<float>(place.y));
+}
+
+SmoothImage smooth_image(Plane plane, int threads) {
+  SmoothImage result;
+  result.spline = spline_through(plane, threads);
+  const Plane& c = result.spline.coefficients;
+  result.slope_x = result.slope_y = {plane.width, plane.height, std::vector<float>(plane.values.size())};
+  in_strips(plane.height, threads, [&](int from, int to) {
+    for (int j = from; j < to; ++j) {
+      const float *above = c.row(j), *here = c.row(j + 1), *below = c.row(j + 2);
+      const std::size_t first = static_cast<std::size_t>(j) * plane.width;
+      for (int i = 0; i < plane.width; ++i) {
+        const auto along = [&](const float* row) { return row[i + 2] - row[i]; };
+        const auto across = [&](int k) { return below[i + k] - above[i + k]; };
+        result.slope_x.values[first + i] = (along(above) + 4 * along(here) + along(below)) / 12;
+        result.slope_y.values[first + i] = (across(0) + 4 * across(1) + across(2)) / 12;
+      }
+    }
+  });
+  result.plane = std::move(plane);
+  return result;
+}
+
+Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,
                       const Window& window) {
   Registered result;
   result.motion = guess;
-  Patch patch = patch_around(reference, place, window.sigma);
+  Patch patch = patch_around(reference, place, window);
   complete(patch);
   if (!(patch.variance > 0)) return result;
   Mat6 prior;
@@ -244,17 +316,15 @@ Registered registered(const Reference& reference, const Plane& target, Vec2 plac
     const double share = shift > 1 ? 1 / shift : 1;  // a slope tells nothing beyond a bead's flank
     result.motion = composed(result.motion, share * change);
     if (!is_finite(result.motion.u) || std::abs(result.motion.u.x - guess.u.x) > 50) return result;
-    constexpr double kSettled = 2e-3;  // px, a tenth of the best standard errors
-    if (shift < kSettled) {
+    if (shift < window.settled_px) {
       result.is_converged = true;
       break;
     }
   }
-  now = compared(patch, target, place, result.motion);
   result.similarity = now.similarity;
-  const Mat6 covariance =
-      inverse * (spread_of_residual(patch, inverse, now) + prior * (window.noise * window.noise)) * inverse;
-  result.sigma_px = std::sqrt(std::max(0.0, 0.5 * (covariance(0, 0) + covariance(1, 1))));
+  result.gain = now.gain;
+  result.sigma_px = std::sqrt(std::max(
+      0.0, variance_of(patch, Warp(place, result.motion), inverse, now, stiffness * window.noise * window.noise)));
   return result;
 }
 

@@ -14,23 +14,37 @@ struct Motion {
   }
 };
 
-/// The image that stays, with its slopes.
-struct Reference {
-  Plane plane, slope_x, slope_y;
+/// The cubic spline through an image's values.
+struct Spline {
+  Plane coefficients;  ///< with a margin of one before and two after, mirrored
+  float last_x = 0, last_y = 0;
 };
-Reference with_slopes(Plane plane);
+
+Spline spline_through(const Plane& plane, int threads);
+/// Beyond the border the last pixel goes on.
+float value_at(const Spline& spline, Vec2 place);
+
+/// An image as a smooth function: its values and slopes at the pixels, and the spline between them.
+struct SmoothImage {
+  Plane plane, slope_x, slope_y;
+  Spline spline;
+};
+SmoothImage smooth_image(Plane plane, int threads);
 
 struct Window {
   double sigma = 4;          ///< px, of its Gaussian weight
   double gradient_sd = 0.2;  ///< how far the gradient may be from the expected one (prior standard deviation)
   double noise = 1;          ///< standard deviation of the difference of two pixels, to weigh the prior with
   int max_steps = 15;
+  bool is_thinned = false;   ///< every other pixel, as on a chessboard: enough to find what is measured later
+  double settled_px = 2e-3;  ///< the last step: a tenth of the best standard errors
 };
 
 struct Registered {
   Motion motion;           ///< at the bead
   double sigma_px = 0;     ///< standard error of a component of u
   double similarity = -1;  ///< weighted correlation of the two windows
+  double gain = 0;         ///< of the target's light over the reference's
   bool is_converged = false;
 };
 
@@ -41,7 +55,7 @@ struct Registered {
 /// inverse-compositional Gauss–Newton steps: slopes and normal matrix come from the reference and stay. Gain and
 /// offset are projected out. The standard error is that of a weighted fit with the window's own residual:
 /// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹.
-Registered registered(const Reference& reference, const Plane& target, Vec2 place, const Motion& guess,
+Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,
                       const Window& window);
 
 }  // namespace mbtfm::segment

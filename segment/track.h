@@ -1,6 +1,7 @@
 /// Displacement of the substrate from two images of its beads: pulled by the cell, and relaxed.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <vector>
 
@@ -14,12 +15,18 @@ namespace mbtfm::segment {
 struct TrackParameters {
   std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
   int stressed_page = 1;                ///< counted from 1, as ImageJ shows them
+  int last_stressed_page = 0;           ///< 0: the first one only
   int relaxed_page = 1;
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
+  std::string drift = "translation";   ///< a stage drifts; a dish put back on it is turned, too
   double far_field_share = 0.12;       ///< of the image's side: the frame that is taken for far from the cell
   double least_similarity = 0.6;       ///< correlation of a bead's neighbourhoods below which it is no match
   double outlier_threshold = 4;        ///< in robust sd: 4 rejects one good bead in 16 000
+  // a displacement field from elsewhere
+  std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
+  std::string sigma_column = "sigma_um";  ///< need not be there
+  std::string length_unit = "um";
 };
 void declare(ParameterList& list, TrackParameters& parameters);
 
@@ -38,28 +45,50 @@ std::vector<DetectedBead> detect_beads(const Image& image, double detection_snr 
 
 struct Tracking {
   DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
-  Vec2 drift_um;                ///< of the stressed image as a whole; taken off the field
+  Vec2 drift_um;                ///< of the stressed image's centre; the drift is taken off the field
+  double turn_rad = 0;          ///< of the stressed image as a whole, from +x towards +y; taken off as `drift` says
+  double growth = 0;            ///< relative; the same
   double far_field_rms_um = 0;  ///< of a displacement component in the frame, after the drift is taken off
+  double noise_um = 0;          ///< the same as robust standard deviation, less the cell's tail
   double bead_sigma_um = 0;     ///< of a bead's picture
-  bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is the mean of all beads
+  bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is that of all beads
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   int n_good = 0;
   int n_beads_stressed = 0;  ///< found in the stressed image
 };
 
-/// Displacement of each bead of `relaxed`.
-///
-/// 1. Windows of both images are cross-correlated on a grid, coarse to fine (drift: phase correlation).
-/// 2. Around each bead the stressed image is registered to the relaxed one by an affine map with free gain and offset
-///    (inverse-compositional Gauss–Newton: Baker & Matthews, IJCV 56:221, 2004), from the grid's prediction, and, where
-///    that fails, from that of the beads already tracked nearby or from the stressed image's unclaimed beads.
-/// 3. Each is registered backwards, compared with its neighbours (Westerweel & Scarano, Exp Fluids 39:1096, 2005) and
-///    flagged where it fails.
-/// 4. The window is chosen for each bead: the widest whose result agrees with all narrower ones within their errors
-///    (intersection of confidence intervals: Goldenshluger & Nemirovski, Math Methods Statist 6:135, 1997).
-///
-/// Neighbouring beads share pixels of their windows: their errors are correlated over about two bead diameters.
-/// @throws InvalidData where an image shows no beads or the sizes differ
+struct Side;
+
+/// The beads of the relaxed image, found once, for any number of stressed ones.
+class RelaxedBeads {
+ public:
+  /// @throws InvalidData where the image shows no beads
+  RelaxedBeads(const Image& relaxed, const TrackParameters& parameters, int threads);
+
+  /// Displacement of each bead of the relaxed image.
+  ///
+  /// 1. Windows of both images are cross-correlated on a grid, coarse to fine (drift: phase correlation; before that,
+  ///    where `drift` allows for it, the stressed image is turned back).
+  /// 2. Around each bead the stressed image is registered to the relaxed one by an affine map with free gain and offset
+  ///    (inverse-compositional Gauss–Newton: Baker & Matthews, IJCV 56:221, 2004), from the grid's prediction, and,
+  ///    where that fails, from that of the beads already tracked nearby or from the stressed image's beads there; then
+  ///    once more in a window of the bead's own size, which no neighbour and no steepness spoils.
+  /// 3. Each is registered backwards, compared with its neighbours (Westerweel & Scarano, Exp Fluids 39:1096, 2005) and
+  ///    flagged where it fails: `no partner`, `ambiguous` (does not come back, goes where another bead goes), `edge`,
+  ///    `neighbours disagree`.
+  /// 4. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
+  ///
+  /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
+  /// @throws InvalidData where the stressed image shows no beads, others than the relaxed one, or the sizes differ
+  Tracking track(const Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
+
+ private:
+  std::shared_ptr<const Side> side_;
+  TrackParameters parameters_;
+  int threads_;
+};
+
+/// Both at once.
 Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_size_um,
                      const TrackParameters& parameters = {}, int threads = 1, const Progress& progress = {});
 

@@ -1,17 +1,26 @@
+#include <algorithm>
 #include <cmath>
+#include <cstdio>
+#include <numbers>
 #include <opencv2/core/utility.hpp>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
 #include "segment/channels.h"
+#include "segment/given_field.h"
 #include "segment/track.h"
 
 namespace mbtfm::segment {
 namespace {
 
-void write_field(StageContext& context, const DisplacementField& field) {
-  write_displacement(context.output("out", "displacement.csv"), field);
+namespace fs = std::filesystem;
+
+constexpr double kRadian_deg = 180 / std::numbers::pi;
+
+void write_field(StageContext& context, const DisplacementField& field, const std::string& name) {
+  write_displacement(context.output("out", name + ".csv"), field);
   std::vector<Vec2> points;
   PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
   PointArray sigma{.name = "sigma_um", .scalars = {}, .vectors = {}};
@@ -22,53 +31,154 @@ void write_field(StageContext& context, const DisplacementField& field) {
     sigma.scalars.push_back(bead.sigma_um);
     is_good.scalars.push_back(bead.flag.empty() ? 1 : 0);
   }
-  write_points_vtp(context.output("out", "displacement.vtp"), points, {displacement, sigma, is_good});
+  write_points_vtp(context.output("out", name + ".vtp"), points, {displacement, sigma, is_good});
+}
+
+struct FieldFigures {
+  std::int64_t n_good = 0;
+  double largest_um = 0, sigma_um = 0;
+};
+
+FieldFigures figures_of(const DisplacementField& field) {
+  FieldFigures result;
+  double squares = 0;
+  for (const Bead& bead : field) {
+    if (!bead.flag.empty()) continue;
+    ++result.n_good;
+    result.largest_um = std::max(result.largest_um, norm(bead.displacement_um));
+    squares += bead.sigma_um * bead.sigma_um;
+  }
+  result.sigma_um = std::sqrt(squares / static_cast<double>(std::max<std::int64_t>(1, result.n_good)));
+  return result;
+}
+
+/// Figures and the last line that any field has, tracked or given.
+StageReport report_of(const DisplacementField& field) {
+  const FieldFigures figures = figures_of(field);
+  const auto n_flagged = static_cast<std::int64_t>(field.size()) - figures.n_good;
+  StageReport report;
+  report.figures = {{"n_beads", static_cast<std::int64_t>(field.size())},
+                    {"n_tracked", figures.n_good},
+                    {"largest_displacement_um", figures.largest_um},
+                    {"sigma_um", figures.sigma_um},
+                    {"outwardness", outwardness(field)}};
+  if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged in displacement.csv";
+  // a contracting cell has -0.7 or so; a layer of cells about 0
+  if (outwardness(field) > 0.3) {
+    report.summary += "; WARNING: the gel is pushed outward everywhere: are stressed and relaxed swapped?";
+  }
+  return report;
 }
 
 StageReport report_of(const Tracking& tracking, double pixel_size_um) {
+  StageReport report = report_of(tracking.field);
+  report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(tracking.field.size()) + " beads tracked" +
+                   report.summary;
+  const Figures more = {{"pixel_size_um", pixel_size_um},
+                        {"n_beads_stressed", static_cast<std::int64_t>(tracking.n_beads_stressed)},
+                        {"bead_sigma_um", tracking.bead_sigma_um},
+                        {"drift_x_um", tracking.drift_um.x},
+                        {"drift_y_um", tracking.drift_um.y},
+                        {"turn_deg", tracking.turn_rad * kRadian_deg},
+                        {"growth", tracking.growth},
+                        {"has_far_field", tracking.has_far_field},
+                        {"far_field_residual_um", tracking.far_field_rms_um},
+                        {"noise_um", tracking.noise_um},
+                        {"scatter_um", tracking.scatter_um}};
+  report.figures.insert(report.figures.end(), more.begin(), more.end());
+  return report;
+}
+
+/// A stressed image: a page of a file.
+struct Frame {
+  fs::path file;
+  int page = 1;
+  std::string name() const { return file.string() + (page > 1 ? ", page " + std::to_string(page) : ""); }
+};
+
+/// The images of a folder in the order of their names, or the pages of a file.
+std::vector<Frame> frames_of(StageContext& context, const TrackParameters& parameters) {
+  const fs::path& given = context.inputs_.at("stressed");
+  std::vector<Frame> frames;
+  if (!fs::is_directory(given)) {
+    const int last = std::max(parameters.stressed_page, parameters.last_stressed_page);
+    for (int page = parameters.stressed_page; page <= last; ++page) frames.push_back({context.input("stressed"), page});
+    return frames;
+  }
+  std::vector<std::string> names;
+  for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
+    const std::string extension = entry.path().extension().string();
+    if (extension == ".tif" || extension == ".tiff" || extension == ".png") {
+      names.push_back(entry.path().filename().string());
+    }
+  }
+  if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png)", "none");
+  std::sort(names.begin(), names.end());
+  context.input("stressed", names);
+  for (const std::string& name : names) frames.push_back({given / name, parameters.stressed_page});
+  return frames;
+}
+
+StageReport track(const TrackParameters& parameters, StageContext& context) {
+  const std::vector<Frame> frames = frames_of(context, parameters);
+  const fs::path relaxed_file = context.input("relaxed");
+  const Channel relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_page - 1)};
+  CsvText list(
+      {"frame", "image", "n_tracked", "drift_x_um", "drift_y_um", "turn_deg", "noise_um", "largest_displacement_um"});
   StageReport report;
-  double largest_um = 0, squares = 0;
-  for (const Bead& bead : tracking.field) {
-    if (!bead.flag.empty()) continue;
-    largest_um = std::max(largest_um, norm(bead.displacement_um));
-    squares += bead.sigma_um * bead.sigma_um;
+  std::optional<RelaxedBeads> beads;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const Channel stressed{frames[k].name(), read_image(frames[k].file, frames[k].page - 1)};
+    require_equal_sizes(relaxed, stressed);
+    const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
+    const double n = static_cast<double>(frames.size());
+    const Progress progress = [&](double fraction, std::string_view what) {
+      context.progress((static_cast<double>(k) + fraction) / n, what);
+    };
+    Tracking tracking;
+    try {
+      if (!beads) beads.emplace(relaxed.image, parameters, context.threads);
+      tracking = beads->track(stressed.image, pixel_size_um, progress);
+    } catch (const InvalidData& error) {
+      throw InputError(relaxed.name + ", " + stressed.name + ": " + error.element, error.expected, error.found,
+                       "are these the bead channels of one place, in focus? Check the pages, detection_snr, and where "
+                       "one may be turned against the other, drift = rotation");
+    }
+    if (k == 0) {
+      write_field(context, tracking.field, "displacement");
+      report = report_of(tracking, pixel_size_um);
+    }
+    if (frames.size() == 1) return report;
+    char number[16];
+    std::snprintf(number, sizeof number, "_%04zu", k + 1);
+    write_field(context, tracking.field, "displacement" + std::string(number));
+    list.add(static_cast<int>(k + 1)).add(stressed.name).add(tracking.n_good).add(tracking.drift_um.x);
+    list.add(tracking.drift_um.y).add(tracking.turn_rad * kRadian_deg).add(tracking.noise_um);
+    list.add(figures_of(tracking.field).largest_um).end_row();
   }
-  const auto n_beads = static_cast<std::int64_t>(tracking.field.size());
-  report.figures = {{"pixel_size_um", pixel_size_um},
-                    {"n_beads", n_beads},
-                    {"n_beads_stressed", static_cast<std::int64_t>(tracking.n_beads_stressed)},
-                    {"n_tracked", static_cast<std::int64_t>(tracking.n_good)},
-                    {"bead_sigma_um", tracking.bead_sigma_um},
-                    {"drift_x_um", tracking.drift_um.x},
-                    {"drift_y_um", tracking.drift_um.y},
-                    {"has_far_field", tracking.has_far_field},
-                    {"far_field_residual_um", tracking.far_field_rms_um},
-                    {"scatter_um", tracking.scatter_um},
-                    {"largest_displacement_um", largest_um},
-                    {"sigma_um", std::sqrt(squares / std::max(1, tracking.n_good))}};
-  report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(n_beads) + " beads tracked";
-  if (n_beads > tracking.n_good) {
-    report.summary += "; " + std::to_string(n_beads - tracking.n_good) + " flagged in displacement.csv";
-  }
+  write_text(context.output("out", "frames.csv"), list.str());
+  report.figures.emplace_back("n_frames", static_cast<std::int64_t>(frames.size()));
+  report.summary = std::to_string(frames.size()) + " frames; the first: " + report.summary;
   return report;
 }
 
 StageReport run(const TrackParameters& parameters, StageContext& context) {
   cv::setNumThreads(context.threads);
-  const auto stressed_file = context.input("stressed"), relaxed_file = context.input("relaxed");
-  const Channel stressed{stressed_file.string(), read_image(stressed_file, parameters.stressed_page - 1)};
-  const Channel relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_page - 1)};
-  require_equal_sizes(relaxed, stressed);
-  const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
-  try {
-    const Tracking tracking =
-        track_beads(relaxed.image, stressed.image, pixel_size_um, parameters, context.threads, context.progress);
-    write_field(context, tracking.field);
-    return report_of(tracking, pixel_size_um);
-  } catch (const InvalidData& error) {
-    throw InputError(relaxed.name + ", " + stressed.name + ": " + error.element, error.expected, error.found,
-                     "are these the bead channels, in focus? Check the pages and detection_snr");
+  const bool has_images = context.has_input("stressed") || context.has_input("relaxed");
+  if (context.has_input("displacement")) {
+    if (has_images) throw UsageError("--displacement and bead images exclude each other");
+    const DisplacementField field = read_given_field(context.input("displacement"), parameters);
+    write_field(context, field, "displacement");
+    StageReport report = report_of(field);
+    report.summary = std::to_string(field.size()) + " displacements read" + report.summary;
+    return report;
   }
+  for (const char* name : {"stressed", "relaxed"}) {
+    if (!context.has_input(name)) {
+      throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
+    }
+  }
+  return track(parameters, context);
 }
 
 }  // namespace
@@ -76,11 +186,14 @@ StageReport run(const TrackParameters& parameters, StageContext& context) {
 
 int main(int argc, char** argv) {
   using mbtfm::FileArgument;
+  using Kind = FileArgument::Kind;
   return mbtfm::run_stage<mbtfm::segment::TrackParameters>(
       {.name = "track",
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
-       .files = {{"stressed", FileArgument::Kind::input, "beads while the cell pulls (TIFF or PNG)"},
-                 {"relaxed", FileArgument::Kind::input, "beads after the cell is removed (TIFF or PNG)"},
-                 {"out", FileArgument::Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
+       .files = {{"stressed", Kind::optional_input,
+                  "beads while the cell pulls (TIFF or PNG); a folder of them: a time series"},
+                 {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF or PNG)"},
+                 {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
+                 {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
       argc, argv, mbtfm::segment::run);
 }

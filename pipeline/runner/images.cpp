@@ -18,6 +18,8 @@ void declare(ParameterList& list, ImageNames& names) {
   list.add("outline_roi", names.outline_roi, "ImageJ area used as the cell's outline, where the file is there");
   list.add("adhesion_rois", names.adhesion_rois, "ImageJ areas used as adhesions, where the file is there");
   list.add("fibre_rois", names.fibre_rois, "ImageJ lines used as fibres, where the file is there");
+  list.add("displacement", names.displacement,
+           "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]");
 }
 
 const std::string& name_of_image(const ImageNames& names, const std::string& key) {
@@ -25,10 +27,16 @@ const std::string& name_of_image(const ImageNames& names, const std::string& key
   if (key == "actin") return names.actin;
   if (key == "beads_stressed") return names.beads_stressed;
   if (key == "beads_relaxed") return names.beads_relaxed;
+  if (key == "displacement") return names.displacement;
   if (key == "outline_roi") return names.outline_roi;
   if (key == "adhesion_rois") return names.adhesion_rois;
   MBTFM_ASSERT(key == "fibre_rois");
   return names.fibre_rois;
+}
+
+std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
+  if (stage.name != "track" || names.displacement.empty()) return stage.images;
+  return {{"displacement", "displacement"}};
 }
 
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/parameters.h"
+#include "pipeline/runner/stages.h"
 
 namespace mbtfm::runner {
 
@@ -16,6 +17,7 @@ struct ImageNames {
   std::string actin = "actin.tif";
   std::string beads_stressed = "beads_stressed.tif";
   std::string beads_relaxed = "beads_relaxed.tif";
+  std::string displacement;  ///< a field from another program, instead of the beads' images
   // drawn by hand in ImageJ, used where they are there
   std::string outline_roi = "outline.roi|outline.zip";
   std::string adhesion_rois = "adhesions.zip|adhesions.roi";
@@ -25,6 +27,9 @@ void declare(ParameterList& list, ImageNames& names);
 
 /// The name or glob of a key of [images]. @throws InternalError for any other key
 const std::string& name_of_image(const ImageNames& names, const std::string& key);
+
+/// The inputs of a stage: its images, or, for tracking, the displacement field that is given instead.
+std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names);
 
 struct ImageMatch {
   std::vector<std::filesystem::path> files;  ///< in alphabetical order

@@ -123,7 +123,7 @@ std::vector<std::string> files_of(const std::vector<ImageInput>& inputs, const f
 }  // namespace
 
 std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, const ImageNames& images) {
-  std::vector<std::string> names = files_of(stage.images, cell, images);
+  std::vector<std::string> names = files_of(images_of(stage, images), cell, images);
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
   return names;
@@ -157,7 +157,7 @@ StageSurroundings surroundings_of(const Stage& stage, const fs::path& cell, cons
           .settings = settings_of(stage, cell / "cell.toml"),
           .inputs = hash_files(cell, inputs_of(stage, cell, images)),
           .outputs = hash_files(cell, outputs),
-          .has_images = !files_of(stage.images, cell, images).empty()};
+          .has_images = !files_of(images_of(stage, images), cell, images).empty()};
 }
 
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now) {

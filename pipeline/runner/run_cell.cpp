@@ -30,7 +30,8 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     command.push_back("--" + flag);
     command.push_back(value);
   };
-  for (const ImageInput& image : stage.images) add(image.flag, resolve_image(cell, images, image.key).string());
+  for (const ImageInput& image : images_of(stage, images))
+    add(image.flag, resolve_image(cell, images, image.key).string());
   for (const ImageInput& image : stage.optional_images) {
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
   }
@@ -82,7 +83,7 @@ void CellRun::check_before_start() const {
     });
     if (now.state != StageState::must_run && !(follows && now.state == StageState::up_to_date)) continue;
     changed.push_back(stage.folder);
-    for (const ImageInput& image : stage.images) resolve_image(cell_, images_, image.key);
+    for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image.key);
     for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
     const ProcessResult check =
         run_process({executable_of(stage, options_), "--check", "--config", (cell_ / "cell.toml").string()});

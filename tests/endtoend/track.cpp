@@ -4,6 +4,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/files.h"
 #include "segment/image.h"
 #include "tests/support/bead_pair.h"
@@ -47,6 +48,45 @@ TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
   EXPECT_GT(field.size(), 150u);
   for (const Bead& bead : field) EXPECT_LE(std::max(bead.position_um.x, bead.position_um.y), 128 * 0.2);
   EXPECT_TRUE(std::filesystem::exists(folder / "out/displacement.vtp"));
+}
+
+TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
+  const test::TemporaryFolder folder;
+  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
+  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});  // of the same beads
+  write(folder / "r.tif", one.relaxed, 0.2);
+  std::filesystem::create_directory(folder / "frames");
+  write(folder / "frames/a.tif", one.stressed, 0.2);
+  write(folder / "frames/b.tif", two.stressed, 0.2);
+  const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
+  ASSERT_EQ(ended.code, 0) << ended.said;
+  const CsvTable frames(folder / "out/frames.csv");
+  ASSERT_EQ(frames.n_rows(), 2);
+  EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
+  EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
+  const auto first = read_displacement(folder / "out/displacement_0001.csv");
+  EXPECT_EQ(first.size(), read_displacement(folder / "out/displacement_0002.csv").size());
+  EXPECT_EQ(read_text(folder / "out/displacement.csv"), read_text(folder / "out/displacement_0001.csv"));
+}
+
+TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "piv.csv", "x,y,u,v\n0,0,1,0\n10,0,1,0\n0,10,1,0\n10,10,NaN,0\n");
+  const std::string out = " --out " + (folder / "out").string();
+  const std::string given = "--displacement " + (folder / "piv.csv").string() + out;
+  const std::string columns = " --x_column x --y_column y --ux_column u --uy_column v";
+  const Ended ended = run_track(folder, given + columns + " --length_unit px --pixel_size_um 0.5");
+  ASSERT_EQ(ended.code, 0) << ended.said;
+  EXPECT_NE(ended.said.find("1 flagged"), std::string::npos) << ended.said;
+  const DisplacementField field = read_displacement(folder / "out/displacement.csv");
+  ASSERT_EQ(field.size(), 4u);
+  EXPECT_EQ(field[1].position_um, (Vec2{5.25, 0.25}));
+  EXPECT_EQ(field[1].displacement_um, (Vec2{0.5, 0}));
+  EXPECT_EQ(field[3].flag, "not a number");
+  EXPECT_EQ(run_track(folder, given).code, 3);                                                  // other columns
+  EXPECT_EQ(run_track(folder, given + columns + " --length_unit px").code, 2);                  // of which size?
+  EXPECT_EQ(run_track(folder, given + " --relaxed " + (folder / "piv.csv").string()).code, 2);  // which of them?
+  EXPECT_EQ(run_track(folder, out).code, 2);
 }
 
 TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {

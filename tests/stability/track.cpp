@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
+#include "segment/given_field.h"
 #include "segment/track.h"
 #include "tests/support/bead_pair.h"
 
@@ -42,16 +43,9 @@ TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
   EXPECT_LE(share_wrong(of_faint, peaks, 1.0), 0.01);
 }
 
-TEST(TrackStability, two_pictures_of_different_beads_give_no_field) {
-  const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 1});
-  const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
-  const Tracking tracking = track_beads(one.relaxed, other.stressed, 1.0, {}, 2);
-  EXPECT_LE(tracking.n_good, 0.05 * static_cast<double>(tracking.field.size()));
-}
-
-std::string what_is_wrong(const Image& relaxed, const Image& stressed) {
+std::string what_is_wrong(const Image& relaxed, const Image& stressed, const TrackParameters& parameters = {}) {
   try {
-    track_beads(relaxed, stressed, 1.0);
+    track_beads(relaxed, stressed, 1.0, parameters);
   } catch (const InvalidData& error) {
     return error.what();
   }
@@ -69,6 +63,42 @@ TEST(TrackStability, images_without_beads_are_refused) {
   EXPECT_EQ(what_is_wrong(pair.relaxed, constant), stressed);
   EXPECT_EQ(what_is_wrong(constant, constant), relaxed);
   EXPECT_EQ(what_is_wrong(noise.relaxed, noise.stressed), relaxed);
+}
+
+TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_give_no_field) {
+  const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .turn_rad = 0.17, .seed = 1});
+  const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
+  const std::string refused = "the stressed image: expected the beads of the relaxed image, displaced, found ";
+  EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed).substr(0, refused.size()), refused);
+  EXPECT_NE(what_is_wrong(one.relaxed, one.stressed), "nothing");
+  const auto little = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .turn_rad = 0.02, .seed = 1});
+  EXPECT_NE(what_is_wrong(little.relaxed, little.stressed).find("(drift = translation), found one turned by 1.1"),
+            std::string::npos);
+  for (const char* drift : {"rotation", "similarity"}) {
+    TrackParameters parameters;
+    parameters.drift = drift;
+    EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed, parameters).substr(0, refused.size()), refused);
+    EXPECT_EQ(what_is_wrong(one.relaxed, one.stressed, parameters), "nothing");
+  }
+}
+
+TEST(TrackStability, one_bead_and_a_pixel_without_a_number_are_refused) {
+  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
+  Image one = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
+  EXPECT_NE(what_is_wrong(pair.relaxed, one), "nothing");
+  EXPECT_NE(what_is_wrong(one, one), "nothing");
+  Image broken = pair.stressed;
+  broken.at(6, 11) = std::numeric_limits<float>::quiet_NaN();
+  EXPECT_EQ(what_is_wrong(pair.relaxed, broken),
+            "the stressed image: expected a number in every pixel, found none at column 7, row 12");
+}
+
+TEST(TrackStability, a_field_of_swapped_images_points_outward) {
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 2950});
+  EXPECT_LT(outwardness(track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2).field), -0.5);
+  EXPECT_GT(outwardness(track_beads(pair.stressed, pair.relaxed, 1.0, {}, 2).field), 0.5);
 }
 
 TEST(TrackStability, images_of_different_sizes_are_refused) {

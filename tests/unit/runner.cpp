@@ -161,6 +161,16 @@ TEST_F(Runner, keeps_outputs_whose_images_were_moved_away) {
   EXPECT_EQ(started(), "");
 }
 
+TEST_F(Runner, takes_a_displacement_field_instead_of_the_beads_images) {
+  for (const char* image : {"beads_stressed.tif", "beads_relaxed.tif"}) fs::remove(cell_ / image);
+  write_text(cell_ / "piv.csv", "x");
+  write_parameters("[images]\ndisplacement = \"piv.csv\"\n");
+  EXPECT_EQ(started(), "fit network segment track");
+  EXPECT_EQ(started(), "");
+  write_text(cell_ / "piv.csv", "y");
+  EXPECT_EQ(started(), "fit track");
+}
+
 TEST_F(Runner, rejects_a_half_given_stage) {
   fs::create_directories(cell_ / "1_segment");
   write_text(cell_ / "1_segment/adhesions.csv", "given");

@@ -1,0 +1,27 @@
+/// Inside of the bead tracker: where each bead has gone, and whether that can be.
+#pragma once
+
+#include "segment/coarse_field.h"
+#include "segment/scene.h"
+
+namespace mbtfm::segment {
+
+/// With the wide window chance finds one bead in twenty of unrelated pictures "again", of related ones most.
+/// @throws InvalidData where it is less than one in five
+void require_common_beads(int n_found, int n_beads);
+
+/// Find the beads with the wide window: from the grid's prediction, then, where that fails, from the motion of the
+/// beads already tracked around, again and again.
+/// @throws InvalidData where the two images do not show the same beads
+std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
+
+/// Flag tracks that contradict those around them "neighbours disagree"; how many.
+int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks);
+
+/// Measure each bead with the narrow window; flag what is less similar than the picture's noise explains.
+void measure(const Scene& scene, double least_similarity, std::vector<Track>& tracks);
+
+/// Registered from where it went, a bead must come back to where it was; no two beads go to one place.
+void verify(const Scene& scene, std::vector<Track>& tracks);
+
+}  // namespace mbtfm::segment

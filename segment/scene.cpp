@@ -1,0 +1,68 @@
+#include "segment/scene.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "segment/beads.h"
+
+namespace mbtfm::segment {
+
+Side side_of(const Image& image, double bead_sigma, double detection_snr, const char* which, int threads) {
+  const InvalidData no_beads(std::string("the ") + which + " image", "bright beads on a darker ground", "none");
+  if (!(bead_sigma > 0)) throw no_beads;
+  Side side;
+  side.bead_sigma = bead_sigma;
+  side.image = smooth_image(without_background(image, background_sigma(bead_sigma)), threads);
+  side.noise = noise_of(side.image.plane);
+  side.beads = find_spots(side.image.plane, bead_sigma, side.noise, detection_snr, threads);
+  constexpr std::size_t kFewest = 8;  // an affine map and a scatter about it take six beads
+  if (side.beads.empty()) throw no_beads;
+  if (side.beads.size() < kFewest) {
+    throw InvalidData(no_beads.element, std::to_string(kFewest) + " beads at least", std::to_string(side.beads.size()));
+  }
+  for (const DetectedBead& bead : side.beads) side.positions.push_back(bead.position_px);
+  const double n_beads = static_cast<double>(side.beads.size());
+  side.spacing = std::sqrt(image.width * static_cast<double>(image.height) / n_beads);
+  side.neighbours = Neighbours(side.positions, std::max(4.0, side.spacing));
+  return side;
+}
+
+Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads) {
+  Scene scene{.relaxed = std::move(relaxed), .stressed = std::move(stressed), .wide = {}, .narrow = {}};
+  scene.threads = threads;
+  const double noise = std::hypot(scene.relaxed->noise, scene.stressed.noise);
+  // A Gaussian weight of sigma s weighs the area 4 pi s²: three beads in it.
+  const double three_beads = scene.spacing() * std::sqrt(0.75 / std::numbers::pi);
+  scene.wide = {.sigma = std::clamp(three_beads, 3.5 * scene.bead_sigma(), 5 * scene.bead_sigma()),
+                .gradient_sd = 0.3,
+                .noise = 2 * noise,
+                .max_steps = 15,
+                .is_thinned = scene.bead_sigma() > 1.2,  // a chessboard, 1.4 px apart, does not see smaller beads whole
+                .settled_px = 0.02};
+  // 1.6 bead sigmas: four fifths of what a bead's flanks tell of its place, and little of its neighbours'
+  scene.narrow = {
+      .sigma = 1.6 * scene.bead_sigma(), .gradient_sd = 0.15, .noise = 2 * noise, .max_steps = 15, .settled_px = 2e-3};
+  return scene;
+}
+
+std::vector<int> good_around(const Scene& scene, const std::vector<Track>& tracks, int bead, int n, double gap) {
+  const Vec2 place = scene.position(bead);
+  std::vector<int> result;
+  for (const int k : scene.relaxed->neighbours.within(place, 3.5 * scene.spacing(), 3 * n)) {
+    if (k == bead || !tracks[k].is_good() || static_cast<int>(result.size()) >= n) continue;
+    if (gap > 0 && norm(scene.position(k) - place) < gap) continue;
+    result.push_back(k);
+  }
+  return result;
+}
+
+std::vector<Motion> motions_of(const std::vector<Track>& tracks) {
+  std::vector<Motion> result;
+  result.reserve(tracks.size());
+  for (const Track& track : tracks) result.push_back(track.found.motion);
+  return result;
+}
+
+}  // namespace mbtfm::segment

@@ -1,0 +1,150 @@
+/// Images that others took or made, where ../shared is at hand.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <numbers>
+#include <sstream>
+
+#include "pipeline/contract/errors.h"
+#include "segment/track.h"
+
+namespace mbtfm::segment {
+namespace {
+
+const std::filesystem::path kBeads = MBTFM_SOURCE_DIR "/../shared/data/beads";
+
+/// Rows of four numbers, separated by commas or blanks; a header is skipped.
+std::vector<std::array<double, 4>> rows_of_four(const std::filesystem::path& file) {
+  std::ifstream in(file);
+  std::vector<std::array<double, 4>> rows;
+  for (std::string line; std::getline(in, line);) {
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream text(line);
+    std::array<double, 4> row;
+    if (text >> row[0] >> row[1] >> row[2] >> row[3]) rows.push_back(row);
+  }
+  return rows;
+}
+
+/// Image correlation over a window of 32 px sees what most of its beads do: the mode of their displacements, as wide
+/// as the correlation of two beads.
+Vec2 as_correlation_sees(const Tracking& tracking, Vec2 place) {
+  constexpr double kWindow = 10;  // px: about the standard deviation of a square of 32
+  Vec2 mode;
+  for (int step = 0; step < 30; ++step) {
+    const double width = step < 3 ? 4 : std::sqrt(2.0) * tracking.bead_sigma_um;
+    double weights = 0;
+    Vec2 sum;
+    for (const Bead& bead : tracking.field) {
+      if (!bead.flag.empty()) continue;
+      const Vec2 u = bead.displacement_um + tracking.drift_um, apart = u - mode;
+      const Vec2 d = bead.position_um - Vec2{0.5, 0.5} - place;
+      const double weight = std::exp(-dot(d, d) / (2 * kWindow * kWindow) - dot(apart, apart) / (2 * width * width));
+      weights += weight;
+      sum += weight * u;
+    }
+    mode = (1 / weights) * sum;
+  }
+  return mode;
+}
+
+struct Agreement {
+  double median_px = 0, correlation = 0;
+};
+
+Agreement agreement(const Tracking& tracking, const std::vector<std::array<double, 4>>& reference) {
+  std::vector<double> apart;
+  std::vector<Vec2> ours, theirs;
+  Vec2 our_mean, their_mean;
+  for (const auto& row : reference) {
+    ours.push_back(as_correlation_sees(tracking, {row[0], row[1]}));
+    theirs.push_back({row[2], row[3]});
+    apart.push_back(norm(ours.back() - theirs.back()));
+    our_mean += (1.0 / static_cast<double>(reference.size())) * ours.back();
+    their_mean += (1.0 / static_cast<double>(reference.size())) * theirs.back();
+  }
+  double both = 0, our = 0, their = 0;
+  for (std::size_t k = 0; k < ours.size(); ++k) {
+    const Vec2 a = ours[k] - our_mean, b = theirs[k] - their_mean;
+    both += dot(a, b), our += dot(a, a), their += dot(b, b);
+  }
+  std::nth_element(apart.begin(), apart.begin() + apart.size() / 2, apart.end());
+  return {apart[apart.size() / 2], both / std::sqrt(our * their)};
+}
+
+TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
+  const auto folder = kBeads / "mdck_pdms_bism";
+  if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
+  for (const int frame : {1, 2}) {
+    SCOPED_TRACE(frame);
+    const auto image = [&](int k) { return read_image(folder / "forPIV" / ("000" + std::to_string(k) + ".tif")); };
+    const Tracking tracking = track_beads(image(2 * frame - 2), image(2 * frame - 1), 1.0, {}, 2);
+    const auto piv = rows_of_four(folder / "reference" / ("PIV" + std::to_string(frame) + ".txt"));
+    const Agreement found = agreement(tracking, piv);
+    RecordProperty("median_px_" + std::to_string(frame), std::to_string(found.median_px));
+    // What a field means over a window is a matter of the window where it turns within it: a registration at the very
+    // points, in windows of 10 to 16 px, differs from this reference by 0.13 to 0.22 px.
+    EXPECT_LE(found.median_px, 0.2);
+    EXPECT_GE(found.correlation, 0.94);
+  }
+}
+
+class TurnedBeads : public testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::filesystem::exists(folder_)) GTEST_SKIP() << folder_ << " is not here";
+    for (const auto& row : rows_of_four(folder_ / "truth_1001_1002.csv")) {
+      truth_[0].push_back({row[0] - 1, row[1] - 1});  // they count from 1
+      truth_[1].push_back({row[2] - 1, row[3] - 1});
+    }
+    for (const int k : {0, 1}) images_[k] = read_image(folder_ / ("img_100" + std::to_string(k + 1) + ".tif"));
+  }
+  std::filesystem::path folder_ = kBeads / "synthetic_rotation_serialtrack";
+  std::vector<Vec2> truth_[2];
+  Image images_[2];
+};
+
+TEST_F(TurnedBeads, are_detected) {
+  for (const int k : {0, 1}) {
+    const auto found = detect_beads(images_[k]);
+    std::vector<char> is_taken(found.size(), 0);
+    int n_true = 0, n_hit = 0;
+    double squares = 0;
+    for (const Vec2 bead : truth_[k]) {
+      if (std::min({bead.x, bead.y, images_[k].width - 1 - bead.x, images_[k].height - 1 - bead.y}) < 0) continue;
+      ++n_true;
+      double best = 1;  // px
+      std::optional<std::size_t> hit;
+      for (std::size_t b = 0; b < found.size(); ++b) {
+        const double distance = norm(found[b].position_px - bead);
+        if (!is_taken[b] && distance < best) best = distance, hit = b;
+      }
+      if (!hit) continue;
+      is_taken[*hit] = 1;
+      squares += best * best;
+      ++n_hit;
+    }
+    EXPECT_GE(n_hit, 0.97 * n_true);
+    EXPECT_GE(n_hit, 0.97 * static_cast<double>(found.size()));
+    EXPECT_LE(std::sqrt(squares / n_hit), 0.1);
+  }
+}
+
+TEST_F(TurnedBeads, are_refused_as_shifted_ones_and_followed_as_turned_ones) {
+  EXPECT_THROW(track_beads(images_[0], images_[1], 1.0), InvalidData);
+  for (const char* drift : {"rotation", "similarity"}) {
+    TrackParameters parameters;
+    parameters.drift = drift;
+    const Tracking tracking = track_beads(images_[0], images_[1], 1.0, parameters, 2);
+    EXPECT_NEAR(tracking.turn_rad * 180 / std::numbers::pi, 10, 0.01);
+    EXPECT_GE(tracking.n_good, 0.85 * static_cast<double>(tracking.field.size()));  // the others have left
+    for (const Bead& bead : tracking.field) {
+      if (!bead.flag.empty()) continue;
+      EXPECT_LE(norm(bead.displacement_um), 0.5);  // the beads were turned and nothing else
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

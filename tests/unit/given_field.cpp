@@ -1,0 +1,91 @@
+#include "segment/given_field.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/bead_pair.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::segment {
+namespace {
+
+std::filesystem::path write(const test::TemporaryFolder& folder, const std::string& text) {
+  write_text(folder / "field.csv", text);
+  return folder / "field.csv";
+}
+
+TEST(GivenField, columns_are_mapped_and_pixels_become_um) {
+  const test::TemporaryFolder folder;
+  TrackParameters p;
+  p.x_column = "x", p.y_column = "y", p.ux_column = "u", p.uy_column = "v", p.sigma_column = "error";
+  p.length_unit = "px";
+  p.pixel_size_um = 0.5;
+  for (const char separator : {',', ';', '\t'}) {
+    std::string text = "i,x,y,u,v,error\n1,0,3,2,-1,0.1\n2,9,4,1,0.5,0.2";
+    std::replace(text.begin(), text.end(), ',', separator);
+    const DisplacementField field = read_given_field(write(folder, text), p);
+    ASSERT_EQ(field.size(), 2u);
+    EXPECT_EQ(field[0].position_um, (Vec2{0.25, 1.75}));
+    EXPECT_EQ(field[0].displacement_um, (Vec2{1, -0.5}));
+    EXPECT_EQ(field[1].sigma_um, 0.1);
+    EXPECT_EQ(field[0].flag, "");
+  }
+}
+
+TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
+  const test::TemporaryFolder folder;
+  const auto peaks = test::ring_of_adhesions(512, 8.3);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 0.05);
+  CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
+  for (int j = 0; j < 64; ++j) {
+    for (int i = 0; i < 64; ++i) {
+      const Vec2 place{8 * i + 4.0, 8 * j + 4.0}, u = test::displacement(peaks, place);
+      csv.add(place.x).add(place.y).add(u.x + normal(random)).add(u.y + normal(random)).end_row();
+    }
+  }
+  const DisplacementField field = read_given_field(write(folder, csv.str()), {});
+  EXPECT_NEAR(field[0].sigma_um, 0.05, 0.01);
+  int n_flagged = 0;
+  for (const Bead& bead : field) {
+    if (!bead.flag.empty()) ++n_flagged;
+  }
+  EXPECT_LE(n_flagged, 0.01 * static_cast<double>(field.size()));
+  EXPECT_LT(outwardness(field), -0.5);
+}
+
+TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
+  const test::TemporaryFolder folder;
+  CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});
+  for (int j = 0; j < 8; ++j) {
+    for (int i = 0; i < 8; ++i) {
+      const bool is_outlier = i == 4 && j == 4;
+      csv.add(1.0 * i).add(1.0 * j).add(is_outlier ? 3.0 : 0.1 * i).add(0.05 * j).add(0.01).end_row();
+    }
+  }
+  csv.add(3.0).add(3.0).add(0.3).add(0.15).add(0.01).end_row();
+  csv.add(3.5).add(3.5).add("NaN").add(0.15).add(0.01).end_row();
+  csv.add(2.5).add(3.5).add("").add(0.15).add(0.01).end_row();
+  const DisplacementField field = read_given_field(write(folder, csv.str()), {});
+  ASSERT_EQ(field.size(), 67u);
+  EXPECT_EQ(field[36].flag, "neighbours disagree");
+  EXPECT_EQ(field[64].flag, "duplicate");
+  EXPECT_EQ(field[65].flag, "not a number");
+  EXPECT_EQ(field[66].flag, "not a number");
+  EXPECT_EQ(std::count_if(field.begin(), field.end(), [](const Bead& b) { return b.flag.empty(); }), 63);
+}
+
+TEST(GivenField, what_is_wrong_with_a_file_is_said) {
+  const test::TemporaryFolder folder;
+  EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,u,v\n1,2,3,4\n"), {}), InputError);
+  EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\nNaN,2,3,4\n"), {}), InputError);
+  EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1,2,NaN,4\n"), {}), InputError);
+  EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n"), {}), InputError);
+  TrackParameters pixels;
+  pixels.length_unit = "px";
+  EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1,2,3,4\n"), pixels), UsageError);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
