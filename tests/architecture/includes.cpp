@@ -34,6 +34,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"zip", {"segment"}},
     {"CGAL/", {"network"}},
     {"Eigen/", {"network", "substrate", "mbtfm", "samples"}},
+    {"fftw3", {"mbtfm"}},
     {"deal.II/", {"substrate"}},
     {"cholmod", {"substrate"}},
     {"metis", {"substrate"}},
