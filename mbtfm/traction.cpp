@@ -25,10 +25,17 @@ void declare(ParameterList& list, TractionParameters& p) {
   list.add("element_um", p.element_um, Range::positive(), "bem: side of the elements that cover the cell (um)");
   list.add("grow_um", p.grow_um, Range::not_negative(),
            "an adhesion's force is that of the tractions on its ellipse grown by this (um)");
+  list.add("shift_error_um", p.shift_error_um, Range::positive(),
+           "adhesion-forces: shift of an ellipse whose effect on its force is reported (um)");
+  list.add("size_error", p.size_error, Range::between(0.001, 10),
+           "adhesion-forces: the same for both axes too long, by this part");
+  list.add("angle_error_deg", p.angle_error_deg, Range::between(0.001, 90),
+           "adhesion-forces: the same for an ellipse turned by this (degrees)");
 }
 
-Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int) {
+Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   if (parameters.method == "fttc") return reconstruct_fttc(inputs, parameters);
+  if (parameters.method == "adhesion-forces") return reconstruct_adhesion_forces(inputs, parameters, threads);
   throw UsageError("traction: unknown method '" + parameters.method + "'");
 }
 
@@ -152,10 +159,9 @@ std::vector<PointArray> columns_of(const std::vector<Sensitivity>& sensitivities
     for (const Sensitivity& s : sensitivities) array.scalars.push_back(s.*member);
     return array;
   };
-  return {column("shift_along_nN_per_um", &Sensitivity::along_nN_per_um),
-          column("shift_across_nN_per_um", &Sensitivity::across_nN_per_um),
-          column("size_nN_per_percent", &Sensitivity::size_nN_per_percent),
-          column("angle_nN_per_deg", &Sensitivity::angle_nN_per_deg)};
+  return {column("shift_along_nN", &Sensitivity::shift_along_nN),
+          column("shift_across_nN", &Sensitivity::shift_across_nN), column("size_nN", &Sensitivity::size_nN),
+          column("angle_nN", &Sensitivity::angle_nN)};
 }
 
 Figures summary_of(const Reconstruction& r, const TractionSums& sums) {

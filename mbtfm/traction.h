@@ -24,6 +24,10 @@ struct TractionParameters {
   double gaussian_um = 0;                   ///< regularisation smooths already
   double element_um = 2;                    ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
   double grow_um = 1.5;                     ///< smoothed tractions spill over an adhesion's rim by about that
+  // adhesion-forces: errors of an ellipse whose effect on its force is reported, as segmentations have them
+  double shift_error_um = 0.3;
+  double size_error = 0.2;
+  double angle_error_deg = 10;
 };
 void declare(ParameterList& list, TractionParameters& parameters);
 
@@ -42,11 +46,11 @@ struct Patch {
   Vec2 displacement_um;  ///< of the surface there, as the model has it
 };
 
-/// How a force answers to a wrong ellipse: length of the change of the force vector.
+/// How far a force moves (length of the change of its vector) where its ellipse is wrong by what a segmentation errs.
 struct Sensitivity {
-  double along_nN_per_um = 0, across_nN_per_um = 0;  ///< to a shift along and across the major axis
-  double size_nN_per_percent = 0;                    ///< to both axes together
-  double angle_nN_per_deg = 0;
+  double shift_along_nN = 0, shift_across_nN = 0;  ///< the ellipse shifted along and across its major axis
+  double size_nN = 0;                              ///< both axes longer
+  double angle_nN = 0;                             ///< turned
 };
 
 struct Reconstruction {
@@ -65,6 +69,9 @@ struct Reconstruction {
 /// @throws UsageError, InvalidData, NotSolved
 Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
 
+/// One force for each adhesion, spread evenly over its ellipse; no regularisation.
+Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const TractionParameters& parameters,
+                                           int threads);
 Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters);
 
 /// Sums over the patches near the cell.

@@ -1,6 +1,7 @@
 /// Traction reconstructions against closed forms and known scenes.
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <random>
 
 #include "mbtfm/fttc.h"
@@ -150,6 +151,55 @@ TEST(Fttc, sums_are_those_of_the_scene) {
   EXPECT_NEAR(sums.strain_energy_fJ, 28.4, 0.03 * 28.4);
   EXPECT_LE(norm(sums.net_force_nN), 0.01 * 89.8);
   EXPECT_NEAR(test::force_error(scene, forces_of(r)), 0, 0.02);
+}
+
+TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) {
+  // targets of the scene's table; over 10 seeds of 8 forces (error/sigma)² has a mean within 1 ± 3 sqrt(2/80)
+  const double most[] = {0.002, 0.022, 0.045};
+  int row = 0;
+  for (const double noise : {0.0, 0.05, 0.1}) {
+    double error = 0, sum = 0;
+    const int n_seeds = noise > 0 ? 10 : 1;
+    for (int seed = 1; seed <= n_seeds; ++seed) {
+      const EllipseScene scene = ellipse_scene(128, noise, static_cast<unsigned>(seed));
+      const Reconstruction r = reconstruct(inputs_of(scene), half_space("adhesion-forces"), 2);
+      error += test::force_error(scene, forces_of(r)) / n_seeds;
+      for (std::size_t a = 0; a < r.forces.size(); ++a) {
+        const double off = norm(r.forces[a].force_nN) - norm(scene.forces_nN[a]);
+        sum += std::pow(off / std::max(*r.forces[a].sigma_nN, 1e-9), 2) / (8 * n_seeds);
+      }
+    }
+    std::printf("adhesion-forces, noise %g: F %.4f, mean (error/sigma)^2 %.2f\n", noise, error, sum);
+    EXPECT_LE(error, most[row++]);
+    if (noise == 0) continue;
+    EXPECT_GT(sum, 0.52);
+    EXPECT_LT(sum, 1.48);
+  }
+}
+
+TEST(AdhesionForces, sensitivities_are_what_a_wrong_ellipse_does) {
+  const EllipseScene scene = ellipse_scene(64, 0.02, 3);
+  const Reconstruction before = reconstruct(inputs_of(scene), half_space("adhesion-forces"), 2);
+  constexpr std::size_t kOne = 4;
+  const double angle = scene.adhesions[kOne].angle_rad;
+  const Vec2 along{std::cos(angle), std::sin(angle)};
+  const auto change_by = [&](const std::function<void(Adhesion&)>& edit) {
+    TractionInputs inputs = inputs_of(scene);
+    edit(inputs.adhesions[kOne]);
+    const Reconstruction after = reconstruct(inputs, half_space("adhesion-forces"), 2);
+    return norm(after.forces[kOne].force_nN - before.forces[kOne].force_nN);
+  };
+  // the same equations by another route: rounding
+  const Sensitivity& s = before.sensitivities[kOne];
+  EXPECT_NEAR(change_by([&](Adhesion& a) { a.position_um += 0.3 * along; }), s.shift_along_nN, 1e-8);
+  EXPECT_NEAR(change_by([&](Adhesion& a) { a.position_um += 0.3 * Vec2{-along.y, along.x}; }), s.shift_across_nN, 1e-8);
+  EXPECT_NEAR(change_by([&](Adhesion& a) {
+                a.major_axis_um *= 1.2;
+                a.minor_axis_um *= 1.2;
+                a.area_um2 *= 1.44;
+              }),
+              s.size_nN, 1e-8);
+  EXPECT_NEAR(change_by([&](Adhesion& a) { a.angle_rad += std::numbers::pi / 18; }), s.angle_nN, 1e-8);
 }
 
 }  // namespace
