@@ -148,8 +148,8 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
                         .moment_nN_um = 0});
   }
   r.sensitivities.resize(ellipses.size());
+  const auto alone = substrate::make_greens(inputs.gel, {.model = parameters.gel_model}, 1);  // one column a thread
   parallel_for(static_cast<int>(ellipses.size()), threads, [&](int a) {
-    const auto alone = substrate::make_greens(inputs.gel, {.model = parameters.gel_model}, 1);
     const auto i = static_cast<std::size_t>(a);
     r.sensitivities[i] = sensitivity(*alone, beads, G, normal_matrix, pulled, forces_nN[i], ellipses[i], a, parameters);
   });

@@ -81,19 +81,7 @@ std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::v
   std::vector<Vec2> positions;
   for (const Patch& p : patches) positions.push_back(p.position_um);
   const std::vector<int> owner = adhesion_of_patches(positions, inputs.adhesions, parameters.grow_um);
-  std::vector<AdhesionForce> forces;
-  for (const Adhesion& a : inputs.adhesions) {
-    forces.push_back(
-        {.adhesion_id = a.adhesion_id, .force_nN = {}, .sigma_nN = {}, .connected = false, .moment_nN_um = 0});
-  }
-  for (std::size_t p = 0; p < patches.size(); ++p) {
-    if (owner[p] < 0) continue;
-    AdhesionForce& f = forces[static_cast<std::size_t>(owner[p])];
-    const Vec2 force = patches[p].area_um2 * patches[p].traction_kPa;
-    f.force_nN += force;
-    *f.moment_nN_um +=
-        cross(patches[p].position_um - inputs.adhesions[static_cast<std::size_t>(owner[p])].position_um, force);
-  }
+  std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
   const std::vector<Vec2> deviations =
       force_deviations_nN(problem, owner, static_cast<int>(forces.size()), lambda, variance);
   for (std::size_t f = 0; f < forces.size(); ++f) {
@@ -129,19 +117,20 @@ std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<V
   return patches;
 }
 
+Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs) {
+  Reconstruction r;
+  r.remark = "no bead has moved: there is no traction";
+  const std::vector<Vec2> nothing(static_cast<std::size_t>(problem.field().n_nodes()));
+  r.patches = patches_of(problem, nothing, problem.transform().no_field());
+  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, 0);
+  return r;
+}
+
 Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters) {
   const LatticeProblem problem(inputs.beads, inputs.gel, lattice_options(parameters));
+  if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
   Reconstruction r;
   r.lambda_unit = "um_per_kPa";
-  const std::vector<Vec2> nothing(static_cast<std::size_t>(problem.field().n_nodes()));
-  if (problem.data_squared() == 0) {
-    r.remark = "no bead has moved: there is no traction";
-    r.patches = patches_of(problem, nothing, problem.transform().no_field());
-    for (const Adhesion& a : inputs.adhesions)
-      r.forces.push_back(
-          {.adhesion_id = a.adhesion_id, .force_nN = {}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}});
-    return r;
-  }
   r.scan = scan_lambda(problem);
   r.lambda = parameters.lambda_um_per_kPa.value_or(chosen_lambda(*r.scan, parameters.lambda_by));
   r.length_um = *r.lambda * inputs.gel.youngs_modulus_kPa;

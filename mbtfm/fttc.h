@@ -28,6 +28,9 @@ LatticeOptions lattice_options(const TractionParameters& parameters);
 std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
                               const NodeField& displacements);
 
+/// Where all displacements are zero: no tractions, and a remark that says so.
+Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs);
+
 /// Waves of traction to vectors at the nodes of the field, rows first. @param gaussian_um  smooths them; 0: not
 std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
                                 double gaussian_um);

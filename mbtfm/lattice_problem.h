@@ -13,6 +13,7 @@ struct LatticeOptions {
   GelModel model = GelModel::layer;
   std::optional<double> spacing_um;  ///< unset: that of the beads
   double padding = 1.5;              ///< periods over the field's size; 1: the field is periodic itself
+  Basis basis = Basis::waves;
 };
 
 /// |P G t − u|² with u the displacements times the roots of their weights, P the interpolation from the lattice to the
@@ -74,6 +75,8 @@ class TikhonovSolver {
   /// @param tolerance  of the error, relative, in the energy of the equation
   /// @returns the iterations taken. @throws NotSolved
   int solve(double lambda, double tolerance);
+  /// Another right hand side; the solution stays as the place to start.
+  void set_right_hand_side(WaveField b) { b_ = std::move(b); }
   const WaveField& solution() const { return t_; }
   double solution_squared() const;
   double right_hand_side_times_solution() const;  ///< b · t

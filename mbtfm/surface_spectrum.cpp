@@ -13,6 +13,8 @@ namespace {
 
 double shear_modulus_kPa(const Gel& gel) { return gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio)); }
 
+double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
+
 /// The mean of the compliance over the rectangle of wave numbers around zero that has no wave but the zero one. The
 /// half-space's 1/k is integrable there: k dk dphi cancels it. By symmetry only the mean of along and across is left.
 double mean_around_zero(const Gel& gel, GelModel model, double side_x_per_um, double side_y_per_um) {
@@ -54,7 +56,8 @@ WaveCompliance wave_compliance(const Gel& gel, GelModel model, double k) {
   return {(1 - nu) * along * scale, std::tanh(x) * scale};
 }
 
-SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings) {
+SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
+                                 Basis basis) {
   const int n_x = lattice.n_columns, n_y = lattice.n_rows;
   const int n_half = n_x / 2 + 1;
   const Eigen::Index n_waves = static_cast<Eigen::Index>(n_half) * n_y;
@@ -67,7 +70,11 @@ SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& 
       const Eigen::Index at = i + static_cast<Eigen::Index>(n_half) * j;
       const double k_x = step_x * i, k_y = step_y * (2 * j <= n_y ? j : j - n_y);
       const double k2 = k_x * k_x + k_y * k_y;
-      const WaveCompliance c = wave_compliance(gel, model, std::sqrt(k2));
+      WaveCompliance c = wave_compliance(gel, model, std::sqrt(k2));
+      if (basis == Basis::cells) {
+        const double share = sinc(0.5 * k_x * lattice.spacing_um) * sinc(0.5 * k_y * lattice.spacing_um);
+        c = {share * c.along_um_per_kPa, share * c.across_um_per_kPa};
+      }
       smallest_ = std::min({smallest_, c.along_um_per_kPa, c.across_um_per_kPa});
       cos_[at] = (k_x * k_x - k_y * k_y) / k2;
       sin_[at] = 2 * k_x * k_y / k2;

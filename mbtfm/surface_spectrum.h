@@ -20,10 +20,17 @@ enum class Surroundings {
   open       ///< nothing more: the lattice is padded, and its zero wave stands for all that are longer than it
 };
 
+/// What the values at the nodes mean.
+enum class Basis {
+  waves,  ///< a sum of the lattice's waves
+  cells   ///< traction even over the cell around each node: its waves are weaker by sinc(kx a/2) sinc(ky a/2)
+};
+
 /// The compliance of every stored wave of a lattice, in the frame of its wave vector.
 class SurfaceSpectrum {
  public:
-  SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings);
+  SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
+                  Basis basis = Basis::waves);
 
   /// Write each wave times f(compliance), f acting on the along and the across part, to `result`, which may be `waves`.
   template <class F>

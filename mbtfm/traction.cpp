@@ -35,6 +35,7 @@ void declare(ParameterList& list, TractionParameters& p) {
 
 Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   if (parameters.method == "fttc") return reconstruct_fttc(inputs, parameters);
+  if (parameters.method == "sparse") return reconstruct_sparse(inputs, parameters);
   if (parameters.method == "adhesion-forces") return reconstruct_adhesion_forces(inputs, parameters, threads);
   throw UsageError("traction: unknown method '" + parameters.method + "'");
 }
@@ -76,6 +77,26 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
     }
   }
   return owner;
+}
+
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
+                                              double grow_um) {
+  std::vector<Vec2> positions;
+  for (const Patch& p : patches) positions.push_back(p.position_um);
+  const std::vector<int> owner = adhesion_of_patches(positions, adhesions, grow_um);
+  std::vector<AdhesionForce> forces;
+  for (const Adhesion& a : adhesions) {
+    forces.push_back(
+        {.adhesion_id = a.adhesion_id, .force_nN = {}, .sigma_nN = {}, .connected = false, .moment_nN_um = 0});
+  }
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    if (owner[p] < 0) continue;
+    const auto a = static_cast<std::size_t>(owner[p]);
+    const Vec2 force = patches[p].area_um2 * patches[p].traction_kPa;
+    forces[a].force_nN += force;
+    *forces[a].moment_nN_um += cross(positions[p] - adhesions[a].position_um, force);
+  }
+  return forces;
 }
 
 TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {

@@ -62,7 +62,8 @@ struct Reconstruction {
   std::string lambda_unit;          ///< um_per_kPa, um_per_nN
   std::optional<double> length_um;  ///< lambda times E, per area: the same for every method
   double relative_l2 = 0;           ///< |u − model| / |u| at the beads, weighted
-  std::string remark;               ///< to be said in the last line; empty: nothing
+  Report report{.converged = true, .iterations = 0, .last_change = 0, .reason = {}};
+  std::string remark;  ///< to be said in the last line; empty: nothing
   Figures figures;
 };
 
@@ -73,6 +74,12 @@ Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameter
 Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const TractionParameters& parameters,
                                            int threads);
 Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters);
+/// Group L1, its weight by generalised cross-validation.
+Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters);
+
+/// Each adhesion's force: the sum over the patches on its grown ellipse; without errors.
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
+                                              double grow_um);
 
 /// Sums over the patches near the cell.
 struct TractionSums {

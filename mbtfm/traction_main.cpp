@@ -50,6 +50,8 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
                    brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " + brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged beads left out";
+  report.converged = r.report.converged;
+  if (!r.report.converged) report.summary += "; " + r.report.reason;
   if (!r.remark.empty()) report.summary += "; " + r.remark;
   report.figures = summary_of(r, sums);
   const bool is_layer = p.traction.gel_model == "layer";

@@ -1,6 +1,7 @@
 /// Traction reconstructions against closed forms and known scenes.
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <functional>
 #include <random>
 
@@ -151,6 +152,28 @@ TEST(Fttc, sums_are_those_of_the_scene) {
   EXPECT_NEAR(sums.strain_energy_fJ, 28.4, 0.03 * 28.4);
   EXPECT_LE(norm(sums.net_force_nN), 0.01 * 89.8);
   EXPECT_NEAR(test::force_error(scene, forces_of(r)), 0, 0.02);
+}
+
+std::vector<Vec2> map_of(const Reconstruction& r) {
+  std::vector<Vec2> tractions;
+  for (const Patch& p : r.patches) tractions.push_back(p.traction_kPa);
+  return tractions;
+}
+
+TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
+  const double most[] = {0.15, 0.50, 0.85};  // targets of the scene's table
+  int row = 0;
+  for (const double noise : {0.0, 0.05, 0.1}) {
+    const EllipseScene scene = ellipse_scene(128, noise, 5);
+    const auto start = std::chrono::steady_clock::now();
+    const Reconstruction r = reconstruct(inputs_of(scene), half_space("sparse"), 1);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
+    const double error = test::traction_error(scene, map_of(r));
+    std::printf("sparse, noise %g: L2 %.3f, F %.3f, %.1f s\n", noise, error, test::force_error(scene, forces_of(r)),
+                seconds.count());
+    EXPECT_TRUE(r.report.converged);
+    EXPECT_LE(error, most[row++]);
+  }
 }
 
 TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) {
