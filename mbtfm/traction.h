@@ -77,6 +77,12 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
 /// Group L1, its weight by generalised cross-validation.
 Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters);
 
+/// A force at the centre of each adhesion, with a Tikhonov penalty.
+Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const TractionParameters& parameters,
+                                        int threads);
+/// Tractions on square elements that cover the cell, with a Tikhonov penalty.
+Reconstruction reconstruct_elements(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
+
 /// Each adhesion's force: the sum over the patches on its grown ellipse; without errors.
 std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
                                               double grow_um);
