@@ -81,6 +81,7 @@ TEST(Fttc, a_scene_turned_by_any_angle_has_the_same_forces_turned) {
 }
 
 TEST(Fttc, odd_and_even_lattices_agree) {
+  // Cells of another size cut the grown ellipses otherwise: as for the turned scene.
   TractionParameters parameters = half_space("fttc");
   for (const double padding : {1.0, 1.5}) {
     parameters.padding = padding;
@@ -88,7 +89,7 @@ TEST(Fttc, odd_and_even_lattices_agree) {
     const Reconstruction one = reconstruct(inputs_of(even), parameters, 1);
     const Reconstruction other = reconstruct(inputs_of(odd), parameters, 1);
     for (std::size_t a = 0; a < one.forces.size(); ++a) {
-      EXPECT_LE(norm(one.forces[a].force_nN - other.forces[a].force_nN), 0.01 * norm(one.forces[a].force_nN))
+      EXPECT_LE(norm(one.forces[a].force_nN - other.forces[a].force_nN), 0.03 * norm(one.forces[a].force_nN))
           << "padding " << padding;
     }
   }
@@ -159,7 +160,7 @@ TEST(Fttc, a_thick_layer_gives_the_tractions_of_the_half_space) {
   TractionParameters half = layer;
   half.gel_model = "half-space";
   const Reconstruction reference = reconstruct(inputs_of(scene), half, 1);
-  double before = 1e9;
+  double before = 1e9, last = 1;
   for (const double thickness : {50.0, 100.0, 1000.0}) {
     TractionInputs inputs = inputs_of(scene);
     inputs.gel.thickness_um = thickness;
@@ -173,8 +174,9 @@ TEST(Fttc, a_thick_layer_gives_the_tractions_of_the_half_space) {
     }
     EXPECT_LE(difference, before);
     before = difference;
-    if (thickness == 1000) EXPECT_LE(std::sqrt(difference / size), 0.02);  // what the waves beyond 10 um tell apart
+    last = std::sqrt(difference / size);
   }
+  EXPECT_LE(last, 0.02);  // what the waves beyond 10 um tell apart
 }
 
 TEST(Tractions, where_nothing_moves_there_is_no_traction_and_that_is_said) {
