@@ -81,6 +81,7 @@ TEST(OthersData, tractions_of_a_monolayer_are_those_of_the_program_that_publishe
     ASSERT_EQ(r.patches.size(), published.size());
     const Comparison same = compare(tractions_of(r), published);
     parameters.lambda_um_per_kPa = {};
+    parameters.read_out = "cells";
     parameters.padding = 1.5;
     r = reconstruct(inputs, parameters, 1);
     const Comparison own = compare(tractions_of(r), published);
