@@ -6,7 +6,6 @@
 
 #include "mbtfm/traction.h"
 #include "tests/support/ellipse_scene.h"
-#include "tests/support/npy.h"
 #include "tests/support/program.h"
 
 namespace mbtfm::inverse {
@@ -92,51 +91,6 @@ TEST(OthersData, tractions_of_a_monolayer_are_those_of_the_program_that_publishe
     if (frame == std::string("1")) {
       EXPECT_NEAR(1000 * own.mean_one, 225.35, 0.15 * 225.35);
     }
-  }
-}
-
-TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_them) {
-  const fs::path folder = kData / "displacement/pytfm_colonies";
-  if (!fs::exists(folder)) GTEST_SKIP() << "no ../shared/data here";
-  for (const std::string name : {"KO04", "WT03"}) {
-    const test::NpyArray u = test::read_npy(folder / (name + "_u.npy")), v = test::read_npy(folder / (name + "_v.npy"));
-    const test::NpyArray tx = test::read_npy(folder / (name + "_tx.npy")),
-                         ty = test::read_npy(folder / (name + "_ty.npy"));
-    constexpr double kSpacing_um = 1.056, kPixel_um = 0.201;
-    TractionInputs inputs{.beads = {},
-                          .gel = {.youngs_modulus_kPa = 49, .poisson_ratio = 0.49, .thickness_um = 300},
-                          .adhesions = {},
-                          .outline_um = {}};
-    std::vector<Vec2> published;
-    Reconstruction theirs;
-    for (std::size_t i = 0; i < u.values.size(); ++i) {
-      const auto column = i % static_cast<std::size_t>(u.n_columns), row = i / static_cast<std::size_t>(u.n_columns);
-      const Vec2 moved{kPixel_um * u.values[i], kPixel_um * v.values[i]};
-      inputs.beads.push_back({.position_um = kSpacing_um * Vec2{double(column), double(row)},
-                              .displacement_um = moved,
-                              .sigma_um = 0,
-                              .flag = {}});
-      published.push_back({tx.values[i] / 1000, ty.values[i] / 1000});
-      theirs.patches.push_back({inputs.beads.back().position_um, kSpacing_um * kSpacing_um, published.back(), moved});
-    }
-    TractionParameters parameters;
-    parameters.padding = 1;
-    parameters.read_out = "points";
-    parameters.gaussian_um = 8 * kSpacing_um;
-    parameters.lambda_um_per_kPa = 1e-6;  // none: the Gaussian smooths
-    const Reconstruction r = reconstruct(inputs, parameters, 1);
-    ASSERT_EQ(r.patches.size(), published.size());
-    const Comparison field = compare(tractions_of(r), published);
-    const TractionSums one = sums_of(r, inputs, 0), other = sums_of(theirs, inputs, 0);
-    std::printf(
-        "colony %s: relative rms %.3f, r %.4f; sum |T| %.3f, strain energy %.3f, contractile moment %.3f of theirs\n",
-        name.c_str(), field.relative_rms, field.correlation, one.total_force_nN / other.total_force_nN,
-        one.strain_energy_fJ / other.strain_energy_fJ,
-        one.contractile_moment_nN_um() / other.contractile_moment_nN_um());
-    EXPECT_LE(field.relative_rms, 0.10);
-    EXPECT_NEAR(one.total_force_nN / other.total_force_nN, 1, 0.10);
-    EXPECT_NEAR(one.strain_energy_fJ / other.strain_energy_fJ, 1, 0.10);
-    EXPECT_NEAR(one.contractile_moment_nN_um() / other.contractile_moment_nN_um(), 1, 0.10);
   }
 }
 
