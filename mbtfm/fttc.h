@@ -22,7 +22,7 @@ enum class ReadOut {
 std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
                                       double lambda, double variance);
 
-LatticeOptions lattice_options(const TractionParameters& parameters);
+LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 
 /// The nodes of the field, rows first. @param displacements  of the box
 std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,

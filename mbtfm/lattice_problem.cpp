@@ -140,7 +140,7 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
   check(gel);
   field_ = field_of(beads, options);
   box_ = box_of(field_, options.padding);
-  transform_ = std::make_unique<WaveTransform>(box_.n_columns, box_.n_rows);
+  transform_ = std::make_unique<WaveTransform>(box_.n_columns, box_.n_rows, options.threads);
   spectrum_ = std::make_unique<SurfaceSpectrum>(gel, options.model, box_,
                                                 options.padding > 1 ? Surroundings::open : Surroundings::periodic);
   const double longest_um = field_.spacing_um * std::max(field_.n_columns, field_.n_rows);
@@ -291,10 +291,10 @@ int TikhonovSolver::solve(double lambda, double tolerance) {
   };
   residual_.x = b_.x - image_.x - lambda2 * t_.x;
   residual_.y = b_.y - image_.y - lambda2 * t_.y;
-  precondition(b_, work_);
-  const double enough = tolerance * tolerance * transform.dot(b_, work_);
   precondition(residual_, step_);
   double energy = transform.dot(residual_, step_);
+  // b · t is the energy of the solution; what t lacks of it yet, the residual has
+  const double enough = tolerance * tolerance * (std::abs(transform.dot(b_, t_)) + energy);
   int n = 0;
   for (; energy > enough; ++n) {
     if (n == kMost) {

@@ -14,6 +14,7 @@ struct LatticeOptions {
   std::optional<double> spacing_um;  ///< unset: that of the beads
   double padding = 1.5;              ///< periods over the field's size; 1: the field is periodic itself
   Basis basis = Basis::waves;
+  int threads = 1;
 };
 
 /// |P G t − u|² with u the displacements times the roots of their weights, P the interpolation from the lattice to the

@@ -120,13 +120,13 @@ Choice choose_weight(const LatticeProblem& problem, double largest_kPa) {
 
 }  // namespace
 
-Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters) {
+Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   if (parameters.lambda_um_per_kPa) {
     throw UsageError(
         "sparse: lambda_um_per_kPa belongs to the other methods; this one has a penalty of its own, chosen by "
         "cross-validation");
   }
-  LatticeOptions options = lattice_options(parameters);
+  LatticeOptions options = lattice_options(parameters, threads);
   options.basis = Basis::cells;
   const LatticeProblem problem(inputs.beads, inputs.gel, options);
   if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);

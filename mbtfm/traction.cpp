@@ -34,8 +34,8 @@ void declare(ParameterList& list, TractionParameters& p) {
 }
 
 Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
-  if (parameters.method == "fttc") return reconstruct_fttc(inputs, parameters);
-  if (parameters.method == "sparse") return reconstruct_sparse(inputs, parameters);
+  if (parameters.method == "fttc") return reconstruct_fttc(inputs, parameters, threads);
+  if (parameters.method == "sparse") return reconstruct_sparse(inputs, parameters, threads);
   if (parameters.method == "trpf") return reconstruct_point_forces(inputs, parameters, threads);
   if (parameters.method == "bem") return reconstruct_elements(inputs, parameters, threads);
   if (parameters.method == "adhesion-forces") return reconstruct_adhesion_forces(inputs, parameters, threads);

@@ -73,9 +73,9 @@ Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameter
 /// One force for each adhesion, spread evenly over its ellipse; no regularisation.
 Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const TractionParameters& parameters,
                                            int threads);
-Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters);
+Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
 /// Group L1, its weight by generalised cross-validation.
-Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters);
+Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
 
 /// A force at the centre of each adhesion, with a Tikhonov penalty.
 Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const TractionParameters& parameters,

@@ -5,6 +5,7 @@
 #include <mutex>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
 
 namespace mbtfm::inverse {
 
@@ -24,8 +25,12 @@ struct WaveTransform::Plans {
   fftw_plan forward = nullptr, backward = nullptr;
 };
 
-WaveTransform::WaveTransform(int n_columns, int n_rows)
-    : n_columns_(n_columns), n_rows_(n_rows), weights_(n_waves()), plans_(std::make_unique<Plans>()) {
+WaveTransform::WaveTransform(int n_columns, int n_rows, int threads)
+    : n_columns_(n_columns),
+      n_rows_(n_rows),
+      threads_(threads),
+      weights_(n_waves()),
+      plans_(std::make_unique<Plans>()) {
   const double once = 1 / (static_cast<double>(n_columns) * n_rows);
   for (int j = 0; j < n_rows; ++j) {
     for (int i = 0; i < n_half(); ++i) {
@@ -59,19 +64,23 @@ NodeField WaveTransform::no_field() const {
 void WaveTransform::forward(const NodeField& field, WaveField& waves) const {
   MBTFM_ASSERT(field.x.size() == static_cast<Eigen::Index>(n_columns_) * n_rows_ && field.y.size() == field.x.size() &&
                waves.x.size() == n_waves() && waves.y.size() == n_waves());
-  // planned with FFTW_PRESERVE_INPUT
-  fftw_execute_dft_r2c(plans_->forward, const_cast<double*>(field.x.data()), values_of(waves.x));
-  fftw_execute_dft_r2c(plans_->forward, const_cast<double*>(field.y.data()), values_of(waves.y));
+  parallel_for(2, threads_, [&](int component) {
+    const Eigen::ArrayXd& from = component == 0 ? field.x : field.y;
+    // planned with FFTW_PRESERVE_INPUT
+    fftw_execute_dft_r2c(plans_->forward, const_cast<double*>(from.data()),
+                         values_of(component == 0 ? waves.x : waves.y));
+  });
 }
 
 void WaveTransform::backward(WaveField& waves, NodeField& field) const {
   MBTFM_ASSERT(field.x.size() == static_cast<Eigen::Index>(n_columns_) * n_rows_ && field.y.size() == field.x.size() &&
                waves.x.size() == n_waves() && waves.y.size() == n_waves());
-  fftw_execute_dft_c2r(plans_->backward, values_of(waves.x), field.x.data());
-  fftw_execute_dft_c2r(plans_->backward, values_of(waves.y), field.y.data());
   const double scale = 1 / (static_cast<double>(n_columns_) * n_rows_);
-  field.x *= scale;
-  field.y *= scale;
+  parallel_for(2, threads_, [&](int component) {
+    Eigen::ArrayXd& to = component == 0 ? field.x : field.y;
+    fftw_execute_dft_c2r(plans_->backward, values_of(component == 0 ? waves.x : waves.y), to.data());
+    to *= scale;
+  });
 }
 
 WaveField WaveTransform::forward(const NodeField& field) const {

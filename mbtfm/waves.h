@@ -30,7 +30,8 @@ struct WaveField {
 /// The discrete Fourier transform of one size. Planned without measuring, so the same bits on every call.
 class WaveTransform {
  public:
-  WaveTransform(int n_columns, int n_rows);
+  /// @param threads  two serve: one for each component
+  WaveTransform(int n_columns, int n_rows, int threads = 1);
   ~WaveTransform();
   WaveTransform(const WaveTransform&) = delete;
   WaveTransform& operator=(const WaveTransform&) = delete;
@@ -52,7 +53,7 @@ class WaveTransform {
 
  private:
   struct Plans;
-  int n_columns_, n_rows_;
+  int n_columns_, n_rows_, threads_;
   Eigen::ArrayXd weights_;  ///< by wave
   std::unique_ptr<Plans> plans_;
 };

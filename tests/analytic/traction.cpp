@@ -107,7 +107,9 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         if (noise == 0 && states_errors) continue;
         if (n_side == 256 && states_errors) continue;
         const EllipseScene scene = ellipse_scene(n_side, noise, 7, 0, 64, states_errors);
-        const LatticeProblem problem(scene.field, scene.gel, {.model = GelModel::half_space, .spacing_um = {}});
+        const LatticeProblem problem(
+            scene.field, scene.gel,
+            {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
         const double chosen = chosen_lambda(scan_lambda(problem), "risk");
         TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
         const auto error_at = [&](double lambda) {
