@@ -3,6 +3,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/parallel.h"
+
 namespace mbtfm::inverse {
 
 namespace {
@@ -51,11 +53,11 @@ LambdaScan scan_lambda(const LatticeProblem& problem) {
 }
 
 std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
-                                      double lambda, double variance) {
+                                      double lambda, double variance, int threads) {
   const Lattice &field = problem.field(), &box = problem.box();
   const double area = field.spacing_um * field.spacing_um;
   std::vector<Vec2> deviations(static_cast<std::size_t>(n_forces));
-  for (int f = 0; f < n_forces; ++f) {
+  parallel_for(n_forces, threads, [&](int f) {
     for (double Vec2::*component : {&Vec2::x, &Vec2::y}) {
       NodeField sum = problem.transform().no_field();
       for (std::size_t p = 0; p < owner.size(); ++p) {
@@ -69,7 +71,7 @@ std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::
       solver.solve(lambda, kScanTolerance);
       deviations[static_cast<std::size_t>(f)].*component = std::sqrt(variance * solver.displaced_squared());
     }
-  }
+  });
   return deviations;
 }
 
@@ -77,13 +79,13 @@ namespace {
 
 std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::vector<Patch>& patches,
                                      const TractionInputs& inputs, const TractionParameters& parameters, double lambda,
-                                     double variance) {
+                                     double variance, int threads) {
   std::vector<Vec2> positions;
   for (const Patch& p : patches) positions.push_back(p.position_um);
   const std::vector<int> owner = adhesion_of_patches(positions, inputs.adhesions, parameters.grow_um);
   std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
   const std::vector<Vec2> deviations =
-      force_deviations_nN(problem, owner, static_cast<int>(forces.size()), lambda, variance);
+      force_deviations_nN(problem, owner, static_cast<int>(forces.size()), lambda, variance, threads);
   for (std::size_t f = 0; f < forces.size(); ++f) {
     // of the magnitude: along the force
     const double length = norm(forces[f].force_nN);
@@ -146,7 +148,7 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
-  r.forces = forces_of(problem, r.patches, inputs, parameters, *r.lambda, r.scan->variance);
+  r.forces = forces_of(problem, r.patches, inputs, parameters, *r.lambda, r.scan->variance, threads);
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},
                {"lattice_rows", std::int64_t(problem.field().n_rows)}};

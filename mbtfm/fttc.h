@@ -20,7 +20,7 @@ enum class ReadOut {
 /// By the noise alone, for one lambda: what the smoothing takes away is not in it.
 /// @param owner  by node of the field: which force it belongs to, or -1
 std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
-                                      double lambda, double variance);
+                                      double lambda, double variance, int threads);
 
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 

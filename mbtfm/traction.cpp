@@ -15,7 +15,8 @@ void declare(ParameterList& list, TractionParameters& p) {
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
            "regularisation, fixed: |u − G t|² + lambda² |t|² over a lattice (um/kPa); unset: by the criterion");
   list.add("spacing_um", p.spacing_um, Range::positive(),
-           "fttc, sparse: spacing of the lattice (um); unset: that of the beads");
+           "fttc, sparse: spacing of the lattice (um); unset: that of beads on a lattice, half the mean distance of "
+           "scattered ones");
   list.add("padding", p.padding, Range::between(1, 8),
            "fttc, sparse: period over the field's size; 1: the field is periodic itself");
   list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them",

@@ -150,8 +150,15 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
   const Reconstruction r = reconstruct(inputs, half_space("fttc"), 1);
   std::vector<Vec2> forces;
   for (const AdhesionForce& f : r.forces) forces.push_back(f.force_nN);
-  std::printf("10000 scattered beads, 2 %% noise: F %.3f\n", test::force_error(scene, forces));
-  EXPECT_LE(test::force_error(scene, forces), 0.10);
+  // As many beads on a lattice are the best spread they can have; chance leaves holes between scattered ones.
+  const EllipseScene even = ellipse_scene(100, 0.02 / scene.largest_um, 3);
+  std::vector<Vec2> even_forces;
+  for (const AdhesionForce& f : reconstruct(inputs_of(even), half_space("fttc"), 1).forces) {
+    even_forces.push_back(f.force_nN);
+  }
+  const double on_lattice = test::force_error(even, even_forces), scattered = test::force_error(scene, forces);
+  std::printf("10000 beads, noise 0.02 um: F %.3f scattered, %.3f on a lattice\n", scattered, on_lattice);
+  EXPECT_LE(scattered, 2 * on_lattice);
 }
 
 TEST(Fttc, a_thick_layer_gives_the_tractions_of_the_half_space) {
