@@ -63,6 +63,27 @@ TEST(Tractions, a_mirrored_scene_has_mirrored_forces) {
   expect_mapped_forces([](Vec2 v) { return Vec2{v.x, -v.y}; }, 0, -1);
 }
 
+TEST(Tractions, are_the_same_bits_for_any_number_of_threads) {
+  TractionInputs inputs = inputs_of(ellipse_scene(32, 0.05, 8));
+  inputs.outline_um = {{10, 10}, {54, 10}, {54, 54}, {10, 54}};
+  TractionParameters parameters = half_space("fttc");
+  parameters.element_um = 6;
+  for (const char* method : {"fttc", "sparse", "trpf", "bem", "adhesion-forces"}) {
+    parameters.method = method;
+    const Reconstruction one = reconstruct(inputs, parameters, 1);
+    for (const int threads : {2, 4}) {
+      const Reconstruction many = reconstruct(inputs, parameters, threads);
+      for (std::size_t p = 0; p < one.patches.size(); ++p) {
+        ASSERT_EQ(many.patches[p].traction_kPa, one.patches[p].traction_kPa) << method << ", " << threads;
+      }
+      for (std::size_t a = 0; a < one.forces.size(); ++a) {
+        ASSERT_EQ(many.forces[a].force_nN, one.forces[a].force_nN) << method << ", " << threads;
+        ASSERT_EQ(many.forces[a].sigma_nN, one.forces[a].sigma_nN) << method << ", " << threads;
+      }
+    }
+  }
+}
+
 TEST(Fttc, a_scene_turned_by_any_angle_has_the_same_forces_turned) {
   // Off the lattice's axes cells cut the ellipses otherwise: a few per cent of the force at their rims.
   const auto forces = [](double turn) {
