@@ -172,5 +172,31 @@ TEST(TractionProgram, writes_what_it_says_for_every_method) {
   }
 }
 
+TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_force) {
+  const test::TemporaryFolder folder;
+  for (const int strength : {1, 2, 3}) {
+    test::EllipseScene scene = test::ellipse_scene(64, 0.03, static_cast<unsigned>(strength));
+    for (Bead& b : scene.field) b.displacement_um = double(strength) * b.displacement_um;
+    const fs::path cell = folder / ("cell_" + std::to_string(strength));
+    for (const char* name : {"1_segment", "2_track", "4_fit"}) fs::create_directories(cell / name);
+    write_text(cell / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+    write_displacement(cell / "2_track/displacement.csv", scene.field);
+    write_outline(cell / "1_segment/outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
+    FitSummary fit;
+    fit.total_force_nN = 89.8 * strength;
+    write_fit_summary(cell / "4_fit/fit.json", fit);
+  }
+  const auto run = test::run_program("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
+                                     (folder / "calibration.csv").string());
+  ASSERT_EQ(run.code, 0) << run.output;
+  EXPECT_NE(run.output.find("FTTC gives the forces of the fit at lambda E"), std::string::npos) << run.output;
+  const CsvTable table(folder / "calibration.csv");
+  // forces in proportion, and the same noise: nearly one line at any lambda; the less smoothing the steeper
+  for (int row = 1; row < table.n_rows(); ++row) {
+    EXPECT_GT(table.number(row, "slope"), table.number(row - 1, "slope"));
+    EXPECT_GT(table.number(row, "correlation"), 0.9);
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm::inverse
