@@ -237,17 +237,25 @@ std::vector<AdhesionForce> read_adhesion_forces(const Path& file) {
 }
 
 void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& forces,
-                           const std::vector<Adhesion>& adhesions) {
+                           const std::vector<Adhesion>& adhesions, const std::vector<PointArray>& more) {
   std::map<int, const Adhesion*> adhesion_of;
   for (const Adhesion& a : adhesions) adhesion_of[a.adhesion_id] = &a;
-  CsvText csv({"adhesion_id", "x_um", "y_um", "area_um2", "fx_nN", "fy_nN", "force_nN", "traction_kPa", "sigma_nN",
-               "connected", "moment_nN_um"});
-  for (const AdhesionForce& f : forces) {
+  std::vector<std::string> header = {"adhesion_id", "x_um",         "y_um",     "area_um2",  "fx_nN",       "fy_nN",
+                                     "force_nN",    "traction_kPa", "sigma_nN", "connected", "moment_nN_um"};
+  for (const PointArray& column : more) {
+    MBTFM_ASSERT(column.scalars.size() == forces.size());
+    header.push_back(column.name);
+  }
+  CsvText csv(header);
+  for (std::size_t row = 0; row < forces.size(); ++row) {
+    const AdhesionForce& f = forces[row];
     MBTFM_ASSERT(adhesion_of.contains(f.adhesion_id));
     const Adhesion& a = *adhesion_of[f.adhesion_id];
     csv.add(f.adhesion_id).add(a.position_um.x).add(a.position_um.y).add(a.area_um2);
     csv.add(f.force_nN.x).add(f.force_nN.y).add(norm(f.force_nN)).add(norm(f.force_nN) / a.area_um2);
-    csv.add(f.sigma_nN).add(text_of(f.connected)).add(f.moment_nN_um).end_row();
+    csv.add(f.sigma_nN).add(text_of(f.connected)).add(f.moment_nN_um);
+    for (const PointArray& column : more) csv.add(column.scalars[row]);
+    csv.end_row();
   }
   write_text(file, csv.str());
 }

@@ -41,10 +41,19 @@ std::vector<Vec2> read_points(const Path& file);
 std::vector<Tension> read_tensions(const Path& file);
 void write_tensions(const Path& file, const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres);
 
+/// A named array over the points or cells of a VTK file or the rows of a table, one value or (x, y) each; the name
+/// carries the unit.
+struct PointArray {
+  std::string name;
+  std::vector<double> scalars;
+  std::vector<Vec2> vectors;
+};
+
 /// Columns adhesion_id, fx_nN, fy_nN at least.
 std::vector<AdhesionForce> read_adhesion_forces(const Path& file);
+/// @param more  further columns, by force; their names carry the unit
 void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& forces,
-                           const std::vector<Adhesion>& adhesions);
+                           const std::vector<Adhesion>& adhesions, const std::vector<PointArray>& more = {});
 
 /// Columns vertex, fx_nN, fy_nN: the force of the network on the substrate at each held vertex.
 void write_reactions(const Path& file, const std::vector<int>& vertices, const std::vector<Vec2>& forces_nN);
@@ -65,18 +74,14 @@ struct FitSummary {
 };
 FitSummary read_fit_summary(const Path& file);
 void write_fit_summary(const Path& file, const FitSummary& summary);
+/// Named figures as one JSON object.
+void write_figures(const Path& file, const Figures& figures);
 
 // VTK (XML, binary appended, compressed)
 
 Network read_network(const Path& file);
 void write_network(const Path& file, const Network& network);
 
-/// A named array over the points or cells of a VTK file, one value or (x, y) each; the name carries the unit.
-struct PointArray {
-  std::string name;
-  std::vector<double> scalars;
-  std::vector<Vec2> vectors;
-};
 /// Outline, adhesion ellipses and fibres as polygons and lines, with adhesion_id, fibre_id and fibre_type by cell.
 void write_cell_vtp(const Path& file, const Cell& cell);
 /// A point cloud with arrays.

@@ -49,4 +49,6 @@ void write_fit_summary(const Path& file, const FitSummary& summary) {
   write_text(file, json.dump(2) + "\n");
 }
 
+void write_figures(const Path& file, const Figures& figures) { write_text(file, json_of(figures).dump(2) + "\n"); }
+
 }  // namespace mbtfm

@@ -246,6 +246,15 @@ fs::path StageContext::output(const std::string& name, const std::string& file) 
   return pending_.back().temporary;
 }
 
+fs::path StageContext::output_beside(const std::string& name, const std::string& ending) {
+  MBTFM_ASSERT(outputs_.contains(name));
+  const fs::path& output = outputs_.at(name);
+  const fs::path destination = output.parent_path() / (output.stem().string() + ending);
+  make_folder(destination.parent_path());
+  pending_.push_back({.temporary = temporary_name(destination), .destination = destination});
+  return pending_.back().temporary;
+}
+
 void StageContext::make_folder(const fs::path& folder) {
   if (folder.empty() || fs::exists(folder)) return;
   make_folder(folder.parent_path());

@@ -42,6 +42,8 @@ class StageContext {
   std::filesystem::path output(const std::string& name);
   /// Temporary path for `file` of an output folder.
   std::filesystem::path output(const std::string& name, const std::string& file);
+  /// Temporary path for a file beside the output `name`, called after it: its name with `ending` for its extension.
+  std::filesystem::path output_beside(const std::string& name, const std::string& ending);
 
   /// Folders that outputs need are made, and unmade where the stage fails.
   void make_folder(const std::filesystem::path& folder);

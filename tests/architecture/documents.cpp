@@ -33,7 +33,7 @@ std::string parameter_page() {
       "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
       "and a "
       "flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file.\n";
-  for (const char* stage : {"segment", "track", "network", "contract", "fit", "simulate", "stats"}) {
+  for (const char* stage : {"segment", "track", "network", "contract", "fit", "traction", "simulate", "stats"}) {
     const auto outcome = test::run_program("mbtfm-" + std::string(stage) + " --parameters");
     EXPECT_EQ(outcome.code, 0) << outcome.output;
     page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outcome.output;

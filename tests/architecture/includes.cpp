@@ -35,6 +35,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"expat", {"segment"}},
     {"CGAL/", {"network"}},
     {"Eigen/", {"network", "substrate", "mbtfm", "samples"}},
+    {"fftw3", {"mbtfm"}},
     {"deal.II/", {"substrate"}},
     {"cholmod", {"substrate"}},
     {"metis", {"substrate"}},

@@ -1,0 +1,110 @@
+#include "mbtfm/dense_problem.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::inverse {
+
+using Eigen::Index;
+
+template <class Use>
+void DenseProblem::for_blocks(const Use& use) const {
+  constexpr std::size_t kBlock = 1024;  // beads at a time: G as a whole may be too large for memory
+  for (std::size_t begin = 0; begin < beads_.size(); begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, beads_.size());
+    std::vector<Vec2> points;
+    for (std::size_t i = begin; i < end; ++i) points.push_back(beads_[i].position_um);
+    Eigen::MatrixXd G = compliance_(points);
+    Eigen::VectorXd u(G.rows());
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto row = 2 * static_cast<Index>(i - begin);
+      const double root = std::sqrt(weights_[i]);
+      G.middleRows<2>(row) *= root;
+      u.segment<2>(row) << root * beads_[i].displacement_um.x, root * beads_[i].displacement_um.y;
+    }
+    use(G, u);
+  }
+}
+
+DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance, Index n_loads)
+    : beads_(beads), compliance_(std::move(compliance)) {
+  check(beads);
+  if (2 * static_cast<Index>(beads.size()) < n_loads) {
+    throw InvalidData("displacement",
+                      "at least " + std::to_string((n_loads + 1) / 2) + " beads for " + std::to_string(n_loads) +
+                          " unknown components",
+                      std::to_string(beads.size()));
+  }
+  const bool states_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  double sum = 0;
+  for (const Bead& b : beads) {
+    weights_.push_back(states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1);
+    sum += weights_.back();
+  }
+  const double mean = sum / static_cast<double>(beads.size());
+  for (double& w : weights_) w /= mean;
+  if (states_errors) stated_variance_ = 1 / mean;
+
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n_loads, n_loads);
+  Eigen::VectorXd pulled = Eigen::VectorXd::Zero(n_loads);
+  for_blocks([&](const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
+    normal.selfadjointView<Eigen::Lower>().rankUpdate(G.transpose());
+    pulled += G.transpose() * u;
+    data_squared_ += u.squaredNorm();
+  });
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
+  eigenvalues_ = eigen.eigenvalues().cwiseMax(0);
+  eigenvectors_ = eigen.eigenvectors();
+  projected_ = eigenvectors_.transpose() * pulled;
+}
+
+LambdaScan DenseProblem::scan() const {
+  const double largest = std::sqrt(eigenvalues_.maxCoeff());
+  // below a millionth of the largest, rounding of the normal matrix is all there is
+  const double smallest = std::max(std::sqrt(eigenvalues_.minCoeff()), 1e-6 * largest);
+  std::vector<ScanPoint> points;
+  const auto n_data = static_cast<double>(2 * beads_.size());
+  const auto degrees_of = [&](double lambda, int power) {
+    return (eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda)).pow(power).sum();
+  };
+  for (const double lambda : lambdas_between(largest, std::min(smallest, 0.1 * largest))) {
+    const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
+    points.push_back({.lambda = lambda,
+                      .misfit = data_squared_ - 2 * (shares * projected_.array()).sum() +
+                                (eigenvalues_.array() * shares.square()).sum(),
+                      .norm = shares.square().sum(),
+                      .degrees = degrees_of(lambda, 1)});
+  }
+  return judge(std::move(points), n_data, stated_variance_, [&](double lambda) {
+    return robust_variance(residuals(solve(lambda)), degrees_of(lambda, 1), degrees_of(lambda, 2));
+  });
+}
+
+Eigen::VectorXd DenseProblem::solve(double lambda) const {
+  return eigenvectors_ * (projected_.array() / (eigenvalues_.array() + lambda * lambda)).matrix();
+}
+
+Eigen::MatrixXd DenseProblem::covariance(double lambda, double variance) const {
+  const Eigen::ArrayXd shares = eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda).square();
+  return variance * eigenvectors_ * shares.matrix().asDiagonal() * eigenvectors_.transpose();
+}
+
+std::vector<double> DenseProblem::residuals(const Eigen::VectorXd& loads) const {
+  std::vector<double> all;
+  for_blocks([&](const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
+    const Eigen::VectorXd r = u - G * loads;
+    all.insert(all.end(), r.begin(), r.end());
+  });
+  return all;
+}
+
+double DenseProblem::relative_l2(const Eigen::VectorXd& loads) const {
+  double sum = 0;
+  for (const double r : residuals(loads)) sum += r * r;
+  return data_squared_ > 0 ? std::sqrt(sum / data_squared_) : 0;
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,186 @@
+#include "mbtfm/fttc.h"
+
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/parallel.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+using std::numbers::pi;
+
+// The criteria are flat where they are best: a hundredth of the tractions, in energy, moves none of them.
+constexpr double kScanTolerance = 1e-2;
+
+double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
+
+}  // namespace
+
+LambdaScan scan_lambda(const LatticeProblem& problem) {
+  // From tractions that only the longest waves of the field tell of, to those that its shortest waves tell of: beyond
+  // either end nothing changes.
+  const double smallest = problem.spectrum().smallest_um_per_kPa();
+  const double largest = 2 * problem.longest_wave_um_per_kPa();
+  TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
+  std::optional<TikhonovSolver> probe;
+  if (!problem.is_complete()) probe.emplace(problem, problem.pulled_back(problem.spread_signs()));
+  const auto degrees_of = [&](double lambda, int power) {
+    if (!probe) {
+      return 0.5 * problem.n_data() * problem.spectrum().trace(problem.transform().weights(), [&](double g) {
+        const double h = g * g / (g * g + lambda * lambda);
+        return power == 1 ? h : h * h;
+      });
+    }
+    return power == 1 ? probe->right_hand_side_times_solution() : probe->displaced_squared();
+  };
+  std::vector<ScanPoint> points;
+  for (const double lambda : lambdas_between(largest, smallest)) {
+    solver.solve(lambda, kScanTolerance);
+    if (probe) probe->solve(lambda, kScanTolerance);
+    const double misfit =
+        problem.data_squared() - 2 * solver.right_hand_side_times_solution() + solver.displaced_squared();
+    points.push_back(
+        {.lambda = lambda, .misfit = misfit, .norm = solver.solution_squared(), .degrees = degrees_of(lambda, 1)});
+  }
+  return judge(std::move(points), problem.n_data(), problem.stated_variance(), [&](double lambda) {
+    solver.solve(lambda, kScanTolerance);
+    if (probe) probe->solve(lambda, kScanTolerance);
+    return robust_variance(problem.residuals(problem.displaced(solver.solution())), degrees_of(lambda, 1),
+                           degrees_of(lambda, 2));
+  });
+}
+
+std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
+                                      double lambda, double variance, int threads) {
+  const Lattice &field = problem.field(), &box = problem.box();
+  const double area = field.spacing_um * field.spacing_um;
+  std::vector<Vec2> deviations(static_cast<std::size_t>(n_forces));
+  parallel_for(n_forces, threads, [&](int f) {
+    for (double Vec2::*component : {&Vec2::x, &Vec2::y}) {
+      NodeField sum = problem.transform().no_field();
+      for (std::size_t p = 0; p < owner.size(); ++p) {
+        if (owner[p] != f) continue;
+        const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
+                   column = static_cast<Eigen::Index>(p) % field.n_columns;
+        (component == &Vec2::x ? sum.x : sum.y)[column + box.n_columns * row] = area;
+      }
+      // F = qᵀ t, t = (A + lambda²)⁻¹ G Pᵀ u with A = G PᵀP G, so Var F = variance sᵀ A s, s = (A + lambda²)⁻¹ q
+      TikhonovSolver solver(problem, problem.transform().forward(sum));
+      solver.solve(lambda, kScanTolerance);
+      deviations[static_cast<std::size_t>(f)].*component = std::sqrt(variance * solver.displaced_squared());
+    }
+  });
+  return deviations;
+}
+
+namespace {
+
+std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::vector<Patch>& patches,
+                                     const TractionInputs& inputs, const TractionParameters& parameters, double lambda,
+                                     double variance, int threads) {
+  std::vector<Vec2> positions;
+  for (const Patch& p : patches) positions.push_back(p.position_um);
+  const std::vector<int> owner = adhesion_of_patches(positions, inputs.adhesions, parameters.grow_um);
+  std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
+  const std::vector<Vec2> deviations =
+      force_deviations_nN(problem, owner, static_cast<int>(forces.size()), lambda, variance, threads);
+  for (std::size_t f = 0; f < forces.size(); ++f) {
+    // of the magnitude: along the force
+    const double length = norm(forces[f].force_nN);
+    const Vec2 e = length > 0 ? 1 / length * forces[f].force_nN : Vec2{1, 0};
+    forces[f].sigma_nN = std::hypot(e.x * deviations[f].x, e.y * deviations[f].y);
+  }
+  return forces;
+}
+
+}  // namespace
+
+LatticeOptions lattice_options(const TractionParameters& p, int threads) {
+  return {.model = p.gel_model == "layer" ? GelModel::layer : GelModel::half_space,
+          .spacing_um = p.spacing_um,
+          .padding = p.padding,
+          .basis = Basis::waves,
+          .threads = threads};
+}
+
+std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions,
+                              const NodeField& displacements) {
+  const Lattice& field = problem.field();
+  std::vector<Patch> patches;
+  for (int j = 0; j < field.n_rows; ++j) {
+    for (int i = 0; i < field.n_columns; ++i) {
+      const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
+      patches.push_back({.position_um = field.position_um(i, j),
+                         .area_um2 = field.spacing_um * field.spacing_um,
+                         .traction_kPa = tractions[patches.size()],
+                         .displacement_um = {displacements.x[at], displacements.y[at]}});
+    }
+  }
+  return patches;
+}
+
+Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs) {
+  Reconstruction r;
+  r.remark = "no bead has moved: there is no traction";
+  const std::vector<Vec2> nothing(static_cast<std::size_t>(problem.field().n_nodes()));
+  r.patches = patches_of(problem, nothing, problem.transform().no_field());
+  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, 0);
+  return r;
+}
+
+Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
+  const LatticeProblem problem(inputs.beads, inputs.gel, lattice_options(parameters, threads));
+  if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
+  Reconstruction r;
+  r.lambda_unit = "um_per_kPa";
+  r.scan = scan_lambda(problem);
+  r.lambda = parameters.lambda_um_per_kPa.value_or(chosen_lambda(*r.scan, parameters.lambda_by));
+  r.length_um = *r.lambda * inputs.gel.youngs_modulus_kPa;
+  TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
+  constexpr double kTolerance = 1e-3;  // in energy: far below any error bar
+  solver.solve(*r.lambda, kTolerance);
+  const ReadOut read_out = parameters.read_out == "cells" ? ReadOut::cells : ReadOut::points;
+  const NodeField displacements = problem.displaced(solver.solution());
+  r.patches =
+      patches_of(problem, tractions_kPa(problem, solver.solution(), read_out, parameters.gaussian_um), displacements);
+  double misfit = 0;
+  for (const double d : problem.residuals(displacements)) misfit += d * d;
+  r.relative_l2 = std::sqrt(misfit / problem.data_squared());
+  r.forces = forces_of(problem, r.patches, inputs, parameters, *r.lambda, r.scan->variance, threads);
+  r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
+               {"lattice_columns", std::int64_t(problem.field().n_columns)},
+               {"lattice_rows", std::int64_t(problem.field().n_rows)}};
+  return r;
+}
+
+std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
+                                double gaussian_um) {
+  const Lattice& box = problem.box();
+  const int n_half = problem.transform().n_half();
+  WaveField read = waves;
+  for (int j = 0; j < box.n_rows; ++j) {
+    for (int i = 0; i < n_half; ++i) {
+      const double turn_x = pi * i / box.n_columns;  // half the phase from a node to the next
+      const double turn_y = pi * (2 * j <= box.n_rows ? j : j - box.n_rows) / box.n_rows;
+      double factor = read_out == ReadOut::cells ? sinc(turn_x) * sinc(turn_y) : 1;
+      const double k_s = 2 * std::hypot(turn_x, turn_y) / box.spacing_um * gaussian_um;
+      factor *= std::exp(-0.5 * k_s * k_s);
+      const Eigen::Index at = i + static_cast<Eigen::Index>(n_half) * j;
+      read.x[at] *= factor;
+      read.y[at] *= factor;
+    }
+  }
+  const NodeField nodes = problem.transform().backward(read);
+  std::vector<Vec2> tractions;
+  for (int j = 0; j < problem.field().n_rows; ++j) {
+    for (int i = 0; i < problem.field().n_columns; ++i) {
+      const Eigen::Index at = i + static_cast<Eigen::Index>(box.n_columns) * j;
+      tractions.push_back({nodes.x[at], nodes.y[at]});
+    }
+  }
+  return tractions;
+}
+
+}  // namespace mbtfm::inverse

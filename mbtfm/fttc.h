@@ -1,0 +1,38 @@
+/// Fourier transform traction cytometry on scattered beads, regularised.
+#pragma once
+
+#include "mbtfm/lattice_problem.h"
+#include "mbtfm/regularisation.h"
+#include "mbtfm/traction.h"
+
+namespace mbtfm::inverse {
+
+/// The criteria over the lambdas that this problem can tell apart.
+LambdaScan scan_lambda(const LatticeProblem& problem);
+
+/// How the tractions of a lattice are read out.
+enum class ReadOut {
+  points,  ///< at the nodes, as Butler et al. 2002
+  cells    ///< their mean over the cell around each node: sums of traction times area are forces
+};
+
+/// Standard deviation (nN) of forces, each the sum over given nodes of the field of traction times area, along x and y.
+/// By the noise alone, for one lambda: what the smoothing takes away is not in it.
+/// @param owner  by node of the field: which force it belongs to, or -1
+std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
+                                      double lambda, double variance, int threads);
+
+LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
+
+/// The nodes of the field, rows first. @param displacements  of the box
+std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
+                              const NodeField& displacements);
+
+/// Where all displacements are zero: no tractions, and a remark that says so.
+Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs);
+
+/// Waves of traction to vectors at the nodes of the field, rows first. @param gaussian_um  smooths them; 0: not
+std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
+                                double gaussian_um);
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,325 @@
+#include "mbtfm/lattice_problem.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+constexpr double kOnNode = 1e-6;  // of a spacing: files hold six digits at least
+
+struct Extent {
+  Vec2 low, high;
+};
+
+Extent extent_of(const DisplacementField& beads) {
+  Extent e{beads.front().position_um, beads.front().position_um};
+  for (const Bead& b : beads) {
+    e.low = {std::min(e.low.x, b.position_um.x), std::min(e.low.y, b.position_um.y)};
+    e.high = {std::max(e.high.x, b.position_um.x), std::max(e.high.y, b.position_um.y)};
+  }
+  return e;
+}
+
+void check_beads(const DisplacementField& beads) {
+  check(beads);
+  // Four unknown numbers, position and strength of the least that can pull, take two vectors; three span an area.
+  if (beads.size() < 3) throw InvalidData("displacement", "three beads at least", std::to_string(beads.size()));
+  struct Place {
+    double x, y;
+    std::size_t bead;
+    auto operator<=>(const Place&) const = default;
+  };
+  std::vector<Place> places;
+  for (std::size_t i = 0; i < beads.size(); ++i) places.push_back({beads[i].position_um.x, beads[i].position_um.y, i});
+  std::sort(places.begin(), places.end());
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    if (places[i].x != places[i - 1].x || places[i].y != places[i - 1].y) continue;
+    throw InvalidData("position of bead " + std::to_string(places[i].bead), "a place of its own",
+                      "that of bead " + std::to_string(places[i - 1].bead));
+  }
+}
+
+/// The step of the beads' coordinates where they lie on rows and columns: of the smallest distinct step, all others are
+/// multiples.
+std::optional<double> common_step(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const double range = values.back() - values.front();
+  double step = range;
+  for (std::size_t i = 1; i < values.size(); ++i) {
+    const double gap = values[i] - values[i - 1];
+    if (gap > kOnNode * range) step = std::min(step, gap);
+  }
+  if (!(step > 0)) return std::nullopt;
+  step = range / std::round(range / step);
+  for (const double v : values) {
+    const double at = (v - values.front()) / step;
+    if (std::abs(at - std::round(at)) > 1e-3) return std::nullopt;
+  }
+  return step;
+}
+
+/// The spacing of beads that fill a square lattice, for the most part.
+std::optional<double> lattice_spacing_um(const DisplacementField& beads, const Extent& e) {
+  std::vector<double> x, y;
+  for (const Bead& b : beads) {
+    x.push_back(b.position_um.x);
+    y.push_back(b.position_um.y);
+  }
+  const auto step_x = common_step(std::move(x)), step_y = common_step(std::move(y));
+  if (!step_x || !step_y || std::abs(*step_x - *step_y) > 1e-3 * *step_x) return std::nullopt;
+  const double step = 0.5 * (*step_x + *step_y);
+  const double n_nodes = (1 + (e.high.x - e.low.x) / step) * (1 + (e.high.y - e.low.y) / step);
+  // coordinates rounded to some digits have a common step too, but then hardly a node has a bead
+  return static_cast<double>(beads.size()) > 0.5 * n_nodes ? std::optional(step) : std::nullopt;
+}
+
+Lattice field_of(const DisplacementField& beads, const LatticeOptions& options) {
+  const Extent e = extent_of(beads);
+  const Vec2 size = e.high - e.low;
+  if (!(size.x > 0 && size.y > 0)) {
+    throw InvalidData("displacement", "beads spread over an area", "all on one line");
+  }
+  const auto of_beads = lattice_spacing_um(beads, e);
+  // Scattered beads lie, some of them, far closer than on average: on a lattice as coarse as that the criteria take
+  // what lies between its nodes for signal (measured at 10 000 beads: lambda settles at half of it).
+  const double mean_distance = std::sqrt(size.x * size.y / static_cast<double>(beads.size()));
+  const double spacing = options.spacing_um.value_or(of_beads.value_or(0.5 * mean_distance));
+  const auto n_along = [&](double length) { return static_cast<double>(std::floor(length / spacing + 0.5)) + 1; };
+  constexpr double kMost = 2.5e7;  // nodes: some GB
+  if (n_along(size.x) * n_along(size.y) * options.padding * options.padding > kMost) {
+    throw UsageError("traction: a spacing of " + std::to_string(spacing) + " um over " + std::to_string(size.x) +
+                     " x " + std::to_string(size.y) + " um takes more nodes than memory: choose a larger spacing_um");
+  }
+  Lattice field{.origin_um = {},
+                .spacing_um = spacing,
+                .n_columns = static_cast<int>(n_along(size.x)),
+                .n_rows = static_cast<int>(n_along(size.y))};
+  // centred on the beads, so that a mirrored or turned scene has a mirrored or turned lattice
+  const Vec2 middle = 0.5 * (e.low + e.high);
+  field.origin_um = middle - 0.5 * spacing * Vec2{field.n_columns - 1.0, field.n_rows - 1.0};
+  return field;
+}
+
+Lattice box_of(const Lattice& field, double padding) {
+  Lattice box = field;
+  if (padding <= 1) return box;
+  box.n_columns = quick_size(static_cast<int>(std::ceil(padding * field.n_columns)));
+  box.n_rows = quick_size(static_cast<int>(std::ceil(padding * field.n_rows)));
+  return box;
+}
+
+/// Cubic convolution with a = −1/2: third order, exact on nodes. Source: Keys, IEEE Trans. ASSP 29 (1981) 1153, eq. 15.
+std::array<double, 4> keys_weights(double s) {
+  const double s2 = s * s, s3 = s2 * s;
+  return {0.5 * (-s3 + 2 * s2 - s), 0.5 * (3 * s3 - 5 * s2 + 2), 0.5 * (-3 * s3 + 4 * s2 + s), 0.5 * (s3 - s2)};
+}
+
+struct Stencil {
+  int node = 0;
+  std::array<double, 4> weights{};
+};
+
+Stencil stencil_of(double at) {
+  const double nearest = std::round(at);
+  if (std::abs(at - nearest) < 1e-3) return {static_cast<int>(nearest), {0, 1, 0, 0}};  // as common_step allows
+  const double below = std::floor(at);
+  return {static_cast<int>(below), keys_weights(at - below)};
+}
+
+int wrapped(int i, int n) { return ((i % n) + n) % n; }
+
+}  // namespace
+
+LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, const LatticeOptions& options) {
+  check_beads(beads);
+  check(gel);
+  field_ = field_of(beads, options);
+  box_ = box_of(field_, options.padding);
+  transform_ = std::make_unique<WaveTransform>(box_.n_columns, box_.n_rows, options.threads);
+  spectrum_ = std::make_unique<SurfaceSpectrum>(gel, options.model, box_,
+                                                options.padding > 1 ? Surroundings::open : Surroundings::periodic);
+  const double longest_um = field_.spacing_um * std::max(field_.n_columns, field_.n_rows);
+  longest_wave_um_per_kPa_ = wave_compliance(gel, options.model, 2 * std::numbers::pi / longest_um).across_um_per_kPa;
+  n_beads_ = beads.size();
+
+  const bool states_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  double sum = 0;
+  for (const Bead& b : beads) sum += states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1;
+  const double n_nodes = static_cast<double>(field_.n_nodes());
+  if (states_errors) stated_variance_ = n_nodes / sum;
+
+  Eigen::ArrayXd &x = data_x_, &y = data_y_;
+  x.resize(beads.size());
+  y.resize(beads.size());
+  bool is_on_nodes = true, is_even = true;
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    const Bead& b = beads[i];
+    const double weight = (states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1) * n_nodes / sum;
+    is_even = is_even && std::abs(weight - 1) < 1e-9;
+    const double root = std::sqrt(weight);
+    const Vec2 at = 1 / field_.spacing_um * (b.position_um - field_.origin_um);
+    const Stencil column = stencil_of(at.x), row = stencil_of(at.y);
+    first_tap_.push_back(taps_.size());
+    for (int q = 0; q < 4; ++q) {
+      for (int p = 0; p < 4; ++p) {
+        const double share = column.weights[p] * row.weights[q];
+        if (share == 0) continue;
+        const int node =
+            wrapped(column.node + p - 1, box_.n_columns) + box_.n_columns * wrapped(row.node + q - 1, box_.n_rows);
+        taps_.push_back({node, root * share});
+      }
+    }
+    is_on_nodes = is_on_nodes && taps_.size() == first_tap_.back() + 1;
+    x[i] = root * b.displacement_um.x;
+    y[i] = root * b.displacement_um.y;
+  }
+  first_tap_.push_back(taps_.size());
+  is_complete_ = is_on_nodes && is_even && static_cast<Eigen::Index>(beads.size()) == field_.n_nodes();
+  data_squared_ = x.square().sum() + y.square().sum();
+  spread_ = spread(x, y);
+}
+
+NodeField LatticeProblem::spread(const Eigen::ArrayXd& x, const Eigen::ArrayXd& y) const {
+  NodeField nodes{Eigen::ArrayXd::Zero(box_.n_nodes()), Eigen::ArrayXd::Zero(box_.n_nodes())};
+  for (std::size_t i = 0; i < n_beads_; ++i) {
+    for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
+      nodes.x[taps_[k].node] += taps_[k].weight * x[i];
+      nodes.y[taps_[k].node] += taps_[k].weight * y[i];
+    }
+  }
+  return nodes;
+}
+
+NodeField LatticeProblem::spread_signs() const {
+  std::mt19937_64 random(1);
+  Eigen::ArrayXd x(n_beads_), y(n_beads_);
+  for (auto* part : {&x, &y}) {
+    for (double& value : *part) value = random() % 2 == 0 ? 1 : -1;
+  }
+  return spread(x, y);
+}
+
+std::vector<double> LatticeProblem::residuals(const NodeField& nodes) const {
+  std::vector<double> residuals;
+  residuals.reserve(2 * n_beads_);
+  for (std::size_t i = 0; i < n_beads_; ++i) {
+    double x = data_x_[i], y = data_y_[i];
+    for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
+      x -= taps_[k].weight * nodes.x[taps_[k].node];
+      y -= taps_[k].weight * nodes.y[taps_[k].node];
+    }
+    residuals.push_back(x);
+    residuals.push_back(y);
+  }
+  return residuals;
+}
+
+void LatticeProblem::normal(const NodeField& nodes, NodeField& result) const {
+  result.x.setZero();
+  result.y.setZero();
+  for (std::size_t i = 0; i < n_beads_; ++i) {
+    double x = 0, y = 0;
+    for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
+      x += taps_[k].weight * nodes.x[taps_[k].node];
+      y += taps_[k].weight * nodes.y[taps_[k].node];
+    }
+    for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
+      result.x[taps_[k].node] += taps_[k].weight * x;
+      result.y[taps_[k].node] += taps_[k].weight * y;
+    }
+  }
+}
+
+NodeField LatticeProblem::displaced(WaveField tractions) const {
+  spectrum_->apply(
+      tractions, [](double g) { return g; }, tractions);
+  return transform_->backward(std::move(tractions));
+}
+
+WaveField LatticeProblem::pulled_back(const NodeField& spread) const {
+  WaveField waves = transform_->forward(spread);
+  spectrum_->apply(
+      waves, [](double g) { return g; }, waves);
+  return waves;
+}
+
+TikhonovSolver::TikhonovSolver(const LatticeProblem& problem, WaveField right_hand_side)
+    : problem_(problem),
+      b_(std::move(right_hand_side)),
+      t_(problem.transform().no_waves()),
+      image_(t_),
+      residual_(t_),
+      step_(t_),
+      work_(t_),
+      nodes_(problem.transform().no_field()),
+      normal_(nodes_) {}
+
+double TikhonovSolver::solution_squared() const { return problem_.transform().dot(t_, t_); }
+double TikhonovSolver::right_hand_side_times_solution() const { return problem_.transform().dot(b_, t_); }
+double TikhonovSolver::displaced_squared() const { return problem_.transform().dot(image_, t_); }
+
+void TikhonovSolver::apply(const WaveField& tractions) {
+  const auto compliance = [](double g) { return g; };
+  problem_.spectrum().apply(tractions, compliance, work_);
+  problem_.transform().backward(work_, nodes_);
+  problem_.normal(nodes_, normal_);
+  problem_.transform().forward(normal_, work_);
+  problem_.spectrum().apply(work_, compliance, work_);
+}
+
+namespace {
+
+void add(WaveField& to, double factor, const WaveField& what) {
+  to.x += factor * what.x;
+  to.y += factor * what.y;
+}
+
+}  // namespace
+
+int TikhonovSolver::solve(double lambda, double tolerance) {
+  constexpr int kMost = 2000;  // an even field takes a few, a patchy one some tens
+  const double lambda2 = lambda * lambda;
+  const WaveTransform& transform = problem_.transform();
+  const auto precondition = [&](const WaveField& waves, WaveField& result) {
+    problem_.spectrum().apply(
+        waves, [lambda2](double g) { return 1 / (g * g + lambda2); }, result);
+  };
+  residual_.x = b_.x - image_.x - lambda2 * t_.x;
+  residual_.y = b_.y - image_.y - lambda2 * t_.y;
+  precondition(residual_, step_);
+  double energy = transform.dot(residual_, step_);
+  // b · t is the energy of the solution; what t lacks of it yet, the residual has
+  const double enough = tolerance * tolerance * (std::abs(transform.dot(b_, t_)) + energy);
+  int n = 0;
+  for (; energy > enough; ++n) {
+    if (n == kMost) {
+      throw NotSolved({.converged = false,
+                       .iterations = n,
+                       .last_change = std::sqrt(energy / enough) * tolerance,
+                       .reason = "the tractions did not settle in " + std::to_string(n) +
+                                 " steps: lambda is far too small for so uneven a field"});
+    }
+    apply(step_);
+    const double length = energy / (transform.dot(step_, work_) + lambda2 * transform.dot(step_, step_));
+    add(t_, length, step_);
+    add(image_, length, work_);
+    residual_.x -= length * (work_.x + lambda2 * step_.x);
+    residual_.y -= length * (work_.y + lambda2 * step_.y);
+    precondition(residual_, work_);
+    const double next_energy = transform.dot(residual_, work_);
+    const double ratio = next_energy / energy;
+    step_.x = work_.x + ratio * step_.x;
+    step_.y = work_.y + ratio * step_.y;
+    energy = next_energy;
+  }
+  return n;
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,81 @@
+/// mbtfm-traction: the standard traction reconstructions, beside the model-based one.
+#include "mbtfm/traction.h"
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/stage.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+struct TractionStageParameters {
+  Gel gel;
+  TractionParameters traction;
+};
+
+void declare(ParameterList& list, TractionStageParameters& p) {
+  declare(list, p.gel);
+  declare(list, p.traction);
+}
+
+StageReport run(const TractionStageParameters& p, StageContext& context) {
+  context.progress(0, "reading");
+  TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
+  int n_flagged = 0;
+  for (Bead& bead : read_displacement(context.input("displacement"))) {
+    if (bead.flag.empty())
+      inputs.beads.push_back(std::move(bead));
+    else
+      ++n_flagged;
+  }
+  if (context.has_input("adhesions")) inputs.adhesions = read_adhesions(context.input("adhesions"));
+  if (context.has_input("outline")) inputs.outline_um = read_outline(context.input("outline"));
+  context.progress(0.1, "reconstructing tractions");
+  const Reconstruction r = reconstruct(inputs, p.traction, context.threads);
+  const TractionSums sums = sums_of(r, inputs, p.traction.grow_um);
+
+  write_tractions(context.output("out"), r.patches);
+  write_tractions_vtp(context.output_beside("out", ".vtp"), r.patches);
+  write_figures(context.output_beside("out", ".json"), summary_of(r, sums));
+  if (r.scan) {
+    write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
+  }
+  if (!inputs.adhesions.empty()) {
+    write_adhesion_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces, inputs.adhesions,
+                          columns_of(r.sensitivities));
+  }
+  context.progress(1, "done");
+
+  StageReport report;
+  report.summary = p.traction.method + ": total force " + brief(sums.total_force_nN) + " nN, strain energy " +
+                   brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " + brief(r.relative_l2);
+  if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
+  if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged beads left out";
+  report.converged = r.report.converged;
+  if (!r.report.converged) report.summary += "; " + r.report.reason;
+  if (!r.remark.empty()) report.summary += "; " + r.remark;
+  report.figures = summary_of(r, sums);
+  const bool is_layer = p.traction.gel_model == "layer";
+  report.effects = {{.name = "finite thickness",
+                     .is_on = is_layer,
+                     .why = is_layer ? "layer on a rigid base" : "half-space, as gel_model asks",
+                     .seconds = 0}};
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
+
+int main(int argc, char** argv) {
+  using mbtfm::FileArgument;
+  using namespace mbtfm::inverse;
+  return mbtfm::run_stage<TractionStageParameters>(
+      {.name = "traction",
+       .purpose = "reconstruct tractions from bead displacements by a standard method",
+       .files = {{"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
+                 {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
+                 {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
+                 {"out", FileArgument::Kind::output,
+                  "traction.csv; traction.vtp, traction.json, traction_lambda.csv and traction_adhesion_forces.csv "
+                  "come beside it"}}},
+      argc, argv, run);
+}

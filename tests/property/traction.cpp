@@ -1,0 +1,262 @@
+/// Symmetries of traction reconstructions, and what they do at borders, with nothing and with bad input.
+#include <gtest/gtest.h>
+
+#include <numbers>
+#include <random>
+
+#include "mbtfm/fttc.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/ellipse_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::ellipse_scene;
+using test::EllipseScene;
+
+TractionParameters half_space(const std::string& method) {
+  TractionParameters parameters;
+  parameters.method = method;
+  parameters.gel_model = "half-space";
+  return parameters;
+}
+
+TractionInputs inputs_of(const EllipseScene& scene) {
+  return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions, .outline_um = {}};
+}
+
+const std::vector<std::string> kMethods = {"fttc", "sparse", "trpf", "adhesion-forces"};
+
+template <class Map>
+TractionInputs mapped(TractionInputs inputs, const Map& map, Vec2 centre, double turn_rad, double mirror) {
+  for (Bead& b : inputs.beads) {
+    b.position_um = centre + map(b.position_um - centre);
+    b.displacement_um = map(b.displacement_um);
+  }
+  for (Adhesion& a : inputs.adhesions) {
+    a.position_um = centre + map(a.position_um - centre);
+    a.angle_rad = mirror * a.angle_rad + turn_rad;
+  }
+  return inputs;
+}
+
+template <class Map>
+void expect_mapped_forces(const Map& map, double turn_rad, double mirror) {
+  const EllipseScene scene = ellipse_scene(48, 0.03, 4);
+  for (const std::string& method : kMethods) {
+    const Reconstruction before = reconstruct(inputs_of(scene), half_space(method), 1);
+    const Reconstruction after =
+        reconstruct(mapped(inputs_of(scene), map, {32, 32}, turn_rad, mirror), half_space(method), 2);
+    for (std::size_t a = 0; a < before.forces.size(); ++a) {
+      const Vec2 expected = map(before.forces[a].force_nN);
+      // Sums run in another order: rounding, and what iterations that stop at 1e-3 make of it.
+      EXPECT_NEAR(norm(after.forces[a].force_nN - expected), 0, 2e-3 * norm(expected)) << method << " " << a;
+    }
+  }
+}
+
+TEST(Tractions, a_turned_scene_has_turned_forces) {
+  expect_mapped_forces([](Vec2 v) { return Vec2{-v.y, v.x}; }, std::numbers::pi / 2, 1);
+}
+
+TEST(Tractions, a_mirrored_scene_has_mirrored_forces) {
+  expect_mapped_forces([](Vec2 v) { return Vec2{v.x, -v.y}; }, 0, -1);
+}
+
+TEST(Tractions, are_the_same_bits_for_any_number_of_threads) {
+  TractionInputs inputs = inputs_of(ellipse_scene(32, 0.05, 8));
+  inputs.outline_um = {{10, 10}, {54, 10}, {54, 54}, {10, 54}};
+  TractionParameters parameters = half_space("fttc");
+  parameters.element_um = 6;
+  for (const char* method : {"fttc", "sparse", "trpf", "bem", "adhesion-forces"}) {
+    parameters.method = method;
+    const Reconstruction one = reconstruct(inputs, parameters, 1);
+    for (const int threads : {2, 4}) {
+      const Reconstruction many = reconstruct(inputs, parameters, threads);
+      for (std::size_t p = 0; p < one.patches.size(); ++p) {
+        ASSERT_EQ(many.patches[p].traction_kPa, one.patches[p].traction_kPa) << method << ", " << threads;
+      }
+      for (std::size_t a = 0; a < one.forces.size(); ++a) {
+        ASSERT_EQ(many.forces[a].force_nN, one.forces[a].force_nN) << method << ", " << threads;
+        ASSERT_EQ(many.forces[a].sigma_nN, one.forces[a].sigma_nN) << method << ", " << threads;
+      }
+    }
+  }
+}
+
+TEST(Fttc, a_scene_turned_by_any_angle_has_the_same_forces_turned) {
+  // Off the lattice's axes cells cut the ellipses otherwise: a few per cent of the force at their rims.
+  const auto forces = [](double turn) {
+    const Reconstruction r = reconstruct(inputs_of(ellipse_scene(128, 0, 1, turn)), half_space("fttc"), 1);
+    return r.forces;
+  };
+  const auto straight = forces(0);
+  for (const double turn : {0.3, 1.1}) {
+    const auto turned = forces(turn);
+    for (std::size_t a = 0; a < straight.size(); ++a) {
+      const Vec2 f = straight[a].force_nN;
+      const Vec2 expected{std::cos(turn) * f.x - std::sin(turn) * f.y, std::sin(turn) * f.x + std::cos(turn) * f.y};
+      EXPECT_LE(norm(turned[a].force_nN - expected), 0.03 * norm(f)) << turn;
+    }
+  }
+}
+
+TEST(Fttc, odd_and_even_lattices_agree) {
+  // Cells of another size cut the grown ellipses otherwise: as for the turned scene.
+  TractionParameters parameters = half_space("fttc");
+  for (const double padding : {1.0, 1.5}) {
+    parameters.padding = padding;
+    const EllipseScene even = ellipse_scene(128, 0), odd = ellipse_scene(127, 0);
+    const Reconstruction one = reconstruct(inputs_of(even), parameters, 1);
+    const Reconstruction other = reconstruct(inputs_of(odd), parameters, 1);
+    for (std::size_t a = 0; a < one.forces.size(); ++a) {
+      EXPECT_LE(norm(one.forces[a].force_nN - other.forces[a].force_nN), 0.03 * norm(one.forces[a].force_nN))
+          << "padding " << padding;
+    }
+  }
+}
+
+TEST(Fttc, cross_validation_smooths_more_where_there_is_more_noise) {
+  double before = 0;
+  for (const double noise : {0.01, 0.03, 0.1, 0.2}) {
+    const EllipseScene scene = ellipse_scene(96, noise, 2, 0, 64, false);
+    const LatticeProblem problem(
+        scene.field, scene.gel,
+        {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+    const LambdaScan scan = scan_lambda(problem);
+    EXPECT_GT(scan.by_gcv, before);
+    before = scan.by_gcv;
+  }
+}
+
+TEST(Fttc, a_field_cut_at_the_border_does_not_inflate_the_contractile_moment) {
+  const EllipseScene whole = ellipse_scene(128, 0.02, 6);
+  const auto moment = [](const EllipseScene& scene, bool is_near) {
+    TractionInputs inputs = inputs_of(scene);
+    if (!is_near) inputs.adhesions.clear();
+    return sums_of(reconstruct(inputs, half_space("fttc"), 1), inputs, 1.5).contractile_moment_nN_um();
+  };
+  double truth = 0;
+  for (std::size_t a = 0; a < whole.forces_nN.size(); ++a) {
+    truth -= dot(whole.adhesions[a].position_um - Vec2{32, 32}, whole.forces_nN[a]);
+  }
+  // cut 1.5 um from the outermost adhesion's rim: 48 of 64 um
+  const EllipseScene cut = ellipse_scene(96, 0.02, 6, 0, 48);
+  std::printf("contractile moment: true %.0f, whole %.0f, cut %.0f near the adhesions, %.0f over all nN um\n", truth,
+              moment(whole, true), moment(cut, true), moment(cut, false));
+  EXPECT_NEAR(moment(cut, true), moment(whole, true), 0.05 * truth);
+  EXPECT_LE(moment(cut, false), 1.1 * truth);
+}
+
+TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
+  const EllipseScene scene = ellipse_scene(96, 0);
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  const auto greens = substrate::make_greens(scene.gel, {.model = "half-space"}, 2);
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> place(0, 64);
+  std::vector<Vec2> points;
+  for (int i = 0; i < 10000; ++i) {
+    const double x = place(random);
+    points.push_back({x, place(random)});
+  }
+  const std::vector<Vec2> u = greens->displacements_um(points, ellipses, scene.forces_nN);
+  TractionInputs inputs = inputs_of(scene);
+  inputs.beads.clear();
+  std::normal_distribution<double> noise(0, 0.02);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Vec2 error{noise(random), noise(random)};
+    inputs.beads.push_back({.position_um = points[i], .displacement_um = u[i] + error, .sigma_um = 0.02, .flag = {}});
+  }
+  const Reconstruction r = reconstruct(inputs, half_space("fttc"), 1);
+  std::vector<Vec2> forces;
+  for (const AdhesionForce& f : r.forces) forces.push_back(f.force_nN);
+  // As many beads on a lattice are the best spread they can have; chance leaves holes between scattered ones.
+  const EllipseScene even = ellipse_scene(100, 0.02 / scene.largest_um, 3);
+  std::vector<Vec2> even_forces;
+  for (const AdhesionForce& f : reconstruct(inputs_of(even), half_space("fttc"), 1).forces) {
+    even_forces.push_back(f.force_nN);
+  }
+  const double on_lattice = test::force_error(even, even_forces), scattered = test::force_error(scene, forces);
+  std::printf("10000 beads, noise 0.02 um: F %.3f scattered, %.3f on a lattice\n", scattered, on_lattice);
+  EXPECT_LE(scattered, 2 * on_lattice);
+}
+
+TEST(Fttc, a_thick_layer_gives_the_tractions_of_the_half_space) {
+  EllipseScene scene = ellipse_scene(64, 0.02, 3, 0, 6.4);  // spacing 0.1 um, cut out of the middle
+  TractionParameters layer = half_space("fttc");
+  layer.gel_model = "layer";
+  layer.lambda_um_per_kPa = 0.05;
+  TractionParameters half = layer;
+  half.gel_model = "half-space";
+  const Reconstruction reference = reconstruct(inputs_of(scene), half, 1);
+  double before = 1e9, last = 1;
+  for (const double thickness : {50.0, 100.0, 1000.0}) {
+    TractionInputs inputs = inputs_of(scene);
+    inputs.gel.thickness_um = thickness;
+    const Reconstruction r = reconstruct(inputs, layer, 1);
+    double difference = 0, size = 0;
+    for (std::size_t p = 0; p < r.patches.size(); ++p) {
+      const Vec2 d = r.patches[p].traction_kPa - reference.patches[p].traction_kPa;
+      ASSERT_TRUE(is_finite(d)) << thickness;
+      difference += dot(d, d);
+      size += dot(reference.patches[p].traction_kPa, reference.patches[p].traction_kPa);
+    }
+    EXPECT_LE(difference, before);
+    before = difference;
+    last = std::sqrt(difference / size);
+  }
+  EXPECT_LE(last, 0.02);  // what the waves beyond 10 um tell apart
+}
+
+TEST(Tractions, where_nothing_moves_there_is_no_traction_and_that_is_said) {
+  EllipseScene scene = ellipse_scene(32, 0);
+  for (Bead& b : scene.field) b.displacement_um = {};
+  TractionInputs inputs = inputs_of(scene);
+  inputs.outline_um = {{10, 10}, {54, 10}, {54, 54}, {10, 54}};
+  TractionParameters parameters = half_space("fttc");
+  parameters.element_um = 8;
+  for (const char* method : {"fttc", "sparse", "trpf", "bem", "adhesion-forces"}) {
+    parameters.method = method;
+    const Reconstruction r = reconstruct(inputs, parameters, 1);
+    for (const Patch& p : r.patches) EXPECT_EQ(p.traction_kPa, (Vec2{})) << method;
+    EXPECT_FALSE(r.patches.empty());
+    EXPECT_NE(r.remark.find("no bead has moved"), std::string::npos) << method;
+  }
+}
+
+TEST(Tractions, bad_input_is_named) {
+  const EllipseScene scene = ellipse_scene(16, 0.05);
+  TractionInputs inputs = inputs_of(scene);
+  const auto expect_rejected = [](const TractionInputs& bad, const std::string& method, const std::string& word) {
+    try {
+      reconstruct(bad, half_space(method), 1);
+      ADD_FAILURE() << method << " took it: " << word;
+    } catch (const InvalidData& error) {
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << method << ": " << error.what();
+    }
+  };
+  for (const std::string& method : kMethods) {
+    TractionInputs bad = inputs;
+    bad.beads[7].displacement_um.x = std::nan("");
+    expect_rejected(bad, method, "displacement of bead 7");
+    bad = inputs;
+    bad.beads.resize(1);
+    expect_rejected(bad, method, "1");
+  }
+  for (const char* method : {"fttc", "sparse"}) {
+    TractionInputs bad = inputs;
+    bad.beads[9].position_um = bad.beads[4].position_um;
+    expect_rejected(bad, method, "position of bead 9");
+    bad = inputs;
+    for (Bead& b : bad.beads) b.position_um.y = 3;
+    expect_rejected(bad, method, "");
+  }
+  TractionInputs few = inputs;
+  few.beads.resize(7);
+  expect_rejected(few, "adhesion-forces", "8 adhesions");
+  expect_rejected(few, "trpf", "16 unknown");
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
