@@ -28,7 +28,7 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
       ++n_flagged;
   }
   if (context.has_input("adhesions")) inputs.adhesions = read_adhesions(context.input("adhesions"));
-  if (context.has_input("outline")) inputs.outline_um = read_outline(context.input("outline"));
+  if (context.has_input("outline")) inputs.outline_um = read_outline(context.input("outline")).front();
   context.progress(0.1, "reconstructing tractions");
   const Reconstruction r = reconstruct(inputs, p.traction, context.threads);
   const TractionSums sums = sums_of(r, inputs, p.traction.grow_um);
