@@ -57,7 +57,7 @@ struct Fibre {
   double confidence = 1;       ///< that it is a fibre, 0 to 1
   Polyline points_um;          ///< at least two, no two in a row equal
   double type_confidence = 1;  ///< that its type is right, 0 to 1
-  std::string type_reason;     ///< in words; empty: none given
+  std::string type_reason{};   ///< in words; empty: none given
 };
 
 /// A segmented cell.

@@ -1,6 +1,8 @@
 /// Bad input: an error that names file, place, expectation and finding; a non-zero exit code; nothing half-written.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include <fstream>
 
 #include "pipeline/contract/csv.h"
@@ -90,10 +92,18 @@ TEST_F(Errors, bead_images_of_different_sizes_are_named_with_their_sizes) {
 }
 
 TEST_F(Errors, an_image_without_adhesions_says_so) {
+  segment::Image noise = segment::read_image(cell_ / "paxillin.tif");
+  std::mt19937_64 random(1);
+  for (float& value : noise.pixels) value = 200 + static_cast<float>(random() % 32);
+  segment::write_tiff(cell_ / "paxillin.tif", noise);
+  expect_error(kInput, {"no adhesion", "paxillin.tif"}, "1_segment");
+}
+
+TEST_F(Errors, a_constant_image_is_called_so) {
   segment::Image flat = segment::read_image(cell_ / "paxillin.tif");
   std::fill(flat.pixels.begin(), flat.pixels.end(), 200.0f);
   segment::write_tiff(cell_ / "paxillin.tif", flat);
-  expect_error(kInput, {"adhesion", "paxillin.tif"}, "1_segment");
+  expect_error(kInput, {"every pixel is 200", "paxillin.tif"}, "1_segment");
 }
 
 TEST_F(Errors, an_unknown_key_names_its_line_and_the_nearest_known_one) {
