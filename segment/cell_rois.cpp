@@ -2,16 +2,12 @@
 
 #include <cmath>
 
+#include "segment/palette.h"
+
 namespace mbtfm::segment {
 namespace {
 
-// Opaque (FF), red, green, blue: the colours of the overlay
-constexpr std::uint32_t kOutline = 0xFFE1E1E1, kAdhesion = 0xFFFFAAEB, kVentral = 0xFF00D68F, kDorsal = 0xFF56B4FF,
-                        kArc = 0xFFFFB728;
-
-std::uint32_t colour_of(FibreType type) {
-  return type == FibreType::ventral ? kVentral : type == FibreType::dorsal ? kDorsal : kArc;
-}
+std::uint32_t argb(Colour c) { return 0xFF000000u | c.red << 16 | c.green << 8 | c.blue; }
 
 std::vector<Vec2> in_px(const std::vector<Vec2>& points_um, double pixel_um, double shift_px) {
   std::vector<Vec2> points_px;
@@ -23,19 +19,20 @@ std::vector<Vec2> in_px(const std::vector<Vec2>& points_um, double pixel_um, dou
 
 std::vector<Roi> rois_of(const Cell& cell, double pixel_um) {
   std::vector<Roi> rois;
-  const auto add = [&](RoiShape shape, const std::string& name, std::uint32_t colour) -> Roi& {
+  const auto add = [&](RoiShape shape, const std::string& name, Colour colour) -> Roi& {
     rois.emplace_back();
     rois.back().shape = shape;
     rois.back().name = name;
-    rois.back().stroke_argb = colour;
+    rois.back().stroke_argb = argb(colour);
     return rois.back();
   };
-  add(RoiShape::polygon, "outline", kOutline).points_px = in_px(cell.outline_um, pixel_um, 0);
+  add(RoiShape::polygon, "outline", kOutlineColour).points_px = in_px(cell.outline_um, pixel_um, 0);
   for (std::size_t i = 0; i < cell.holes_um.size(); ++i)
-    add(RoiShape::polygon, "hole " + std::to_string(i + 1), kOutline).points_px = in_px(cell.holes_um[i], pixel_um, 0);
+    add(RoiShape::polygon, "hole " + std::to_string(i + 1), kOutlineColour).points_px =
+        in_px(cell.holes_um[i], pixel_um, 0);
   for (const Adhesion& a : cell.adhesions) {
     const Vec2 half = 0.5 * a.major_axis_um * Vec2{std::cos(a.angle_rad), std::sin(a.angle_rad)};
-    Roi& roi = add(RoiShape::ellipse, "adhesion " + std::to_string(a.adhesion_id), kAdhesion);
+    Roi& roi = add(RoiShape::ellipse, "adhesion " + std::to_string(a.adhesion_id), kAdhesionColour);
     roi.points_px = in_px({a.position_um - half, a.position_um + half}, pixel_um, 0);
     roi.aspect_ratio = a.minor_axis_um / a.major_axis_um;
   }

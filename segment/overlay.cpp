@@ -8,14 +8,13 @@
 #include "pipeline/contract/polyline.h"
 #include "segment/ellipse.h"
 #include "segment/grid.h"
+#include "segment/palette.h"
 
 namespace mbtfm::segment {
 
 namespace {
 
-/// Colours are red, green, blue: those of the report's plots, lighter for the dark ground.
-const cv::Scalar kVentral(0, 214, 143), kDorsal(86, 180, 255), kArc(255, 183, 40), kAdhesion(255, 170, 235),
-    kOutline(225, 225, 225), kInk(15, 15, 15), kPaper(255, 255, 255);
+const cv::Scalar kInk(15, 15, 15), kPaper(255, 255, 255);  // red, green, blue
 constexpr int kFont = cv::FONT_HERSHEY_SIMPLEX;
 constexpr int kShift = 4;           // OpenCV's drawing takes fixed-point coordinates: sixteenths of a pixel
 constexpr double kLongSide = 1600;  // px: two screens' pixels for each where a page shows it 700 px wide
@@ -23,9 +22,7 @@ constexpr double kMargin_um = 3;    // around the cell, so that one sees what th
 constexpr double kFibreText = 1.0, kAdhesionText = 0.6, kLegendText = 1.0;  // times 22 px: height of a capital
 constexpr double kStemOfU = 4;  // px from the left of the letter's box at size 1
 
-cv::Scalar colour_of(FibreType type) {
-  return type == FibreType::ventral ? kVentral : type == FibreType::dorsal ? kDorsal : kArc;
-}
+cv::Scalar scalar(Colour c) { return cv::Scalar(c.red, c.green, c.blue); }
 
 /// Part of an image at the size of the picture, 0 to 1 between its 1 % and its 99.8 % quantile, brightened by a root so
 /// that faint structure shows.
@@ -138,14 +135,15 @@ void draw_labels(Canvas& canvas, const Cell& cell) {
   constexpr double kClear_px = 30;  // about a label's width
   for (const Fibre& f : cell.fibres)
     canvas.label(label_places_um(f, cell.fibres, kClear_px * canvas.pixel_um()), std::to_string(f.fibre_id),
-                 colour_of(f.type), kFibreText);
+                 scalar(colour_of(f.type)), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
   std::vector<const Adhesion*> large_first;
   for (const Adhesion& a : cell.adhesions) large_first.push_back(&a);
   std::stable_sort(large_first.begin(), large_first.end(),
                    [](const Adhesion* a, const Adhesion* b) { return a->area_um2 > b->area_um2; });
   for (const Adhesion* a : large_first)
-    canvas.label(places_beside(*a, canvas.pixel_um()), std::to_string(a->adhesion_id), kAdhesion, kAdhesionText);
+    canvas.label(places_beside(*a, canvas.pixel_um()), std::to_string(a->adhesion_id), scalar(kAdhesionColour),
+                 kAdhesionText);
 }
 
 /// 1, 2 or 5 times a power of ten, at most `limit`.
@@ -167,9 +165,9 @@ std::vector<Entry> entries_of(const Cell& cell, double pixel_um, int width) {
   for (const FibreType type : kFibreTypes) {
     const auto n =
         std::count_if(cell.fibres.begin(), cell.fibres.end(), [&](const Fibre& f) { return f.type == type; });
-    entries.push_back({std::string(name_of(type)) + " " + std::to_string(n), colour_of(type)});
+    entries.push_back({std::string(name_of(type)) + " " + std::to_string(n), scalar(colour_of(type))});
   }
-  entries.push_back({"adhesion " + std::to_string(cell.adhesions.size()), kAdhesion});
+  entries.push_back({"adhesion " + std::to_string(cell.adhesions.size()), scalar(kAdhesionColour)});
   entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});
   const double bar_um = round_length(0.2 * width * pixel_um);
   char text[32];
@@ -212,10 +210,11 @@ cv::Mat legend(const std::vector<Entry>& entries, int width) {
 }
 
 void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
-  canvas.line(cell.outline_um, true, kOutline, thickness);
-  for (const Polygon& hole : cell.holes_um) canvas.line(hole, true, kOutline, thickness);
-  for (const Adhesion& a : cell.adhesions) canvas.line(ellipse_polygon(a, 32), true, kAdhesion, thickness);
-  for (const Fibre& f : cell.fibres) canvas.line(f.points_um, false, colour_of(f.type), thickness + 1);
+  canvas.line(cell.outline_um, true, scalar(kOutlineColour), thickness);
+  for (const Polygon& hole : cell.holes_um) canvas.line(hole, true, scalar(kOutlineColour), thickness);
+  for (const Adhesion& a : cell.adhesions)
+    canvas.line(ellipse_polygon(a, 32), true, scalar(kAdhesionColour), thickness);
+  for (const Fibre& f : cell.fibres) canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
 }
 
 }  // namespace

@@ -6,6 +6,30 @@
 #include "pipeline/contract/errors.h"
 #include "tests/support/segmentation_accuracy.h"
 
+namespace {
+
+/// How many of the fibres said to be one with some confidence are one.
+struct Calibration {
+  static constexpr double kLimits[] = {0.3, 0.6, 0.8, 0.9, 0.97, 1.0001};
+  struct Bin {
+    int n = 0, n_true = 0;
+    double sum = 0;
+  } bins[std::size(kLimits)];
+  void add(double confidence, bool is_true) {
+    Bin& bin = bins[std::upper_bound(std::begin(kLimits), std::end(kLimits), confidence) - std::begin(kLimits)];
+    ++bin.n;
+    bin.n_true += is_true;
+    bin.sum += confidence;
+  }
+  void print() const {
+    std::printf("confidence of a fibre: stated, true, fibres\n");
+    for (const Bin& b : bins)
+      if (b.n > 0) std::printf("  %.2f  %.2f  %d\n", b.sum / b.n, 1.0 * b.n_true / b.n, b.n);
+  }
+};
+
+}  // namespace
+
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using namespace mbtfm::test;
@@ -13,6 +37,7 @@ int main(int argc, char** argv) {
   const int first = argc > 2 ? std::atoi(argv[2]) : 1, last = argc > 3 ? std::atoi(argv[3]) : 4;
   const bool has_true_adhesions = argc > 4 && std::string(argv[4]) == "true-adhesions";
   std::map<std::string, std::map<std::string, double>> table;
+  Calibration calibration;
   const std::vector<std::string> qualities = {"poor", "ordinary", "good"};
   for (const std::string& quality : qualities) {
     for (int seed = first; seed <= last; ++seed) {
@@ -29,6 +54,7 @@ int main(int argc, char** argv) {
       } catch (const InputError& error) {
         std::fprintf(stderr, "%s seed %d: %s\n", quality.c_str(), seed, error.what());
       }
+      for (const Fibre& f : found.fibres) calibration.add(f.confidence, is_true_fibre(f, cell.truth.fibres, 0.4));
       for (const auto& [name, value] : accuracy_of(cell.truth, found))
         table[name][quality] += value / (last - first + 1);
     }
@@ -37,4 +63,5 @@ int main(int argc, char** argv) {
               last);
   for (auto& [name, row] : table)
     std::printf("%-42s %9.3f %9.3f %9.3f\n", name.c_str(), row["poor"], row["ordinary"], row["good"]);
+  calibration.print();
 }

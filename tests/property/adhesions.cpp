@@ -14,17 +14,6 @@ using namespace mbtfm::test;
 
 constexpr double kPixel_um = DrawnScene::kPixel_um, kSide_um = 25.6;
 
-template <class Map>
-Image mapped(const Image& image, Map map) {
-  Image result = image;
-  for (int row = 0; row < image.height; ++row)
-    for (int column = 0; column < image.width; ++column) {
-      const auto [c, r] = map(column, row);
-      result.at(c, r) = image.at(column, row);
-    }
-  return result;
-}
-
 struct Found {
   std::vector<Adhesion> adhesions;
   Polygon outline_um;

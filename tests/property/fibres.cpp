@@ -12,17 +12,6 @@ using namespace mbtfm::test;
 constexpr int kSide = 256;
 constexpr double kPixel_um = DrawnScene::kPixel_um;
 
-template <class Map>
-Image mapped(const Image& image, Map map) {
-  Image result = image;
-  for (int row = 0; row < image.height; ++row)
-    for (int column = 0; column < image.width; ++column) {
-      const auto [c, r] = map(column, row);
-      result.at(c, r) = image.at(column, row);
-    }
-  return result;
-}
-
 struct Scene {
   Image image;
   Polygon outline_um;

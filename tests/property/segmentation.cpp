@@ -18,17 +18,6 @@ Segmentation segmented(const Image& adhesion, const Image& actin) {
   return segment_cell(Channel{"adhesion", adhesion}, Channel{"actin", actin}, p);
 }
 
-template <class Map>
-Image mapped(const Image& image, Map map) {
-  Image result = image;
-  for (int row = 0; row < image.height; ++row)
-    for (int column = 0; column < image.width; ++column) {
-      const auto [c, r] = map(column, row);
-      result.at(c, r) = image.at(column, row);
-    }
-  return result;
-}
-
 /// `b` is `a` after `move`: same numbers, every adhesion and fibre type again.
 template <class Move>
 void expect_moved(const Segmentation& a, const Segmentation& b, Move move) {

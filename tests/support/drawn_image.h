@@ -91,4 +91,16 @@ inline DrawnScene drawn_scene(double noise, std::uint64_t seed) {
   return s;
 }
 
+/// The image with each pixel (column, row) at `map` of them; for maps of a field onto itself.
+template <class Map>
+segment::Image mapped(const segment::Image& image, Map map) {
+  segment::Image result = image;
+  for (int row = 0; row < image.height; ++row)
+    for (int column = 0; column < image.width; ++column) {
+      const auto [c, r] = map(column, row);
+      result.at(c, r) = image.at(column, row);
+    }
+  return result;
+}
+
 }  // namespace mbtfm::test

@@ -113,6 +113,11 @@ inline double covered_share(const std::vector<Fibre>& lines, const std::vector<F
   return n > 0 ? static_cast<double>(n_near) / static_cast<double>(n) : 1;
 }
 
+/// At least half of it lies on a true one.
+inline bool is_true_fibre(const Fibre& found, const std::vector<Fibre>& truth, double tolerance_um) {
+  return 2 * covered_share(std::vector{found}, truth, tolerance_um) >= 1;
+}
+
 inline LineScore score_lines(const std::vector<Fibre>& truth, const std::vector<Fibre>& found, double tolerance_um) {
   return {covered_share(truth, found, tolerance_um), covered_share(found, truth, tolerance_um)};
 }
@@ -156,14 +161,7 @@ inline FibreScore score_fibres(const Cell& truth, const Cell& found, const Adhes
       break;
     }
   }
-  for (const Fibre& f : found.fibres) {
-    int n = 0;
-    const Polyline points = densely(f.points_um);
-    for (const Vec2 p : points)
-      n += std::any_of(truth.fibres.begin(), truth.fibres.end(),
-                       [&](const Fibre& t) { return distance_to_line_um(p, t.points_um) <= kTolerance_um; });
-    s.n_false += 2 * n < static_cast<int>(points.size());
-  }
+  for (const Fibre& f : found.fibres) s.n_false += !is_true_fibre(f, truth.fibres, kTolerance_um);
   return s;
 }
 
