@@ -36,9 +36,8 @@ std::vector<FittedCell> read_cells(StageContext& context) {
     ParameterList list;
     declare(list, cell.inputs.gel);
     read_toml(list, path / "cell.toml");
-    for (Bead& bead : read_displacement(path / "2_track/displacement.csv")) {
-      if (bead.flag.empty()) cell.inputs.beads.push_back(std::move(bead));
-    }
+    cell.inputs.beads = read_displacement(path / "2_track/displacement.csv");
+    std::erase_if(cell.inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
     cell.inputs.outline_um = read_outline(path / "1_segment/outline.csv").front();
     cell.fitted_force_nN = read_fit_summary(path / "4_fit/fit.json").total_force_nN;
     cells.push_back(std::move(cell));

@@ -20,13 +20,8 @@ void declare(ParameterList& list, TractionStageParameters& p) {
 StageReport run(const TractionStageParameters& p, StageContext& context) {
   context.progress(0, "reading");
   TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
-  int n_flagged = 0;
-  for (Bead& bead : read_displacement(context.input("displacement"))) {
-    if (bead.flag.empty())
-      inputs.beads.push_back(std::move(bead));
-    else
-      ++n_flagged;
-  }
+  inputs.beads = read_displacement(context.input("displacement"));
+  const auto n_flagged = std::erase_if(inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
   if (context.has_input("adhesions")) inputs.adhesions = read_adhesions(context.input("adhesions"));
   if (context.has_input("outline")) inputs.outline_um = read_outline(context.input("outline")).front();
   context.progress(0.1, "reconstructing tractions");

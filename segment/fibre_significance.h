@@ -18,8 +18,8 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
 /// false alarms (Desolneux, Moisan & Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
 double expected_false_lines(double significance, double area_um2);
 
-/// The chance that such a line is a fibre, where by chance there would be `n_false` at least as significant: the density
-/// of fibres at that significance over that of all lines.
+/// The chance that such a line is a fibre, where by chance there would be `n_false` at least as significant: the
+/// density of fibres at that significance over that of all lines.
 double chance_of_fibre(double n_false);
 
 /// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond

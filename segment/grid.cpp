@@ -50,14 +50,6 @@ cv::Mat enlarge(const cv::Mat& coarse, int factor, cv::Size size) {
   return fine(cv::Rect(cv::Point(0, 0), size)).clone();
 }
 
-/// Second differences in both directions, as magnitudes in units of a pixel's noise (the kernel's norm is 6).
-cv::Mat noise_magnitude(const cv::Mat& image) {
-  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1) / 6;
-  cv::Mat differences;
-  cv::filter2D(image, differences, CV_32F, kernel, cv::Point(-1, -1), 0, cv::BORDER_REFLECT);
-  return cv::abs(differences);
-}
-
 /// One pixel of each block: keeps the spread of single pixels, which a mean would lower.
 cv::Mat pick(const cv::Mat& image, int factor) {
   cv::Mat result((image.rows + factor - 1) / factor, (image.cols + factor - 1) / factor, CV_32F);
@@ -110,6 +102,13 @@ cv::Mat local_median(const cv::Mat& image, double radius_px) {
   const int factor = factor_for(radius_px);
   const int radius = std::max(1, static_cast<int>(std::lround(radius_px / factor)));
   return enlarge(disc_median(shrink(image, factor), radius), factor, image.size());
+}
+
+cv::Mat noise_magnitude(const cv::Mat& image) {
+  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1) / 6;
+  cv::Mat differences;
+  cv::filter2D(image, differences, CV_32F, kernel, cv::Point(-1, -1), 0, cv::BORDER_REFLECT);
+  return cv::abs(differences);
 }
 
 cv::Mat local_noise(const cv::Mat& image, double radius_px) {

@@ -35,6 +35,10 @@ double noise_gain(double sigma_px);
 /// stay where they are; objects that fill less than half of the disc vanish.
 cv::Mat local_median(const cv::Mat& image, double radius_px);
 
+/// Magnitudes of second differences in both directions, which cancel everything smooth, in units of a pixel's white
+/// noise (Immerkaer, CVIU 64:300, 1996; the kernel's norm is 6).
+cv::Mat noise_magnitude(const cv::Mat& image);
+
 /// Standard deviation of the white noise of each pixel, from second differences in both directions, which cancel
 /// everything smooth (Immerkaer 1996), as a local median over a disc.
 cv::Mat local_noise(const cv::Mat& image, double radius_px);

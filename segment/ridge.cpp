@@ -109,19 +109,6 @@ void filter_tile(const cv::Mat& padded, const FilterBank& bank, cv::Point at, Ri
 
 }  // namespace
 
-namespace {
-
-/// Standard deviation of the white noise of each pixel: second differences in both directions cancel everything smooth
-/// (Immerkaer, CVIU 64:300, 1996). The kernel's norm is 6.
-cv::Mat camera_noise(const cv::Mat& image, const cv::Mat& is_inside, double radius_px) {
-  const cv::Mat kernel = (cv::Mat_<float>(3, 3) << 1, -2, 1, -2, 4, -2, 1, -2, 1);
-  cv::Mat differences;
-  cv::filter2D(image, differences, CV_32F, kernel / 6, cv::Point(-1, -1), 0, cv::BORDER_REFLECT);
-  return texture_of({differences}, is_inside, radius_px);
-}
-
-}  // namespace
-
 double Ridges::at(cv::Point2d point, double angle_rad) const {
   const int n = n_directions();
   double place = angle_rad / pi * n;
@@ -147,7 +134,7 @@ Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeSc
     for (int i = tiles.start; i < tiles.end; ++i)
       filter_tile(padded, bank, {i % columns * step, i / columns * step}, ridges);
   });
-  ridges.noise = cv::max(camera_noise(image, is_inside, scales.noise_radius_px) * bank.noise_gain,
+  ridges.noise = cv::max(texture_of({noise_magnitude(image)}, is_inside, scales.noise_radius_px) * bank.noise_gain,
                          texture_of(ridges.response, is_inside, scales.noise_radius_px));
   return ridges;
 }

@@ -73,45 +73,6 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& c
   return {std::move(cells[static_cast<std::size_t>(p.cell - 1)])};
 }
 
-struct Crop {
-  Image image;
-  Vec2 origin_um;
-};
-
-/// The part of the image that shows the cell, and as much around it as backgrounds are taken over.
-Crop crop_to(const Image& image, const Polygon& outline_um, double pixel_um) {
-  constexpr double kMargin_um = 10;
-  Vec2 low = outline_um.front(), high = low;
-  for (const Vec2 p : outline_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
-  const auto place = [&](double at_um, int n) { return std::clamp(static_cast<int>(at_um / pixel_um), 0, n); };
-  const int left = place(low.x - kMargin_um, image.width), top = place(low.y - kMargin_um, image.height);
-  Crop crop{image, {left * pixel_um, top * pixel_um}};
-  crop.image.width = place(high.x + kMargin_um, image.width) - left;
-  crop.image.height = place(high.y + kMargin_um, image.height) - top;
-  crop.image.pixels.clear();
-  for (int row = top; row < top + crop.image.height; ++row) {
-    const auto first = image.pixels.begin() + static_cast<std::ptrdiff_t>(row) * image.width + left;
-    crop.image.pixels.insert(crop.image.pixels.end(), first, first + crop.image.width);
-  }
-  return crop;
-}
-
-std::vector<Fibre> fibres_of(const Channel& actin, const Cell& cell, double pixel_um, const FibreParameters& p) {
-  require_content(actin);
-  const Crop crop = crop_to(actin.image, cell.outline_um, pixel_um);
-  Polygon outline = cell.outline_um;
-  std::vector<Adhesion> adhesions = cell.adhesions;
-  for (Vec2& point : outline) point = point - crop.origin_um;
-  for (Adhesion& a : adhesions) a.position_um = a.position_um - crop.origin_um;
-  std::vector<Fibre> fibres = find_fibres(crop.image, outline, adhesions, pixel_um, p);
-  for (Fibre& f : fibres)
-    for (Vec2& point : f.points_um) point += crop.origin_um;
-  return fibres;
-}
-
 }  // namespace
 
 std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
@@ -129,6 +90,7 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
   const Channel& shape = actin ? *actin : *adhesion;
   const auto outlines =
       drawn.outline ? std::vector{hand_drawn_outline(*drawn.outline, field)} : outlines_of(shape, found, pixel_um, p);
+  if (actin && drawn.outline && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
   std::vector<Segmentation> result;
   for (const CellOutline& outline : chosen(outlines, shape, p)) {
     Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um},
@@ -145,7 +107,7 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
     if (drawn.fibres)
       s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres);
     else if (actin)
-      s.cell.fibres = fibres_of(*actin, s.cell, pixel_um, p.fibres);
+      s.cell.fibres = find_fibres(actin->image, s.cell.outline_um, s.cell.adhesions, pixel_um, p.fibres);
     result.push_back(std::move(s));
   }
   return result;

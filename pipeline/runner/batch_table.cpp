@@ -22,10 +22,6 @@ ordered_json record_of(const fs::path& cell, const Stage& stage) {
   return record.is_object() && record.contains("figures") ? record : ordered_json{};
 }
 
-bool is_asked(const Stage& stage, const std::vector<std::string>& only) {
-  return only.empty() || std::find(only.begin(), only.end(), stage.name) != only.end();
-}
-
 std::string text_of(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_number_float()) return shortest(value.get<double>());

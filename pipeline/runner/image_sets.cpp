@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "pipeline/contract/csv.h"
@@ -73,12 +74,15 @@ std::map<std::string, ImageSet> group_images(const fs::path& folder, const std::
   return sets;
 }
 
+/// A basic string of TOML, whose escapes are those of JSON.
+std::string quoted(const std::string& text) { return nlohmann::json(text).dump(); }
+
 std::string toml_of(const std::string& settings, const ImageSet& images, const fs::path& folder, const fs::path& cell) {
   std::string text = settings;
   if (!text.empty() && text.back() != '\n') text += '\n';
   text += text.empty() ? "[images]\n" : "\n[images]\n";
   for (const auto& [key, file] : images)
-    text += key + " = '" + (folder / file).lexically_relative(cell).generic_string() + "'\n";
+    text += key + " = " + quoted((folder / file).lexically_relative(cell).generic_string()) + "\n";
   return text;
 }
 

@@ -65,7 +65,7 @@ class CellRun {
 };
 
 StageStatus CellRun::status(const Stage& stage) const {
-  if (!options_.only.empty() && !contains_name(options_.only, stage.name)) {
+  if (!is_asked(stage, options_.only)) {
     return {StageState::not_asked, "left out by --only"};
   }
   if (contains_name(options_.redo, stage.name)) return {StageState::must_run, "asked for"};
@@ -170,12 +170,10 @@ CellOutcome CellRun::run() {
   CellOutcome outcome;
   outcome.stages.resize(all.size());
   const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
-  const auto is_asked = [&](const std::vector<int>& chain) {
-    return options_.only.empty() || std::any_of(chain.begin(), chain.end(), [&](int i) {
-             return std::find(options_.only.begin(), options_.only.end(), all[i].name) != options_.only.end();
-           });
+  const auto is_wanted = [&](const std::vector<int>& chain) {
+    return std::any_of(chain.begin(), chain.end(), [&](int i) { return is_asked(all[i], options_.only); });
   };
-  const int workers = is_asked(chains[0]) && is_asked(chains[1]) ? std::min(options_.threads, 2) : 1;
+  const int workers = is_wanted(chains[0]) && is_wanted(chains[1]) ? std::min(options_.threads, 2) : 1;
   const auto threads_of = [&](int chain) {
     return workers == 1 ? options_.threads
                         : (chain == 0 ? options_.threads - options_.threads / 2 : options_.threads / 2);

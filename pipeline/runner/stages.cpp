@@ -1,5 +1,7 @@
 #include "pipeline/runner/stages.h"
 
+#include <algorithm>
+
 namespace mbtfm::runner {
 
 const std::vector<Stage>& stages() {
@@ -48,6 +50,10 @@ const std::vector<Stage>& stages() {
        .tables = {"", "gel", "network", "cables", "substrate", "fit"}},
   };
   return list;
+}
+
+bool is_asked(const Stage& stage, const std::vector<std::string>& only) {
+  return only.empty() || std::find(only.begin(), only.end(), stage.name) != only.end();
 }
 
 }  // namespace mbtfm::runner

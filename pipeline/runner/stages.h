@@ -32,4 +32,7 @@ struct Stage {
 
 const std::vector<Stage>& stages();
 
+/// Is the stage among those named? @param only  empty: all are
+bool is_asked(const Stage& stage, const std::vector<std::string>& only);
+
 }  // namespace mbtfm::runner

@@ -46,6 +46,14 @@ TEST(ImageSets, a_cell_may_be_a_folder) {
   EXPECT_EQ(f.make({"adhesion=day1/{cell}/pax_??.tif"}), (std::vector<std::string>{"a", "b"}));
 }
 
+TEST(ImageSets, names_may_hold_quotes) {
+  const std::string name = "Ann's \"best\"";
+  ImageFolder f({name + "_pax.tif"});
+  EXPECT_EQ(f.make({"adhesion={cell}_pax.tif"}), std::vector<std::string>{name});
+  const ImageNames names = read_image_names(f.folder / name);
+  EXPECT_TRUE(fs::equivalent(resolve_image(f.folder / name, names, "adhesion"), f.folder / (name + "_pax.tif")));
+}
+
 TEST(ImageSets, settings_that_are_there_stay) {
   ImageFolder f({"a_pax.tif"});
   f.make({"adhesion={cell}_pax.tif"});
