@@ -38,7 +38,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"fftw3", {"mbtfm"}},
     {"deal.II/", {"substrate"}},
     {"cholmod", {"substrate"}},
-    {"metis", {"substrate"}},
+    {"metis", {"network", "substrate"}},
     {"cblas", {"substrate"}},
     {"boost/math/", {"mbtfm", "pipeline", "substrate"}},
     {"boost/", {"mbtfm", "pipeline/contract"}},
