@@ -156,7 +156,7 @@ void write_contracted(const Path& file, const network::CableNetwork& network, co
   std::vector<double> tensions;
   for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
   const network::Equilibrium e = network.equilibrium(tensions, fit.fits.front().trial.equilibrium.positions_um);
-  write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN);
+  write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN, e.link_states);
 }
 
 }  // namespace mbtfm::inverse

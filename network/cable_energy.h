@@ -35,6 +35,8 @@ struct Pull {
   double stiffness_nN_per_um = 0;  ///< dq/dl
 };
 
+constexpr double kRestRounding = 1e-12;  // of a length, and as much again of its change by a few steps
+
 inline double smoothed_um(double distance_um, double eps_um) {
   return std::sqrt(distance_um * distance_um + eps_um * eps_um);
 }
@@ -50,8 +52,8 @@ inline Pull pull(const Cable& cable, Vec2 span_um, const Rounding& rounding) {
     const double q = k / 2 * sum;
     return {length, e, q, cable.tension_nN + q, q / root};
   }
-  // A cable at its rest length counts as stiff: a network at rest can move only by stretching. 1e-12: rounding of l.
-  if (e < -1e-12 * cable.rest_length_um) return {length, e, 0, cable.tension_nN, 0};
+  // A cable at its rest length counts as stiff: a network at rest can move only by stretching.
+  if (e < -kRestRounding * cable.rest_length_um) return {length, e, 0, cable.tension_nN, 0};
   const double q = k * std::max(0.0, e);
   return {length, e, q, cable.tension_nN + q, k};
 }

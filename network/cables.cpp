@@ -17,6 +17,8 @@ namespace {
 constexpr double kSlackTension = 1e-7;
 // A stretch is known to the rounding of two lengths, at a vertex of some six cables; its force to that part of EA.
 constexpr double kStretchRounding = 8 * std::numeric_limits<double>::epsilon();
+// A cable shorter than this times eps is collapsed: there the smoothing takes more than half a per cent off its force.
+constexpr double kCollapsed = 10;
 
 int index_of(const std::vector<int>& sorted, int value) {
   return static_cast<int>(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin());
@@ -44,6 +46,11 @@ FreeVertices free_vertices(const Network& network) {
   return {std::move(unknown), std::move(pair), BlockCholesky(n_free, pairs)};
 }
 
+CableState state_of(const Cable& cable, const Pull& pull, Vec2 span_um, const Rounding& rounding) {
+  if (norm(span_um) < kCollapsed * rounding.eps_um) return CableState::collapsed;
+  return pull.stretch_um > kRestRounding * cable.rest_length_um ? CableState::taut : CableState::slack;
+}
+
 }  // namespace
 
 void declare(ParameterList& list, CableParameters& p) {
@@ -54,7 +61,11 @@ void declare(ParameterList& list, CableParameters& p) {
            "length over which the kink of a collapsed cable is rounded off (mean edge lengths)");
   list.add("force_tolerance", p.force_tolerance, Range{.low = 1e-13, .high = 1e-3},
            "largest net force on a free vertex at equilibrium (of the largest tension)");
-  list.add("max_iterations", p.max_iterations, Range::between(1, 100000), "Newton steps at most");
+  list.add("max_iterations", p.max_iterations, Range::between(1, 1e7),
+           "steps at most; unset: " + std::to_string(CableParameters::kNewtonSteps) + " of Newton's method, " +
+               std::to_string(CableParameters::kConjugateSteps) + " of conjugate gradients");
+  list.add("contraction", p.contraction, "how the equilibrium is found; conjugate-gradient: as in the thesis, slow",
+           {"newton", "conjugate-gradient"});
 }
 
 struct CableNetwork::Impl {
@@ -63,6 +74,7 @@ struct CableNetwork::Impl {
   std::vector<int> fibre_ids, adhesion_ids;
   std::vector<int> group;     // by link
   std::vector<int> adhesion;  // by vertex: index of the adhesion that holds it, or −1
+  std::vector<int> held_vertices;
   double mean_rest_length_um = 0;
   FreeVertices free;
 
@@ -102,13 +114,16 @@ CableNetwork::CableNetwork(Network network, CableParameters parameters) {
     throw InvalidData("network", "at least two adhesions that hold it: with fewer it contracts to a point",
                       std::to_string(adhesions.size()));
   std::vector<int> fibre_ids(fibres.begin(), fibres.end()), adhesion_ids(adhesions.begin(), adhesions.end());
-  std::vector<int> group, adhesion;
+  std::vector<int> group, adhesion, held_vertices;
   for (const Link& link : network.links) group.push_back(index_of(fibre_ids, link.fibre_id));
   for (const int id : network.adhesion_id) adhesion.push_back(id == 0 ? -1 : index_of(adhesion_ids, id));
+  for (std::size_t v = 0; v < adhesion.size(); ++v)
+    if (adhesion[v] >= 0) held_vertices.push_back(static_cast<int>(v));
   const double mean_rest = mean_rest_length_um(network);
   FreeVertices free = free_vertices(network);
   impl_ = std::make_unique<Impl>(Impl{std::move(network), parameters, std::move(fibre_ids), std::move(adhesion_ids),
-                                      std::move(group), std::move(adhesion), mean_rest, std::move(free)});
+                                      std::move(group), std::move(adhesion), std::move(held_vertices), mean_rest,
+                                      std::move(free)});
 }
 CableNetwork::~CableNetwork() = default;
 CableNetwork::CableNetwork(CableNetwork&&) noexcept = default;
@@ -117,6 +132,7 @@ CableNetwork& CableNetwork::operator=(CableNetwork&&) noexcept = default;
 const Network& CableNetwork::network() const { return impl_->network; }
 const std::vector<int>& CableNetwork::fibre_ids() const { return impl_->fibre_ids; }
 const std::vector<int>& CableNetwork::adhesion_ids() const { return impl_->adhesion_ids; }
+const std::vector<int>& CableNetwork::held_vertices() const { return impl_->held_vertices; }
 
 Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
@@ -130,18 +146,22 @@ Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, co
   double force = 0, largest_share = 0;
   for (const Cable& cable : cables) force = std::max(force, cable.tension_nN);
   for (const Link& link : impl_->network.links) largest_share = std::max(largest_share, link.share);
+  const auto method = impl_->parameters.contraction == "newton" ? Contraction::newton : Contraction::conjugate_gradient;
   const double axial_stiffness = largest_share * impl_->parameters.axial_stiffness_nN;
   Minimum minimum = minimise(
       impl_->free, cables, std::move(positions), start.empty() ? Start::cold : Start::warm,
-      {.eps_um = impl_->rounding().eps_um,
+      {.method = method,
+       .eps_um = impl_->rounding().eps_um,
        .edge_length_um = impl_->mean_rest_length_um,
        .force_nN = force > 0 ? force : axial_stiffness,
        .force_tolerance_nN = std::max(impl_->parameters.force_tolerance * force, kStretchRounding * axial_stiffness),
-       .max_iterations = impl_->parameters.max_iterations});
+       .max_iterations = impl_->parameters.max_iterations.value_or(
+           method == Contraction::newton ? CableParameters::kNewtonSteps : CableParameters::kConjugateSteps)});
   Equilibrium result;
   for (std::size_t k = 0; k < cables.size(); ++k) {
     const Pull p = pull(cables[k], minimum.spans_um[k], impl_->rounding());
     result.link_force_nN.push_back(p.force_nN * norm(minimum.spans_um[k]) / p.length_um);
+    result.link_states.push_back(state_of(cables[k], p, minimum.spans_um[k], impl_->rounding()));
     result.energy_fJ += energy_fJ(cables[k], p, impl_->rounding());
   }
   result.positions_um = std::move(minimum.positions_um);
@@ -176,17 +196,16 @@ Eigen::VectorXd CableNetwork::adhesion_forces_nN(const std::vector<double>& tens
   return result;
 }
 
-// Held rows are summed by adhesion as they arise: H_xf and B_x have two rows an adhesion.
-Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<double>& tensions_nN,
-                                                         const Equilibrium& equilibrium) const {
+Eigen::MatrixXd CableNetwork::reaction_derivatives(const std::vector<double>& tensions_nN,
+                                                   const Equilibrium& equilibrium) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
   const Eigen::Index n_groups = static_cast<Eigen::Index>(impl_->fibre_ids.size());
   BlockCholesky h_ff = impl_->free.matrix;
   h_ff.set_zero();
   BlockCholesky::Columns b_f = BlockCholesky::Columns::Zero(2 * h_ff.n_blocks(), n_groups);
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()), n_groups);
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->held_vertices.size()), n_groups);
   struct Coupling {
-    int adhesion, unknown;
+    int held, unknown;
     BlockCholesky::Block stiffness;
   };
   std::vector<Coupling> couplings;  // the blocks of −H_xf
@@ -201,17 +220,29 @@ Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<doubl
     for (int e = 0; e < 2; ++e) {
       const Eigen::Vector2d b = (e == 0 ? -1 : 1) * pull_of_unit_tension;
       const int unknown = impl_->free.unknown[ends[e]], other = impl_->free.unknown[ends[1 - e]];
+      const int held = index_of(impl_->held_vertices, ends[e]);
       if (unknown >= 0)
         b_f.block<2, 1>(2 * unknown, impl_->group[k]) += b;
       else
-        result.block<2, 1>(2 * impl_->adhesion[ends[e]], impl_->group[k]) -= b;
-      if (unknown < 0 && other >= 0) couplings.push_back({impl_->adhesion[ends[e]], other, block});
+        result.block<2, 1>(2 * held, impl_->group[k]) -= b;
+      if (unknown < 0 && other >= 0) couplings.push_back({held, other, block});
     }
   }
   h_ff.factorise();
   h_ff.solve(b_f);  // now −dx_f/dt
   for (const Coupling& c : couplings)
-    result.middleRows<2>(2 * c.adhesion) -= c.stiffness * b_f.middleRows<2>(2 * c.unknown);
+    result.middleRows<2>(2 * c.held) -= c.stiffness * b_f.middleRows<2>(2 * c.unknown);
+  return result;
+}
+
+Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<double>& tensions_nN,
+                                                         const Equilibrium& equilibrium) const {
+  const Eigen::MatrixXd by_vertex = reaction_derivatives(tensions_nN, equilibrium);
+  Eigen::MatrixXd result =
+      Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()), by_vertex.cols());
+  for (std::size_t i = 0; i < impl_->held_vertices.size(); ++i)
+    result.middleRows<2>(2 * impl_->adhesion[impl_->held_vertices[i]]) +=
+        by_vertex.middleRows<2>(2 * static_cast<Eigen::Index>(i));
   return result;
 }
 

@@ -9,6 +9,8 @@
 
 #include <Eigen/Core>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "pipeline/contract/parameters.h"
@@ -18,10 +20,13 @@
 namespace mbtfm::network {
 
 struct CableParameters {
-  double axial_stiffness_nN = 50;  ///< EA: force at 100 % strain beyond the rest length (thesis 3.2.3)
-  double smoothing = 1e-5;         ///< eps in mean rest lengths: far below what the forces can tell
-  double force_tolerance = 1e-9;   ///< largest net force on a free vertex, relative to the largest tension
-  int max_iterations = 500;        ///< Newton steps; ordinary cells take 20 to 30, EA / t of 1e6 some 70
+  static constexpr int kNewtonSteps = 500;  ///< ordinary cells take 20 to 30, EA / t of 1e6 some 70
+  static constexpr int kConjugateSteps = 1'000'000;
+  double axial_stiffness_nN = 50;       ///< EA: force at 100 % strain beyond the rest length (thesis 3.2.3)
+  double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can tell
+  double force_tolerance = 1e-9;        ///< largest net force on a free vertex, relative to the largest tension
+  std::optional<int> max_iterations{};  ///< or kNewtonSteps, kConjugateSteps
+  std::string contraction = "newton";   ///< newton | conjugate-gradient
 };
 void declare(ParameterList& list, CableParameters& parameters);
 
@@ -30,8 +35,9 @@ struct Equilibrium {
   std::vector<Vec2> spans_um;  ///< by link, x_b − x_a: to the last digit even where the cable has collapsed, which the
                                ///< difference of the rounded positions is not; the forces follow from these
   std::vector<double> link_force_nN;  ///< by link; of a collapsed cable anything up to its tension
-  double energy_fJ = 0;               ///< nN·um
-  Report report;                      ///< last_change: the largest net force on a free vertex (nN)
+  std::vector<CableState> link_states;
+  double energy_fJ = 0;  ///< nN·um
+  Report report;         ///< last_change: the largest net force on a free vertex (nN)
 };
 
 /// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix.
@@ -48,6 +54,8 @@ class CableNetwork {
   const std::vector<int>& fibre_ids() const;
   /// Labels of the adhesions that hold vertices, in rising order.
   const std::vector<int>& adhesion_ids() const;
+  /// Vertices that adhesions hold, in rising order.
+  const std::vector<int>& held_vertices() const;
 
   /// @param tensions_nN  by group, >= 0
   /// Not converged: the report says so, nothing is thrown. A part of the network that nothing holds collapses to a
@@ -63,8 +71,11 @@ class CableNetwork {
   /// dR/dt of the adhesion forces: 2·adhesions × groups, by the implicit function theorem (thesis has none):
   /// dR/dt = −(B_x − H_xf H_ff⁻¹ B_f), H = d²U/dx², B = d²U/dx dt. At a tension of zero: the derivative from above;
   /// with all tensions zero: the elastic response of the network at rest.
+  /// A column without entries belongs to a group whose tension only takes the place of its cables' stretch.
   Eigen::MatrixXd adhesion_force_derivatives(const std::vector<double>& tensions_nN,
                                              const Equilibrium& equilibrium) const;
+  /// The same by held vertex: rows 2i, 2i+1 are the force on held_vertices()[i]. Moments of an adhesion follow from it.
+  Eigen::MatrixXd reaction_derivatives(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
 
  private:
   struct Impl;

@@ -32,12 +32,18 @@ StageReport report_of(const network::CableNetwork& cables, const network::Equili
                       const Eigen::VectorXd& forces) {
   double total = 0;
   for (Eigen::Index i = 0; i < forces.size(); i += 2) total += forces.segment<2>(i).norm();
+  const auto count = [&](CableState state) {
+    return static_cast<std::int64_t>(std::ranges::count(equilibrium.link_states, state));
+  };
   StageReport report;
   report.converged = equilibrium.report.converged;
   report.summary = equilibrium.report.reason;
-  report.figures = {{"newton_steps", std::int64_t{equilibrium.report.iterations}},
+  report.figures = {{"steps", std::int64_t{equilibrium.report.iterations}},
                     {"largest_net_force_nN", equilibrium.report.last_change},
                     {"energy_fJ", equilibrium.energy_fJ},
+                    {"n_slack_cables", count(CableState::slack)},
+                    {"n_taut_cables", count(CableState::taut)},
+                    {"n_collapsed_cables", count(CableState::collapsed)},
                     {"n_adhesions", static_cast<std::int64_t>(cables.adhesion_ids().size())},
                     {"total_force_nN", total}};
   return report;
@@ -70,7 +76,7 @@ int main(int argc, char** argv) {
             forces.push_back(by_vertex[v]);
           }
         write_contracted_network(context.output("out"), cables.network(), equilibrium.positions_um,
-                                 equilibrium.link_force_nN);
+                                 equilibrium.link_force_nN, equilibrium.link_states);
         write_reactions(context.output("reactions"), vertices, forces);
         return report_of(cables, equilibrium, cables.adhesion_forces_nN(tensions, equilibrium));
       });

@@ -20,7 +20,9 @@ constexpr double kFullStep = 0.9;
 // A warm start that has not converged by then is far away: the path is shorter.
 constexpr int kWarmSteps = 25;
 // A line search ends where the slope has fallen to this part of the first: finer costs more than it saves.
-constexpr double kSlopeReduction = 0.5;
+constexpr double kNewtonReduction = 0.5;
+// Conjugate gradients are conjugate only where the lines are searched well.
+constexpr double kConjugateReduction = 0.1;
 constexpr double kLongestStep = 16;
 constexpr int kLineTrials = 40;
 // Convergence is quadratic at the end: one more step takes any residual above this part of the force scale to rounding.
@@ -63,17 +65,107 @@ double inside(double q, const Cable& cable, const Pull& pull) {
   return std::max(q, bound + 0.1 * (pull.stretch_force_nN - bound));
 }
 
-class Minimiser {
+/// Where the vertices are, and how the energy changes along a line from there.
+class Descent {
  public:
-  Minimiser(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> start, Rounding rounding)
+  Descent(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> start, Rounding rounding)
       : free_(free),
         cables_(cables),
-        matrix_(free.matrix),
         rounding_(rounding),
         x_(std::move(start)),
         change_(cables.size()),
-        gradient_(x_.size()) {
+        gradient_(x_.size()),
+        step_(x_.size()) {
     for (const Cable& cable : cables_) span_.push_back(x_[cable.vertex_b] - x_[cable.vertex_a]);
+    find_gradient();
+  }
+
+  double residual_nN() const {
+    double largest = 0;
+    for (const Vec2 force : gradient_) largest = std::max(largest, norm(force));
+    return largest;
+  }
+
+  Minimum result(Report report) && { return {std::move(x_), std::move(span_), std::move(report)}; }
+
+ protected:
+  void find_gradient() {
+    std::fill(gradient_.begin(), gradient_.end(), Vec2{});
+    for (std::size_t k = 0; k < cables_.size(); ++k) {
+      const Pull p = pull(cables_[k], span_[k], rounding_);
+      const Vec2 force = (p.force_nN / p.length_um) * span_[k];
+      gradient_[cables_[k].vertex_b] += force;
+      gradient_[cables_[k].vertex_a] += -1.0 * force;
+    }
+    for (std::size_t v = 0; v < x_.size(); ++v)
+      if (free_.unknown[v] < 0) gradient_[v] = {};
+  }
+
+  /// What step_ changes of each span.
+  void find_change() {
+    for (std::size_t k = 0; k < cables_.size(); ++k)
+      change_[k] = step_[cables_[k].vertex_b] - step_[cables_[k].vertex_a];
+  }
+
+  struct OnLine {
+    double energy = 0, slope = 0, curvature = 0;
+  };
+  OnLine on_line(double length) const {
+    OnLine result;
+    for (std::size_t k = 0; k < cables_.size(); ++k) {
+      const Vec2 span = span_[k] + length * change_[k];
+      const Pull p = pull(cables_[k], span, rounding_);
+      const double longer = dot(span, change_[k]) / p.length_um;  // dl / d length
+      result.energy += energy_fJ(cables_[k], p, rounding_);
+      result.slope += p.force_nN * longer;
+      result.curvature += p.stiffness_nN_per_um * longer * longer +
+                          p.force_nN / p.length_um * (dot(change_[k], change_[k]) - longer * longer);
+    }
+    return result;
+  }
+
+  /// Convex along the line: the slope rises through one zero. Bracket it, close in by secants and bisection, until
+  /// it has fallen to `reduction` of what it was.
+  double line_search(const OnLine& start, double first_length, double reduction) const {
+    const double flat = -reduction * start.slope;
+    const double no_more = start.energy + 1e-13 * std::abs(start.energy);  // rounding of a sum of ~1e4 terms
+    double low = 0, slope_low = start.slope, slope_high = 0, length = first_length;
+    std::optional<double> high;
+    for (int i = 0; i < kLineTrials; ++i) {
+      const OnLine at = on_line(length);
+      if (std::abs(at.slope) <= flat && at.energy <= no_more) return length;
+      if (at.slope < 0) {
+        low = length;
+        slope_low = at.slope;
+      } else {
+        high = length;
+        slope_high = at.slope;
+      }
+      if (!high && length >= kLongestStep * first_length) return length;
+      const double part = !high || i % 3 == 2 ? 0.5 : std::clamp(slope_low / (slope_low - slope_high), 0.05, 0.95);
+      length = high ? low + part * (*high - low) : 2 * length;
+    }
+    return low;
+  }
+
+  void move(double length) {
+    for (std::size_t k = 0; k < cables_.size(); ++k) span_[k] += length * change_[k];
+    for (std::size_t v = 0; v < x_.size(); ++v) x_[v] += length * step_[v];
+  }
+
+  const FreeVertices& free_;
+  const std::vector<Cable>& cables_;
+  Rounding rounding_;
+  // Spans are state beside the positions: a collapsed cable is a millionth of an edge long, and its force depends on
+  // its direction, which the difference of two rounded positions does not tell.
+  std::vector<Vec2> x_, span_, change_;
+  std::vector<Vec2> gradient_, step_;  // by vertex, zero where it is held
+};
+
+class Newton : public Descent {
+ public:
+  Newton(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> start, Rounding rounding)
+      : Descent(free, cables, std::move(start), rounding), matrix_(free.matrix) {
     reset_duals();
   }
 
@@ -89,39 +181,19 @@ class Minimiser {
       const Pull p = pull(cables_[k], span_[k], rounding_);
       dual_.push_back({(1 / p.length_um) * span_[k], p.stretch_force_nN});
     }
-    find_gradient();
-  }
-
-  double residual_nN() const {
-    double largest = 0;
-    for (std::size_t v = 0; v < x_.size(); ++v)
-      if (free_.unknown[v] >= 0) largest = std::max(largest, norm(gradient_[v]));
-    return largest;
   }
 
   /// One step of Newton's method for positions and duals, the duals eliminated. @returns the part of it taken
   double step() {
     find_stiffness();
-    find_change();
-    const double length = line_search();
-    move(length);
+    const OnLine start = find_direction();
+    const double length = line_search(start, 1, kNewtonReduction);
+    advance(length);
     find_gradient();
     return length;
   }
 
-  Minimum result(Report report) && { return {std::move(x_), std::move(span_), std::move(report)}; }
-
  private:
-  void find_gradient() {
-    std::fill(gradient_.begin(), gradient_.end(), Vec2{});
-    for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Pull p = pull(cables_[k], span_[k], rounding_);
-      const Vec2 force = (p.force_nN / p.length_um) * span_[k];
-      gradient_[cables_[k].vertex_b] += force;
-      gradient_[cables_[k].vertex_a] += -1.0 * force;
-    }
-  }
-
   void find_stiffness() {
     matrix_.set_zero();
     for (std::size_t k = 0; k < cables_.size(); ++k) {
@@ -132,99 +204,88 @@ class Minimiser {
   }
 
   /// Solve for a direction of descent; Levenberg's shift only where rounding spoils the unshifted one.
-  void find_change() {
+  OnLine find_direction() {
+    OnLine start;
     for (double shift = 0; shift <= 1; shift = std::max(1e-10, 100 * shift)) {
       matrix_.factorise(shift);
-      step_.resize(2 * matrix_.n_blocks(), 1);
+      columns_.resize(2 * matrix_.n_blocks(), 1);
       for (std::size_t v = 0; v < x_.size(); ++v)
-        if (free_.unknown[v] >= 0) step_.middleRows<2>(2 * free_.unknown[v]) << -gradient_[v].x, -gradient_[v].y;
-      matrix_.solve(step_);
-      for (std::size_t k = 0; k < cables_.size(); ++k)
-        change_[k] = step_of(cables_[k].vertex_b) - step_of(cables_[k].vertex_a);
-      if (on_line(0).slope < 0) return;  // false for NaN too
+        if (const int i = free_.unknown[v]; i >= 0) columns_.middleRows<2>(2 * i) << -gradient_[v].x, -gradient_[v].y;
+      matrix_.solve(columns_);
+      for (std::size_t v = 0; v < x_.size(); ++v)
+        if (const int i = free_.unknown[v]; i >= 0) step_[v] = {columns_(2 * i, 0), columns_(2 * i + 1, 0)};
+      find_change();
+      start = on_line(0);
+      if (start.slope < 0) break;  // false for NaN too
     }
+    return start;
   }
 
-  Vec2 step_of(int vertex) const {
-    const int i = free_.unknown[vertex];
-    return i < 0 ? Vec2{} : Vec2{step_(2 * i, 0), step_(2 * i + 1, 0)};
-  }
-
-  struct OnLine {
-    double energy = 0, slope = 0;
-  };
-  OnLine on_line(double length) const {
-    OnLine result;
-    for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Vec2 span = span_[k] + length * change_[k];
-      const Pull p = pull(cables_[k], span, rounding_);
-      result.energy += energy_fJ(cables_[k], p, rounding_);
-      result.slope += p.force_nN * dot(span, change_[k]) / p.length_um;
-    }
-    return result;
-  }
-
-  /// Convex along the line: the slope rises through one zero. Bracket it, close in by secants and bisection.
-  double line_search() const {
-    const OnLine start = on_line(0);
-    const double flat = -kSlopeReduction * start.slope;
-    const double no_more = start.energy + 1e-13 * std::abs(start.energy);  // rounding of a sum of ~1e4 terms
-    double low = 0, slope_low = start.slope, slope_high = 0, length = 1;
-    std::optional<double> high;
-    for (int i = 0; i < kLineTrials; ++i) {
-      const OnLine at = on_line(length);
-      if (std::abs(at.slope) <= flat && at.energy <= no_more) return length;
-      if (at.slope < 0) {
-        low = length;
-        slope_low = at.slope;
-      } else {
-        high = length;
-        slope_high = at.slope;
-      }
-      if (!high && length >= kLongestStep) return length;
-      const double part = !high || i % 3 == 2 ? 0.5 : std::clamp(slope_low / (slope_low - slope_high), 0.05, 0.95);
-      length = high ? low + part * (*high - low) : 2 * length;
-    }
-    return low;
-  }
-
-  void move(double length) {
+  void advance(double length) {
     for (std::size_t k = 0; k < cables_.size(); ++k) {
       const Pull before = pull(cables_[k], span_[k], rounding_);
       dual_[k] = advanced(cables_[k], dual_[k], before, span_[k], change_[k], length, rounding_.mu_fJ);
-      span_[k] += length * change_[k];
-      dual_[k].stretch_force_nN = inside(dual_[k].stretch_force_nN, cables_[k], pull(cables_[k], span_[k], rounding_));
     }
-    for (std::size_t v = 0; v < x_.size(); ++v) x_[v] += length * step_of(static_cast<int>(v));
+    move(length);
+    for (std::size_t k = 0; k < cables_.size(); ++k)
+      dual_[k].stretch_force_nN = inside(dual_[k].stretch_force_nN, cables_[k], pull(cables_[k], span_[k], rounding_));
   }
 
-  const FreeVertices& free_;
-  const std::vector<Cable>& cables_;
   BlockCholesky matrix_;
-  Rounding rounding_;
-  // Spans are state beside the positions: a collapsed cable is a millionth of an edge long, and its force depends on
-  // its direction, which the difference of two rounded positions does not tell.
-  std::vector<Vec2> x_, span_, change_, gradient_;
+  BlockCholesky::Columns columns_;
   std::vector<Dual> dual_;  // by cable
-  BlockCholesky::Columns step_;
+};
+
+/// Non-linear conjugate gradients after Polak and Ribière (Nocedal & Wright, Numerical Optimization, 2006, 5.2).
+class ConjugateGradients : public Descent {
+ public:
+  using Descent::Descent;
+
+  /// @returns whether the energy could still be lowered
+  bool step() {
+    double squares = 0, product = 0;
+    for (std::size_t v = 0; v < x_.size(); ++v) {
+      squares += dot(gradient_[v], gradient_[v]);
+      if (last_squares_ > 0) product += dot(gradient_[v], gradient_[v] - last_gradient_[v]);
+    }
+    const double keep = last_squares_ > 0 ? std::max(0.0, product / last_squares_) : 0;
+    OnLine start = turn(keep);
+    if (!(start.slope < 0)) start = turn(0);
+    last_gradient_ = gradient_;
+    const double length = line_search(start, -start.slope / start.curvature, kConjugateReduction);
+    move(length);
+    find_gradient();
+    last_squares_ = length > 0 ? squares : 0;  // 0: begin anew along the gradient
+    n_stuck_ = length > 0 ? 0 : n_stuck_ + 1;
+    return n_stuck_ < 2;
+  }
+
+ private:
+  OnLine turn(double keep) {
+    for (std::size_t v = 0; v < x_.size(); ++v) step_[v] = keep * step_[v] + -1.0 * gradient_[v];
+    find_change();
+    return on_line(0);
+  }
+  std::vector<Vec2> last_gradient_;
+  double last_squares_ = 0;
+  int n_stuck_ = 0;
 };
 
 std::string reason_of(const Report& report, const MinimiseOptions& options) {
   std::ostringstream text;
   text << "largest net force on a free vertex " << report.last_change << " nN after " << report.iterations
-       << " Newton steps, wanted " << options.force_tolerance_nN << " nN";
+       << (options.method == Contraction::newton ? " Newton steps" : " steps of conjugate gradients") << ", wanted "
+       << options.force_tolerance_nN << " nN";
   if (!report.converged)
     text << "; more steps may help, or an axial stiffness nearer to the tensions (force scale " << options.force_nN
          << " nN)";
   return text.str();
 }
 
-}  // namespace
-
-Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> positions_um,
-                 Start start, const MinimiseOptions& options) {
+Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> positions_um,
+                           Start start, const MinimiseOptions& options) {
   const Rounding sharp{.eps_um = options.eps_um, .mu_fJ = 0};
-  Minimiser minimiser(free, cables, std::move(positions_um), sharp);
+  Newton minimiser(free, cables, std::move(positions_um), sharp);
   Report report;
   const auto has_converged = [&] { return minimiser.residual_nN() <= options.force_tolerance_nN; };
   const auto may_step = [&](int limit) { return report.iterations < std::min(limit, options.max_iterations); };
@@ -262,6 +323,29 @@ Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std
   report.converged = has_converged();
   report.reason = reason_of(report, options);
   return std::move(minimiser).result(std::move(report));
+}
+
+Minimum minimise_by_conjugate_gradients(const FreeVertices& free, const std::vector<Cable>& cables,
+                                        std::vector<Vec2> positions_um, const MinimiseOptions& options) {
+  ConjugateGradients minimiser(free, cables, std::move(positions_um), {.eps_um = options.eps_um, .mu_fJ = 0});
+  Report report;
+  while (minimiser.residual_nN() > options.force_tolerance_nN && report.iterations < options.max_iterations) {
+    ++report.iterations;
+    if (!minimiser.step()) break;
+  }
+  report.last_change = minimiser.residual_nN();
+  report.converged = report.last_change <= options.force_tolerance_nN;
+  report.reason = reason_of(report, options);
+  return std::move(minimiser).result(std::move(report));
+}
+
+}  // namespace
+
+Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> positions_um,
+                 Start start, const MinimiseOptions& options) {
+  if (options.method == Contraction::conjugate_gradient)
+    return minimise_by_conjugate_gradients(free, cables, std::move(positions_um), options);
+  return minimise_by_newton(free, cables, std::move(positions_um), start, options);
 }
 
 }  // namespace mbtfm::network

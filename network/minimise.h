@@ -24,7 +24,10 @@ struct FreeVertices {
   }
 };
 
+enum class Contraction { newton, conjugate_gradient };
+
 struct MinimiseOptions {
+  Contraction method = Contraction::newton;
   double eps_um = 0;              ///< of the length
   double edge_length_um = 0;      ///< what lengths compare with
   double force_nN = 0;            ///< what forces compare with
@@ -41,6 +44,7 @@ struct Minimum {
 };
 
 /// Newton's method with line search on a path of ever less rounded energies; a warm start tries the exact energy first.
+/// Conjugate gradients know no path: they are the thesis' method, there to compare with.
 /// Each step lowers the energy (of the present rounding).
 Minimum minimise(const FreeVertices& free, const std::vector<Cable>& cables, std::vector<Vec2> positions_um,
                  Start start, const MinimiseOptions& options);

@@ -96,6 +96,6 @@ struct ContractedNetwork {
 };
 ContractedNetwork read_contracted_network(const Path& file);
 void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
-                              const std::vector<double>& link_force_nN);
+                              const std::vector<double>& link_force_nN, const std::vector<CableState>& link_states);
 
 }  // namespace mbtfm

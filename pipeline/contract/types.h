@@ -92,6 +92,10 @@ struct Link {
   double share = 1;  ///< multiplies its group's tension and its stiffness: the width of material this cable stands for
 };
 
+/// How a cable carries its force in equilibrium: slack with its tension alone, taut with more, being longer than at
+/// rest, and collapsed to a point with less, in whatever direction its ends are pressed together.
+enum class CableState { slack, taut, collapsed };
+
 struct Network {
   std::vector<Vec2> vertices_um;
   std::vector<int> adhesion_id;  ///< by vertex; the substrate holds it where it is not 0

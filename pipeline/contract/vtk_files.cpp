@@ -202,11 +202,15 @@ ContractedNetwork read_contracted_network(const Path& file) {
 }
 
 void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
-                              const std::vector<double>& link_force_nN) {
+                              const std::vector<double>& link_force_nN, const std::vector<CableState>& link_states) {
   check(network);
-  MBTFM_ASSERT(positions_um.size() == network.vertices_um.size() && link_force_nN.size() == network.links.size());
+  MBTFM_ASSERT(positions_um.size() == network.vertices_um.size() && link_force_nN.size() == network.links.size() &&
+               link_states.size() == network.links.size());
   const auto grid = grid_of(network, positions_um);
   grid->GetCellData()->AddArray(double_array({.name = "force_nN", .scalars = link_force_nN, .vectors = {}}));
+  const auto state = int_array("state");  // 0 slack, 1 taut, 2 collapsed
+  for (const CableState s : link_states) state->InsertNextValue(static_cast<int>(s));
+  grid->GetCellData()->AddArray(state);
   std::vector<Vec2> moves_um;
   for (std::size_t v = 0; v < positions_um.size(); ++v) moves_um.push_back(positions_um[v] - network.vertices_um[v]);
   grid->GetPointData()->AddArray(double_array({.name = "contraction_um", .scalars = {}, .vectors = moves_um}));

@@ -179,7 +179,8 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
   std::vector<double> carried;
   for (const Link& link : network.links)
     carried.push_back(link.fibre_id == 0 ? 0.06 : tensions[link.fibre_id].tension_nN);
-  write_contracted_network(folder / "4_fit/contracted.vtu", network, drawn, carried);
+  write_contracted_network(folder / "4_fit/contracted.vtu", network, drawn, carried,
+                           std::vector<CableState>(network.links.size(), CableState::slack));
 
   DisplacementField fitted = read_displacement(folder / "2_track/displacement.csv");
   for (Bead& bead : fitted) bead.displacement_um = 0.9 * bead.displacement_um;

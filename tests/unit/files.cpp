@@ -113,7 +113,8 @@ TEST(Files, a_network_comes_back_as_it_was_written) {
   EXPECT_EQ(read.links[1].rest_length_um, 1.25);
   EXPECT_EQ(read.links[0].share, 0.75);
 
-  write_contracted_network(folder / "contracted.vtu", network(), {{0, 0}, {0.5, 0.5}, {0, 1}}, {0.1, 2});
+  write_contracted_network(folder / "contracted.vtu", network(), {{0, 0}, {0.5, 0.5}, {0, 1}}, {0.1, 2},
+                           {CableState::collapsed, CableState::slack});
   const ContractedNetwork contracted = read_contracted_network(folder / "contracted.vtu");
   EXPECT_EQ(contracted.network.vertices_um[1].y, 0.5);
   EXPECT_EQ(contracted.link_force_nN[1], 2);
