@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <Eigen/Dense>
 #include <numbers>
 
+#include "network/mesh.h"
 #include "tests/support/equilibrium.h"
 
 namespace mbtfm {
@@ -113,6 +115,69 @@ TEST(Cables, a_link_of_twice_the_share_acts_like_two) {
   const CableNetwork one(net, {});
   // eps depends on the mean rest length, which differs: 1e-10 of the forces
   for (int v = 0; v < 3; ++v) EXPECT_LE(norm(force_on(one, {1, 0.8}, v) - force_on(two, {1, 0.8}, v)), 1e-7);
+}
+
+/// Radius of the circle nearest to the points (Kåsa, IEEE Trans. Instrum. Meas. 25 (1976) 8).
+double radius_of(const std::vector<Vec2>& points) {
+  Eigen::MatrixXd rows(points.size(), 3);
+  Eigen::VectorXd squares(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    rows.row(i) << points[i].x, points[i].y, 1;
+    squares[i] = dot(points[i], points[i]);
+  }
+  const Eigen::Vector3d c = rows.colPivHouseholderQr().solve(squares);
+  return std::sqrt(c[2] + 0.25 * (c[0] * c[0] + c[1] * c[1]));
+}
+
+/// A sheet of 20 × 10 um, held along three sides; a fibre runs along the fourth. Rest lengths are long: nothing is
+/// taut.
+/// @returns radius of the free edge over line tension / surface tension, where the latter is `law_radius_um`
+double free_edge_radius_over_law(double edge_um, std::uint64_t seed, double law_radius_um) {
+  Cell cell;
+  cell.outline_um = {{0, 0}, {20, 0}, {20, 10}, {0, 10}};
+  for (const Vec2 corner : cell.outline_um) {
+    Adhesion a;
+    a.adhesion_id = static_cast<int>(cell.adhesions.size()) + 1;
+    a.position_um = corner;
+    a.area_um2 = 1e-4;
+    a.major_axis_um = a.minor_axis_um = std::sqrt(4e-4 / std::numbers::pi);
+    cell.adhesions.push_back(a);
+  }
+  Network net = network::generate_network(cell, {.edge_length_um = edge_um, .seed = seed}).network;
+  std::vector<int> edge;
+  for (int v = 0; v < static_cast<int>(net.vertices_um.size()); ++v) {
+    const Vec2 x = net.vertices_um[v];
+    net.adhesion_id[v] = x.y < 1e-9 ? 1 : x.x < 1e-9 ? 2 : x.x > 20 - 1e-9 ? 3 : 0;
+    if (x.y > 10 - 1e-9) edge.push_back(v);
+  }
+  std::sort(edge.begin(), edge.end(), [&](int a, int b) { return net.vertices_um[a].x < net.vertices_um[b].x; });
+  for (std::size_t i = 1; i < edge.size(); ++i)
+    net.links.push_back({.vertex_a = edge[i - 1], .vertex_b = edge[i], .fibre_id = 1, .rest_length_um = edge_um});
+  for (Link& link : net.links) link.rest_length_um *= 100;
+  const CableNetwork cables(net);
+  const double surface_tension = 0.1;  // nN/um
+  const std::vector<double> tensions{surface_tension * edge_um / std::sqrt(3.0), surface_tension * law_radius_um};
+  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+  test::expect_equilibrium(cables, tensions, equilibrium);
+  std::vector<Vec2> arc;
+  for (const int v : edge) arc.push_back(equilibrium.positions_um[v]);
+  return radius_of(arc) / law_radius_um;
+}
+
+// Bischofs, Schmidt & Schwarz, Phys. Rev. Lett. 103 (2009) 048101. With links weighted by width a sheet's energy is
+// surface tension times area to first order in the strain, on any mesh: the law is exact for a flat arc, and what is
+// left is the strain, sagitta over the sheet's height: (20 um)² / (8 R) / 10 um = 5 um / R, times a factor of order 1.
+TEST(Cables, a_free_edge_is_an_arc_of_radius_line_tension_over_surface_tension) {
+  for (const double edge_um : {2.0, 1.0})
+    for (const std::uint64_t seed : {1, 2}) {
+      double before = 1;
+      for (const double radius_um : {50.0, 500.0, 5000.0}) {
+        const double error = std::abs(free_edge_radius_over_law(edge_um, seed, radius_um) - 1);
+        EXPECT_LE(error, 10 / radius_um);
+        EXPECT_LE(error, before / 5);  // first order: a tenth
+        before = error;
+      }
+    }
 }
 
 }  // namespace

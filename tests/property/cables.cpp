@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <map>
+#include <numbers>
 #include <numeric>
 
 #include "tests/support/equilibrium.h"
@@ -125,6 +127,102 @@ TEST_P(Cables, each_step_lowers_the_energy) {
     const double energy = bounded.equilibrium(tensions, net.vertices_um).energy_fJ;
     EXPECT_LE(energy, before * (1 + 1e-12)) << steps;  // rounding of sums
     before = energy;
+  }
+}
+
+TEST_P(Cables, conjugate_gradients_find_the_same_minimum) {
+  const Eigen::VectorXd f = forces(net, tensions, {.contraction = "conjugate-gradient"});
+  EXPECT_LE((f - reference).lpNorm<Eigen::Infinity>(), tolerance);
+}
+
+TEST_P(Cables, forces_do_not_depend_on_the_smoothing_down_to_a_millionth_of_an_edge) {
+  // Rounding a kink off over eps moves the ends of collapsed cables by about eps: a force of (EA / l0) eps each.
+  const Eigen::VectorXd sharpest = forces(net, tensions, {.smoothing = 1e-8});
+  for (const double smoothing : {1e-3, 1e-4, 1e-5, 1e-6})
+    EXPECT_LE((forces(net, tensions, {.smoothing = smoothing}) - sharpest).lpNorm<Eigen::Infinity>(), 50 * smoothing)
+        << smoothing;
+}
+
+TEST_P(Cables, are_taut_slack_or_collapsed_as_their_forces_tell) {
+  for (std::size_t k = 0; k < net.links.size(); ++k) {
+    const Link& link = net.links[k];
+    const double tension = link.share * tensions[link.fibre_id];  // groups of the lattice are numbered as its fibres
+    const double length = norm(equilibrium.spans_um[k]), force = equilibrium.link_force_nN[k];
+    switch (equilibrium.link_states[k]) {
+      case CableState::taut:
+        EXPECT_NEAR(force, tension + 50 * (length / link.rest_length_um - 1), 1e-8 * (1 + force));
+        EXPECT_GT(length, link.rest_length_um);
+        break;
+      case CableState::slack:
+        EXPECT_NEAR(force, tension, 0.005 * tension);  // collapsed: by more
+        EXPECT_LE(length, link.rest_length_um * (1 + 1e-11));
+        break;
+      case CableState::collapsed:
+        EXPECT_LT(force, tension);
+        EXPECT_LE(length, 1e-4 * 1.5);
+    }
+  }
+}
+
+TEST_P(Cables, derivatives_by_vertex_add_up_to_those_by_adhesion_and_exert_no_torque) {
+  Network shared = net;  // adhesions of several vertices: each has a moment of its own
+  for (int& id : shared.adhesion_id) id = id == 0 ? 0 : 1 + id % 4;
+  const CableNetwork few(shared);
+  const Equilibrium e = few.equilibrium(tensions);
+  test::expect_equilibrium(few, tensions, e);
+  const Eigen::MatrixXd by_vertex = few.reaction_derivatives(tensions, e);
+  Eigen::MatrixXd sum = few.adhesion_force_derivatives(tensions, e);
+  ASSERT_EQ(sum.rows(), 8);
+  for (Eigen::Index g = 0; g < sum.cols(); ++g) {
+    double torque = 0;
+    for (std::size_t i = 0; i < few.held_vertices().size(); ++i) {
+      const int v = few.held_vertices()[i];
+      const Vec2 f{by_vertex(2 * i, g), by_vertex(2 * i + 1, g)};
+      torque += cross(shared.vertices_um[v], f);
+      sum(2 * (shared.adhesion_id[v] - 1), g) -= f.x;
+      sum(2 * (shared.adhesion_id[v] - 1) + 1, g) -= f.y;
+    }
+    EXPECT_LE(std::abs(torque), 1e-7 * 20 * by_vertex.col(g).norm());  // the condition of H times rounding
+  }
+  EXPECT_LE(sum.norm(), 1e-12 * by_vertex.norm());
+}
+
+/// A hexagon of a triangular lattice, held at its corners and drawn by three fibres through its centre.
+Network hexagon(int n, double edge_um) {
+  Network result;
+  std::map<std::pair<int, int>, int> vertex;  // by lattice coordinates
+  for (int i = -n; i <= n; ++i)
+    for (int j = std::max(-n, -n - i); j <= std::min(n, n - i); ++j) {
+      vertex[{i, j}] = static_cast<int>(result.vertices_um.size());
+      result.vertices_um.push_back({edge_um * (i + 0.5 * j), edge_um * std::sqrt(0.75) * j});
+      result.adhesion_id.push_back(0);
+    }
+  const int corners[6][2] = {{n, 0}, {0, n}, {-n, n}, {-n, 0}, {0, -n}, {n, -n}};
+  for (int c = 0; c < 6; ++c) result.adhesion_id[vertex[{corners[c][0], corners[c][1]}]] = c + 1;
+  for (const auto& [at, a] : vertex)
+    for (const auto& [di, dj] : {std::pair(1, 0), std::pair(0, 1), std::pair(-1, 1)}) {
+      const auto other = vertex.find({at.first + di, at.second + dj});
+      if (other == vertex.end()) continue;
+      const bool through_centre = di == 1 ? at.second == 0 : di == 0 ? at.first == 0 : at.first + at.second == 0;
+      const int fibre = through_centre ? (di == 1 ? 1 : di == 0 ? 2 : 3) : 0;
+      result.links.push_back({.vertex_a = a, .vertex_b = other->second, .fibre_id = fibre, .rest_length_um = edge_um});
+    }
+  return result;
+}
+
+TEST(SymmetricCables, symmetric_cells_have_symmetric_forces) {
+  for (const double t_fibre : {0.06, 3.0}) {
+    const CableNetwork cables(hexagon(6, 1.5));
+    const std::vector<double> tensions{0.06, t_fibre, t_fibre, t_fibre};
+    const Equilibrium equilibrium = cables.equilibrium(tensions);
+    test::expect_equilibrium(cables, tensions, equilibrium);
+    const Eigen::VectorXd f = cables.adhesion_forces_nN(tensions, equilibrium);
+    for (int c = 0; c < 6; ++c) {  // towards the centre, all the same
+      const double angle = c * std::numbers::pi / 3;
+      EXPECT_NEAR(f[2 * c], f[0] * std::cos(angle), 1e-8 * std::abs(f[0]));
+      EXPECT_NEAR(f[2 * c + 1], f[0] * std::sin(angle), 1e-8 * std::abs(f[0]));
+    }
+    EXPECT_LT(f[0], 0);
   }
 }
 
