@@ -29,8 +29,8 @@ constexpr int kLineTrials = 40;
 constexpr double kPolished = 1e-13;
 
 Vec2 unit_or_less(Vec2 v) {
-  const double length = norm(v);
-  return length > 1 ? (1 / length) * v : v;
+  const double squared = dot(v, v);
+  return squared > 1 ? (1 / std::sqrt(squared)) * v : v;
 }
 
 /// What a cable's force follows from, kept as unknowns of their own beside the positions and updated by the linearised
@@ -82,8 +82,8 @@ class Descent {
 
   double residual_nN() const {
     double largest = 0;
-    for (const Vec2 force : gradient_) largest = std::max(largest, norm(force));
-    return largest;
+    for (const Vec2 force : gradient_) largest = std::max(largest, dot(force, force));
+    return std::sqrt(largest);
   }
 
   Minimum result(Report report) && { return {std::move(x_), std::move(span_), std::move(report)}; }
