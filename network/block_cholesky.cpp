@@ -153,7 +153,6 @@ struct BlockCholesky::Panel {
   std::vector<Entry> entries;  // of the matrix, off the diagonal
 
   int height() const { return n_columns + static_cast<int>(rows.size()); }
-  double n_stored() const { return n_columns * (0.5 * (n_columns + 1) + static_cast<double>(rows.size())); }
   std::size_t update_size() const { return 4 * rows.size() * rows.size(); }
   int place_of(int row) const {
     if (row < first + n_columns) return row - first;
@@ -182,7 +181,7 @@ void BlockCholesky::Pattern::find_panels(Lists below) {
     panel.first = k;
     panel.n_columns = 1;
     panel.rows = std::move(below[k]);
-    panel.filled = panel.n_stored();
+    panel.filled = 1 + static_cast<double>(panel.rows.size());
     while (!panels.empty() && !panels.back().rows.empty() && panels.back().rows.front() == panel.first) {
       const int n_columns = panels.back().n_columns + panel.n_columns;
       const double filled = panels.back().filled + panel.filled;

@@ -3,7 +3,7 @@
 /// to its right is handed on to the next panel up the elimination tree (Liu, SIAM Review 34 (1992) 82).
 ///
 /// Written out here for two reasons. A slack direction (a pivot that vanishes) must hold still, where CHOLMOD's panels
-/// fail. And at the usual thousand vertices CHOLMOD and Eigen take two to four times as long (benchmark_cables).
+/// fail. And at the usual thousand vertices CHOLMOD takes three to five times as long (benchmark_cables).
 #pragma once
 
 #include <Eigen/Core>
