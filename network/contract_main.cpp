@@ -37,13 +37,16 @@ StageReport report_of(const network::CableNetwork& cables, const network::Equili
   };
   StageReport report;
   report.converged = equilibrium.report.converged;
-  report.summary = equilibrium.report.reason;
+  const std::int64_t n_slack = count(CableState::slack), n_taut = count(CableState::taut),
+                     n_collapsed = count(CableState::collapsed);
+  report.summary = equilibrium.report.reason + "; cables: " + std::to_string(n_slack) + " slack, " +
+                   std::to_string(n_taut) + " taut, " + std::to_string(n_collapsed) + " collapsed";
   report.figures = {{"steps", std::int64_t{equilibrium.report.iterations}},
                     {"largest_net_force_nN", equilibrium.report.last_change},
                     {"energy_fJ", equilibrium.energy_fJ},
-                    {"n_slack_cables", count(CableState::slack)},
-                    {"n_taut_cables", count(CableState::taut)},
-                    {"n_collapsed_cables", count(CableState::collapsed)},
+                    {"n_slack_cables", n_slack},
+                    {"n_taut_cables", n_taut},
+                    {"n_collapsed_cables", n_collapsed},
                     {"n_adhesions", static_cast<std::int64_t>(cables.adhesion_ids().size())},
                     {"total_force_nN", total}};
   return report;
