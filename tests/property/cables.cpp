@@ -4,6 +4,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "pipeline/contract/parallel.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/lattice.h"
 
@@ -224,6 +225,22 @@ TEST(SymmetricCables, symmetric_cells_have_symmetric_forces) {
     }
     EXPECT_LT(f[0], 0);
   }
+}
+
+// Networks of more than 4 000 free vertices are ordered by nested dissection, which draws random numbers.
+TEST(LargeCables, balance_and_come_to_the_same_bytes_when_prepared_at_once) {
+  const Network net = test::lattice({.columns = 70, .rows = 70, .seed = 3});
+  std::vector<Eigen::VectorXd> forces(4);
+  const auto contract = [&](int i) {
+    const CableNetwork cables(net);
+    const std::vector<double> t = test::random_tensions_nN(cables.fibre_ids().size(), 3);
+    const Equilibrium equilibrium = cables.equilibrium(t);
+    if (i == 0) test::expect_equilibrium(cables, t, equilibrium);
+    forces[i] = cables.adhesion_forces_nN(t, equilibrium);
+  };
+  contract(0);
+  parallel_for(3, 3, [&](int i) { contract(i + 1); });
+  for (int i = 1; i < 4; ++i) EXPECT_EQ(forces[i], forces[0]);
 }
 
 INSTANTIATE_TEST_SUITE_P(seeds, Cables, testing::Range(1u, 6u));
