@@ -95,7 +95,7 @@ BENCHMARK(analyse)->Apply(sizes);
 BENCHMARK(cold)->Apply(sizes);
 BENCHMARK(warm_after_5_per_cent)->Apply(sizes);
 BENCHMARK(derivatives_of_20_groups)->Apply(sizes);
-BENCHMARK(cold_by_conjugate_gradients)->Arg(1200)->Arg(5000)->Unit(benchmark::kMillisecond);
+BENCHMARK(cold_by_conjugate_gradients)->Arg(1200)->Iterations(1)->Unit(benchmark::kMillisecond);
 
 // Why the factorisation is our own: the same matrix, springs of a mesh on a weak ground, by CHOLMOD.
 
