@@ -52,7 +52,7 @@ std::vector<FittedCell> read_cells(StageContext& context) {
 std::vector<double> total_forces_nN(const FittedCell& cell, const std::vector<double>& lengths_um,
                                     const TractionParameters& parameters) {
   const LatticeProblem problem(cell.inputs.beads, cell.inputs.gel, lattice_options(parameters, 1));
-  TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
+  TikhonovSolver solver(problem);
   std::vector<double> totals;
   for (const double length_um : lengths_um) {
     solver.solve(length_um / cell.inputs.gel.youngs_modulus_kPa, 1e-2);  // a per cent of the energy: less of the sum

@@ -20,7 +20,7 @@ class GroupLasso {
       : problem_(problem),
         shortening_kPa_(kShortening * largest_kPa),
         pulled_(problem.pulled_back(problem.spread_data())),
-        solver_(problem, pulled_),
+        solver_(problem, pulled_, problem.threads()),
         z_(problem.transform().no_field()),
         w_(z_),
         around_(z_) {}
@@ -130,9 +130,8 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
   options.basis = Basis::cells;
   const LatticeProblem problem(inputs.beads, inputs.gel, options);
   if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
-  const double lambda = scan_lambda(problem).by_risk;
-  TikhonovSolver smooth(problem, problem.pulled_back(problem.spread_data()));
-  smooth.solve(lambda, 1e-2);
+  TikhonovSolver smooth(problem);
+  smooth.solve(scan_lambda(problem, smooth).by_risk, 1e-2);
   const NodeField t = problem.transform().backward(smooth.solution());
   const Choice choice = choose_weight(problem, std::sqrt((t.x.square() + t.y.square()).maxCoeff()));
 

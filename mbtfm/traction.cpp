@@ -102,6 +102,11 @@ std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches,
   return forces;
 }
 
+Vec2 direction_of(Vec2 force_nN) {
+  const double length = norm(force_nN);
+  return length > 0 ? 1 / length * force_nN : Vec2{1, 0};
+}
+
 TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {
   const std::vector<Patch>& patches = reconstruction.patches;
   TractionSums sums;

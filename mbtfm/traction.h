@@ -87,6 +87,9 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
 std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
                                               double grow_um);
 
+/// Along which the error of a force's magnitude is taken: the force, or x where there is none.
+Vec2 direction_of(Vec2 force_nN);
+
 /// Sums over the patches near the cell.
 struct TractionSums {
   double total_force_nN = 0;  ///< sum of magnitudes

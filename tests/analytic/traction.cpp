@@ -64,8 +64,7 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
             disc / (0.25 * 0.25) * std::polar(1.0, -(k_x * centre.x + k_y * centre.y));
       }
     }
-    spectrum.apply(
-        waves, [](double g) { return g; }, waves);
+    spectrum.displace(waves);
     const NodeField u = transform.backward(waves);
     const substrate::Layer layer(gel);
     const substrate::LayerEllipse disc(
@@ -110,8 +109,8 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         const LatticeProblem problem(
             scene.field, scene.gel,
             {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
-        const double chosen = chosen_lambda(scan_lambda(problem), "risk");
-        TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
+        TikhonovSolver solver(problem);
+        const double chosen = chosen_lambda(scan_lambda(problem, solver), "risk");
         const auto error_at = [&](double lambda) {
           solver.solve(lambda, 1e-4);
           return test::traction_error(scene, tractions_kPa(problem, solver.solution(), ReadOut::cells, 0));

@@ -123,7 +123,8 @@ TEST(Fttc, cross_validation_smooths_more_where_there_is_more_noise) {
     const LatticeProblem problem(
         scene.field, scene.gel,
         {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
-    const LambdaScan scan = scan_lambda(problem);
+    TikhonovSolver solver(problem);
+    const LambdaScan scan = scan_lambda(problem, solver);
     EXPECT_GT(scan.by_gcv, before);
     before = scan.by_gcv;
   }
