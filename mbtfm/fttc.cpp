@@ -44,10 +44,13 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
     if (probe) probe->solve(lambda, kScanTolerance);
     const double misfit =
         problem.data_squared() - 2 * solver.right_hand_side_times_solution() + solver.displaced_squared();
-    points.push_back(
-        {.lambda = lambda, .misfit = misfit, .norm = solver.solution_squared(), .degrees = degrees_of(lambda, 1)});
+    points.push_back({.lambda = lambda,
+                      .misfit = misfit,
+                      .norm = solver.solution_squared(),
+                      .degrees = degrees_of(lambda, 1),
+                      .removable_misfit = {}});
   }
-  return judge(std::move(points), problem.n_data(), problem.stated_variance(), [&](double lambda) {
+  return judge(std::move(points), problem.n_data(), problem.n_data(), problem.stated_variance(), [&](double lambda) {
     solver.solve(lambda, kScanTolerance);
     if (probe) probe->solve(lambda, kScanTolerance);
     return robust_variance(problem.residuals(problem.displaced(solver.solution())), degrees_of(lambda, 1),

@@ -211,7 +211,7 @@ Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
     const double scale = *r.length_um / *r.lambda;
     figures.emplace_back("length_by_risk_um", r.scan->by_risk * scale);
     figures.emplace_back("length_by_gcv_um", r.scan->by_gcv * scale);
-    figures.emplace_back("length_by_l_curve_um", r.scan->by_l_curve * scale);
+    if (r.scan->by_l_curve) figures.emplace_back("length_by_l_curve_um", *r.scan->by_l_curve * scale);
     figures.emplace_back("length_by_evidence_um", r.scan->by_evidence * scale);
     figures.emplace_back("noise_from", r.scan->variance_source);
   }

@@ -168,7 +168,9 @@ TEST(TractionProgram, writes_what_it_says_for_every_method) {
     for (const char* ending : {".vtp", ".json"})
       EXPECT_TRUE(fs::exists(folder / (method + ending))) << method << ending;
     const bool has_scan = method != "sparse" && method != "adhesion-forces";
-    EXPECT_EQ(fs::exists(folder / (method + "_lambda.csv")), has_scan) << method;
+    for (const char* ending : {"_lambda.csv", "_lambda.svg"}) {
+      EXPECT_EQ(fs::exists(folder / (method + ending)), has_scan) << method << ending;
+    }
   }
 }
 
@@ -184,6 +186,7 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     write_outline(cell / "1_segment/outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
     FitSummary fit;
     fit.total_force_nN = 89.8 * strength;
+    fit.converged = true;
     write_fit_summary(cell / "4_fit/fit.json", fit);
   }
   const auto run = test::run_program("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
@@ -196,6 +199,9 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     EXPECT_GT(table.number(row, "slope"), table.number(row - 1, "slope"));
     EXPECT_GT(table.number(row, "correlation"), 0.9);
   }
+  EXPECT_EQ(CsvTable(folder / "calibration_cells.csv").n_rows(), 3 * table.n_rows());
+  const std::string picture = read_text(folder / "calibration.svg");
+  EXPECT_NE(picture.find("slope one at ℓ = "), std::string::npos);
 }
 
 }  // namespace
