@@ -58,28 +58,21 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
   });
 }
 
-std::vector<double> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner,
-                                        const std::vector<Vec2>& directions, double lambda, double variance,
-                                        int threads) {
+TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
+                           double lambda) {
   const Lattice &field = problem.field(), &box = problem.box();
   const double area = field.spacing_um * field.spacing_um;
-  std::vector<double> deviations(directions.size());
-  parallel_for(static_cast<int>(directions.size()), threads, [&](int f) {
-    const Vec2 direction = directions[static_cast<std::size_t>(f)];
-    NodeField sum = problem.transform().no_field();
-    for (std::size_t p = 0; p < owner.size(); ++p) {
-      if (owner[p] != f) continue;
-      const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
-                 column = static_cast<Eigen::Index>(p) % field.n_columns;
-      sum.x[column + box.n_columns * row] = area * direction.x;
-      sum.y[column + box.n_columns * row] = area * direction.y;
-    }
-    // F = qᵀ t, t = (A + lambda²)⁻¹ G Pᵀ u with A = G PᵀP G, so Var F = variance sᵀ A s, s = (A + lambda²)⁻¹ q
-    TikhonovSolver solver(problem, problem.transform().forward(sum), 1);
-    solver.solve(lambda, kScanTolerance);
-    deviations[static_cast<std::size_t>(f)] = std::sqrt(variance * solver.displaced_squared());
-  });
-  return deviations;
+  NodeField q = problem.transform().no_field();
+  for (std::size_t p = 0; p < owner.size(); ++p) {
+    if (owner[p] != force) continue;
+    const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
+               column = static_cast<Eigen::Index>(p) % field.n_columns;
+    q.x[column + box.n_columns * row] = area * direction.x;
+    q.y[column + box.n_columns * row] = area * direction.y;
+  }
+  TikhonovSolver solver(problem, problem.transform().forward(q), 1);
+  solver.solve(lambda, kScanTolerance);
+  return solver;
 }
 
 namespace {
@@ -87,13 +80,14 @@ namespace {
 std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::vector<Patch>& patches,
                                      const TractionInputs& inputs, const TractionParameters& parameters, double lambda,
                                      double variance, int threads) {
-  std::vector<Vec2> positions, directions;
-  for (const Patch& p : patches) positions.push_back(p.position_um);
-  const std::vector<int> owner = adhesion_of_patches(positions, inputs.adhesions, parameters.grow_um);
+  const std::vector<int> owner = adhesion_of_patches(positions_of(patches), inputs.adhesions, parameters.grow_um);
   std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
-  for (const AdhesionForce& f : forces) directions.push_back(direction_of(f.force_nN));
-  const std::vector<double> deviations = force_deviations_nN(problem, owner, directions, lambda, variance, threads);
-  for (std::size_t f = 0; f < forces.size(); ++f) forces[f].sigma_nN = deviations[f];
+  parallel_for(static_cast<int>(forces.size()), threads, [&](int f) {
+    AdhesionForce& force = forces[static_cast<std::size_t>(f)];
+    const TikhonovSolver probe = force_probe(problem, owner, f, direction_of(force.force_nN), lambda);
+    const double squared = probe.displaced_squared();
+    if (squared > 0) force.sigma_nN = std::sqrt(variance * squared);  // beyond the field nothing is known of a force
+  });
   return forces;
 }
 

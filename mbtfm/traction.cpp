@@ -82,10 +82,15 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
   return owner;
 }
 
-std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
-                                              double grow_um) {
+std::vector<Vec2> positions_of(const std::vector<Patch>& patches) {
   std::vector<Vec2> positions;
   for (const Patch& p : patches) positions.push_back(p.position_um);
+  return positions;
+}
+
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
+                                              double grow_um) {
+  const std::vector<Vec2> positions = positions_of(patches);
   const std::vector<int> owner = adhesion_of_patches(positions, adhesions, grow_um);
   std::vector<AdhesionForce> forces;
   for (const Adhesion& a : adhesions) {
@@ -110,8 +115,7 @@ Vec2 direction_of(Vec2 force_nN) {
 TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {
   const std::vector<Patch>& patches = reconstruction.patches;
   TractionSums sums;
-  std::vector<Vec2> positions;
-  for (const Patch& p : patches) positions.push_back(p.position_um);
+  const std::vector<Vec2> positions = positions_of(patches);
   std::vector<bool> is_near(patches.size(), true);
   sums.where = "the whole field";
   if (!inputs.outline_um.empty()) {

@@ -46,6 +46,8 @@ struct Patch {
   Vec2 displacement_um;  ///< of the surface there, as the model has it
 };
 
+std::vector<Vec2> positions_of(const std::vector<Patch>& patches);
+
 /// How far a force moves (length of the change of its vector) where its ellipse is wrong by what a segmentation errs.
 struct Sensitivity {
   double shift_along_nN = 0, shift_across_nN = 0;  ///< the ellipse shifted along and across its major axis

@@ -178,6 +178,25 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
   }
 }
 
+TEST(Sparse, forces_by_adhesion_err_as_much_as_stated) {
+  // Against the truth, as the shortening by the penalty is put right. Bounds as for adhesion-forces, of 5 seeds each.
+  for (const double noise : {0.03, 0.08}) {
+    double sum = 0, offset = 0;
+    for (unsigned seed = 201; seed <= 205; ++seed) {
+      const EllipseScene scene = ellipse_scene(64, noise, seed);
+      const Reconstruction r = reconstruct(inputs_of(scene), half_space("sparse"), 2);
+      for (std::size_t a = 0; a < r.forces.size(); ++a) {
+        const double z = (norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN;
+        offset += z / 40;
+        sum += z * z / 40;
+      }
+    }
+    std::printf("sparse, noise %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n", noise, offset, sum);
+    EXPECT_LE(std::abs(offset), 3 * std::sqrt(1 / 40.0));
+    EXPECT_NEAR(sum, 1, 3 * std::sqrt(2 / 40.0));
+  }
+}
+
 TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) {
   // targets of the scene's table; over 10 seeds of 8 forces (error/sigma)² has a mean within 1 ± 3 sqrt(2/80)
   const double most[] = {0.002, 0.022, 0.045};
