@@ -140,6 +140,7 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
     sums.strain_energy_fJ += 0.5 * dot(force, patches[i].displacement_um);
   }
   if (sums.total_force_nN > 0) centre = 1 / sums.total_force_nN * centre;
+  double inward = 0, weight = 0;
   for (std::size_t i = 0; i < patches.size(); ++i) {
     if (!is_near[i]) continue;
     const Vec2 force = patches[i].area_um2 * patches[i].traction_kPa;
@@ -148,7 +149,10 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
     sums.moment_nN_um[0][1] += arm.x * force.y;
     sums.moment_nN_um[1][0] += arm.y * force.x;
     sums.moment_nN_um[1][1] += arm.y * force.y;
+    inward -= dot(arm, force) * norm(force);
+    weight += norm(arm) * dot(force, force);
   }
+  if (weight > 0) sums.inward_share = inward / weight;
   return sums;
 }
 
@@ -203,6 +207,7 @@ Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
                      {"net_force_y_nN", sums.net_force_nN.y},
                      {"strain_energy_fJ", sums.strain_energy_fJ},
                      {"contractile_moment_nN_um", sums.contractile_moment_nN_um()},
+                     {"inward_share", sums.inward_share},
                      {"moment_xx_nN_um", sums.moment_nN_um[0][0]},
                      {"moment_xy_nN_um", sums.moment_nN_um[0][1]},
                      {"moment_yx_nN_um", sums.moment_nN_um[1][0]},

@@ -99,6 +99,9 @@ struct TractionSums {
   double strain_energy_fJ = 0;     ///< half the sum of t · u A
   double moment_nN_um[2][2] = {};  ///< sum of (x − centre)_i F_j
   double contractile_moment_nN_um() const { return -(moment_nN_um[0][0] + moment_nN_um[1][1]); }  ///< > 0: inward
+  /// Mean cosine between force and direction to the centre, weighted by distance and the square of the force, as noise
+  /// is everywhere: near 1 for a contracting cell, 0 where forces know no centre, -1 where they push outward.
+  double inward_share = 0;
   std::string where;
 };
 /// Near the cell: inside its outline or within `grow_um` of it, else of its adhesions; with neither, everywhere.

@@ -50,6 +50,10 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   report.converged = r.report.converged;
   if (!r.report.converged) report.summary += "; " + r.report.reason;
   if (!r.remark.empty()) report.summary += "; " + r.remark;
+  constexpr double kOutward = -0.5;  // no cell pushes so; noise has a share near zero
+  if (sums.inward_share < kOutward) {
+    report.summary += "; WARNING: the tractions push outward everywhere: are stressed and relaxed swapped?";
+  }
   report.figures = summary_of(r, sums);
   const bool is_layer = p.traction.gel_model == "layer";
   report.effects = {{.name = "finite thickness",

@@ -39,6 +39,44 @@ TEST(TractionProgram, writes_what_it_says_for_every_method) {
   }
 }
 
+TEST(TractionProgram, warns_where_tractions_push_outward_as_after_a_swap_of_the_images) {
+  const test::TemporaryFolder folder;
+  test::EllipseScene scene = test::ellipse_scene(48, 0.1);
+  write_text(folder / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+  for (const bool is_swapped : {false, true}) {
+    for (Bead& b : scene.field) b.displacement_um = (is_swapped ? -1.0 : 1.0) * b.displacement_um;
+    write_displacement(folder / "displacement.csv", scene.field);
+    for (const std::string method : {"fttc", "sparse"}) {
+      const auto run = test::run_program(
+          "mbtfm-traction --method " + method + " --gel " + (folder / "cell.toml").string() + " --displacement " +
+          (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
+      ASSERT_EQ(run.code, 0) << run.output;
+      EXPECT_EQ(run.output.find("swapped") != std::string::npos, is_swapped) << method << ": " << run.output;
+    }
+  }
+}
+
+TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+  const std::string header = "x_um,y_um,ux_um,uy_um,sigma_um\n", bead = "1,2,0.1,0.1,0.01\n";
+  const std::pair<std::string, std::string> cases[] = {
+      {header, "three beads"},                                           // none
+      {header + bead, "three beads"},                                    // one
+      {header + bead + "2,2,nan,0,0.01\n3,5,0,0,0.01\n", "ux_um"},       // not a number
+      {header + bead + "2,4,0,0,0.01\n3,5,0,0,0.01\n" + bead, "bead 3"}  // the same place twice
+  };
+  for (const auto& [text, word] : cases) {
+    write_text(folder / "displacement.csv", text);
+    const auto run =
+        test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
+                          (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
+    EXPECT_EQ(run.code, 3) << run.output;
+    EXPECT_NE(run.output.find(word), std::string::npos) << run.output;
+    EXPECT_FALSE(fs::exists(folder / "traction.csv"));
+  }
+}
+
 TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_force) {
   const test::TemporaryFolder folder;
   for (const int strength : {1, 2, 3}) {
