@@ -102,7 +102,8 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
   const double corner_at = std::clamp(
       smallest_at(scan.points.size(), [&](double at) { return -curvature_at(std::clamp(at, 2.0, n_last - 2)); }), 2.0,
       n_last - 2);
-  if (curvature_at(corner_at) > 0) scan.by_l_curve = lambda_at(corner_at);
+  constexpr double kLeastCurvature = 0.1;  // a radius of ten e-folds, four decades, is no corner to the eye
+  if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(corner_at);
 
   // (14) The determinant from its derivative: d log det(1 + G Gᵀ / lambda²) / d log lambda² = −degrees.
   double log_determinant = 0;

@@ -7,6 +7,7 @@
 
 #include "mbtfm/fttc.h"
 #include "mbtfm/panel.h"
+#include "pipeline/contract/errors.h"
 #include "substrate/layer.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/substrate_scene.h"
@@ -97,6 +98,30 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
     before = furthest;
   }
   EXPECT_LE(before, 1e-12);  // tanh(1000): rounding
+}
+
+TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_the_other_way) {
+  // An L: above the corner the misfit grows with lambda², below it the tractions do with 1/lambda². The other way round
+  // there is no such place.
+  constexpr double kCorner = 0.02;
+  for (const bool is_l : {true, false}) {
+    std::vector<ScanPoint> points;
+    for (const double lambda : lambdas_between(10, 1e-4)) {
+      const double up = std::pow(lambda / kCorner, 2);
+      points.push_back({.lambda = lambda,
+                        .misfit = is_l ? 1 + up : up / (1 + up),
+                        .norm = is_l ? 1 + 1 / up : 1 / (1 + up),
+                        .degrees = 50 / (1 + up),
+                        .removable_misfit = {}});
+    }
+    const LambdaScan scan = judge(points, 100, 100, {}, [](double) { return 0.01; });
+    ASSERT_EQ(scan.by_l_curve.has_value(), is_l);
+    if (is_l) {
+      EXPECT_NEAR(std::log(*scan.by_l_curve / kCorner), 0, std::log(1.2));  // a tenth of the scan's step
+    } else {
+      EXPECT_THROW(chosen_lambda(scan, "l-curve"), NotSolved);
+    }
+  }
 }
 
 TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
