@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "mbtfm/fttc.h"
+#include "pipeline/charts/chart.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
@@ -15,35 +16,48 @@ namespace {
 constexpr double kLargest_um = 30, kSmallest_um = 0.1;
 
 struct FittedCell {
+  std::string name;
   TractionInputs inputs;
   double fitted_force_nN = 0;
 };
 
-/// The folders that hold a displacement and a finished fit, in alphabetical order.
-std::vector<FittedCell> read_cells(StageContext& context) {
+struct Cells {
+  std::vector<FittedCell> fitted;
+  int n_not_converged = 0;  ///< whose fit has no result to compare with
+};
+
+/// The folders that hold a displacement and a fit, in alphabetical order.
+Cells read_cells(StageContext& context) {
   const Path folder = context.input("cells", {});
   std::vector<Path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
     if (std::filesystem::exists(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
-  std::vector<FittedCell> cells;
+  Cells cells;
   for (const Path& path : paths) {
+    const FitSummary fit = read_fit_summary(path / "4_fit/fit.json");
+    if (!fit.converged) {
+      ++cells.n_not_converged;
+      continue;
+    }
     const std::string name = path.filename().string();
     context.input("cells", {name + "/cell.toml", name + "/2_track/displacement.csv", name + "/1_segment/outline.csv",
                             name + "/4_fit/fit.json"});
     FittedCell cell;
+    cell.name = name;
     ParameterList list;
     declare(list, cell.inputs.gel);
     read_toml(list, path / "cell.toml");
     cell.inputs.beads = read_displacement(path / "2_track/displacement.csv");
     std::erase_if(cell.inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
     cell.inputs.outline_um = read_outline(path / "1_segment/outline.csv").front();
-    cell.fitted_force_nN = read_fit_summary(path / "4_fit/fit.json").total_force_nN;
-    cells.push_back(std::move(cell));
+    cell.fitted_force_nN = fit.total_force_nN;
+    cells.fitted.push_back(std::move(cell));
   }
-  if (cells.size() < 2) {
-    throw InputError(folder.string(), "at least two cell folders with 4_fit/fit.json", std::to_string(cells.size()));
+  if (cells.fitted.size() < 2) {
+    throw InputError(folder.string(), "at least two cell folders with a converged 4_fit/fit.json",
+                     std::to_string(cells.fitted.size()));
   }
   return cells;
 }
@@ -52,7 +66,7 @@ std::vector<FittedCell> read_cells(StageContext& context) {
 std::vector<double> total_forces_nN(const FittedCell& cell, const std::vector<double>& lengths_um,
                                     const TractionParameters& parameters) {
   const LatticeProblem problem(cell.inputs.beads, cell.inputs.gel, lattice_options(parameters, 1));
-  TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
+  TikhonovSolver solver(problem);
   std::vector<double> totals;
   for (const double length_um : lengths_um) {
     solver.solve(length_um / cell.inputs.gel.youngs_modulus_kPa, 1e-2);  // a per cent of the energy: less of the sum
@@ -85,8 +99,96 @@ Line line_of(const std::vector<double>& x, const std::vector<double>& y) {
   return {.slope = xx > 0 ? xy / xx : 0, .correlation = vx * vy > 0 ? cov / std::sqrt(vx * vy) : 0};
 }
 
+/// The comparison over all cells, for one lambda.
+struct Comparison {
+  double length_um = 0;
+  std::vector<double> fttc_nN;  ///< by cell
+  Line line;
+};
+
+/// The length with slope one, between two of the series; the slope grows as lambda falls.
+std::optional<double> length_of_slope_one_um(const std::vector<Comparison>& series) {
+  for (std::size_t l = 1; l < series.size(); ++l) {
+    const Comparison &before = series[l - 1], &after = series[l];
+    if (before.line.slope > 1 || after.line.slope <= 1) continue;
+    const double share = (1 - before.line.slope) / (after.line.slope - before.line.slope);
+    return before.length_um * std::pow(after.length_um / before.length_um, share);
+  }
+  return std::nullopt;
+}
+
+std::string says(const Comparison& c) {
+  return "ℓ = " + charts::readable(c.length_um) + " µm: slope " + charts::readable(c.line.slope) + ", r " +
+         charts::readable(c.line.correlation);
+}
+
+constexpr const char* kOneToOne = "stroke:#333;stroke-width:1.6;stroke-dasharray:6 4";
+
+/// FTTC's total force over the fit's, for some of the series and for slope one (thesis fig. 3.8).
+charts::Chart forces_chart(const std::vector<FittedCell>& cells, const std::vector<Comparison>& shown) {
+  double largest_fitted = 0, largest = 0;
+  for (const FittedCell& cell : cells) largest_fitted = std::max(largest_fitted, 1.08 * cell.fitted_force_nN);
+  for (const Comparison& c : shown) {
+    for (const double force : c.fttc_nN) largest = std::max({largest, 1.05 * force, c.line.slope * largest_fitted});
+  }
+  charts::Chart chart("Total force of a cell", {"model-based fit (nN)", 0, largest_fitted, charts::Scale::linear},
+                      {"FTTC (nN)", 0, std::max(largest, largest_fitted), charts::Scale::linear});
+  chart.curve({{0, 0}, {largest_fitted, largest_fitted}}, kOneToOne);
+  chart.put_key(charts::Chart::KeySide::left);
+  for (std::size_t i = 0; i < shown.size(); ++i) {
+    const std::string colour = charts::kColours[i % std::size(charts::kColours)];
+    chart.curve({{0, 0}, {largest_fitted, shown[i].line.slope * largest_fitted}}, "stroke-width:1.2;stroke:" + colour);
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      chart.dot({cells[c].fitted_force_nN, shown[i].fttc_nN[c]}, 4, "fill:" + colour, cells[c].name);
+    }
+    chart.key(says(shown[i]), colour);
+  }
+  return chart;
+}
+
+/// Slope and correlation by lambda (thesis fig. 3.9).
+charts::Chart slope_chart(const std::vector<Comparison>& series, std::optional<double> slope_one_um) {
+  std::vector<double> lengths, slopes;
+  std::vector<Vec2> by_slope, by_correlation;
+  for (const Comparison& c : series) {
+    lengths.push_back(c.length_um);
+    slopes.push_back(c.line.slope);
+    by_slope.push_back({c.length_um, c.line.slope});
+    by_correlation.push_back({c.length_um, c.line.correlation});
+  }
+  slopes.push_back(1);
+  charts::Chart chart("Slope and correlation", charts::axis_over("ℓ = λE (µm)", lengths, charts::Scale::logarithmic),
+                      charts::axis_over("FTTC over fit", slopes, charts::Scale::logarithmic));
+  chart.level(1, kOneToOne);
+  if (slope_one_um) chart.upright(*slope_one_um, kOneToOne);
+  chart.curve(by_slope, std::string("stroke-width:2;stroke:") + charts::kColours[0]);
+  chart.curve(by_correlation, std::string("stroke-width:2;stroke:") + charts::kColours[1]);
+  for (std::size_t i = 0; i < series.size(); ++i) {
+    chart.dot(by_slope[i], 3, std::string("fill:") + charts::kColours[0], says(series[i]));
+    chart.dot(by_correlation[i], 3, std::string("fill:") + charts::kColours[1], says(series[i]));
+  }
+  chart.subtitle(slope_one_um ? "slope one at ℓ = " + charts::readable(*slope_one_um) + " µm" : "slope one nowhere",
+                 "#333");
+  chart.key("slope", charts::kColours[0]);
+  chart.key("correlation r", charts::kColours[1]);
+  return chart;
+}
+
+void write_tables(StageContext& context, const std::vector<FittedCell>& cells, const std::vector<Comparison>& series) {
+  CsvText table({"length_um", "slope", "correlation", "n_cells"});
+  CsvText by_cell({"cell", "length_um", "fttc_total_force_nN", "fit_total_force_nN"});
+  for (const Comparison& s : series) {
+    table.add(s.length_um).add(s.line.slope).add(s.line.correlation).add(static_cast<int>(cells.size())).end_row();
+    for (std::size_t c = 0; c < cells.size(); ++c) {
+      by_cell.add(cells[c].name).add(s.length_um).add(s.fttc_nN[c]).add(cells[c].fitted_force_nN).end_row();
+    }
+  }
+  write_text(context.output("out"), table.str());
+  write_text(context.output_beside("out", "_cells.csv"), by_cell.str());
+}
+
 StageReport calibrate(const TractionParameters& p, StageContext& context) {
-  const std::vector<FittedCell> cells = read_cells(context);
+  const auto [cells, n_not_converged] = read_cells(context);
   const std::vector<double> lengths_um = lambdas_between(kLargest_um, kSmallest_um);
   std::vector<std::vector<double>> totals(cells.size());
   parallel_for(static_cast<int>(cells.size()), context.threads, [&](int c) {
@@ -95,28 +197,32 @@ StageReport calibrate(const TractionParameters& p, StageContext& context) {
   });
   std::vector<double> fitted;
   for (const FittedCell& cell : cells) fitted.push_back(cell.fitted_force_nN);
-  CsvText csv({"length_um", "slope", "correlation", "n_cells"});
-  std::vector<Line> lines;
+  std::vector<Comparison> series;
   for (std::size_t l = 0; l < lengths_um.size(); ++l) {
     std::vector<double> fttc;
     for (const auto& of_cell : totals) fttc.push_back(of_cell[l]);
-    lines.push_back(line_of(fitted, fttc));
-    csv.add(lengths_um[l]).add(lines[l].slope).add(lines[l].correlation).add(static_cast<int>(cells.size())).end_row();
+    series.push_back({lengths_um[l], fttc, line_of(fitted, fttc)});
   }
-  write_text(context.output("out"), csv.str());
+  write_tables(context, cells, series);
+  const std::optional<double> slope_one_um = length_of_slope_one_um(series);
+  std::vector<Comparison> shown;  // more than so far from one, the others would crowd along an axis
+  std::copy_if(series.begin(), series.end(), std::back_inserter(shown),
+               [](const Comparison& c) { return c.line.slope > 0.25 && c.line.slope < 4; });
+  write_text(context.output_beside("out", ".svg"),
+             charts::svg_file({forces_chart(cells, shown), slope_chart(series, slope_one_um)}, 2,
+                              {std::to_string(cells.size()) + " cells. Dashed: FTTC as the fit."}));
   StageReport report{
       .converged = true, .summary = std::to_string(cells.size()) + " cells", .figures = {}, .effects = {}};
-  for (std::size_t l = 1; l < lines.size(); ++l) {  // the slope grows as lambda falls
-    if (lines[l - 1].slope > 1 || lines[l].slope <= 1) continue;
-    const double share = (1 - lines[l - 1].slope) / (lines[l].slope - lines[l - 1].slope);
-    const double length_um = lengths_um[l - 1] * std::pow(lengths_um[l] / lengths_um[l - 1], share);
-    report.figures.emplace_back("length_of_slope_one_um", length_um);
-    report.summary += ": FTTC gives the forces of the fit at lambda E = " + brief(length_um) + " um, correlation " +
-                      brief(lines[l].correlation);
-    return report;
+  if (slope_one_um) {
+    report.figures.emplace_back("length_of_slope_one_um", *slope_one_um);
+    report.summary += ": FTTC gives the forces of the fit at lambda E = " + brief(*slope_one_um) + " um";
+  } else {
+    report.summary += ": no lambda between " + brief(kSmallest_um) + " and " + brief(kLargest_um) +
+                      " um gives FTTC the forces of the fit";
   }
-  report.summary += ": no lambda between " + brief(kSmallest_um) + " and " + brief(kLargest_um) +
-                    " um gives FTTC the forces of the fit";
+  if (n_not_converged > 0) {
+    report.summary += "; " + std::to_string(n_not_converged) + " left out, whose fit has not converged";
+  }
   return report;
 }
 
@@ -130,6 +236,8 @@ int main(int argc, char** argv) {
       {.name = "calibrate",
        .purpose = "compare FTTC's total forces with the fit's over finished cells, for a series of lambdas",
        .files = {{"cells", FileArgument::Kind::input, "folder of cell folders with 4_fit/fit.json"},
-                 {"out", FileArgument::Kind::output, "calibration.csv: slope and correlation by lambda E"}}},
+                 {"out", FileArgument::Kind::output,
+                  "calibration.csv: slope and correlation by lambda E; calibration_cells.csv and calibration.svg come "
+                  "beside it"}}},
       argc, argv, calibrate);
 }

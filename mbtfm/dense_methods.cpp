@@ -29,23 +29,43 @@ double beads_per_um2(const DisplacementField& beads) {
   return static_cast<double>(beads.size()) / area;
 }
 
-/// Choose lambda and solve. `length_um` is lambda E for lambda = 1 in the problem's own unit: what the penalty would be
-/// over an area, ∫ |u|² + (lambda/E)² ∫ |t|², in the place of sums over beads and loads.
-Eigen::VectorXd regularised(const DenseProblem& problem, const TractionParameters& parameters, double length_um,
-                            double youngs_modulus_kPa, Reconstruction& r) {
+/// Forces or tractions with their covariance by the noise.
+struct Loads {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;
+  Vec2 at(std::size_t load) const {
+    return {values[2 * static_cast<Index>(load)], values[2 * static_cast<Index>(load) + 1]};
+  }
+  Eigen::Matrix2d covariance_of(std::size_t one, std::size_t other) const {
+    return covariance.block<2, 2>(2 * static_cast<Index>(one), 2 * static_cast<Index>(other));
+  }
+};
+
+/// Choose lambda and solve. `length_at_unit_density_um` is lambda E for lambda = 1 in the problem's own unit and one
+/// bead a um²: what the penalty would be over an area, ∫ |u|² + (lambda/E)² ∫ |t|², in the place of sums over beads and
+/// loads.
+Loads regularised(const TractionInputs& inputs, const TractionParameters& parameters, const Compliance& compliance,
+                  std::size_t n_loads, double length_at_unit_density_um, Reconstruction& r) {
+  const auto n = 2 * static_cast<Index>(n_loads);
+  const DenseProblem problem(inputs.beads, compliance, n);
+  if (problem.data_squared() == 0) {
+    r.remark = "no bead has moved: there is no traction";
+    return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
+  }
+  const double length_um = length_at_unit_density_um / std::sqrt(beads_per_um2(inputs.beads));
   r.scan = problem.scan();
-  r.lambda = parameters.lambda_um_per_kPa ? *parameters.lambda_um_per_kPa * youngs_modulus_kPa / length_um
+  r.lambda = parameters.lambda_um_per_kPa ? *parameters.lambda_um_per_kPa * inputs.gel.youngs_modulus_kPa / length_um
                                           : chosen_lambda(*r.scan, parameters.lambda_by);
   r.length_um = *r.lambda * length_um;
   const Eigen::VectorXd loads = problem.solve(*r.lambda);
   r.relative_l2 = problem.relative_l2(loads);
-  return loads;
+  return {loads, problem.covariance(*r.lambda, r.scan->variance)};
 }
 
 /// Standard error of the magnitude of a force from the covariance of its components.
 double magnitude_deviation(Vec2 force, const Eigen::Matrix2d& covariance) {
-  const double length = norm(force);
-  const Eigen::Vector2d e = length > 0 ? Eigen::Vector2d(force.x / length, force.y / length) : Eigen::Vector2d(1, 0);
+  const Vec2 along = direction_of(force);
+  const Eigen::Vector2d e(along.x, along.y);
   return std::sqrt(e.dot(covariance * e));
 }
 
@@ -81,29 +101,19 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
     ellipses.push_back(substrate::ellipse_of(a));
     area += a.area_um2 / static_cast<double>(inputs.adhesions.size());
   }
-  const auto n_loads = 2 * static_cast<Index>(points.size());
-  const DenseProblem problem(
-      inputs.beads, [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); }, n_loads);
   Reconstruction r;
   r.lambda_unit = "um_per_nN";
-  Eigen::VectorXd loads = Eigen::VectorXd::Zero(n_loads);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n_loads, n_loads);
-  if (problem.data_squared() == 0) {
-    r.remark = "no bead has moved: there is no force";
-  } else {
-    // sum of F² over adhesions of area a stands for a times the integral of t²
-    const double length_um = inputs.gel.youngs_modulus_kPa * std::sqrt(area / beads_per_um2(inputs.beads));
-    loads = regularised(problem, parameters, length_um, inputs.gel.youngs_modulus_kPa, r);
-    covariance = problem.covariance(*r.lambda, r.scan->variance);
-  }
+  // sum of F² over adhesions of area a stands for a times the integral of t²
+  const Loads loads = regularised(
+      inputs, parameters, [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); },
+      points.size(), inputs.gel.youngs_modulus_kPa * std::sqrt(area), r);
   std::vector<Vec2> forces;
-  for (Index a = 0; a < n_loads; a += 2) forces.push_back({loads[a], loads[a + 1]});
+  for (std::size_t a = 0; a < points.size(); ++a) forces.push_back(loads.at(a));
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const Adhesion& adhesion = inputs.adhesions[a];
-    const auto at = 2 * static_cast<Index>(a);
     r.forces.push_back({.adhesion_id = adhesion.adhesion_id,
                         .force_nN = forces[a],
-                        .sigma_nN = magnitude_deviation(forces[a], covariance.block<2, 2>(at, at)),
+                        .sigma_nN = magnitude_deviation(forces[a], loads.covariance_of(a, a)),
                         .connected = false,
                         .moment_nN_um = 0});
     // a point yields without end: the work is that of the force spread over its adhesion, at its centre
@@ -120,9 +130,8 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
   check(inputs.gel);
   const substrate::Layer layer(inputs.gel);
   const bool is_layer = parameters.gel_model == "layer";
-  const auto n_loads = 2 * static_cast<Index>(centres.size());
   const auto compliance = [&](const std::vector<Vec2>& at) {
-    Eigen::MatrixXd G(2 * static_cast<Index>(at.size()), n_loads);
+    Eigen::MatrixXd G(2 * at.size(), 2 * centres.size());
     parallel_for(static_cast<int>(centres.size()), threads, [&](int j) {
       for (std::size_t i = 0; i < at.size(); ++i) {
         const Vec2 offset = at[i] - centres[static_cast<std::size_t>(j)];
@@ -133,24 +142,16 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
     });
     return G;
   };
-  const DenseProblem problem(inputs.beads, compliance, n_loads);
   const double area = parameters.element_um * parameters.element_um;
   Reconstruction r;
   r.lambda_unit = "um_per_kPa";
-  Eigen::VectorXd loads = Eigen::VectorXd::Zero(n_loads);
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(n_loads, n_loads);
-  if (problem.data_squared() == 0) {
-    r.remark = "no bead has moved: there is no traction";
-  } else {
-    // sum of t² over elements of area a stands for the integral of t² over a
-    const double length_um = inputs.gel.youngs_modulus_kPa / std::sqrt(area * beads_per_um2(inputs.beads));
-    loads = regularised(problem, parameters, length_um, inputs.gel.youngs_modulus_kPa, r);
-    covariance = area * area * problem.covariance(*r.lambda, r.scan->variance);
-  }
-  const Eigen::VectorXd u = compliance(centres) * loads;
+  // sum of t² over elements of area a stands for the integral of t² over a
+  const Loads loads =
+      regularised(inputs, parameters, compliance, centres.size(), inputs.gel.youngs_modulus_kPa / std::sqrt(area), r);
+  const Eigen::VectorXd u = compliance(centres) * loads.values;
   for (std::size_t j = 0; j < centres.size(); ++j) {
     const auto at = 2 * static_cast<Index>(j);
-    r.patches.push_back({centres[j], area, {loads[at], loads[at + 1]}, {u[at], u[at + 1]}});
+    r.patches.push_back({centres[j], area, loads.at(j), {u[at], u[at + 1]}});
   }
   r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
   const std::vector<int> owner = adhesion_of_patches(centres, inputs.adhesions, parameters.grow_um);
@@ -158,12 +159,10 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
     Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
     for (std::size_t i = 0; i < centres.size(); ++i) {
       for (std::size_t j = 0; j < centres.size(); ++j) {
-        if (owner[i] == static_cast<int>(a) && owner[j] == owner[i]) {
-          sum += covariance.block<2, 2>(2 * static_cast<Index>(i), 2 * static_cast<Index>(j));
-        }
+        if (owner[i] == static_cast<int>(a) && owner[j] == owner[i]) sum += loads.covariance_of(i, j);
       }
     }
-    r.forces[a].sigma_nN = magnitude_deviation(r.forces[a].force_nN, sum);
+    r.forces[a].sigma_nN = area * magnitude_deviation(r.forces[a].force_nN, sum);
   }
   r.figures = {{"n_elements", std::int64_t(centres.size())}};
   return r;

@@ -63,23 +63,27 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
 
 LambdaScan DenseProblem::scan() const {
   const double largest = std::sqrt(eigenvalues_.maxCoeff());
-  // below a millionth of the largest, rounding of the normal matrix is all there is
-  const double smallest = std::max(std::sqrt(eigenvalues_.minCoeff()), 1e-6 * largest);
+  // At a tenth of the smallest singular value nothing is smoothed any more; below a millionth of the largest, rounding
+  // of the normal matrix is all there is.
+  const double smallest = std::max(0.1 * std::sqrt(eigenvalues_.minCoeff()), 1e-6 * largest);
   std::vector<ScanPoint> points;
   const auto n_data = static_cast<double>(2 * beads_.size());
-  const auto degrees_of = [&](double lambda, int power) {
-    return (eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda)).pow(power).sum();
-  };
-  for (const double lambda : lambdas_between(largest, std::min(smallest, 0.1 * largest))) {
+  const Eigen::Array<bool, Eigen::Dynamic, 1> is_felt = eigenvalues_.array() > 1e-12 * largest * largest;
+  const auto point_at = [&](double lambda) -> ScanPoint {
     const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
-    points.push_back({.lambda = lambda,
-                      .misfit = data_squared_ - 2 * (shares * projected_.array()).sum() +
-                                (eigenvalues_.array() * shares.square()).sum(),
-                      .norm = shares.square().sum(),
-                      .degrees = degrees_of(lambda, 1)});
-  }
-  return judge(std::move(points), n_data, stated_variance_, [&](double lambda) {
-    return robust_variance(residuals(solve(lambda)), degrees_of(lambda, 1), degrees_of(lambda, 2));
+    return {.lambda = lambda,
+            .misfit = data_squared_ - 2 * (shares * projected_.array()).sum() +
+                      (eigenvalues_.array() * shares.square()).sum(),
+            .norm = shares.square().sum(),
+            .degrees = (eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda)).sum(),
+            .removable_misfit = is_felt.select(shares.square() / eigenvalues_.array(), 0).sum() * std::pow(lambda, 4)};
+  };
+  for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
+  // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
+  // for tractions that follow all but a few, would call most of it signal.)
+  return judge(std::move(points), n_data, static_cast<double>(is_felt.count()), stated_variance_, [&](double lambda) {
+    const ScanPoint p = point_at(lambda);
+    return p.misfit / (n_data - p.degrees);
   });
 }
 
@@ -92,18 +96,9 @@ Eigen::MatrixXd DenseProblem::covariance(double lambda, double variance) const {
   return variance * eigenvectors_ * shares.matrix().asDiagonal() * eigenvectors_.transpose();
 }
 
-std::vector<double> DenseProblem::residuals(const Eigen::VectorXd& loads) const {
-  std::vector<double> all;
-  for_blocks([&](const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
-    const Eigen::VectorXd r = u - G * loads;
-    all.insert(all.end(), r.begin(), r.end());
-  });
-  return all;
-}
-
 double DenseProblem::relative_l2(const Eigen::VectorXd& loads) const {
   double sum = 0;
-  for (const double r : residuals(loads)) sum += r * r;
+  for_blocks([&](const Eigen::MatrixXd& G, const Eigen::VectorXd& u) { sum += (u - G * loads).squaredNorm(); });
   return data_squared_ > 0 ? std::sqrt(sum / data_squared_) : 0;
 }
 

@@ -27,7 +27,6 @@ class DenseProblem {
   double data_squared() const { return data_squared_; }
 
  private:
-  std::vector<double> residuals(const Eigen::VectorXd& loads) const;
   template <class Use>
   void for_blocks(const Use& use) const;  ///< use(weighted block of G, weighted u of the same rows)
   const DisplacementField& beads_;

@@ -18,20 +18,23 @@ double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
 
 }  // namespace
 
-LambdaScan scan_lambda(const LatticeProblem& problem) {
+LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
   // From tractions that only the longest waves of the field tell of, to those that its shortest waves tell of: beyond
   // either end nothing changes.
   const double smallest = problem.spectrum().smallest_um_per_kPa();
   const double largest = 2 * problem.longest_wave_um_per_kPa();
-  TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
   std::optional<TikhonovSolver> probe;
-  if (!problem.is_complete()) probe.emplace(problem, problem.pulled_back(problem.spread_signs()));
+  if (!problem.is_complete()) probe.emplace(problem, problem.pulled_back(problem.spread_signs()), problem.threads());
   const auto degrees_of = [&](double lambda, int power) {
     if (!probe) {
-      return 0.5 * problem.n_data() * problem.spectrum().trace(problem.transform().weights(), [&](double g) {
-        const double h = g * g / (g * g + lambda * lambda);
-        return power == 1 ? h : h * h;
-      });
+      const auto shares = [&](const Eigen::ArrayXd& compliance) -> Eigen::ArrayXd {
+        const Eigen::ArrayXd h = 1 / (1 + lambda * lambda / compliance.square());
+        return power == 1 ? h : h.square();
+      };
+      return 0.5 * problem.n_data() *
+             (problem.transform().weights() *
+              (shares(problem.spectrum().along_um_per_kPa()) + shares(problem.spectrum().across_um_per_kPa())))
+                 .sum();
     }
     return power == 1 ? probe->right_hand_side_times_solution() : probe->displaced_squared();
   };
@@ -41,10 +44,13 @@ LambdaScan scan_lambda(const LatticeProblem& problem) {
     if (probe) probe->solve(lambda, kScanTolerance);
     const double misfit =
         problem.data_squared() - 2 * solver.right_hand_side_times_solution() + solver.displaced_squared();
-    points.push_back(
-        {.lambda = lambda, .misfit = misfit, .norm = solver.solution_squared(), .degrees = degrees_of(lambda, 1)});
+    points.push_back({.lambda = lambda,
+                      .misfit = misfit,
+                      .norm = solver.solution_squared(),
+                      .degrees = degrees_of(lambda, 1),
+                      .removable_misfit = {}});
   }
-  return judge(std::move(points), problem.n_data(), problem.stated_variance(), [&](double lambda) {
+  return judge(std::move(points), problem.n_data(), problem.n_data(), problem.stated_variance(), [&](double lambda) {
     solver.solve(lambda, kScanTolerance);
     if (probe) probe->solve(lambda, kScanTolerance);
     return robust_variance(problem.residuals(problem.displaced(solver.solution())), degrees_of(lambda, 1),
@@ -52,27 +58,21 @@ LambdaScan scan_lambda(const LatticeProblem& problem) {
   });
 }
 
-std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
-                                      double lambda, double variance, int threads) {
+TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
+                           double lambda) {
   const Lattice &field = problem.field(), &box = problem.box();
   const double area = field.spacing_um * field.spacing_um;
-  std::vector<Vec2> deviations(static_cast<std::size_t>(n_forces));
-  parallel_for(n_forces, threads, [&](int f) {
-    for (double Vec2::*component : {&Vec2::x, &Vec2::y}) {
-      NodeField sum = problem.transform().no_field();
-      for (std::size_t p = 0; p < owner.size(); ++p) {
-        if (owner[p] != f) continue;
-        const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
-                   column = static_cast<Eigen::Index>(p) % field.n_columns;
-        (component == &Vec2::x ? sum.x : sum.y)[column + box.n_columns * row] = area;
-      }
-      // F = qᵀ t, t = (A + lambda²)⁻¹ G Pᵀ u with A = G PᵀP G, so Var F = variance sᵀ A s, s = (A + lambda²)⁻¹ q
-      TikhonovSolver solver(problem, problem.transform().forward(sum));
-      solver.solve(lambda, kScanTolerance);
-      deviations[static_cast<std::size_t>(f)].*component = std::sqrt(variance * solver.displaced_squared());
-    }
-  });
-  return deviations;
+  NodeField q = problem.transform().no_field();
+  for (std::size_t p = 0; p < owner.size(); ++p) {
+    if (owner[p] != force) continue;
+    const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
+               column = static_cast<Eigen::Index>(p) % field.n_columns;
+    q.x[column + box.n_columns * row] = area * direction.x;
+    q.y[column + box.n_columns * row] = area * direction.y;
+  }
+  TikhonovSolver solver(problem, problem.transform().forward(q), 1);
+  solver.solve(lambda, kScanTolerance);
+  return solver;
 }
 
 namespace {
@@ -80,18 +80,14 @@ namespace {
 std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::vector<Patch>& patches,
                                      const TractionInputs& inputs, const TractionParameters& parameters, double lambda,
                                      double variance, int threads) {
-  std::vector<Vec2> positions;
-  for (const Patch& p : patches) positions.push_back(p.position_um);
-  const std::vector<int> owner = adhesion_of_patches(positions, inputs.adhesions, parameters.grow_um);
+  const std::vector<int> owner = adhesion_of_patches(positions_of(patches), inputs.adhesions, parameters.grow_um);
   std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
-  const std::vector<Vec2> deviations =
-      force_deviations_nN(problem, owner, static_cast<int>(forces.size()), lambda, variance, threads);
-  for (std::size_t f = 0; f < forces.size(); ++f) {
-    // of the magnitude: along the force
-    const double length = norm(forces[f].force_nN);
-    const Vec2 e = length > 0 ? 1 / length * forces[f].force_nN : Vec2{1, 0};
-    forces[f].sigma_nN = std::hypot(e.x * deviations[f].x, e.y * deviations[f].y);
-  }
+  parallel_for(static_cast<int>(forces.size()), threads, [&](int f) {
+    AdhesionForce& force = forces[static_cast<std::size_t>(f)];
+    const TikhonovSolver probe = force_probe(problem, owner, f, direction_of(force.force_nN), lambda);
+    const double squared = probe.displaced_squared();
+    if (squared > 0) force.sigma_nN = std::sqrt(variance * squared);  // beyond the field nothing is known of a force
+  });
   return forces;
 }
 
@@ -135,16 +131,16 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
   Reconstruction r;
   r.lambda_unit = "um_per_kPa";
-  r.scan = scan_lambda(problem);
+  TikhonovSolver solver(problem);
+  r.scan = scan_lambda(problem, solver);
   r.lambda = parameters.lambda_um_per_kPa.value_or(chosen_lambda(*r.scan, parameters.lambda_by));
   r.length_um = *r.lambda * inputs.gel.youngs_modulus_kPa;
-  TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
   constexpr double kTolerance = 1e-3;  // in energy: far below any error bar
   solver.solve(*r.lambda, kTolerance);
   const ReadOut read_out = parameters.read_out == "cells" ? ReadOut::cells : ReadOut::points;
-  const NodeField displacements = problem.displaced(solver.solution());
-  r.patches =
-      patches_of(problem, tractions_kPa(problem, solver.solution(), read_out, parameters.gaussian_um), displacements);
+  const WaveField waves = solver.solution();
+  const NodeField displacements = problem.displaced(waves);
+  r.patches = patches_of(problem, tractions_kPa(problem, waves, read_out, parameters.gaussian_um), displacements);
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
@@ -158,21 +154,24 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
 std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& waves, ReadOut read_out,
                                 double gaussian_um) {
   const Lattice& box = problem.box();
+  const auto factors = [&](int n_waves, int n_nodes) {  // along one axis: both smoothings are products over the two
+    Eigen::ArrayXd f(n_waves);
+    for (int i = 0; i < n_waves; ++i) {
+      const double turn = pi * (2 * i <= n_nodes ? i : i - n_nodes) / n_nodes;  // half the phase to the next node
+      f[i] = (read_out == ReadOut::cells ? sinc(turn) : 1) *
+             std::exp(-2 * std::pow(turn / box.spacing_um * gaussian_um, 2));
+    }
+    return f;
+  };
   const int n_half = problem.transform().n_half();
+  const Eigen::ArrayXd by_column = factors(n_half, box.n_columns), by_row = factors(box.n_rows, box.n_rows);
   WaveField read = waves;
   for (int j = 0; j < box.n_rows; ++j) {
-    for (int i = 0; i < n_half; ++i) {
-      const double turn_x = pi * i / box.n_columns;  // half the phase from a node to the next
-      const double turn_y = pi * (2 * j <= box.n_rows ? j : j - box.n_rows) / box.n_rows;
-      double factor = read_out == ReadOut::cells ? sinc(turn_x) * sinc(turn_y) : 1;
-      const double k_s = 2 * std::hypot(turn_x, turn_y) / box.spacing_um * gaussian_um;
-      factor *= std::exp(-0.5 * k_s * k_s);
-      const Eigen::Index at = i + static_cast<Eigen::Index>(n_half) * j;
-      read.x[at] *= factor;
-      read.y[at] *= factor;
-    }
+    const Eigen::Index row = static_cast<Eigen::Index>(n_half) * j;
+    read.x.segment(row, n_half) *= by_row[j] * by_column;
+    read.y.segment(row, n_half) *= by_row[j] * by_column;
   }
-  const NodeField nodes = problem.transform().backward(read);
+  const NodeField nodes = problem.transform().backward(std::move(read), problem.threads());
   std::vector<Vec2> tractions;
   for (int j = 0; j < problem.field().n_rows; ++j) {
     for (int i = 0; i < problem.field().n_columns; ++i) {

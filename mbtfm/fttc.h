@@ -7,8 +7,8 @@
 
 namespace mbtfm::inverse {
 
-/// The criteria over the lambdas that this problem can tell apart.
-LambdaScan scan_lambda(const LatticeProblem& problem);
+/// The criteria over the lambdas that this problem can tell apart. @param solver  of the problem's data: left near one
+LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver);
 
 /// How the tractions of a lattice are read out.
 enum class ReadOut {
@@ -16,11 +16,12 @@ enum class ReadOut {
   cells    ///< their mean over the cell around each node: sums of traction times area are forces
 };
 
-/// Standard deviation (nN) of forces, each the sum over given nodes of the field of traction times area, along x and y.
-/// By the noise alone, for one lambda: what the smoothing takes away is not in it.
-/// @param owner  by node of the field: which force it belongs to, or -1
-std::vector<Vec2> force_deviations_nN(const LatticeProblem& problem, const std::vector<int>& owner, int n_forces,
-                                      double lambda, double variance, int threads);
+/// F = qᵀ t is a force: the sum over given nodes of the field of traction times area, along a direction. This solves
+/// (A + lambda²) s = q, A = G PᵀP G. The tractions of one lambda have the force sᵀ G Pᵀ u, so s tells its variance,
+/// sᵀ A s of one datum's: by the noise alone, what the smoothing takes away is not in it.
+/// @param owner  by node of the field: which force it belongs to, or -1. @param force  the one
+TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
+                           double lambda);
 
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 

@@ -137,12 +137,13 @@ int wrapped(int i, int n) { return ((i % n) + n) % n; }
 
 }  // namespace
 
-LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, const LatticeOptions& options) {
+LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, const LatticeOptions& options)
+    : threads_(options.threads) {
   check_beads(beads);
   check(gel);
   field_ = field_of(beads, options);
   box_ = box_of(field_, options.padding);
-  transform_ = std::make_unique<WaveTransform>(box_.n_columns, box_.n_rows, options.threads);
+  transform_ = std::make_unique<WaveTransform>(box_.n_columns, box_.n_rows);
   spectrum_ = std::make_unique<SurfaceSpectrum>(gel, options.model, box_,
                                                 options.padding > 1 ? Surroundings::open : Surroundings::periodic);
   const double longest_um = field_.spacing_um * std::max(field_.n_columns, field_.n_rows);
@@ -238,65 +239,88 @@ void LatticeProblem::normal(const NodeField& nodes, NodeField& result) const {
 }
 
 NodeField LatticeProblem::displaced(WaveField tractions) const {
-  spectrum_->apply(
-      tractions, [](double g) { return g; }, tractions);
-  return transform_->backward(std::move(tractions));
+  spectrum_->displace(tractions);
+  return transform_->backward(std::move(tractions), threads_);
 }
 
 WaveField LatticeProblem::pulled_back(const NodeField& spread) const {
-  WaveField waves = transform_->forward(spread);
-  spectrum_->apply(
-      waves, [](double g) { return g; }, waves);
+  WaveField waves = transform_->forward(spread, threads_);
+  spectrum_->displace(waves);
   return waves;
 }
 
-TikhonovSolver::TikhonovSolver(const LatticeProblem& problem, WaveField right_hand_side)
+TikhonovSolver::TikhonovSolver(const LatticeProblem& problem)
+    : TikhonovSolver(problem, problem.pulled_back(problem.spread_data()), problem.threads()) {}
+
+TikhonovSolver::TikhonovSolver(const LatticeProblem& problem, WaveField right_hand_side, int threads)
     : problem_(problem),
+      threads_(threads),
       b_(std::move(right_hand_side)),
       t_(problem.transform().no_waves()),
-      image_(t_),
-      residual_(t_),
       step_(t_),
       work_(t_),
       nodes_(problem.transform().no_field()),
-      normal_(nodes_) {}
+      normal_(nodes_) {
+  problem_.spectrum().turn(b_);
+  residual_ = b_;
+}
+
+void TikhonovSolver::set_right_hand_side(WaveField b) {
+  problem_.spectrum().turn(b);
+  residual_.x += b.x - b_.x;
+  residual_.y += b.y - b_.y;
+  b_ = std::move(b);
+}
+
+WaveField TikhonovSolver::solution() const {
+  WaveField waves = t_;
+  problem_.spectrum().turn(waves);
+  return waves;
+}
 
 double TikhonovSolver::solution_squared() const { return problem_.transform().dot(t_, t_); }
 double TikhonovSolver::right_hand_side_times_solution() const { return problem_.transform().dot(b_, t_); }
-double TikhonovSolver::displaced_squared() const { return problem_.transform().dot(image_, t_); }
-
-void TikhonovSolver::apply(const WaveField& tractions) {
-  const auto compliance = [](double g) { return g; };
-  problem_.spectrum().apply(tractions, compliance, work_);
-  problem_.transform().backward(work_, nodes_);
-  problem_.normal(nodes_, normal_);
-  problem_.transform().forward(normal_, work_);
-  problem_.spectrum().apply(work_, compliance, work_);
+double TikhonovSolver::displaced_squared() const {
+  const WaveTransform& transform = problem_.transform();
+  return transform.dot(b_, t_) - transform.dot(residual_, t_) - lambda2_ * transform.dot(t_, t_);
 }
 
 namespace {
 
-void add(WaveField& to, double factor, const WaveField& what) {
-  to.x += factor * what.x;
-  to.y += factor * what.y;
+double squared(const std::complex<double>& z) { return z.real() * z.real() + z.imag() * z.imag(); }
+double product(const std::complex<double>& a, const std::complex<double>& b) {
+  return a.real() * b.real() + a.imag() * b.imag();
 }
 
 }  // namespace
 
 int TikhonovSolver::solve(double lambda, double tolerance) {
   constexpr int kMost = 2000;  // an even field takes a few, a patchy one some tens
-  const double lambda2 = lambda * lambda;
-  const WaveTransform& transform = problem_.transform();
-  const auto precondition = [&](const WaveField& waves, WaveField& result) {
-    problem_.spectrum().apply(
-        waves, [lambda2](double g) { return 1 / (g * g + lambda2); }, result);
+  const SurfaceSpectrum& spectrum = problem_.spectrum();
+  const Eigen::ArrayXd &along = spectrum.along_um_per_kPa(), &across = spectrum.across_um_per_kPa();
+  const Eigen::ArrayXd& weights = problem_.transform().weights();
+  const double more = lambda * lambda - lambda2_;
+  lambda2_ = lambda * lambda;
+  const Eigen::ArrayXd by_along = 1 / (along.square() + lambda2_), by_across = 1 / (across.square() + lambda2_);
+  const auto for_waves = [&](const auto& body) {  // the sum of weight times both numbers that it returns
+    return sum_over_parts(weights.size(), threads_, [&](Eigen::Index begin, Eigen::Index end) {
+      Eigen::Array2d sums = Eigen::Array2d::Zero();
+      for (Eigen::Index k = begin; k < end; ++k) sums += weights[k] * body(k);
+      return sums;
+    });
   };
-  residual_.x = b_.x - image_.x - lambda2 * t_.x;
-  residual_.y = b_.y - image_.y - lambda2 * t_.y;
-  precondition(residual_, step_);
-  double energy = transform.dot(residual_, step_);
+  const auto energy_of_residual = [&](Eigen::Index k) {
+    return by_along[k] * squared(residual_.x[k]) + by_across[k] * squared(residual_.y[k]);
+  };
+
   // b · t is the energy of the solution; what t lacks of it yet, the residual has
-  const double enough = tolerance * tolerance * (std::abs(transform.dot(b_, t_)) + energy);
+  const Eigen::Array2d start = for_waves([&](Eigen::Index k) {
+    residual_.x[k] -= more * t_.x[k];
+    residual_.y[k] -= more * t_.y[k];
+    return Eigen::Array2d(energy_of_residual(k), product(b_.x[k], t_.x[k]) + product(b_.y[k], t_.y[k]));
+  });
+  double energy = start[0], ratio = 0;
+  const double enough = tolerance * tolerance * (std::abs(start[1]) + energy);
   int n = 0;
   for (; energy > enough; ++n) {
     if (n == kMost) {
@@ -306,17 +330,34 @@ int TikhonovSolver::solve(double lambda, double tolerance) {
                        .reason = "the tractions did not settle in " + std::to_string(n) +
                                  " steps: lambda is far too small for so uneven a field"});
     }
-    apply(step_);
-    const double length = energy / (transform.dot(step_, work_) + lambda2 * transform.dot(step_, step_));
-    add(t_, length, step_);
-    add(image_, length, work_);
-    residual_.x -= length * (work_.x + lambda2 * step_.x);
-    residual_.y -= length * (work_.y + lambda2 * step_.y);
-    precondition(residual_, work_);
-    const double next_energy = transform.dot(residual_, work_);
-    const double ratio = next_energy / energy;
-    step_.x = work_.x + ratio * step_.x;
-    step_.y = work_.y + ratio * step_.y;
+    const double step_squared = for_waves([&](Eigen::Index k) {
+      std::complex<double>&x = step_.x[k], &y = step_.y[k];
+      x = by_along[k] * residual_.x[k] + ratio * x;
+      y = by_across[k] * residual_.y[k] + ratio * y;
+      work_.x[k] = along[k] * x;
+      work_.y[k] = across[k] * y;
+      spectrum.turn(k, work_.x[k], work_.y[k]);
+      return Eigen::Array2d(squared(x) + squared(y), 0);
+    })[0];
+    problem_.transform().backward(work_, nodes_, threads_);
+    problem_.normal(nodes_, normal_);
+    problem_.transform().forward(normal_, work_, threads_);
+    const double step_displaced = for_waves([&](Eigen::Index k) {
+      std::complex<double>&x = work_.x[k], &y = work_.y[k];
+      spectrum.turn(k, x, y);
+      x *= along[k];
+      y *= across[k];
+      return Eigen::Array2d(product(x, step_.x[k]) + product(y, step_.y[k]), 0);
+    })[0];
+    const double length = energy / (step_displaced + lambda2_ * step_squared);
+    const double next_energy = for_waves([&](Eigen::Index k) {
+      t_.x[k] += length * step_.x[k];
+      t_.y[k] += length * step_.y[k];
+      residual_.x[k] -= length * (work_.x[k] + lambda2_ * step_.x[k]);
+      residual_.y[k] -= length * (work_.y[k] + lambda2_ * step_.y[k]);
+      return Eigen::Array2d(energy_of_residual(k), 0);
+    })[0];
+    ratio = next_energy / energy;
     energy = next_energy;
   }
   return n;

@@ -35,6 +35,7 @@ class LatticeProblem {
   double longest_wave_um_per_kPa() const { return longest_wave_um_per_kPa_; }
   bool is_complete() const { return is_complete_; }  ///< one bead on each node, all of one weight
   std::optional<double> stated_variance() const { return stated_variance_; }  ///< of one component of u
+  int threads() const { return threads_; }
 
   /// Pᵀ u: the displacements on the lattice.
   const NodeField& spread_data() const { return spread_; }
@@ -55,6 +56,7 @@ class LatticeProblem {
   std::unique_ptr<SurfaceSpectrum> spectrum_;
   std::unique_ptr<WaveTransform> transform_;
   std::size_t n_beads_ = 0;
+  int threads_;
   bool is_complete_ = false;
   std::optional<double> stated_variance_;
   double data_squared_ = 0, longest_wave_um_per_kPa_ = 0;
@@ -69,25 +71,31 @@ class LatticeProblem {
 };
 
 /// (G PᵀP G + lambda²) t = b by conjugate gradients, preconditioned with the inverse for a field without gaps or
-/// borders, which is diagonal in Fourier space. For several lambdas in turn: each starts where the one before ended.
+/// borders, which is diagonal in Fourier space, in the frame of the wave vectors. For several lambdas in turn: each
+/// starts where the one before ended. A pass over the waves costs as much as a transform: so there are three a
+/// step, and each does all that it can.
 class TikhonovSolver {
  public:
-  TikhonovSolver(const LatticeProblem& problem, WaveField right_hand_side);
+  /// b = G Pᵀ u
+  explicit TikhonovSolver(const LatticeProblem& problem);
+  /// @param right_hand_side  as the solution, in waves of x and y
+  TikhonovSolver(const LatticeProblem& problem, WaveField right_hand_side, int threads);
   /// @param tolerance  of the error, relative, in the energy of the equation
   /// @returns the iterations taken. @throws NotSolved
   int solve(double lambda, double tolerance);
   /// Another right hand side; the solution stays as the place to start.
-  void set_right_hand_side(WaveField b) { b_ = std::move(b); }
-  const WaveField& solution() const { return t_; }
+  void set_right_hand_side(WaveField b);
+  WaveField solution() const;
   double solution_squared() const;
   double right_hand_side_times_solution() const;  ///< b · t
   double displaced_squared() const;               ///< |P G t|²
 
  private:
-  void apply(const WaveField& tractions);  ///< G PᵀP G of them, to work_
   const LatticeProblem& problem_;
-  WaveField b_, t_, image_;  ///< image: G PᵀP G t
-  WaveField residual_, step_, work_;
+  int threads_;
+  double lambda2_ = 0;
+  WaveField b_, t_, residual_;  ///< residual: b − (G PᵀP G + lambda²) t
+  WaveField step_, work_;
   NodeField nodes_, normal_;
 };
 

@@ -68,8 +68,8 @@ double robust_variance(std::vector<double> residuals, double degrees, double deg
   return deviation * deviation * n / std::max(n - 2 * degrees + degrees_of_square, 1e-6 * n);
 }
 
-LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<double> stated_variance,
-                 const std::function<double(double lambda)>& variance_left_at) {
+LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
+                 std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at) {
   MBTFM_ASSERT(points.size() >= 5);
   LambdaScan scan;
   scan.points = std::move(points);
@@ -96,10 +96,14 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
     return turn / std::pow(std::max(dx * dx + dy * dy, 1e-300), 1.5);
   };
   for (std::size_t i = 0; i < scan.points.size(); ++i) scan.curvature.push_back(curvature_at(static_cast<double>(i)));
-  // at its ends a spline knows no curvature
+  // At its ends a spline knows no curvature. Tractions that grow with the noise no faster than with the signal bend the
+  // curve the other way all along: then it has no corner.
   const auto n_last = static_cast<double>(scan.points.size()) - 1;
-  scan.by_l_curve = lambda_at(
-      smallest_at(scan.points.size(), [&](double at) { return -curvature_at(std::clamp(at, 2.0, n_last - 2)); }));
+  const double corner_at = std::clamp(
+      smallest_at(scan.points.size(), [&](double at) { return -curvature_at(std::clamp(at, 2.0, n_last - 2)); }), 2.0,
+      n_last - 2);
+  constexpr double kLeastCurvature = 0.1;  // a radius of ten e-folds, four decades, is no corner to the eye
+  if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(corner_at);
 
   // (14) The determinant from its derivative: d log det(1 + G Gᵀ / lambda²) / d log lambda² = −degrees.
   double log_determinant = 0;
@@ -124,20 +128,50 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, std::optional<dou
   scan.variance_source = scan.variance > left ? "the errors that the data state" : "the misfit";
   scan.risk = over_points(scan.points, [&](const ScanPoint& p) {
     const double lambda2 = p.lambda * p.lambda;
-    return -(2 * p.misfit + lambda2 * p.norm - 2 * scan.variance * (n_data - p.degrees)) / lambda2;
+    const double misfit = p.removable_misfit.value_or(p.misfit);
+    return -(2 * misfit + lambda2 * p.norm - 2 * scan.variance * (n_removable - p.degrees)) / lambda2;
   });
-  // Far from its minimum it grows by powers of ten, which a spline through it would answer with waves.
-  const double least = *std::min_element(scan.risk.begin(), scan.risk.end());
+  const RiskScale scale(scan.risk);
   std::vector<double> tamed;
-  for (const double r : scan.risk) tamed.push_back(std::asinh((r - least) / std::max(std::abs(least), 1e-300)));
+  for (const double r : scan.risk) tamed.push_back(scale.to(r));
   scan.by_risk = lambda_at(smallest_at(tamed));
   return scan;
 }
 
+Refinement::Refinement(const std::vector<ScanPoint>& points) {
+  const std::size_t n_places = (points.size() - 1) * kFine;
+  const double ratio = points.back().lambda / points.front().lambda;
+  for (std::size_t i = 0; i <= n_places; ++i) {
+    lambdas.push_back(points.front().lambda * std::pow(ratio, static_cast<double>(i) / static_cast<double>(n_places)));
+  }
+}
+
+std::vector<double> Refinement::of(const std::vector<double>& values, const std::function<double(double)>& to,
+                                   const std::function<double(double)>& from) const {
+  std::vector<double> scaled, fine;
+  for (const double v : values) scaled.push_back(to(v));
+  const auto spline = spline_of(scaled);
+  for (std::size_t i = 0; i < lambdas.size(); ++i) {
+    fine.push_back(from(spline(std::min(static_cast<double>(i) / kFine, static_cast<double>(values.size()) - 1))));
+  }
+  return fine;
+}
+
+RiskScale::RiskScale(const std::vector<double>& risk)
+    : least(*std::min_element(risk.begin(), risk.end())), depth(std::max(std::abs(least), 1e-300)) {}
+double RiskScale::to(double risk) const { return std::asinh((risk - least) / depth); }
+double RiskScale::from(double tamed) const { return least + depth * std::sinh(tamed); }
+
 double chosen_lambda(const LambdaScan& scan, const std::string& criterion) {
   if (criterion == "risk") return scan.by_risk;
   if (criterion == "gcv") return scan.by_gcv;
-  if (criterion == "l-curve") return scan.by_l_curve;
+  if (criterion == "l-curve" && !scan.by_l_curve) {
+    throw NotSolved({.converged = false,
+                     .iterations = 0,
+                     .last_change = 0,
+                     .reason = "the L-curve of these data has no corner: choose lambda by another criterion"});
+  }
+  if (criterion == "l-curve") return *scan.by_l_curve;
   if (criterion == "evidence") return scan.by_evidence;
   throw UsageError("traction: unknown criterion '" + criterion + "'");
 }

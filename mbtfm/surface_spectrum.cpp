@@ -76,16 +76,17 @@ SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& 
         c = {share * c.along_um_per_kPa, share * c.across_um_per_kPa};
       }
       smallest_ = std::min({smallest_, c.along_um_per_kPa, c.across_um_per_kPa});
-      cos_[at] = (k_x * k_x - k_y * k_y) / k2;
-      sin_[at] = 2 * k_x * k_y / k2;
+      cos_[at] = k_x / std::sqrt(k2);
+      sin_[at] = k_y / std::sqrt(k2);
       along_[at] = c.along_um_per_kPa;
       across_[at] = c.across_um_per_kPa;
       if (2 * i != n_x && 2 * j != n_y) continue;
       // The shortest wave of an even lattice runs both ways at once: the mean of the two tensors, whose mixed part
       // cancels.
-      const double even = 0.5 * (along_[at] + across_[at]), odd = 0.5 * (along_[at] - across_[at]) * cos_[at];
-      along_[at] = even + odd;
-      across_[at] = even - odd;
+      const double x_share = k_x * k_x / k2;
+      const double along = along_[at], across = across_[at];
+      along_[at] = x_share * along + (1 - x_share) * across;
+      across_[at] = x_share * across + (1 - x_share) * along;
       cos_[at] = 1;
       sin_[at] = 0;
     }

@@ -32,39 +32,36 @@ class SurfaceSpectrum {
   SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
                   Basis basis = Basis::waves);
 
-  /// Write each wave times f(compliance), f acting on the along and the across part, to `result`, which may be `waves`.
-  template <class F>
-  void apply(const WaveField& waves, const F& f, WaveField& result) const;
-  /// Sum over the stored waves of weight · (f(along) + f(across)).
-  template <class F>
-  double trace(const Eigen::ArrayXd& weights, const F& f) const;
+  const Eigen::ArrayXd& along_um_per_kPa() const { return along_; }  ///< by wave
+  const Eigen::ArrayXd& across_um_per_kPa() const { return across_; }
   /// Of all waves that displace the surface at all.
   double smallest_um_per_kPa() const { return smallest_; }
 
+  /// To the frame of the wave vectors, in which the compliance is diagonal: x becomes along, y across. And back: it is
+  /// a reflection.
+  void turn(WaveField& waves) const {
+    for (Eigen::Index k = 0; k < waves.x.size(); ++k) turn(k, waves.x[k], waves.y[k]);
+  }
+  void turn(Eigen::Index wave, std::complex<double>& x, std::complex<double>& y) const {
+    const double c = cos_[wave], s = sin_[wave];
+    const std::complex<double> along = c * x + s * y;
+    y = s * x - c * y;
+    x = along;
+  }
+  /// Tractions (x, y) to displacements.
+  void displace(WaveField& waves) const {
+    for (Eigen::Index k = 0; k < waves.x.size(); ++k) {
+      turn(k, waves.x[k], waves.y[k]);
+      waves.x[k] *= along_[k];
+      waves.y[k] *= across_[k];
+      turn(k, waves.x[k], waves.y[k]);
+    }
+  }
+
  private:
   Eigen::ArrayXd along_, across_;
-  Eigen::ArrayXd cos_, sin_;  ///< of twice the direction of the wave vector
+  Eigen::ArrayXd cos_, sin_;  ///< of the direction of the wave vector
   double smallest_ = 0;
 };
-
-// A symmetric tensor with p along and q across the direction phi is (p + q)/2 + (p − q)/2 [cos 2phi, sin 2phi; …].
-template <class F>
-void SurfaceSpectrum::apply(const WaveField& waves, const F& f, WaveField& result) const {
-  for (Eigen::Index k = 0; k < waves.x.size(); ++k) {
-    const double p = f(along_[k]), q = f(across_[k]);
-    const double even = 0.5 * (p + q), odd = 0.5 * (p - q);
-    const double xx = even + odd * cos_[k], yy = even - odd * cos_[k], xy = odd * sin_[k];
-    const std::complex<double> x = waves.x[k], y = waves.y[k];
-    result.x[k] = xx * x + xy * y;
-    result.y[k] = xy * x + yy * y;
-  }
-}
-
-template <class F>
-double SurfaceSpectrum::trace(const Eigen::ArrayXd& weights, const F& f) const {
-  double sum = 0;
-  for (Eigen::Index k = 0; k < weights.size(); ++k) sum += weights[k] * (f(along_[k]) + f(across_[k]));
-  return sum;
-}
 
 }  // namespace mbtfm::inverse

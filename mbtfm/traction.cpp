@@ -82,10 +82,15 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
   return owner;
 }
 
-std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
-                                              double grow_um) {
+std::vector<Vec2> positions_of(const std::vector<Patch>& patches) {
   std::vector<Vec2> positions;
   for (const Patch& p : patches) positions.push_back(p.position_um);
+  return positions;
+}
+
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
+                                              double grow_um) {
+  const std::vector<Vec2> positions = positions_of(patches);
   const std::vector<int> owner = adhesion_of_patches(positions, adhesions, grow_um);
   std::vector<AdhesionForce> forces;
   for (const Adhesion& a : adhesions) {
@@ -102,11 +107,15 @@ std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches,
   return forces;
 }
 
+Vec2 direction_of(Vec2 force_nN) {
+  const double length = norm(force_nN);
+  return length > 0 ? 1 / length * force_nN : Vec2{1, 0};
+}
+
 TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {
   const std::vector<Patch>& patches = reconstruction.patches;
   TractionSums sums;
-  std::vector<Vec2> positions;
-  for (const Patch& p : patches) positions.push_back(p.position_um);
+  const std::vector<Vec2> positions = positions_of(patches);
   std::vector<bool> is_near(patches.size(), true);
   sums.where = "the whole field";
   if (!inputs.outline_um.empty()) {
@@ -131,6 +140,7 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
     sums.strain_energy_fJ += 0.5 * dot(force, patches[i].displacement_um);
   }
   if (sums.total_force_nN > 0) centre = 1 / sums.total_force_nN * centre;
+  double inward = 0, weight = 0;
   for (std::size_t i = 0; i < patches.size(); ++i) {
     if (!is_near[i]) continue;
     const Vec2 force = patches[i].area_um2 * patches[i].traction_kPa;
@@ -139,7 +149,10 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
     sums.moment_nN_um[0][1] += arm.x * force.y;
     sums.moment_nN_um[1][0] += arm.y * force.x;
     sums.moment_nN_um[1][1] += arm.y * force.y;
+    inward -= dot(arm, force) * norm(force);
+    weight += norm(arm) * dot(force, force);
   }
+  if (weight > 0) sums.inward_share = inward / weight;
   return sums;
 }
 
@@ -194,6 +207,7 @@ Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
                      {"net_force_y_nN", sums.net_force_nN.y},
                      {"strain_energy_fJ", sums.strain_energy_fJ},
                      {"contractile_moment_nN_um", sums.contractile_moment_nN_um()},
+                     {"inward_share", sums.inward_share},
                      {"moment_xx_nN_um", sums.moment_nN_um[0][0]},
                      {"moment_xy_nN_um", sums.moment_nN_um[0][1]},
                      {"moment_yx_nN_um", sums.moment_nN_um[1][0]},
@@ -206,7 +220,7 @@ Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
     const double scale = *r.length_um / *r.lambda;
     figures.emplace_back("length_by_risk_um", r.scan->by_risk * scale);
     figures.emplace_back("length_by_gcv_um", r.scan->by_gcv * scale);
-    figures.emplace_back("length_by_l_curve_um", r.scan->by_l_curve * scale);
+    if (r.scan->by_l_curve) figures.emplace_back("length_by_l_curve_um", *r.scan->by_l_curve * scale);
     figures.emplace_back("length_by_evidence_um", r.scan->by_evidence * scale);
     figures.emplace_back("noise_from", r.scan->variance_source);
   }

@@ -46,6 +46,8 @@ struct Patch {
   Vec2 displacement_um;  ///< of the surface there, as the model has it
 };
 
+std::vector<Vec2> positions_of(const std::vector<Patch>& patches);
+
 /// How far a force moves (length of the change of its vector) where its ellipse is wrong by what a segmentation errs.
 struct Sensitivity {
   double shift_along_nN = 0, shift_across_nN = 0;  ///< the ellipse shifted along and across its major axis
@@ -87,6 +89,9 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
 std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
                                               double grow_um);
 
+/// Along which the error of a force's magnitude is taken: the force, or x where there is none.
+Vec2 direction_of(Vec2 force_nN);
+
 /// Sums over the patches near the cell.
 struct TractionSums {
   double total_force_nN = 0;  ///< sum of magnitudes
@@ -94,6 +99,9 @@ struct TractionSums {
   double strain_energy_fJ = 0;     ///< half the sum of t · u A
   double moment_nN_um[2][2] = {};  ///< sum of (x − centre)_i F_j
   double contractile_moment_nN_um() const { return -(moment_nN_um[0][0] + moment_nN_um[1][1]); }  ///< > 0: inward
+  /// Mean cosine between force and direction to the centre, weighted by distance and the square of the force, as noise
+  /// is everywhere: near 1 for a contracting cell, 0 where forces know no centre, -1 where they push outward.
+  double inward_share = 0;
   std::string where;
 };
 /// Near the cell: inside its outline or within `grow_um` of it, else of its adhesions; with neither, everywhere.
@@ -107,6 +115,8 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
 void write_tractions(const Path& file, const std::vector<Patch>& patches);
 void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches);
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda);
+/// The criteria over lambda in both its units, an SVG. @param chosen_by  for people; the reconstruction has a scan
+void write_lambda_picture(const Path& file, const Reconstruction& reconstruction, const std::string& chosen_by);
 std::vector<PointArray> columns_of(const std::vector<Sensitivity>& sensitivities);
 Figures summary_of(const Reconstruction& reconstruction, const TractionSums& sums);
 

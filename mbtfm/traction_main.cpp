@@ -33,6 +33,8 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   write_figures(context.output_beside("out", ".json"), summary_of(r, sums));
   if (r.scan) {
     write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
+    write_lambda_picture(context.output_beside("out", "_lambda.svg"), r,
+                         p.traction.lambda_um_per_kPa ? "as given" : "by " + p.traction.lambda_by);
   }
   if (!inputs.adhesions.empty()) {
     write_adhesion_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces, inputs.adhesions,
@@ -48,6 +50,10 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   report.converged = r.report.converged;
   if (!r.report.converged) report.summary += "; " + r.report.reason;
   if (!r.remark.empty()) report.summary += "; " + r.remark;
+  constexpr double kOutward = -0.5;  // no cell pushes so; noise has a share near zero
+  if (sums.inward_share < kOutward) {
+    report.summary += "; WARNING: the tractions push outward everywhere: are stressed and relaxed swapped?";
+  }
   report.figures = summary_of(r, sums);
   const bool is_layer = p.traction.gel_model == "layer";
   report.effects = {{.name = "finite thickness",
@@ -70,7 +76,7 @@ int main(int argc, char** argv) {
                  {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
                  {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
                  {"out", FileArgument::Kind::output,
-                  "traction.csv; traction.vtp, traction.json, traction_lambda.csv and traction_adhesion_forces.csv "
-                  "come beside it"}}},
+                  "traction.csv; traction.vtp, traction.json, traction_lambda.csv and .svg, and "
+                  "traction_adhesion_forces.csv come beside it"}}},
       argc, argv, run);
 }

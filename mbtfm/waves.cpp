@@ -2,6 +2,7 @@
 
 #include <fftw3.h>
 
+#include <array>
 #include <mutex>
 
 #include "pipeline/contract/errors.h"
@@ -25,12 +26,8 @@ struct WaveTransform::Plans {
   fftw_plan forward = nullptr, backward = nullptr;
 };
 
-WaveTransform::WaveTransform(int n_columns, int n_rows, int threads)
-    : n_columns_(n_columns),
-      n_rows_(n_rows),
-      threads_(threads),
-      weights_(n_waves()),
-      plans_(std::make_unique<Plans>()) {
+WaveTransform::WaveTransform(int n_columns, int n_rows)
+    : n_columns_(n_columns), n_rows_(n_rows), weights_(n_waves()), plans_(std::make_unique<Plans>()) {
   const double once = 1 / (static_cast<double>(n_columns) * n_rows);
   for (int j = 0; j < n_rows; ++j) {
     for (int i = 0; i < n_half(); ++i) {
@@ -61,10 +58,10 @@ NodeField WaveTransform::no_field() const {
   return {Eigen::ArrayXd::Zero(n_nodes), Eigen::ArrayXd::Zero(n_nodes)};
 }
 
-void WaveTransform::forward(const NodeField& field, WaveField& waves) const {
+void WaveTransform::forward(const NodeField& field, WaveField& waves, int threads) const {
   MBTFM_ASSERT(field.x.size() == static_cast<Eigen::Index>(n_columns_) * n_rows_ && field.y.size() == field.x.size() &&
                waves.x.size() == n_waves() && waves.y.size() == n_waves());
-  parallel_for(2, threads_, [&](int component) {
+  parallel_for(2, threads, [&](int component) {
     const Eigen::ArrayXd& from = component == 0 ? field.x : field.y;
     // planned with FFTW_PRESERVE_INPUT
     fftw_execute_dft_r2c(plans_->forward, const_cast<double*>(from.data()),
@@ -72,26 +69,26 @@ void WaveTransform::forward(const NodeField& field, WaveField& waves) const {
   });
 }
 
-void WaveTransform::backward(WaveField& waves, NodeField& field) const {
+void WaveTransform::backward(WaveField& waves, NodeField& field, int threads) const {
   MBTFM_ASSERT(field.x.size() == static_cast<Eigen::Index>(n_columns_) * n_rows_ && field.y.size() == field.x.size() &&
                waves.x.size() == n_waves() && waves.y.size() == n_waves());
   const double scale = 1 / (static_cast<double>(n_columns_) * n_rows_);
-  parallel_for(2, threads_, [&](int component) {
+  parallel_for(2, threads, [&](int component) {
     Eigen::ArrayXd& to = component == 0 ? field.x : field.y;
     fftw_execute_dft_c2r(plans_->backward, values_of(component == 0 ? waves.x : waves.y), to.data());
     to *= scale;
   });
 }
 
-WaveField WaveTransform::forward(const NodeField& field) const {
+WaveField WaveTransform::forward(const NodeField& field, int threads) const {
   WaveField waves = no_waves();
-  forward(field, waves);
+  forward(field, waves, threads);
   return waves;
 }
 
-NodeField WaveTransform::backward(WaveField waves) const {
+NodeField WaveTransform::backward(WaveField waves, int threads) const {
   NodeField field = no_field();
-  backward(waves, field);
+  backward(waves, field, threads);
   return field;
 }
 
@@ -102,6 +99,16 @@ double WaveTransform::dot(const WaveField& a, const WaveField& b) const {
                           a.y[k].real() * b.y[k].real() + a.y[k].imag() * b.y[k].imag());
   }
   return sum;
+}
+
+Eigen::Array2d sum_over_parts(Eigen::Index n_waves, int threads,
+                              const std::function<Eigen::Array2d(Eigen::Index begin, Eigen::Index end)>& body) {
+  constexpr int kParts = 4;  // as many threads as serve: beyond, memory is the limit
+  std::array<Eigen::Array2d, kParts> sums;
+  parallel_for(kParts, threads, [&](int part) {
+    sums[static_cast<std::size_t>(part)] = body(n_waves * part / kParts, n_waves * (part + 1) / kParts);
+  });
+  return (sums[0] + sums[1]) + (sums[2] + sums[3]);
 }
 
 int quick_size(int at_least) {

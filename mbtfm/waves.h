@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 
 #include "pipeline/contract/types.h"
@@ -27,11 +28,11 @@ struct WaveField {
   Eigen::ArrayXcd x, y;
 };
 
-/// The discrete Fourier transform of one size. Planned without measuring, so the same bits on every call.
+/// The discrete Fourier transform of one size. Planned without measuring, so the same bits on every call. Of threads
+/// two serve: one for each component.
 class WaveTransform {
  public:
-  /// @param threads  two serve: one for each component
-  WaveTransform(int n_columns, int n_rows, int threads = 1);
+  WaveTransform(int n_columns, int n_rows);
   ~WaveTransform();
   WaveTransform(const WaveTransform&) = delete;
   WaveTransform& operator=(const WaveTransform&) = delete;
@@ -42,21 +43,25 @@ class WaveTransform {
   /// these weights is the sum over the nodes (Parseval).
   const Eigen::ArrayXd& weights() const { return weights_; }
 
-  WaveField forward(const NodeField& field) const;
-  NodeField backward(WaveField waves) const;
+  WaveField forward(const NodeField& field, int threads = 1) const;
+  NodeField backward(WaveField waves, int threads = 1) const;
   /// The same into arrays of the right sizes: fresh memory costs more than the transform. `backward` spoils its input.
-  void forward(const NodeField& field, WaveField& waves) const;
-  void backward(WaveField& waves, NodeField& field) const;
+  void forward(const NodeField& field, WaveField& waves, int threads) const;
+  void backward(WaveField& waves, NodeField& field, int threads) const;
   WaveField no_waves() const;
   NodeField no_field() const;
   double dot(const WaveField& a, const WaveField& b) const;
 
  private:
   struct Plans;
-  int n_columns_, n_rows_, threads_;
+  int n_columns_, n_rows_;
   Eigen::ArrayXd weights_;  ///< by wave
   std::unique_ptr<Plans> plans_;
 };
+
+/// Both sums that `body` returns for part of the waves, over all of them. The parts do not depend on the threads.
+Eigen::Array2d sum_over_parts(Eigen::Index n_waves, int threads,
+                              const std::function<Eigen::Array2d(Eigen::Index begin, Eigen::Index end)>& body);
 
 /// The smallest size from `at_least` on that transforms quickly: factors 2, 3 and 5 only, and no multiple of 64, whose
 /// columns fall on the same lines of the cache (measured: 512 takes five times as long as 540).

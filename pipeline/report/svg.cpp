@@ -30,45 +30,7 @@ std::string element(const std::string& tag, const std::string& attributes, const
   return "<" + tag + " " + attributes + hover_element(hover) + (hover.empty() ? "" : "</" + tag + ">") + "\n";
 }
 
-/// Multiples of the smallest step of 1, 2 or 5 times a power of ten that gives no more than six of them.
-std::vector<double> ticks(double low, double high) {
-  const double fine = round_below((high - low) / 5);
-  const double step = (high - low) / fine <= 5 ? fine : round_below(2.5 * fine);
-  std::vector<double> list;
-  for (double t = std::ceil(low / step) * step; t <= high + 1e-9 * step; t += step)
-    list.push_back(std::abs(t) < step / 2 ? 0 : t);
-  return list;
-}
-
 }  // namespace
-
-std::string html_escaped(std::string_view text) {
-  std::string safe;
-  for (const char c : text) {
-    switch (c) {
-      case '&':
-        safe += "&amp;";
-        break;
-      case '<':
-        safe += "&lt;";
-        break;
-      case '>':
-        safe += "&gt;";
-        break;
-      case '"':
-        safe += "&quot;";
-        break;
-      default:
-        safe += c;
-    }
-  }
-  return safe;
-}
-
-std::string readable(double value) {
-  const std::string text = std::abs(value) >= 100 ? fmt::format("{:.0f}", value) : fmt::format("{:.3g}", value);
-  return !text.empty() && text[0] == '-' ? "−" + text.substr(1) : text;
-}
 
 Box box_of(const std::vector<Vec2>& points, double margin_um) {
   Box box{points.front(), points.front()};
@@ -90,12 +52,6 @@ std::string ColourScale::colour(double value) const {
     text += fmt::format("{:02x}", static_cast<int>(mixed));
   }
   return text;
-}
-
-double round_below(double value) {
-  const double power = std::pow(10.0, std::floor(std::log10(value)));
-  const double digit = value / power;
-  return power * (digit >= 5 ? 5 : digit >= 2 ? 2 : 1);
 }
 
 double round_end(double value) {

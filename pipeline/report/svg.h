@@ -2,17 +2,18 @@
 #pragma once
 
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
+#include "pipeline/charts/chart.h"
 #include "pipeline/contract/types.h"
 
 namespace mbtfm::report {
 
-std::string html_escaped(std::string_view text);
-/// Three significant digits, for people.
-std::string readable(double value);
+using charts::html_escaped;
+using charts::readable;
+using charts::round_below;
+using charts::ticks;
 
 struct Box {
   Vec2 low, high;
@@ -25,9 +26,6 @@ struct ColourScale {
   std::string label;  ///< with the unit
   std::string colour(double value) const;
 };
-
-/// Round number (1, 2 or 5 times a power of ten) nearest below.
-double round_below(double value);
 
 /// End of a colour bar from zero that shows `value`: the next of the bar's ticks. 0 where nothing is positive.
 double round_end(double value);

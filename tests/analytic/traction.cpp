@@ -7,6 +7,7 @@
 
 #include "mbtfm/fttc.h"
 #include "mbtfm/panel.h"
+#include "pipeline/contract/errors.h"
 #include "substrate/layer.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/substrate_scene.h"
@@ -64,8 +65,7 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
             disc / (0.25 * 0.25) * std::polar(1.0, -(k_x * centre.x + k_y * centre.y));
       }
     }
-    spectrum.apply(
-        waves, [](double g) { return g; }, waves);
+    spectrum.displace(waves);
     const NodeField u = transform.backward(waves);
     const substrate::Layer layer(gel);
     const substrate::LayerEllipse disc(
@@ -100,6 +100,30 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
   EXPECT_LE(before, 1e-12);  // tanh(1000): rounding
 }
 
+TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_the_other_way) {
+  // An L: above the corner the misfit grows with lambda², below it the tractions do with 1/lambda². The other way round
+  // there is no such place.
+  constexpr double kCorner = 0.02;
+  for (const bool is_l : {true, false}) {
+    std::vector<ScanPoint> points;
+    for (const double lambda : lambdas_between(10, 1e-4)) {
+      const double up = std::pow(lambda / kCorner, 2);
+      points.push_back({.lambda = lambda,
+                        .misfit = is_l ? 1 + up : up / (1 + up),
+                        .norm = is_l ? 1 + 1 / up : 1 / (1 + up),
+                        .degrees = 50 / (1 + up),
+                        .removable_misfit = {}});
+    }
+    const LambdaScan scan = judge(points, 100, 100, {}, [](double) { return 0.01; });
+    ASSERT_EQ(scan.by_l_curve.has_value(), is_l);
+    if (is_l) {
+      EXPECT_NEAR(std::log(*scan.by_l_curve / kCorner), 0, std::log(1.2));  // a tenth of the scan's step
+    } else {
+      EXPECT_THROW(chosen_lambda(scan, "l-curve"), NotSolved);
+    }
+  }
+}
+
 TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
   for (const int n_side : {128, 256}) {
     for (const double noise : {0.0, 0.05, 0.1}) {
@@ -110,8 +134,8 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         const LatticeProblem problem(
             scene.field, scene.gel,
             {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
-        const double chosen = chosen_lambda(scan_lambda(problem), "risk");
-        TikhonovSolver solver(problem, problem.pulled_back(problem.spread_data()));
+        TikhonovSolver solver(problem);
+        const double chosen = chosen_lambda(scan_lambda(problem, solver), "risk");
         const auto error_at = [&](double lambda) {
           solver.solve(lambda, 1e-4);
           return test::traction_error(scene, tractions_kPa(problem, solver.solution(), ReadOut::cells, 0));
@@ -176,6 +200,25 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
                 seconds.count());
     EXPECT_TRUE(r.report.converged);
     EXPECT_LE(error, most[row++]);
+  }
+}
+
+TEST(Sparse, forces_by_adhesion_err_as_much_as_stated) {
+  // Against the truth, as the shortening by the penalty is put right. Bounds as for adhesion-forces, of 5 seeds each.
+  for (const double noise : {0.03, 0.08}) {
+    double sum = 0, offset = 0;
+    for (unsigned seed = 201; seed <= 205; ++seed) {
+      const EllipseScene scene = ellipse_scene(64, noise, seed);
+      const Reconstruction r = reconstruct(inputs_of(scene), half_space("sparse"), 2);
+      for (std::size_t a = 0; a < r.forces.size(); ++a) {
+        const double z = (norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN;
+        offset += z / 40;
+        sum += z * z / 40;
+      }
+    }
+    std::printf("sparse, noise %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n", noise, offset, sum);
+    EXPECT_LE(std::abs(offset), 3 * std::sqrt(1 / 40.0));
+    EXPECT_NEAR(sum, 1, 3 * std::sqrt(2 / 40.0));
   }
 }
 
