@@ -39,6 +39,7 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
                     {"n_parts", static_cast<std::int64_t>(generated.n_parts)},
                     {"n_shared_segments", static_cast<std::int64_t>(generated.n_shared_segments)},
                     {"mean_edge_um", mean_edge_um},
+                    {"even_share", generated.even_share},
                     {"mean_quality", generated.mean_quality},
                     {"worst_quality", generated.worst_quality},
                     {"mean_free_quality", generated.mean_free_quality},

@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "network/polyline.h"
+
 namespace mbtfm::network {
 namespace {
 
@@ -15,29 +17,6 @@ constexpr double kCornerTurn = 50 * std::numbers::pi / 180;
 Polygon positively_oriented(Polygon polygon) {
   if (signed_area_um2(polygon) < 0) std::reverse(polygon.begin(), polygon.end());
   return polygon;
-}
-
-/// The closed line at equal steps of arc length.
-Polygon resampled(const Polygon& polygon, int n) {
-  double perimeter = 0;
-  const std::size_t size = polygon.size();
-  for (std::size_t i = 0; i < size; ++i) perimeter += norm(polygon[(i + 1) % size] - polygon[i]);
-  Polygon points;
-  points.reserve(n);
-  double start = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    const Vec2 a = polygon[i];
-    const Vec2 step = polygon[(i + 1) % size] - a;
-    const double length = norm(step);
-    while (static_cast<int>(points.size()) < n) {
-      const double s = perimeter * static_cast<double>(points.size()) / n;
-      if (s >= start + length) break;
-      points.push_back(a + ((s - start) / length) * step);
-    }
-    start += length;
-  }
-  while (static_cast<int>(points.size()) < n) points.push_back(polygon.front());  // rounding at the very end
-  return points;
 }
 
 double turn(const Polygon& points, int i, int reach) {
@@ -71,7 +50,7 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
   double perimeter = 0;
   for (std::size_t i = 0; i < outline.size(); ++i) perimeter += norm(outline[(i + 1) % outline.size()] - outline[i]);
   const int n = std::max(6 * kSamplesPerEdge, static_cast<int>(std::lround(kSamplesPerEdge * perimeter / edge_um)));
-  const Polygon dense = resampled(outline, n);
+  const Polygon dense = evenly_resampled(outline, n);
   points_um_.resize(n);
   for (int i = 0; i < n; ++i) {
     for (int k = -kHalfWindow; k <= kHalfWindow; ++k) {
@@ -95,7 +74,11 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
     points_um_[c] = tip;
   }
   start_um_.resize(n + 1);
-  for (int i = 0; i < n; ++i) start_um_[i + 1] = start_um_[i] + norm(points_um_[(i + 1) % n] - points_um_[i]);
+  for (int i = 0; i < n; ++i) {
+    const double piece = norm(points_um_[(i + 1) % n] - points_um_[i]);
+    start_um_[i + 1] = start_um_[i] + piece;
+    longest_piece_um_ = std::max(longest_piece_um_, piece);
+  }
   for (const int c : corners) corners_um_.push_back(start_um_[c]);
 }
 
@@ -116,18 +99,50 @@ Vec2 OutlineCurve::at(double s_um) const {
 double OutlineCurve::nearest(Vec2 point_um) const {
   double best = 0;
   double smallest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < points_um_.size(); ++i) {
+  for (std::size_t i = 0; i < points_um_.size();) {
     const Vec2 a = points_um_[i];
     const Vec2 step = points_um_[(i + 1) % points_um_.size()] - a;
     const double along = nearest_share(a, a + step, point_um);
-    const Vec2 gap = point_um - (a + along * step);
-    const double distance = dot(gap, gap);
+    const double distance = norm(point_um - (a + along * step));
     if (distance < smallest) {
       smallest = distance;
       best = start_um_[i] + along * (start_um_[i + 1] - start_um_[i]);
     }
+    // nothing nearer than the best within so many pieces
+    i += 1 + static_cast<std::size_t>((distance - smallest) / longest_piece_um_);
   }
   return wrapped(best);
+}
+
+Boundary::Boundary(const Cell& cell, double edge_um) {
+  rings_.emplace_back(cell.outline_um, edge_um);
+  const double smallest_um2 = 0.25 * std::numbers::sqrt3 * edge_um * edge_um;
+  for (const Polygon& hole : cell.holes_um) {
+    if (std::abs(signed_area_um2(hole)) < smallest_um2) {
+      ++n_filled_holes_;
+    } else {
+      rings_.emplace_back(hole, edge_um);
+    }
+  }
+}
+
+BoundaryPlace Boundary::place(Vec2 point_um) const {
+  BoundaryPlace place;
+  place.is_inside = is_within_outline(point_um);
+  place.distance_um = std::numeric_limits<double>::infinity();
+  for (int ring = 0; ring < static_cast<int>(rings_.size()); ++ring) {
+    const double s = rings_[ring].nearest(point_um);
+    const double distance = norm(point_um - rings_[ring].at(s));
+    if (ring > 0 && contains(rings_[ring].polygon(), point_um)) {
+      place.is_in_hole = true;
+      place.is_inside = false;
+    }
+    if (distance >= place.distance_um) continue;
+    place.ring = ring;
+    place.s_um = s;
+    place.distance_um = distance;
+  }
+  return place;
 }
 
 }  // namespace mbtfm::network

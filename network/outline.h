@@ -1,4 +1,4 @@
-/// The cell's outline as a smooth closed curve by arc length: pixel steps averaged away, sharp corners kept.
+/// The cell's outline and the rims of its holes as smooth closed curves: pixel steps averaged away, sharp corners kept.
 #pragma once
 
 #include <vector>
@@ -27,6 +27,31 @@ class OutlineCurve {
   Polygon points_um_;             ///< positively oriented
   std::vector<double> start_um_;  ///< arc length at each point, and the whole length at the end
   std::vector<double> corners_um_;
+  double longest_piece_um_ = 0;
+};
+
+/// A point seen from the boundary.
+struct BoundaryPlace {
+  int ring = 0;     ///< the nearest
+  double s_um = 0;  ///< where on it
+  double distance_um = 0;
+  bool is_inside = true;    ///< the cell
+  bool is_in_hole = false;  ///< outside the cell, but inside its outline
+};
+
+/// The outline and the holes that a mesh can show: those smaller than one of its triangles are filled.
+class Boundary {
+ public:
+  Boundary(const Cell& cell, double edge_um);
+
+  const std::vector<OutlineCurve>& rings() const { return rings_; }  ///< the outline, then the holes
+  int n_filled_holes() const { return n_filled_holes_; }
+  bool is_within_outline(Vec2 point_um) const { return contains(rings_.front().polygon(), point_um); }
+  BoundaryPlace place(Vec2 point_um) const;
+
+ private:
+  std::vector<OutlineCurve> rings_;
+  int n_filled_holes_ = 0;
 };
 
 }  // namespace mbtfm::network

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -60,8 +61,12 @@ TEST(Mesh, two_hundred_random_cells_give_valid_networks) {
                                        .pixel_um = seed % 3 == 0 ? 0.1 : 0.0};
     const Cell cell = random_cell(seed, options);
     GeneratedNetwork generated;
-    ASSERT_NO_THROW(generated = generate_network(cell, {.seed = seed}));
-    expect_valid(generated, cell, 1.5);
+    NetworkParameters parameters{.seed = seed};
+    parameters.adhesion_anchor = std::array{"rim", "ellipse", "centre"}[seed % 3];
+    parameters.free_fibre_ends = std::array{"width", "point"}[seed % 2];
+    parameters.seeds = std::array{"regular", "jittered", "poisson"}[seed / 2 % 3];
+    ASSERT_NO_THROW(generated = generate_network(cell, parameters));
+    expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
   }
 }
 

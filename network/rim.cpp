@@ -1,0 +1,75 @@
+#include "network/rim.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "network/frame.h"
+#include "network/polyline.h"
+
+namespace mbtfm::network {
+namespace {
+
+constexpr int kCornersOfEllipse = 256;  // perimeter and area to 1e-4
+constexpr int kPointsPerEdge = 4;       // of the fine line that fibres cross, a sixteenth of an edge off at most
+constexpr double kBind = 0.25;          // nearer to the boundary (in edges) the boundary itself is the rim
+
+enum class Side { kept, outside, covered };
+
+Side side_of(Vec2 point, const Adhesion& adhesion, const std::vector<Adhesion>& others, const Boundary& boundary,
+             double edge_um) {
+  const BoundaryPlace place = boundary.place(point);
+  if (!place.is_inside || place.distance_um < kBind * edge_um) return Side::outside;
+  const bool is_covered = std::any_of(others.begin(), others.end(), [&](const Adhesion& other) {
+    return other.adhesion_id != adhesion.adhesion_id && covers(other, point);
+  });
+  return is_covered ? Side::covered : Side::kept;
+}
+
+}  // namespace
+
+double perimeter_um(const Adhesion& adhesion) {
+  Polygon corners = ellipse_corners(adhesion, kCornersOfEllipse);
+  corners.push_back(corners.front());
+  return length_um(corners);
+}
+
+Polygon rim_um(const Adhesion& adhesion, double edge_um) {
+  Polygon corners = ellipse_corners(adhesion, kCornersOfEllipse);
+  const double n_edges = std::max(3.0, std::round(perimeter_um(adhesion) / edge_um));
+  // a regular polygon of n corners has sin(2 pi / n) / (2 pi / n) of its circle's area
+  const double angle = 2 * std::numbers::pi / n_edges;
+  const double stretch = std::sqrt(angle / std::sin(angle));
+  for (Vec2& p : corners) p = adhesion.position_um + stretch * (p - adhesion.position_um);
+  return evenly_resampled(corners, kPointsPerEdge * static_cast<int>(std::max(8.0, n_edges)));
+}
+
+std::vector<RimPart> free_rim(const Adhesion& adhesion, const std::vector<Adhesion>& others, const Boundary& boundary,
+                              double edge_um) {
+  const Polygon rim = rim_um(adhesion, edge_um);
+  const int n = static_cast<int>(rim.size());
+  std::vector<Side> sides;
+  for (const Vec2 p : rim) sides.push_back(side_of(p, adhesion, others, boundary, edge_um));
+  const auto gap = std::find_if(sides.begin(), sides.end(), [](Side s) { return s != Side::kept; });
+  if (gap == sides.end()) return {{rim, true}};
+  const auto boundary_point = [&](int i) {
+    const BoundaryPlace place = boundary.place(rim[i]);
+    return boundary.rings()[place.ring].at(place.s_um);
+  };
+  std::vector<RimPart> parts;
+  const int start = static_cast<int>(gap - sides.begin());
+  for (int k = start; k < start + n;) {
+    if (sides[k % n] != Side::kept) {
+      ++k;
+      continue;
+    }
+    RimPart part;
+    if (sides[(k + n - 1) % n] == Side::outside) part.points_um.push_back(boundary_point((k + n - 1) % n));
+    for (; sides[k % n] == Side::kept; ++k) part.points_um.push_back(rim[k % n]);
+    if (sides[k % n] == Side::outside) part.points_um.push_back(boundary_point(k % n));
+    if (length_um(part.points_um) > 0.5 * edge_um) parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+}  // namespace mbtfm::network
