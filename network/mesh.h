@@ -30,14 +30,14 @@ struct GeneratedNetwork {
   double worst_quality = 0;
   double mean_free_quality = 0;   ///< of those away from fibres, adhesions and outline, whose shape nothing forces
   double worst_free_quality = 0;  ///< of the same; 1 where there are none
-  double even_share = 0;  ///< of the edges, that are 0.6 to 1.5 times as long as wanted there
+  double even_share = 0;          ///< of the edges, that are 0.6 to 1.5 times as long as wanted there
   int n_triangles = 0;
   double area_um2 = 0;        ///< of the triangles
   int n_parts = 1;            ///< that no link joins: more than one where a neck is thinner than a tenth of an edge
   int n_shared_segments = 0;  ///< where several fibres run along one edge, each with a link of its own
-  int n_filled_holes = 0;                 ///< smaller than a triangle
-  std::vector<int> clipped_fibre_ids;     ///< cut at the outline
-  std::vector<int> snapped_adhesion_ids;  ///< outside the cell by up to an edge length: the mesh reaches out to them
+  int n_filled_holes = 0;     ///< smaller than a triangle
+  std::vector<int> clipped_fibre_ids;       ///< cut at the outline
+  std::vector<int> snapped_adhesion_ids;    ///< outside the cell by up to an edge length: the mesh reaches out to them
   std::vector<int> separated_adhesion_ids;  ///< moved apart, being at the same place
 };
 

@@ -90,7 +90,8 @@ bool MovingMesh::should_flip(int triangle, int side) const {
   const double cos_d = dot(c - d, b - d);
   const double sin_d = cross(c - d, b - d);
   constexpr double kTie = 1e-10;  // of four points on a circle either edge will do; never flip to and fro
-  return sin_a * cos_d + cos_a * sin_d < -kTie * (std::abs(sin_a) + std::abs(cos_a)) * (std::abs(sin_d) + std::abs(cos_d));
+  return sin_a * cos_d + cos_a * sin_d <
+         -kTie * (std::abs(sin_a) + std::abs(cos_a)) * (std::abs(sin_d) + std::abs(cos_d));
 }
 
 void MovingMesh::turn_neighbour(int triangle, int from, int to) {

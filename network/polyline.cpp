@@ -92,7 +92,8 @@ Polyline evenly_divided(const Polyline& points_um, const SizeField& size, int fe
     return points_um[i - 1] + ((s - start[i - 1]) / (start[i] - start[i - 1])) * (points_um[i] - points_um[i - 1]);
   };
   Polyline inner;
-  for (const double s : even_division_um(start.back(), [&](double s) { return size.at(at(s)); }, fewest)) {
+  for (const double s : even_division_um(
+           start.back(), [&](double s) { return size.at(at(s)); }, fewest)) {
     inner.push_back(at(s));
   }
   return inner;

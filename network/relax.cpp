@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "network/grid.h"
 #include "network/moving_mesh.h"
@@ -13,20 +13,21 @@
 namespace mbtfm::network {
 namespace {
 
-constexpr double kOverlength = 1.2;
-constexpr double kStep = 0.3;
-constexpr double kRest = 0.005;
-constexpr int kMaxSweeps = 200;
-constexpr int kDensityRounds = 6;
+// Moves and distances are in wanted edge lengths.
+constexpr double kRest = 0.005;   // no vertex moves further in a sweep: the mesh is at rest
+constexpr int kMostSweeps = 200;  // ten times what an ordinary cell takes
+constexpr double kLongestMove = 0.3;
+constexpr int kDensityRounds = 6;  // then the number of vertices stays
 constexpr int kSweepsBetween = 6;
-constexpr double kTooShort = 0.6;
-constexpr double kTooLong = 1.45;
-constexpr double kFinest = 0.4;
-constexpr double kWall = 0.75;
+constexpr double kTooShort = 0.6;  // a free vertex this near another is taken out …
+constexpr double kTooLong = 1.45;  // … and one put into an edge this long: both about √2 off
+constexpr double kWall = 0.75;     // a vertex nearer to a line of the frame is pushed away …
+constexpr double kPush = 0.3;      // … by this part of what is missing
+constexpr double kFinest = 0.4;    // edge length where lines of the frame are closer than that
 
-const int kMethod = getenv("M") ? atoi(getenv("M")) : 0;
-const double kPower = getenv("P") ? atof(getenv("P")) : 4;
+enum class Density { even_out, thin_out };  // take out and put in, or only take out
 
+/// An edge length of their distance where vertices of the frame are close together.
 void refine_where_lines_are_close(Frame& frame) {
   const double edge = frame.size.edge_um();
   Grid near(frame.points_um, edge);
@@ -51,57 +52,52 @@ class Relaxation {
       : frame_(frame),
         boundary_(boundary),
         n_frame_(static_cast<int>(frame.points_um.size())),
-        slide_(frame.ring_s_um),
+        slide_s_um_(frame.ring_s_um),
         mesh_(triangulated(std::move(points))) {
     measure_sizes();
   }
 
   RelaxedMesh run() {
     RelaxedMesh result;
-    result.report.reason = "sweeps used up";
+    Report& report = result.report;
+    report.reason = "sweeps used up";
     for (int round = 0; round < kDensityRounds; ++round) {
-      for (int k = 0; k < kSweepsBetween; ++k) sweep();
-      result.report.iterations += kSweepsBetween;
-      if (!change_density(true)) break;
+      for (int k = 0; k < kSweepsBetween; ++k, ++report.iterations) sweep();
+      if (!change_density(Density::even_out)) break;
     }
-    for (; result.report.iterations < kMaxSweeps; ++result.report.iterations) {
-      result.report.last_change = sweep();
-      if (result.report.last_change < kRest) {
-        result.report.converged = true;
-        result.report.reason = "at rest";
-        break;
-      }
+    while (!report.converged && report.iterations < kMostSweeps) {
+      ++report.iterations;
+      report.last_change = sweep();
+      report.converged = report.last_change < kRest && !change_density(Density::thin_out);
     }
-    for (int pass = 0; pass < 4 && change_density(false); ++pass) {
-      for (int k = 0; k < 8; ++k) sweep();
-    }
-    if (getenv("DBG")) for (auto& t : mesh_.triangles()) {
-      auto& P = mesh_.points_um();
-      double q = quality(P[t[0]], P[t[1]], P[t[2]]);
-      if (q < 0.2) { printf("q %.4f:", q); for (int v : t) printf(" %d(%.3f,%.3f)h%.2f%s%s%s", v, P[v].x, P[v].y, size_[v], v < n_frame_ ? "F" : "", v < n_frame_ && frame_.slides(v) ? "S" : "", v < n_frame_ && frame_.adhesion_id[v] ? "A" : v < n_frame_ && frame_.rim_adhesion_id[v] ? "R" : ""); printf("\n"); }
+    if (report.converged) report.reason = "at rest";
+    // with sweeps used up something may still crowd
+    for (int round = 0; !report.converged && round < kDensityRounds; ++round) {
+      if (!change_density(Density::thin_out)) break;
     }
     result.points_um = mesh_.points_um();
     result.triangulation = mesh_.triangulation();
-    result.size_um = std::move(size_);
+    result.size_um = std::move(size_um_);
     return result;
   }
 
  private:
   MovingMesh triangulated(std::vector<Vec2> points) {
     auto triangulation = triangulate(points, frame_.segments);
-    if (!triangulation) {
+    if (!triangulation && is_sliding_) {
+      // sliding has made the boundary cross itself: back to where it did not, and no more sliding
       is_sliding_ = false;
       std::copy(frame_.points_um.begin(), frame_.points_um.end(), points.begin());
       triangulation = triangulate(points, frame_.segments);
-      if (!triangulation) {
-        throw InvalidData("outline and fibres", "lines that a mesh of this edge length can follow",
-                          "lines that cross again and again");
-      }
+    }
+    if (!triangulation) {
+      throw InvalidData("outline and fibres", "lines that a mesh of this edge length can follow", "lines that cross");
     }
     leave_out_unused(points, *triangulation);
     return {std::move(points), *triangulation};
   }
 
+  /// Leave out the free vertices that no triangle uses, being outside the cell.
   void leave_out_unused(std::vector<Vec2>& points, Triangulation& triangulation) const {
     std::vector<char> is_used(points.size(), 0);
     std::fill(is_used.begin(), is_used.begin() + n_frame_, 1);
@@ -127,10 +123,11 @@ class Relaxation {
   }
 
   void measure_sizes() {
-    size_.clear();
-    for (const Vec2 p : mesh_.points_um()) size_.push_back(frame_.size.at(p));
+    size_um_.clear();
+    for (const Vec2 p : mesh_.points_um()) size_um_.push_back(frame_.size.at(p));
   }
 
+  /// Move every vertex once, then renew the edges. @return the furthest move, in wanted edge lengths
   double sweep() {
     double furthest = 0;
     const int n = static_cast<int>(mesh_.points_um().size());
@@ -145,92 +142,61 @@ class Relaxation {
     return furthest;
   }
 
-  Vec2 spring_step(int v) const {
+  /// To the centroid of the vertex's triangles, each weighted by its area in wanted edge lengths squared; and off the
+  /// lines of the frame.
+  Vec2 wanted_move(int v) const {
     const auto& points = mesh_.points_um();
-    Vec2 force;
-    for (const int t : mesh_.triangles_of(v)) {
-      const auto& corners = mesh_.triangles()[t];
-      int at = 0;
-      for (int i = 0; i < 3; ++i) {
-        const int w = corners[i];
-        if (w == v) {
-          at = i;
-          continue;
-        }
-        const Vec2 gap = points[v] - points[w];
-        const double length = std::sqrt(dot(gap, gap));
-        const double wanted = kOverlength * 0.5 * (size_[v] + size_[w]);
-        // an edge inside is seen from both its triangles
-        const double weight = mesh_.is_boundary(t, 3 - i - corner_of(corners, v)) ? 1 : 0.5;
-        if (length < wanted) force += (weight * (wanted - length) / length) * gap;
-      }
-      if (mesh_.is_of_frame(t, at)) force += push_off_wall(points[v], points[corners[(at + 1) % 3]], points[corners[(at + 2) % 3]], size_[v]);
-    }
-    return kStep * force;
-  }
-
-  static int corner_of(const std::array<int, 3>& corners, int v) { return corners[0] == v ? 0 : corners[1] == v ? 1 : 2; }
-
-  static Vec2 push_off_wall(Vec2 at, Vec2 a, Vec2 b, double size) {
-    const double length = std::sqrt(dot(b - a, b - a));
-    const Vec2 normal = (1 / length) * Vec2{a.y - b.y, b.x - a.x};
-    return std::max(0.0, kWall * size - dot(at - a, normal)) * normal;
-  }
-
-  Vec2 patch_step(int v) const {
-    const auto& points = mesh_.points_um();
-    Vec2 sum;
+    const Vec2 at = points[v];
+    Vec2 sum, push;
     double weights = 0;
     for (const int t : mesh_.triangles_of(v)) {
       const auto& corners = mesh_.triangles()[t];
-      const Vec2 a = points[corners[0]], b = points[corners[1]], c = points[corners[2]];
-      const Vec2 centroid = (1.0 / 3) * (a + b + c);
-      const double h = frame_.size.at(centroid);
-      const double doubled = cross(b - a, c - a);
-      const double weight = doubled / std::pow(h, kPower);
-      Vec2 centre = centroid;
-      if (kMethod == 2) {
-        const Vec2 ab = b - a, ac = c - a;
-        const double bb = dot(ab, ab), cc = dot(ac, ac);
-        centre = a + (0.5 / doubled) * Vec2{ac.y * bb - ab.y * cc, ab.x * cc - ac.x * bb};
-        const Vec2 off = centre - centroid;
-        const double len = norm(off);
-        if (len > h) centre = centroid + (h / len) * off;
-      }
-      sum += weight * centre;
+      const int i = corners[0] == v ? 0 : corners[1] == v ? 1 : 2;
+      const int next = corners[(i + 1) % 3], after = corners[(i + 2) % 3];
+      const Vec2 to_next = points[next] - at, to_after = points[after] - at;
+      const double size = size_um_[v] + size_um_[next] + size_um_[after];
+      const double doubled_area = cross(to_next, to_after);
+      const double weight = doubled_area / (size * size);
+      sum += (weight / 3) * (to_next + to_after);
       weights += weight;
+      if (!mesh_.is_of_frame(t, i)) continue;
+      const Vec2 wall = to_after - to_next;
+      const double length = std::sqrt(dot(wall, wall));
+      const double missing = kWall * size_um_[v] - doubled_area / length;
+      if (missing > 0) push += (kPush * missing / length) * Vec2{-wall.y, wall.x};
     }
-    return (1 / weights) * sum - points[v];
+    return (1 / weights) * sum + push;
   }
 
   double relax(int v) {
     const Vec2 at = mesh_.points_um()[v];
-    const double size = size_[v];
-    Vec2 step = kMethod == 0 ? spring_step(v) : patch_step(v);
-    const double length = norm(step);
-    if (length > 0.3 * size) step = (0.3 * size / length) * step;
-    for (int attempt = 0; attempt < 4; ++attempt, step = 0.5 * step) {
-      if (!mesh_.move(v, at + step)) continue;
-      size_[v] = frame_.size.at(at + step);
-      return norm(step) / size;
+    Vec2 move = wanted_move(v);
+    const double length = norm(move) / size_um_[v];
+    if (length > kLongestMove) move = (kLongestMove / length) * move;
+    constexpr int kHalvings = 4;
+    for (int attempt = 0; attempt < kHalvings; ++attempt, move = 0.5 * move) {
+      if (!mesh_.move(v, at + move)) continue;
+      size_um_[v] = frame_.size.at(at + move);
+      return norm(move) / size_um_[v];
     }
     return 0;
   }
 
   void slide(int v) {
     const OutlineCurve& curve = boundary_.rings()[frame_.ring[v]];
-    const double reach = 0.1 * size_[v];
-    const Vec2 chord = curve.at(slide_[v] + reach) - curve.at(slide_[v] - reach);
+    const double reach = 0.1 * size_um_[v];
+    const Vec2 chord = curve.at(slide_s_um_[v] + reach) - curve.at(slide_s_um_[v] - reach);
     const double length = norm(chord);
     if (length == 0) return;
-    const double along = std::clamp(dot(spring_step(v), chord) / length, -reach, reach);
-    const double s = curve.wrapped(slide_[v] + along);
+    const double along = std::clamp(dot(wanted_move(v), chord) / length, -reach, reach);
+    const double s = curve.wrapped(slide_s_um_[v] + along);
     if (!mesh_.move(v, curve.at(s))) return;
-    slide_[v] = s;
-    size_[v] = frame_.size.at(curve.at(s));
+    slide_s_um_[v] = s;
+    size_um_[v] = frame_.size.at(curve.at(s));
   }
 
-  bool change_density(bool adds) {
+  /// Take out free vertices that crowd, put some into long edges; neighbours of a change wait for the next time.
+  bool change_density(Density density) {
     const Triangulation now = mesh_.triangulation();
     std::vector<Vec2> points = mesh_.points_um();
     std::vector<int> order(now.edges.size());
@@ -238,8 +204,8 @@ class Relaxation {
     std::vector<double> relative(now.edges.size());
     for (std::size_t k = 0; k < order.size(); ++k) {
       const auto& e = now.edges[k];
-      relative[k] = norm(points[e.vertex_b] - points[e.vertex_a]) /
-                    frame_.size.at(0.5 * (points[e.vertex_a] + points[e.vertex_b]));
+      relative[k] =
+          norm(points[e.vertex_b] - points[e.vertex_a]) / (0.5 * (size_um_[e.vertex_a] + size_um_[e.vertex_b]));
     }
     std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return relative[a] < relative[b]; });
     std::vector<char> is_touched(points.size(), 0);
@@ -258,7 +224,7 @@ class Relaxation {
       is_touched[e.vertex_a] = is_touched[e.vertex_b] = 1;
       has_changed = true;
     }
-    for (auto k = order.rbegin(); adds && k != order.rend() && relative[*k] > kTooLong; ++k) {
+    for (auto k = order.rbegin(); density == Density::even_out && k != order.rend() && relative[*k] > kTooLong; ++k) {
       const auto& e = now.edges[*k];
       if (e.is_of_frame || !is_untouched(e)) continue;
       added.push_back(0.5 * (points[e.vertex_a] + points[e.vertex_b]));
@@ -269,12 +235,12 @@ class Relaxation {
       has_changed = true;
     }
     if (!has_changed) return false;
-    std::vector<Vec2> kept;
+    std::vector<Vec2> changed;
     for (std::size_t v = 0; v < points.size(); ++v) {
-      if (is_kept[v]) kept.push_back(points[v]);
+      if (is_kept[v]) changed.push_back(points[v]);
     }
-    kept.insert(kept.end(), added.begin(), added.end());
-    mesh_ = triangulated(std::move(kept));
+    changed.insert(changed.end(), added.begin(), added.end());
+    mesh_ = triangulated(std::move(changed));
     measure_sizes();
     return true;
   }
@@ -283,17 +249,17 @@ class Relaxation {
   const Boundary& boundary_;
   int n_frame_;
   bool is_sliding_ = true;
-  std::vector<double> slide_;
-  std::vector<double> size_;  ///< wanted at each vertex
+  std::vector<double> slide_s_um_;  ///< of the sliding vertices
   MovingMesh mesh_;
+  std::vector<double> size_um_;  ///< wanted edge length at each vertex
 };
 
 }  // namespace
 
-RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, const std::string& kind, Random& random) {
+RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, const std::string& seeds, Random& random) {
   refine_where_lines_are_close(frame);
   std::vector<Vec2> points = frame.points_um;
-  const std::vector<Vec2> inner = seeds(frame, kind, random);
+  const std::vector<Vec2> inner = places_of_seeds(frame, seeds, random);
   points.insert(points.end(), inner.begin(), inner.end());
   return Relaxation(frame, boundary, std::move(points)).run();
 }

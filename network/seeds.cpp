@@ -69,14 +69,16 @@ std::vector<Vec2> lattice(const Frame& frame, double jitter, Random& random) {
   Clearance clearance(frame);
   double finest = edge;
   for (const Vec2 p : frame.points_um) finest = std::min(finest, frame.size.at(p));
-  const auto level_of = [&](double size) { return static_cast<int>(std::lround(2 * std::log(edge / size) / std::log(3.0))); };
+  const auto level_of = [&](double size) {
+    return static_cast<int>(std::lround(2 * std::log(edge / size) / std::log(3.0)));
+  };
   const double angle = random.uniform(0, std::numbers::pi / 3);
   const double shift_along = random.uniform();
   const double shift_up = random.uniform();
   const auto direction = [](double a) { return Vec2{std::cos(a), std::sin(a)}; };
-  const Vec2 origin = 0.5 * (box.low + box.high) +
-                      kSpacing * edge *
-                          (shift_along * direction(angle) + shift_up * direction(angle + std::numbers::pi / 3));
+  const Vec2 origin =
+      0.5 * (box.low + box.high) +
+      kSpacing * edge * (shift_along * direction(angle) + shift_up * direction(angle + std::numbers::pi / 3));
   std::vector<Vec2> points;
   for (int level = 0; level <= level_of(finest); ++level) {
     const double spacing = kSpacing * edge / std::pow(std::numbers::sqrt3, level);
@@ -133,7 +135,7 @@ std::vector<Vec2> poisson_discs(const Frame& frame, Random& random) {
 
 }  // namespace
 
-std::vector<Vec2> seeds(const Frame& frame, const std::string& kind, Random& random) {
+std::vector<Vec2> places_of_seeds(const Frame& frame, const std::string& kind, Random& random) {
   if (kind == "poisson") return poisson_discs(frame, random);
   return lattice(frame, kind == "regular" ? 0 : kJitter, random);
 }

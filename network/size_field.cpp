@@ -31,9 +31,7 @@ int SizeField::row_of(double y_um) const {
   return static_cast<int>(std::clamp((y_um - low_um_.y) / bin_um_, 0.0, rows_ - 1.0));
 }
 
-Vec2 SizeField::centre_of(int column, int row) const {
-  return low_um_ + bin_um_ * Vec2{column + 0.5, row + 0.5};
-}
+Vec2 SizeField::centre_of(int column, int row) const { return low_um_ + bin_um_ * Vec2{column + 0.5, row + 0.5}; }
 
 void SizeField::refine(Vec2 point_um, double size_um) {
   if (size_um >= at(point_um)) return;

@@ -68,8 +68,9 @@ int main(int argc, char** argv) {
   for (std::uint64_t k = 1; k <= 5; ++k) {
     cell.cells.push_back(draw_cell(scenario.cell, scenario.tension, samples::field_um(scenario.microscope), k).cell);
   }
-  std::printf("scene,edge_um,seeds,anchor,vertices,mean,least_mean,worst,free_mean,free_worst,even_share,sweeps,at_rest,"
-              "cpu_s\n");
+  std::printf(
+      "scene,edge_um,seeds,anchor,vertices,mean,least_mean,worst,free_mean,free_worst,even_share,sweeps,at_rest,"
+      "cpu_s\n");
   for (const std::string seeds : {"regular", "jittered", "poisson"}) {
     if (argc > 3 && seeds != argv[3]) continue;
     for (const Scene& s : scenes) print_row(s, seeds, "centre", n_seeds);
