@@ -6,6 +6,7 @@
 #include <string>
 #include <utility>
 
+#include "network/grid.h"
 #include "network/planar.h"
 #include "network/polyline.h"
 #include "network/rim.h"
@@ -29,28 +30,33 @@ std::string shown(double value_um) { return std::to_string(value_um) + " um"; }
 /// @return the labels of those moved
 std::vector<int> separate(std::vector<Adhesion>& adhesions, const SizeField& size, double relative_distance) {
   std::vector<int> moved;
+  const double widest = relative_distance * size.edge_um();
+  std::vector<Vec2> positions;
+  for (const Adhesion& a : adhesions) positions.push_back(a.position_um);
   constexpr int kSweeps = 20;
-  for (int sweep = 0; sweep < kSweeps; ++sweep) {
-    bool has_changed = false;
-    for (std::size_t i = 0; i < adhesions.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j) {
-        const Vec2 gap = adhesions[i].position_um - adhesions[j].position_um;
+  bool has_changed = true;
+  for (int sweep = 0; sweep < kSweeps && has_changed; ++sweep) {
+    has_changed = false;
+    Grid before(positions, widest);  // those that come first
+    for (int i = 0; i < static_cast<int>(positions.size()); ++i) {
+      const double distance = relative_distance * size.at(positions[i]);
+      before.for_each_near(positions[i], positions[i], widest, [&](int j) {
+        const Vec2 gap = positions[i] - positions[j];
         const double length = norm(gap);
-        if (length >= relative_distance * size.edge_um()) continue;
-        const double distance = relative_distance * size.at(adhesions[i].position_um);
-        if (length >= distance) continue;
+        if (length >= distance) return;
         const double angle = adhesions[j].angle_rad;  // along the one that came first, where there is no direction
         const Vec2 direction = length > 1e-6 * distance ? (1 / length) * gap : Vec2{std::cos(angle), std::sin(angle)};
         const Vec2 shift = (0.505 * (distance - length)) * direction;  // a little too far, so that it ends
-        adhesions[i].position_um += shift;
-        adhesions[j].position_um += -1.0 * shift;
+        positions[i] += shift;
+        positions[j] += -1.0 * shift;
         moved.push_back(adhesions[i].adhesion_id);
         moved.push_back(adhesions[j].adhesion_id);
         has_changed = true;
-      }
+      });
+      before.add(i, positions[i], positions[i]);
     }
-    if (!has_changed) break;
   }
+  for (std::size_t i = 0; i < positions.size(); ++i) adhesions[i].position_um = positions[i];
   std::sort(moved.begin(), moved.end());
   moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
   return moved;
@@ -135,8 +141,20 @@ class Builder {
   }
 
   void add_rims() {
+    std::vector<Vec2> positions;
+    double longest = 0;
     for (const Adhesion& a : adhesions_) {
-      for (const RimPart& part : free_rim(a, adhesions_, boundary_, rim_edge_um(a))) {
+      positions.push_back(a.position_um);
+      longest = std::max(longest, a.major_axis_um);
+    }
+    Grid grid(positions, longest);
+    for (int i = 0; i < static_cast<int>(positions.size()); ++i) grid.add(i, positions[i], positions[i]);
+    for (const Adhesion& a : adhesions_) {
+      std::vector<Adhesion> others;
+      grid.for_each_near(a.position_um, a.position_um, longest, [&](int i) {
+        if (adhesions_[i].adhesion_id != a.adhesion_id) others.push_back(adhesions_[i]);
+      });
+      for (const RimPart& part : free_rim(a, others, boundary_, rim_edge_um(a))) {
         Chain chain{.adhesion_id = a.adhesion_id, .is_closed = part.is_closed};
         for (const Vec2 p : part.points_um) chain.vertices.push_back(graph_.add_vertex(p, kRimPoint));
         graph_.chains.push_back(std::move(chain));
@@ -166,12 +184,14 @@ class Builder {
       }
       int last = first;
       while (last + 1 < n && may_hold(dense[last + 1], fibre)) ++last;
-      // an end made by clipping lies inside, not in the margin that a fibre along the outline is allowed
+      // an end made by clipping lies on the outline, not in the margin that a fibre along it is allowed
       int from = first;
       int to = last;
       while (first > 0 && from < to && !boundary_.is_within_outline(dense[from])) ++from;
       while (last < n - 1 && from < to && !boundary_.is_within_outline(dense[to])) --to;
-      const Polyline part(dense.begin() + from, dense.begin() + to + 1);
+      Polyline part(dense.begin() + from, dense.begin() + to + 1);
+      if (first > 0 && from > 0) part.insert(part.begin(), crossing_of_outline(dense[from], dense[from - 1]));
+      if (last < n - 1 && to < n - 1) part.push_back(crossing_of_outline(dense[to], dense[to + 1]));
       if (length_um(part) > kShortestPiece * edge_) {
         has_part = add_fibre_part(fibre, part, first == 0, last == n - 1) || has_part;
       }
@@ -182,6 +202,16 @@ class Builder {
                         "a part longer than " + shown(kShortestPiece * edge_) + " inside the outline", "none");
     }
     if (is_clipped) frame_.clipped_fibre_ids.push_back(fibre.fibre_id);
+  }
+
+  /// Where the line from a point inside the outline to the next, outside, leaves it.
+  Vec2 crossing_of_outline(Vec2 inside, Vec2 outside) const {
+    constexpr int kBisections = 30;
+    for (int i = 0; i < kBisections; ++i) {
+      const Vec2 middle = 0.5 * (inside + outside);
+      (boundary_.is_within_outline(middle) ? inside : outside) = middle;
+    }
+    return inside;
   }
 
   /// Let an end run into the centre of its adhesion: points in its ellipse or near its centre give way.

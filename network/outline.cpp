@@ -80,6 +80,35 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
     longest_piece_um_ = std::max(longest_piece_um_, piece);
   }
   for (const int c : corners) corners_um_.push_back(start_um_[c]);
+  index_stripes();
+}
+
+int OutlineCurve::stripe_of(double y_um) const {
+  return static_cast<int>(std::clamp((y_um - top_um_) / stripe_um_, 0.0, static_cast<double>(stripes_.size()) - 1));
+}
+
+void OutlineCurve::index_stripes() {
+  const auto [low, high] =
+      std::minmax_element(points_um_.begin(), points_um_.end(), [](Vec2 a, Vec2 b) { return a.y < b.y; });
+  const std::size_t n = points_um_.size();
+  top_um_ = low->y;
+  stripe_um_ = std::max((high->y - low->y) / static_cast<double>(n), std::numeric_limits<double>::min());
+  stripes_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto [y0, y1] = std::minmax(points_um_[i].y, points_um_[(i + 1) % n].y);
+    for (int stripe = stripe_of(y0); stripe <= stripe_of(y1); ++stripe) stripes_[stripe].push_back(static_cast<int>(i));
+  }
+}
+
+bool OutlineCurve::contains(Vec2 point_um) const {
+  bool is_inside = false;
+  for (const int i : stripes_[stripe_of(point_um.y)]) {
+    const Vec2 a = points_um_[i];
+    const Vec2 b = points_um_[(i + 1) % points_um_.size()];
+    if ((a.y > point_um.y) == (b.y > point_um.y)) continue;
+    if (point_um.x < a.x + (point_um.y - a.y) / (b.y - a.y) * (b.x - a.x)) is_inside = !is_inside;
+  }
+  return is_inside;
 }
 
 double OutlineCurve::wrapped(double s_um) const {
@@ -133,7 +162,7 @@ BoundaryPlace Boundary::place(Vec2 point_um) const {
   for (int ring = 0; ring < static_cast<int>(rings_.size()); ++ring) {
     const double s = rings_[ring].nearest(point_um);
     const double distance = norm(point_um - rings_[ring].at(s));
-    if (ring > 0 && contains(rings_[ring].polygon(), point_um)) {
+    if (ring > 0 && rings_[ring].contains(point_um)) {
       place.is_in_hole = true;
       place.is_inside = false;
     }

@@ -20,14 +20,22 @@ class OutlineCurve {
   /// Arc lengths of the corners, rising.
   const std::vector<double>& corners() const { return corners_um_; }
   const Polygon& polygon() const { return points_um_; }
+  bool contains(Vec2 point_um) const;
   /// Brings an arc length into [0, length).
   double wrapped(double s_um) const;
 
  private:
+  void index_stripes();
+  int stripe_of(double y_um) const;
+
   Polygon points_um_;             ///< positively oriented
   std::vector<double> start_um_;  ///< arc length at each point, and the whole length at the end
   std::vector<double> corners_um_;
   double longest_piece_um_ = 0;
+  // which pieces cross a horizontal stripe
+  double top_um_ = 0;
+  double stripe_um_ = 1;
+  std::vector<std::vector<int>> stripes_;
 };
 
 /// A point seen from the boundary.
@@ -46,7 +54,7 @@ class Boundary {
 
   const std::vector<OutlineCurve>& rings() const { return rings_; }  ///< the outline, then the holes
   int n_filled_holes() const { return n_filled_holes_; }
-  bool is_within_outline(Vec2 point_um) const { return contains(rings_.front().polygon(), point_um); }
+  bool is_within_outline(Vec2 point_um) const { return rings_.front().contains(point_um); }
   BoundaryPlace place(Vec2 point_um) const;
 
  private:

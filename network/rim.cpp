@@ -16,13 +16,11 @@ constexpr double kBind = 0.25;          // nearer to the boundary (in edges) the
 
 enum class Side { kept, outside, covered };
 
-Side side_of(Vec2 point, const Adhesion& adhesion, const std::vector<Adhesion>& others, const Boundary& boundary,
-             double edge_um) {
+Side side_of(Vec2 point, const std::vector<Adhesion>& others, const Boundary& boundary, double edge_um) {
   const BoundaryPlace place = boundary.place(point);
   if (!place.is_inside || place.distance_um < kBind * edge_um) return Side::outside;
-  const bool is_covered = std::any_of(others.begin(), others.end(), [&](const Adhesion& other) {
-    return other.adhesion_id != adhesion.adhesion_id && covers(other, point);
-  });
+  const bool is_covered =
+      std::any_of(others.begin(), others.end(), [&](const Adhesion& other) { return covers(other, point); });
   return is_covered ? Side::covered : Side::kept;
 }
 
@@ -36,12 +34,12 @@ double perimeter_um(const Adhesion& adhesion) {
 
 Polygon rim_um(const Adhesion& adhesion, double edge_um) {
   Polygon corners = ellipse_corners(adhesion, kCornersOfEllipse);
-  const double n_edges = std::max(3.0, std::round(perimeter_um(adhesion) / edge_um));
-  // a regular polygon of n corners has sin(2 pi / n) / (2 pi / n) of its circle's area
-  const double angle = 2 * std::numbers::pi / n_edges;
-  const double stretch = std::sqrt(angle / std::sin(angle));
+  const int n_edges = std::max(3, static_cast<int>(std::lround(perimeter_um(adhesion) / edge_um)));
+  // chords cut area off the ellipse: an eighth and more where it is long
+  const double drawn_um2 = std::abs(signed_area_um2(evenly_resampled(corners, n_edges)));
+  const double stretch = std::sqrt(std::abs(signed_area_um2(corners)) / drawn_um2);
   for (Vec2& p : corners) p = adhesion.position_um + stretch * (p - adhesion.position_um);
-  return evenly_resampled(corners, kPointsPerEdge * static_cast<int>(std::max(8.0, n_edges)));
+  return evenly_resampled(corners, kPointsPerEdge * std::max(8, n_edges));
 }
 
 std::vector<RimPart> free_rim(const Adhesion& adhesion, const std::vector<Adhesion>& others, const Boundary& boundary,
@@ -49,7 +47,7 @@ std::vector<RimPart> free_rim(const Adhesion& adhesion, const std::vector<Adhesi
   const Polygon rim = rim_um(adhesion, edge_um);
   const int n = static_cast<int>(rim.size());
   std::vector<Side> sides;
-  for (const Vec2 p : rim) sides.push_back(side_of(p, adhesion, others, boundary, edge_um));
+  for (const Vec2 p : rim) sides.push_back(side_of(p, others, boundary, edge_um));
   const auto gap = std::find_if(sides.begin(), sides.end(), [](Side s) { return s != Side::kept; });
   if (gap == sides.end()) return {{rim, true}};
   const auto boundary_point = [&](int i) {

@@ -21,6 +21,7 @@ Polygon rim_um(const Adhesion& adhesion, double edge_um);
 
 /// What of the rim bounds the area held by all adhesions: it lies inside the cell, and in no other adhesion. Where it
 /// leaves the cell it ends on the boundary.
+/// @param others  those near by
 std::vector<RimPart> free_rim(const Adhesion& adhesion, const std::vector<Adhesion>& others, const Boundary& boundary,
                               double edge_um);
 
