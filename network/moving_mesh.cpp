@@ -118,14 +118,16 @@ void MovingMesh::flip(int t, int side) {
   turn_neighbour(across_b, t, u);
 }
 
-void MovingMesh::restore_delaunay() {
+std::vector<int> MovingMesh::restore_delaunay(const std::vector<int>& moved) {
   std::vector<std::pair<int, int>> open;
-  for (int t = 0; t < static_cast<int>(vertices_.size()); ++t) {
-    for (int i = 0; i < 3; ++i) {
-      if (neighbours_[t][i] > t && should_flip(t, i)) open.push_back({t, i});
+  for (const int v : moved) {
+    for (const int t : triangles_of(v)) {
+      for (int i = 0; i < 3; ++i) {
+        if (should_flip(t, i)) open.push_back({t, i});
+      }
     }
   }
-  if (open.empty()) return;
+  std::vector<int> changed;
   // each flip lowers the energy of the lifted surface, so that this ends; rounding could make it circle
   std::size_t most = 20 * vertices_.size();
   while (!open.empty() && most-- > 0) {
@@ -134,11 +136,15 @@ void MovingMesh::restore_delaunay() {
     if (!should_flip(t, i)) continue;
     const int u = neighbours_[t][i];
     flip(t, i);
-    for (const int changed : {t, u}) {
-      for (int k = 0; k < 3; ++k) open.push_back({changed, k});
+    for (const int triangle : {t, u}) {
+      for (int k = 0; k < 3; ++k) {
+        open.push_back({triangle, k});
+        changed.push_back(vertices_[triangle][k]);
+      }
     }
   }
-  index_stars();
+  if (!changed.empty()) index_stars();
+  return changed;
 }
 
 Triangulation MovingMesh::triangulation() const {

@@ -25,8 +25,10 @@ class MovingMesh {
 
   /// Move a vertex, if all its triangles keep their orientation and a part of their height.
   bool move(int vertex, Vec2 to_um);
-  /// Flip free edges until the triangulation is constrained Delaunay (Lawson 1977).
-  void restore_delaunay();
+  /// Flip free edges until the triangulation is constrained Delaunay again (Lawson 1977).
+  /// @param moved  vertices since the last time
+  /// @return vertices that got or lost an edge, some repeatedly
+  std::vector<int> restore_delaunay(const std::vector<int>& moved);
   Triangulation triangulation() const;
 
  private:

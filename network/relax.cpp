@@ -15,6 +15,7 @@ namespace {
 
 // Moves and distances are in wanted edge lengths.
 constexpr double kRest = 0.005;   // no vertex moves further in a sweep: the mesh is at rest
+constexpr double kStill = 0.001;   // a vertex that moves less does not wake its neighbours
 constexpr int kMostSweeps = 200;  // ten times what an ordinary cell takes
 constexpr double kLongestMove = 0.3;
 constexpr int kDensityRounds = 6;  // then the number of vertices stays
@@ -54,7 +55,7 @@ class Relaxation {
         n_frame_(static_cast<int>(frame.points_um.size())),
         slide_s_um_(frame.ring_s_um),
         mesh_(triangulated(std::move(points))) {
-    measure_sizes();
+    start_moving();
   }
 
   RelaxedMesh run() {
@@ -122,23 +123,33 @@ class Relaxation {
     }
   }
 
-  void measure_sizes() {
+  void start_moving() {
     size_um_.clear();
     for (const Vec2 p : mesh_.points_um()) size_um_.push_back(frame_.size.at(p));
+    is_awake_.assign(size_um_.size(), 1);
+    damping_.assign(size_um_.size(), 1);
+    last_move_um_.assign(size_um_.size(), {});
   }
 
-  /// Move every vertex once, then renew the edges. @return the furthest move, in wanted edge lengths
+  /// Move every vertex once, but those that came to rest and whose neighbours did; then renew the edges.
+  /// @return the furthest move, in wanted edge lengths
   double sweep() {
     double furthest = 0;
-    const int n = static_cast<int>(mesh_.points_um().size());
+    std::vector<int> moved;
+    std::vector<char> is_awake(is_awake_.size(), 0);
+    const int n = static_cast<int>(is_awake_.size());
     for (int v = 0; v < n; ++v) {
-      if (v >= n_frame_) {
-        furthest = std::max(furthest, relax(v));
-      } else if (is_sliding_ && frame_.slides(v)) {
-        slide(v);
+      if (!is_awake_[v]) continue;
+      const double move = v >= n_frame_ ? relax(v) : slide(v);
+      if (move > 0) moved.push_back(v);
+      if (move < kStill) continue;
+      furthest = std::max(furthest, move);
+      for (const int t : mesh_.triangles_of(v)) {
+        for (const int w : mesh_.triangles()[t]) is_awake[w] = 1;
       }
     }
-    mesh_.restore_delaunay();
+    for (const int v : mesh_.restore_delaunay(moved)) is_awake[v] = 1;
+    is_awake_ = std::move(is_awake);
     return furthest;
   }
 
@@ -173,6 +184,10 @@ class Relaxation {
     Vec2 move = wanted_move(v);
     const double length = norm(move) / size_um_[v];
     if (length > kLongestMove) move = (kLongestMove / length) * move;
+    // flips beside a wall switch its push on and off: a vertex that goes to and fro takes ever smaller steps
+    damping_[v] = dot(move, last_move_um_[v]) < 0 ? 0.5 * damping_[v] : std::min(1.0, 1.2 * damping_[v]);
+    last_move_um_[v] = move;
+    move = damping_[v] * move;
     constexpr int kHalvings = 4;
     for (int attempt = 0; attempt < kHalvings; ++attempt, move = 0.5 * move) {
       if (!mesh_.move(v, at + move)) continue;
@@ -182,17 +197,19 @@ class Relaxation {
     return 0;
   }
 
-  void slide(int v) {
+  double slide(int v) {
+    if (!is_sliding_ || !frame_.slides(v)) return 0;
     const OutlineCurve& curve = boundary_.rings()[frame_.ring[v]];
     const double reach = 0.1 * size_um_[v];
     const Vec2 chord = curve.at(slide_s_um_[v] + reach) - curve.at(slide_s_um_[v] - reach);
     const double length = norm(chord);
-    if (length == 0) return;
+    if (length == 0) return 0;
     const double along = std::clamp(dot(wanted_move(v), chord) / length, -reach, reach);
     const double s = curve.wrapped(slide_s_um_[v] + along);
-    if (!mesh_.move(v, curve.at(s))) return;
+    if (!mesh_.move(v, curve.at(s))) return 0;
     slide_s_um_[v] = s;
     size_um_[v] = frame_.size.at(curve.at(s));
+    return std::abs(along) / size_um_[v];
   }
 
   /// Take out free vertices that crowd, put some into long edges; neighbours of a change wait for the next time.
@@ -241,7 +258,7 @@ class Relaxation {
     }
     changed.insert(changed.end(), added.begin(), added.end());
     mesh_ = triangulated(std::move(changed));
-    measure_sizes();
+    start_moving();
     return true;
   }
 
@@ -252,6 +269,9 @@ class Relaxation {
   std::vector<double> slide_s_um_;  ///< of the sliding vertices
   MovingMesh mesh_;
   std::vector<double> size_um_;  ///< wanted edge length at each vertex
+  std::vector<char> is_awake_;   ///< it or a neighbour has moved
+  std::vector<double> damping_;  ///< of the moves of each vertex
+  std::vector<Vec2> last_move_um_;
 };
 
 }  // namespace
