@@ -167,6 +167,7 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
     const double q = quality(mesh.points_um[t[0]], mesh.points_um[t[1]], mesh.points_um[t[2]]);
     result.mean_quality += q / static_cast<double>(mesh.triangulation.triangles.size());
     result.worst_quality = std::min(result.worst_quality, q);
+    result.n_needles += q < 0.1;
     if (t[0] >= n_of_frame) {  // the smallest of the three
       result.worst_free_quality = std::min(result.worst_free_quality, q);
       sum_of_free += q;

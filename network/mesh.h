@@ -31,6 +31,7 @@ struct GeneratedNetwork {
   double mean_free_quality = 0;   ///< of those away from fibres, adhesions and outline, whose shape nothing forces
   double worst_free_quality = 0;  ///< of the same; 1 where there are none
   double even_share = 0;          ///< of the edges, that are 0.6 to 1.5 times as long as wanted there
+  int n_needles = 0;              ///< triangles of quality below 0.1, which only lines that close can force
   int n_triangles = 0;
   double area_um2 = 0;        ///< of the triangles
   int n_parts = 1;            ///< that no link joins: more than one where a neck is thinner than a tenth of an edge

@@ -74,11 +74,7 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
     points_um_[c] = tip;
   }
   start_um_.resize(n + 1);
-  for (int i = 0; i < n; ++i) {
-    const double piece = norm(points_um_[(i + 1) % n] - points_um_[i]);
-    start_um_[i + 1] = start_um_[i] + piece;
-    longest_piece_um_ = std::max(longest_piece_um_, piece);
-  }
+  for (int i = 0; i < n; ++i) start_um_[i + 1] = start_um_[i] + norm(points_um_[(i + 1) % n] - points_um_[i]);
   for (const int c : corners) corners_um_.push_back(start_um_[c]);
   index_stripes();
 }
@@ -125,25 +121,15 @@ Vec2 OutlineCurve::at(double s_um) const {
   return points_um_[i] + along * (points_um_[(i + 1) % points_um_.size()] - points_um_[i]);
 }
 
-double OutlineCurve::nearest(Vec2 point_um) const {
-  double best = 0;
-  double smallest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < points_um_.size();) {
-    const Vec2 a = points_um_[i];
-    const Vec2 step = points_um_[(i + 1) % points_um_.size()] - a;
-    const double along = nearest_share(a, a + step, point_um);
-    const double distance = norm(point_um - (a + along * step));
-    if (distance < smallest) {
-      smallest = distance;
-      best = start_um_[i] + along * (start_um_[i + 1] - start_um_[i]);
-    }
-    // nothing nearer than the best within so many pieces
-    i += 1 + static_cast<std::size_t>((distance - smallest) / longest_piece_um_);
-  }
-  return wrapped(best);
+OutlineCurve::Nearest OutlineCurve::nearest_on_piece(std::size_t piece, Vec2 point_um) const {
+  const Vec2 a = points_um_[piece];
+  const Vec2 step = points_um_[(piece + 1) % points_um_.size()] - a;
+  const double along = nearest_share(a, a + step, point_um);
+  return {wrapped(start_um_[piece] + along * (start_um_[piece + 1] - start_um_[piece])),
+          norm(point_um - (a + along * step))};
 }
 
-Boundary::Boundary(const Cell& cell, double edge_um) {
+Boundary::Boundary(const Cell& cell, double edge_um) : edge_um_(edge_um) {
   rings_.emplace_back(cell.outline_um, edge_um);
   const double smallest_um2 = 0.25 * std::numbers::sqrt3 * edge_um * edge_um;
   for (const Polygon& hole : cell.holes_um) {
@@ -153,24 +139,36 @@ Boundary::Boundary(const Cell& cell, double edge_um) {
       rings_.emplace_back(hole, edge_um);
     }
   }
+  grid_ = Grid(rings_.front().polygon(), edge_um);
+  for (int ring = 0; ring < static_cast<int>(rings_.size()); ++ring) {
+    const Polygon& corners = rings_[ring].polygon();
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      grid_.add(static_cast<int>(pieces_.size()), corners[i], corners[(i + 1) % corners.size()]);
+      pieces_.push_back({ring, static_cast<int>(i)});
+    }
+  }
 }
 
 BoundaryPlace Boundary::place(Vec2 point_um) const {
   BoundaryPlace place;
-  place.is_inside = is_within_outline(point_um);
-  place.distance_um = std::numeric_limits<double>::infinity();
-  for (int ring = 0; ring < static_cast<int>(rings_.size()); ++ring) {
-    const double s = rings_[ring].nearest(point_um);
-    const double distance = norm(point_um - rings_[ring].at(s));
-    if (ring > 0 && rings_[ring].contains(point_um)) {
-      place.is_in_hole = true;
-      place.is_inside = false;
-    }
-    if (distance >= place.distance_um) continue;
-    place.ring = ring;
-    place.s_um = s;
-    place.distance_um = distance;
+  for (std::size_t ring = 1; ring < rings_.size(); ++ring) {
+    place.is_in_hole = place.is_in_hole || rings_[ring].contains(point_um);
   }
+  place.is_inside = is_within_outline(point_um) && !place.is_in_hole;
+  place.distance_um = std::numeric_limits<double>::infinity();
+  const auto look_at = [&](int piece) {
+    const auto [ring, i] = pieces_[piece];
+    const auto [s_um, distance_um] = rings_[ring].nearest_on_piece(i, point_um);
+    if (distance_um >= place.distance_um) return;
+    place.ring = ring;
+    place.s_um = s_um;
+    place.distance_um = distance_um;
+  };
+  grid_.for_each_near(point_um, point_um, edge_um_, look_at);
+  if (!place.is_inside && place.distance_um > edge_um_) {
+    for (int piece = 0; piece < static_cast<int>(pieces_.size()); ++piece) look_at(piece);
+  }
+  if (place.distance_um > edge_um_ && place.is_inside) place.distance_um = std::numeric_limits<double>::infinity();
   return place;
 }
 

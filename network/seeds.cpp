@@ -10,10 +10,11 @@
 namespace mbtfm::network {
 namespace {
 
-constexpr double kSpacing = 0.98;      // of the lattice, in edge lengths
-constexpr double kJitter = 0.15;       // in edge lengths: enough for meshes that differ everywhere
-constexpr double kClearance = 0.5;     // of the seeds from the frame
-constexpr double kDiscDistance = 0.8;  // at saturation such discs are as dense as a lattice of spacing 1
+constexpr double kSpacing = 0.98;   // of the lattice, in edge lengths
+constexpr double kJitter = 0.15;    // in edge lengths: enough for meshes that differ everywhere
+constexpr double kClearance = 0.5;  // of the seeds from the frame
+// Discs at saturation cover 0.547 of the plane: with this distance they are as many as the lattice's points
+constexpr double kDiscDistance = 0.76;
 
 struct Box {
   Vec2 low, high;
