@@ -15,16 +15,17 @@ namespace {
 
 // Moves and distances are in wanted edge lengths.
 constexpr double kRest = 0.005;   // no vertex moves further in a sweep: the mesh is at rest
-constexpr double kStill = 0.001;   // a vertex that moves less does not wake its neighbours
+constexpr double kStill = 0.001;  // a vertex that moves less does not wake its neighbours
 constexpr int kMostSweeps = 200;  // ten times what an ordinary cell takes
 constexpr double kLongestMove = 0.3;
 constexpr int kDensityRounds = 6;  // then the number of vertices stays
 constexpr int kSweepsBetween = 6;
-constexpr double kTooShort = 0.6;  // a free vertex this near another is taken out …
-constexpr double kTooLong = 1.45;  // … and one put into an edge this long: both about √2 off
-constexpr double kWall = 0.75;     // a vertex nearer to a line of the frame is pushed away …
-constexpr double kPush = 0.3;      // … by this part of what is missing
-constexpr double kFinest = 0.4;    // edge length where lines of the frame are closer than that
+constexpr double kTooShort = 0.6;       // a free vertex this near another is taken out …
+constexpr double kTooLong = 1.45;       // … and one put into an edge this long: both about √2 off
+constexpr double kWall = 0.75;          // a vertex nearer to a line of the frame is pushed away …
+constexpr double kPush = 0.3;           // … by this part of what is missing
+constexpr double kLongBoundary = 1.25;  // vertices do not slide further apart
+constexpr double kFinest = 0.4;         // edge length where lines of the frame are closer than that
 
 enum class Density { even_out, thin_out };  // take out and put in, or only take out
 
@@ -206,10 +207,26 @@ class Relaxation {
     if (length == 0) return 0;
     const double along = std::clamp(dot(wanted_move(v), chord) / length, -reach, reach);
     const double s = curve.wrapped(slide_s_um_[v] + along);
-    if (!mesh_.move(v, curve.at(s))) return 0;
+    if (stretches_boundary(v, curve.at(s)) || !mesh_.move(v, curve.at(s))) return 0;
     slide_s_um_[v] = s;
     size_um_[v] = frame_.size.at(curve.at(s));
     return std::abs(along) / size_um_[v];
+  }
+
+  /// A boundary edge at v would grow too long: its chord would cut off the curve, and what lies beside that.
+  bool stretches_boundary(int v, Vec2 to) const {
+    const auto& points = mesh_.points_um();
+    for (const int t : mesh_.triangles_of(v)) {
+      const auto& corners = mesh_.triangles()[t];
+      for (int i = 0; i < 3; ++i) {
+        if (corners[i] == v || !mesh_.is_boundary(t, i)) continue;
+        const int other = corners[(i + 1) % 3] == v ? corners[(i + 2) % 3] : corners[(i + 1) % 3];
+        const double now = norm(points[other] - points[v]);
+        const double then = norm(points[other] - to);
+        if (then > now && then > kLongBoundary * 0.5 * (size_um_[v] + size_um_[other])) return true;
+      }
+    }
+    return false;
   }
 
   /// Take out free vertices that crowd, put some into long edges; neighbours of a change wait for the next time.

@@ -31,7 +31,7 @@ Cell unit_disc() {
 
 void print_row(const Scene& scene, const std::string& seeds, const std::string& anchor, int n_seeds) {
   double vertices = 0, mean = 0, worst = 1, worst_mean = 1, free_mean = 0, free_worst = 1, even = 0, sweeps = 0;
-  double seconds = 0;
+  double seconds = 0, needles = 0;
   int n_at_rest = 0;
   for (int seed = 1; seed <= n_seeds; ++seed) {
     network::NetworkParameters p;
@@ -49,12 +49,13 @@ void print_row(const Scene& scene, const std::string& seeds, const std::string& 
     free_mean += generated.mean_free_quality / n_seeds;
     free_worst = std::min(free_worst, generated.worst_free_quality);
     even += generated.even_share / n_seeds;
+    needles += static_cast<double>(generated.n_needles) / n_seeds;
     sweeps += static_cast<double>(generated.report.iterations) / n_seeds;
     n_at_rest += generated.report.converged;
   }
-  std::printf("%s,%g,%s,%s,%.0f,%.4f,%.4f,%.3f,%.4f,%.3f,%.4f,%.0f,%d/%d,%.3f\n", scene.name.c_str(), scene.edge_um,
+  std::printf("%s,%g,%s,%s,%.0f,%.4f,%.4f,%.3f,%.4f,%.3f,%.4f,%.0f,%d/%d,%.1f,%.3f\n", scene.name.c_str(), scene.edge_um,
               seeds.c_str(), anchor.c_str(), vertices, mean, worst_mean, worst, free_mean, free_worst, even, sweeps,
-              n_at_rest, n_seeds, seconds);
+              n_at_rest, n_seeds, needles, seconds);
   std::fflush(stdout);
 }
 
