@@ -25,6 +25,7 @@ constexpr double kTooLong = 1.45;       // … and one put into an edge this lon
 constexpr double kWall = 0.75;          // a vertex nearer to a line of the frame is pushed away …
 constexpr double kPush = 0.3;           // … by this part of what is missing
 constexpr double kLongBoundary = 1.25;  // vertices do not slide further apart
+constexpr double kPressed = 0.25;       // a vertex this near to a line after all is taken out
 constexpr double kFinest = 0.4;         // edge length where lines of the frame are closer than that
 
 enum class Density { even_out, thin_out };  // take out and put in, or only take out
@@ -229,6 +230,23 @@ class Relaxation {
     return false;
   }
 
+  /// Free vertices on a line of the frame, in spite of its push: another presses from behind.
+  std::vector<int> pressed_vertices() const {
+    const auto& points = mesh_.points_um();
+    std::vector<int> pressed;
+    for (int t = 0; t < static_cast<int>(mesh_.triangles().size()); ++t) {
+      const auto& corners = mesh_.triangles()[t];
+      for (int i = 0; i < 3; ++i) {
+        const int v = corners[i];
+        if (v < n_frame_ || !mesh_.is_of_frame(t, i)) continue;
+        const Vec2 a = points[corners[(i + 1) % 3]];
+        const Vec2 b = points[corners[(i + 2) % 3]];
+        if (cross(b - a, points[v] - a) < kPressed * size_um_[v] * norm(b - a)) pressed.push_back(v);
+      }
+    }
+    return pressed;
+  }
+
   /// Take out free vertices that crowd, put some into long edges; neighbours of a change wait for the next time.
   bool change_density(Density density) {
     const Triangulation now = mesh_.triangulation();
@@ -256,6 +274,12 @@ class Relaxation {
       if (free < n_frame_ || !is_untouched(e)) continue;
       is_kept[free] = 0;
       is_touched[e.vertex_a] = is_touched[e.vertex_b] = 1;
+      has_changed = true;
+    }
+    for (const int v : pressed_vertices()) {
+      if (is_touched[v]) continue;
+      is_kept[v] = 0;
+      is_touched[v] = 1;
       has_changed = true;
     }
     for (auto k = order.rbegin(); density == Density::even_out && k != order.rend() && relative[*k] > kTooLong; ++k) {
