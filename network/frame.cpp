@@ -4,12 +4,13 @@
 #include <cmath>
 #include <map>
 #include <string>
+#include <tuple>
 #include <utility>
 
+#include "network/adhesions.h"
 #include "network/grid.h"
 #include "network/planar.h"
 #include "network/polyline.h"
-#include "network/rim.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::network {
@@ -25,42 +26,6 @@ constexpr double kSnapReach = 1.0;      // an adhesion this far outside still be
 constexpr double kBoundaryJitter = 0.15;
 
 std::string shown(double value_um) { return std::to_string(value_um) + " um"; }
-
-/// Adhesions at the same place moved apart, so that each can hold a vertex.
-/// @return the labels of those moved
-std::vector<int> separate(std::vector<Adhesion>& adhesions, const SizeField& size, double relative_distance) {
-  std::vector<int> moved;
-  const double widest = relative_distance * size.edge_um();
-  std::vector<Vec2> positions;
-  for (const Adhesion& a : adhesions) positions.push_back(a.position_um);
-  constexpr int kSweeps = 20;
-  bool has_changed = true;
-  for (int sweep = 0; sweep < kSweeps && has_changed; ++sweep) {
-    has_changed = false;
-    Grid before(positions, widest);  // those that come first
-    for (int i = 0; i < static_cast<int>(positions.size()); ++i) {
-      const double distance = relative_distance * size.at(positions[i]);
-      before.for_each_near(positions[i], positions[i], widest, [&](int j) {
-        const Vec2 gap = positions[i] - positions[j];
-        const double length = norm(gap);
-        if (length >= distance) return;
-        const double angle = adhesions[j].angle_rad;  // along the one that came first, where there is no direction
-        const Vec2 direction = length > 1e-6 * distance ? (1 / length) * gap : Vec2{std::cos(angle), std::sin(angle)};
-        const Vec2 shift = (0.505 * (distance - length)) * direction;  // a little too far, so that it ends
-        positions[i] += shift;
-        positions[j] += -1.0 * shift;
-        moved.push_back(adhesions[i].adhesion_id);
-        moved.push_back(adhesions[j].adhesion_id);
-        has_changed = true;
-      });
-      before.add(i, positions[i], positions[i]);
-    }
-  }
-  for (std::size_t i = 0; i < positions.size(); ++i) adhesions[i].position_um = positions[i];
-  std::sort(moved.begin(), moved.end());
-  moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
-  return moved;
-}
 
 /// A vertex of the graph that a ring of the boundary goes through.
 struct Knot {
@@ -85,7 +50,6 @@ class Builder {
         parameters_(parameters),
         edge_(parameters.edge_length_um),
         random_(random),
-        adhesions_(cell.adhesions),
         frame_{.size = SizeField(edge_, parameters.edge_growth, cell.outline_um)} {}
 
   Frame build() {
@@ -93,13 +57,12 @@ class Builder {
     add_adhesions();
     for (const Fibre& fibre : cell_.fibres) add_fibre(fibre);
     if (has_rims()) add_rims();
-    bool is_planar = make_planar(graph_, frame_.size, kMerge);
+    make_planar(graph_, frame_.size, kMerge);
     divide_evenly(graph_, frame_.size);
     make_planar(graph_, frame_.size, kMerge);
     const std::vector<std::vector<Knot>> knots = boundary_knots();
     for (std::size_t ring = 0; ring < knots.size(); ++ring) add_ring(static_cast<int>(ring), knots[ring]);
-    is_planar = make_planar(graph_, frame_.size, kMerge) && is_planar;
-    frame_.is_planar = is_planar;
+    make_planar(graph_, frame_.size, kMerge);  // what still crosses is found when the mesh is made
     collect();
     return std::move(frame_);
   }
@@ -112,7 +75,7 @@ class Builder {
   }
 
   void refine_where_wanted() {
-    for (const Adhesion& a : adhesions_) {
+    for (const Adhesion& a : cell_.adhesions) {
       if (!has_rims()) break;
       const Polygon rim = rim_um(a, rim_edge_um(a));
       for (std::size_t i = 0; i < rim.size(); i += 2) frame_.size.refine(rim[i], rim_edge_um(a));
@@ -125,7 +88,7 @@ class Builder {
   }
 
   void add_adhesions() {
-    frame_.separated_adhesion_ids = separate(adhesions_, frame_.size, 2 * kMerge);
+    std::tie(adhesions_, frame_.separated_adhesion_ids) = separated(cell_.adhesions, frame_.size, 2 * kMerge);
     for (const Adhesion& a : adhesions_) {
       const BoundaryPlace place = boundary_.place(a.position_um);
       if (!place.is_inside && place.distance_um > kSnapReach * edge_) {
@@ -404,14 +367,6 @@ class Builder {
 };
 
 }  // namespace
-
-bool covers(const Adhesion& adhesion, Vec2 point_um) {
-  const Vec2 offset = point_um - adhesion.position_um;
-  const Vec2 axis = {std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
-  const double along = 2 * dot(offset, axis) / adhesion.major_axis_um;
-  const double across = 2 * cross(axis, offset) / adhesion.minor_axis_um;
-  return along * along + across * across <= 1;
-}
 
 Frame build_frame(const Cell& cell, const Boundary& boundary, const NetworkParameters& parameters, Random& random) {
   return Builder(cell, boundary, parameters, random).build();

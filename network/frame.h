@@ -30,15 +30,11 @@ struct Frame {
   std::vector<int> snapped_adhesion_ids{};
   std::vector<int> separated_adhesion_ids{};  ///< moved apart from one at the same place
   int n_shared_segments = 0;
-  bool is_planar = true;
 
   bool slides(int vertex) const { return ring[vertex] >= 0; }
 };
 
 /// @throws InvalidData where an adhesion lies further than an edge length outside the cell, or all of a fibre does
 Frame build_frame(const Cell& cell, const Boundary& boundary, const NetworkParameters& parameters, Random& random);
-
-/// The adhesion's ellipse contains the point.
-bool covers(const Adhesion& adhesion, Vec2 point_um);
 
 }  // namespace mbtfm::network

@@ -9,6 +9,7 @@
 #include <string>
 #include <tuple>
 
+#include "network/adhesions.h"
 #include "network/frame.h"
 #include "network/grid.h"
 #include "network/relax.h"

@@ -14,11 +14,11 @@ namespace mbtfm::network {
 namespace {
 
 // Moves and distances are in wanted edge lengths.
-constexpr double kRest = 0.005;   // no vertex moves further in a sweep: the mesh is at rest
-constexpr double kStill = 0.001;  // a vertex that moves less does not wake its neighbours
-constexpr int kMostSweeps = 200;  // ten times what an ordinary cell takes
-constexpr double kLongestMove = 0.3;
-constexpr int kDensityRounds = 6;  // then the number of vertices stays
+constexpr double kRest = 0.005;       // no vertex moves further in a sweep: the mesh is at rest
+constexpr double kStill = 0.001;      // a vertex that moves less does not wake its neighbours
+constexpr int kMostSweeps = 200;      // five times what an ordinary cell takes
+constexpr double kLongestMove = 0.3;  // in a sweep: into the next triangle at most
+constexpr int kDensityRounds = 6;     // then the number of vertices stays
 constexpr int kSweepsBetween = 6;
 constexpr double kTooShort = 0.6;       // a free vertex this near another is taken out …
 constexpr double kTooLong = 1.45;       // … and one put into an edge this long: both about √2 off

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "network/frame.h"
+#include "network/adhesions.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"

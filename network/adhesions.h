@@ -1,12 +1,22 @@
-/// Rims of adhesions as lines that the mesh contains.
+/// Adhesions as areas that the mesh holds.
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "network/outline.h"
+#include "network/size_field.h"
 #include "pipeline/contract/types.h"
 
 namespace mbtfm::network {
+
+/// The adhesion's ellipse contains the point.
+bool covers(const Adhesion& adhesion, Vec2 point_um);
+
+/// Adhesions at the same place moved apart, so that each can hold a vertex; and the labels of those moved.
+/// @param distance  between centres, in wanted edge lengths
+std::pair<std::vector<Adhesion>, std::vector<int>> separated(std::vector<Adhesion> adhesions, const SizeField& size,
+                                                             double distance);
 
 struct RimPart {
   Polyline points_um;

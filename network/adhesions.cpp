@@ -1,10 +1,10 @@
-#include "network/rim.h"
+#include "network/adhesions.h"
 
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
-#include "network/frame.h"
+#include "network/grid.h"
 #include "network/polyline.h"
 
 namespace mbtfm::network {
@@ -25,6 +25,49 @@ Side side_of(Vec2 point, const std::vector<Adhesion>& others, const Boundary& bo
 }
 
 }  // namespace
+
+bool covers(const Adhesion& adhesion, Vec2 point_um) {
+  const Vec2 offset = point_um - adhesion.position_um;
+  const Vec2 axis = {std::cos(adhesion.angle_rad), std::sin(adhesion.angle_rad)};
+  const double along = 2 * dot(offset, axis) / adhesion.major_axis_um;
+  const double across = 2 * cross(axis, offset) / adhesion.minor_axis_um;
+  return along * along + across * across <= 1;
+}
+
+std::pair<std::vector<Adhesion>, std::vector<int>> separated(std::vector<Adhesion> adhesions, const SizeField& size,
+                                                             double distance) {
+  std::vector<int> moved;
+  const double widest = distance * size.edge_um();
+  std::vector<Vec2> positions;
+  for (const Adhesion& a : adhesions) positions.push_back(a.position_um);
+  constexpr int kSweeps = 20;
+  bool has_changed = true;
+  for (int sweep = 0; sweep < kSweeps && has_changed; ++sweep) {
+    has_changed = false;
+    Grid before(positions, widest);  // those that come first
+    for (int i = 0; i < static_cast<int>(positions.size()); ++i) {
+      const double wanted = distance * size.at(positions[i]);
+      before.for_each_near(positions[i], positions[i], widest, [&](int j) {
+        const Vec2 gap = positions[i] - positions[j];
+        const double length = norm(gap);
+        if (length >= wanted) return;
+        const double angle = adhesions[j].angle_rad;  // along the one that came first, where there is no direction
+        const Vec2 direction = length > 1e-6 * wanted ? (1 / length) * gap : Vec2{std::cos(angle), std::sin(angle)};
+        const Vec2 shift = (0.505 * (wanted - length)) * direction;  // a little too far, so that it ends
+        positions[i] += shift;
+        positions[j] += -1.0 * shift;
+        moved.push_back(adhesions[i].adhesion_id);
+        moved.push_back(adhesions[j].adhesion_id);
+        has_changed = true;
+      });
+      before.add(i, positions[i], positions[i]);
+    }
+  }
+  for (std::size_t i = 0; i < positions.size(); ++i) adhesions[i].position_um = positions[i];
+  std::sort(moved.begin(), moved.end());
+  moved.erase(std::unique(moved.begin(), moved.end()), moved.end());
+  return {std::move(adhesions), std::move(moved)};
+}
 
 double perimeter_um(const Adhesion& adhesion) {
   Polygon corners = ellipse_corners(adhesion, kCornersOfEllipse);
