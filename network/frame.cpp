@@ -137,7 +137,8 @@ class Builder {
   void add_fibre(const Fibre& fibre) {
     const Polyline dense = densified(fibre.points_um, kBind * edge_);
     const int n = static_cast<int>(dense.size());
-    bool is_clipped = false;
+    bool is_clipped =
+        (!fibre.start_adhesion_id && is_in_hole(dense.front())) || (!fibre.end_adhesion_id && is_in_hole(dense.back()));
     bool has_part = false;
     for (int first = 0; first < n;) {
       if (!may_hold(dense[first], fibre)) {
@@ -201,18 +202,23 @@ class Builder {
       if (i + 1 == line.size() && after >= 0) return after;
       return graph_.add_vertex(line[i], i == 0 || i + 1 == line.size() ? kFibreEnd : kFibrePoint);
     };
-    Chain chain{.fibre_id = fibre.fibre_id, .vertices = {vertex(0)}};
+    std::vector<Chain> pieces = {{.fibre_id = fibre.fibre_id, .vertices = {vertex(0)}}};
     for (std::size_t i = 1; i < line.size(); ++i) {
       for (const Vec2 crossing : crossings_of_holes(line[i - 1], line[i])) {
-        chain.vertices.push_back(graph_.add_vertex(crossing, kFibreEnd));  // a rim of the mesh: it has to stay
-        const int last = chain.vertices.back();
-        graph_.chains.push_back(std::exchange(chain, {.fibre_id = fibre.fibre_id, .vertices = {last}}));
+        const int v = graph_.add_vertex(crossing, kFibreEnd);
+        pieces.back().vertices.push_back(v);
+        pieces.push_back({.fibre_id = fibre.fibre_id, .vertices = {v}});
       }
-      chain.vertices.push_back(vertex(i));
+      pieces.back().vertices.push_back(vertex(i));
     }
-    graph_.chains.push_back(std::move(chain));
-    return true;
+    // nothing holds an end that is free in a hole: cut it off
+    if (after < 0 && is_in_hole(line.back())) pieces.pop_back();
+    if (before < 0 && !pieces.empty() && is_in_hole(line.front())) pieces.erase(pieces.begin());
+    graph_.chains.insert(graph_.chains.end(), pieces.begin(), pieces.end());
+    return !pieces.empty();
   }
+
+  bool is_in_hole(Vec2 point) const { return boundary_.place(point).is_in_hole; }
 
   /// Where the line from a to b enters or leaves a hole, in its order.
   Polyline crossings_of_holes(Vec2 a, Vec2 b) const {

@@ -33,19 +33,20 @@ struct GeneratedNetwork {
   double even_share = 0;          ///< of the edges, that are 0.6 to 1.5 times as long as wanted there
   int n_needles = 0;              ///< triangles of quality below 0.1, which only lines that close can force
   int n_triangles = 0;
-  double area_um2 = 0;        ///< of the triangles
-  int n_parts = 1;            ///< that no link joins: more than one where a neck is thinner than a tenth of an edge
-  int n_shared_segments = 0;  ///< where several fibres run along one edge, each with a link of its own
-  int n_filled_holes = 0;     ///< smaller than a triangle
-  std::vector<int> clipped_fibre_ids;       ///< cut at the outline
+  double area_um2 = 0;  ///< of the triangles
+  int n_parts = 1;  ///< that no link joins: more than one where a neck is thinner than a tenth of an edge, or holes cut
+                    ///< the cell up
+  int n_shared_segments = 0;                ///< where several fibres run along one edge, each with a link of its own
+  int n_filled_holes = 0;                   ///< smaller than a triangle
+  std::vector<int> clipped_fibre_ids;       ///< cut at the outline, or at a hole they end in
   std::vector<int> snapped_adhesion_ids;    ///< outside the cell by up to an edge length: the mesh reaches out to them
   std::vector<int> separated_adhesion_ids;  ///< moved apart, being at the same place
 };
 
 /// Span a network. Fibre polylines are chains of links of their fibre_id; each adhesion holds the vertices inside its
-/// ellipse, at least the one at its centre. A fibre that is said to end on an adhesion ends at its centre.
-/// Lines closer than a tenth of an edge length run together; the outline passes through what lies within a quarter
-/// of an edge length of it.
+/// ellipse and on its rim, at least the one at its centre. A fibre that is said to end on an adhesion ends at its
+/// centre. Holes are left out, but fibres span them. Lines closer than a tenth of the wanted edge length run together;
+/// the outline passes through what lies within a quarter of it. docs/theory.md, "How the mesh is made".
 /// @throws InvalidData where an adhesion lies more than an edge length outside the cell, or all of a fibre does
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters);
 

@@ -183,6 +183,12 @@ int rank_of_points(const Chain& chain) {
   return chain.adhesion_id > 0 ? kRimPoint : chain.fibre_id > 0 ? kFibrePoint : kOutlinePoint;
 }
 
+/// A fibre stays straight where it crosses a rim: points of the rim give way.
+int rank_of_crossing(const Chain& a, const Chain& b) {
+  if ((a.fibre_id > 0 && b.adhesion_id > 0) || (a.adhesion_id > 0 && b.fibre_id > 0)) return kFibreEnd;
+  return std::max(rank_of_points(a), rank_of_points(b));
+}
+
 bool cross_segments(PlanarGraph& graph) {
   const std::vector<Segment> segments = segments_of(graph);
   Grid index(graph.points_um, segment_grid_cell(graph, segments));
@@ -201,7 +207,7 @@ bool cross_segments(PlanarGraph& graph) {
       const double along_s = cross(c - a, d - c) / determinant;
       const double along_t = cross(c - a, b - a) / determinant;
       if (along_s <= 0 || along_s >= 1 || along_t <= 0 || along_t >= 1) return;
-      const int rank = std::max(rank_of_points(graph.chains[s.chain]), rank_of_points(graph.chains[t.chain]));
+      const int rank = rank_of_crossing(graph.chains[s.chain], graph.chains[t.chain]);
       const int v = graph.add_vertex(a + along_s * (b - a), rank);
       cuts.push_back({s.chain, s.place, along_s, v});
       cuts.push_back({t.chain, t.place, along_t, v});

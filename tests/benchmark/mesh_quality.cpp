@@ -53,9 +53,9 @@ void print_row(const Scene& scene, const std::string& seeds, const std::string& 
     sweeps += static_cast<double>(generated.report.iterations) / n_seeds;
     n_at_rest += generated.report.converged;
   }
-  std::printf("%s,%g,%s,%s,%.0f,%.4f,%.4f,%.3f,%.4f,%.3f,%.4f,%.0f,%d/%d,%.1f,%.3f\n", scene.name.c_str(), scene.edge_um,
-              seeds.c_str(), anchor.c_str(), vertices, mean, worst_mean, worst, free_mean, free_worst, even, sweeps,
-              n_at_rest, n_seeds, needles, seconds);
+  std::printf("%s,%g,%s,%s,%.0f,%.4f,%.4f,%.3f,%.4f,%.3f,%.4f,%.0f,%d/%d,%.1f,%.3f\n", scene.name.c_str(),
+              scene.edge_um, seeds.c_str(), anchor.c_str(), vertices, mean, worst_mean, worst, free_mean, free_worst,
+              even, sweeps, n_at_rest, n_seeds, needles, seconds);
   std::fflush(stdout);
 }
 
@@ -71,6 +71,7 @@ int main(int argc, char** argv) {
   }
   std::printf(
       "scene,edge_um,seeds,anchor,vertices,mean,least_mean,worst,free_mean,free_worst,even_share,sweeps,at_rest,"
+      "needles,"
       "cpu_s\n");
   for (const std::string seeds : {"regular", "jittered", "poisson"}) {
     if (argc > 3 && seeds != argv[3]) continue;

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
 #include "tests/support/valid_network.h"
 
@@ -76,7 +77,11 @@ TEST(Mesh, two_hundred_random_cells_give_valid_networks) {
                                        .roughness = 0.05 * static_cast<double>(seed % 8),
                                        .n_outline_points = seed % 3 == 0 ? 2000 : 90,
                                        .pixel_um = seed % 3 == 0 ? 0.1 : 0.0};
-    const Cell cell = random_cell(seed, options);
+    Cell cell = random_cell(seed, options);
+    // adhesions may lie in it, up to an edge length from the cell; fibres span it
+    const Polygon hole = testing::circle({30, 30}, 1.4, 40);
+    const bool has_room = std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(cell.outline_um, p); });
+    if (has_room && seed % 4 < 2) cell.holes_um = {hole};
     GeneratedNetwork generated;
     NetworkParameters parameters{.seed = seed};
     parameters.adhesion_anchor = std::array{"rim", "ellipse", "centre"}[seed % 3];

@@ -213,10 +213,30 @@ TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
 }
 
 TEST(HardMesh, cell_smaller_than_an_edge) {
-  Cell cell = square_cell();
-  for (const double edge : {10.0, 20.0, 100.0}) {
-    SCOPED_TRACE("edge " + std::to_string(edge));
-    expect_valid(generate_network(cell, {.edge_length_um = edge}), cell, 0.0);
+  const Cell cell = square_cell();
+  for (const std::string anchor : {"rim", "ellipse"}) {
+    for (const double edge : {10.0, 20.0, 100.0}) {
+      SCOPED_TRACE(anchor + ", edge " + std::to_string(edge));
+      expect_valid(generate_network(cell, {.edge_length_um = edge, .adhesion_anchor = anchor}), cell, 0.0);
+    }
+  }
+}
+
+TEST(HardMesh, adhesions_of_any_size) {
+  for (const double scale : {0.05, 0.3, 3.0, 12.0}) {
+    SCOPED_TRACE("scale " + std::to_string(scale));
+    Cell cell = square_cell();
+    cell.adhesions.push_back(adhesion_at(5, {10, 10}, 0.4));
+    cell.adhesions.back().major_axis_um *= scale;
+    cell.adhesions.back().minor_axis_um *= scale;
+    cell.adhesions.back().area_um2 *= scale * scale;
+    cell.fibres = {fibre_along(1, {{2, 2}, {10, 10}}, 1, 5)};
+    const NetworkParameters parameters{.adhesion_anchor = "rim"};
+    const GeneratedNetwork generated = generate_network(cell, parameters);
+    expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
+    EXPECT_GE(generated.worst_free_quality, 0.3);
+    // the fibre is straight, to the centres of both
+    EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 8 * std::sqrt(2.0), 1e-9);
   }
 }
 
@@ -279,6 +299,17 @@ TEST(HardMesh, fibre_spans_a_hole) {
     // chords of the rim lie inside the hole by edge² / 8R
     EXPECT_TRUE(link.fibre_id > 0 || norm(middle - Vec2{10, 10}) > 3 - 0.2) << "in the hole";
   }
+}
+
+TEST(HardMesh, free_end_in_a_hole_is_cut_off_and_named) {
+  Cell cell = square_cell();
+  cell.holes_um = {testing::circle({10, 10}, 3, 80)};
+  cell.fibres = {fibre_along(1, {{3, 10}, {10, 10}}), fibre_along(2, {{3, 12}, {17, 12}})};
+  const GeneratedNetwork generated = generate_network(cell, {});
+  expect_valid(generated, cell, 1.5);
+  EXPECT_EQ(generated.clipped_fibre_ids, (std::vector<int>{1}));
+  // averaging the rim draws it in by edge² / 96 R, merging by a tenth of an edge
+  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 4, 0.1 * 1.5 + 0.01);
 }
 
 TEST(HardMesh, hole_smaller_than_a_triangle_is_filled) {
