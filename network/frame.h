@@ -3,8 +3,10 @@
 
 #include <vector>
 
+#include "network/mesh.h"
 #include "network/outline.h"
 #include "network/random.h"
+#include "network/size_field.h"
 #include "pipeline/contract/types.h"
 
 namespace mbtfm::network {
@@ -13,27 +15,26 @@ struct FrameSegment {
   int vertex_a = 0;
   int vertex_b = 0;
   std::vector<int> fibre_ids;  ///< rising; several where fibres share the segment
-  int outline_count = 0;       ///< how often the outline runs along it: odd where it bounds the cell
+  int outline_count = 0;       ///< how often the outline or a hole's rim runs along it: odd where it bounds the cell
 };
 
 struct Frame {
-  std::vector<Vec2> points_um;
-  std::vector<int> adhesion_id;      ///< 0: none
-  std::vector<double> outline_s_um;  ///< arc length on the outline of a vertex that may slide there; else NaN
-  std::vector<FrameSegment> segments;
-  std::vector<int> clipped_fibre_ids;
-  std::vector<int> snapped_adhesion_ids;
-  std::vector<int> separated_adhesion_ids;  ///< moved apart from one at the same place
+  SizeField size;
+  std::vector<Vec2> points_um{};
+  std::vector<int> adhesion_id{};      ///< of centres; 0: none
+  std::vector<int> rim_adhesion_id{};  ///< of vertices on the rim of an adhesion; 0: none
+  std::vector<int> ring{};             ///< of the boundary, on which a vertex may slide; -1: it may not
+  std::vector<double> ring_s_um{};     ///< arc length there
+  std::vector<FrameSegment> segments{};
+  std::vector<int> clipped_fibre_ids{};
+  std::vector<int> snapped_adhesion_ids{};
+  std::vector<int> separated_adhesion_ids{};  ///< moved apart from one at the same place
   int n_shared_segments = 0;
-  bool is_planar = true;
 
-  bool slides(int vertex) const { return outline_s_um[vertex] == outline_s_um[vertex]; }
+  bool slides(int vertex) const { return ring[vertex] >= 0; }
 };
 
-/// @throws InvalidData where an adhesion lies further than an edge length outside the outline, or all of a fibre does
-Frame build_frame(const Cell& cell, const OutlineCurve& outline, double edge_um, Random& random);
-
-/// The adhesion's ellipse contains the point.
-bool covers(const Adhesion& adhesion, Vec2 point_um);
+/// @throws InvalidData where an adhesion lies further than an edge length outside the cell, or all of a fibre does
+Frame build_frame(const Cell& cell, const Boundary& boundary, const NetworkParameters& parameters, Random& random);
 
 }  // namespace mbtfm::network

@@ -30,16 +30,16 @@ class Grid {
 
   /// Add an item that lies in the box of a and b.
   void add(int item, Vec2 a, Vec2 b) {
-    for_each_bin(a, b, 0, [&](std::vector<int>& bin) { bin.push_back(item); });
+    for_each_bin(a, b, 0, [&](std::size_t bin) { bins_[bin].push_back(item); });
   }
 
   /// Call body(item) for the items of all bins within `reach` of the box of a and b. An item that fills several bins
   /// is named once for each call: in the first bin they share.
   template <class Body>
-  void for_each_near(Vec2 a, Vec2 b, double reach, const Body& body) {
+  void for_each_near(Vec2 a, Vec2 b, double reach, const Body& body) const {
     found_.clear();
     for_each_bin(a, b, reach,
-                 [&](const std::vector<int>& bin) { found_.insert(found_.end(), bin.begin(), bin.end()); });
+                 [&](std::size_t bin) { found_.insert(found_.end(), bins_[bin].begin(), bins_[bin].end()); });
     std::sort(found_.begin(), found_.end());
     found_.erase(std::unique(found_.begin(), found_.end()), found_.end());
     for (const int item : found_) body(item);
@@ -49,13 +49,13 @@ class Grid {
   int clamped(double value, int n) const { return static_cast<int>(std::clamp(value, 0.0, n - 1.0)); }
 
   template <class Body>
-  void for_each_bin(Vec2 a, Vec2 b, double reach, const Body& body) {
+  void for_each_bin(Vec2 a, Vec2 b, double reach, const Body& body) const {
     const int x0 = clamped((std::min(a.x, b.x) - reach - low_.x) / bin_, columns_);
     const int x1 = clamped((std::max(a.x, b.x) + reach - low_.x) / bin_, columns_);
     const int y0 = clamped((std::min(a.y, b.y) - reach - low_.y) / bin_, rows_);
     const int y1 = clamped((std::max(a.y, b.y) + reach - low_.y) / bin_, rows_);
     for (int y = y0; y <= y1; ++y) {
-      for (int x = x0; x <= x1; ++x) body(bins_[static_cast<std::size_t>(y) * columns_ + x]);
+      for (int x = x0; x <= x1; ++x) body(static_cast<std::size_t>(y) * columns_ + x);
     }
   }
 
@@ -64,7 +64,7 @@ class Grid {
   int columns_ = 0;
   int rows_ = 0;
   std::vector<std::vector<int>> bins_;
-  std::vector<int> found_;
+  mutable std::vector<int> found_;  ///< scratch: one thread at a time
 };
 
 }  // namespace mbtfm::network

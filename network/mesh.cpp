@@ -5,10 +5,13 @@
 #include <limits>
 #include <map>
 #include <numeric>
+#include <set>
 #include <string>
 #include <tuple>
 
+#include "network/adhesions.h"
 #include "network/frame.h"
+#include "network/grid.h"
 #include "network/relax.h"
 #include "pipeline/contract/errors.h"
 
@@ -73,30 +76,44 @@ std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const Ne
   return links;
 }
 
-/// Each vertex belongs to the adhesion whose ellipse it lies in, the nearest where several overlap.
-void hold_within_ellipses(const Cell& cell, Network& network) {
+/// Each vertex belongs to the adhesion whose ellipse it lies in, or on whose rim; the nearest where several overlap.
+void hold_adhesions(const Cell& cell, const Frame& frame, Network& network) {
+  std::map<int, Vec2> position_um;
+  for (const Adhesion& a : cell.adhesions) position_um[a.adhesion_id] = a.position_um;
   std::vector<double> nearest(network.vertices_um.size(), std::numeric_limits<double>::infinity());
-  for (std::size_t v = 0; v < nearest.size(); ++v) {
-    if (network.adhesion_id[v] != 0) nearest[v] = -1;  // an adhesion's own
+  Grid grid(network.vertices_um, frame.size.edge_um());
+  for (int v = 0; v < static_cast<int>(nearest.size()); ++v) {
+    grid.add(v, network.vertices_um[v], network.vertices_um[v]);
+    if (network.adhesion_id[v] != 0) {
+      nearest[v] = -1;  // an adhesion's own
+    } else if (v < static_cast<int>(frame.rim_adhesion_id.size()) && frame.rim_adhesion_id[v] != 0) {
+      network.adhesion_id[v] = frame.rim_adhesion_id[v];
+      nearest[v] = norm(network.vertices_um[v] - position_um[network.adhesion_id[v]]);
+    }
   }
   for (const Adhesion& adhesion : cell.adhesions) {
-    for (std::size_t v = 0; v < nearest.size(); ++v) {
-      const double distance = norm(network.vertices_um[v] - adhesion.position_um);
-      if (distance >= nearest[v] || !covers(adhesion, network.vertices_um[v])) continue;
+    const Vec2 at = adhesion.position_um;
+    grid.for_each_near(at, at, 0.5 * adhesion.major_axis_um, [&](int v) {
+      const double distance = norm(network.vertices_um[v] - at);
+      if (distance >= nearest[v] || !covers(adhesion, network.vertices_um[v])) return;
       nearest[v] = distance;
       network.adhesion_id[v] = adhesion.adhesion_id;
-    }
+    });
   }
 }
 
-/// Leave out vertices that no link joins, as the tip of a whisker of the outline; an adhesion's is joined to the
-/// nearest vertex that stays.
+/// Leave out vertices that no link joins, as the tip of a whisker of the outline. An adhesion that would lose its last
+/// is joined to the nearest vertex that stays.
 void leave_out_loose_vertices(Network& network) {
   const std::size_t n = network.vertices_um.size();
   std::vector<char> is_joined(n, 0);
   for (const Link& link : network.links) is_joined[link.vertex_a] = is_joined[link.vertex_b] = 1;
+  std::set<int> held;
   for (std::size_t v = 0; v < n; ++v) {
-    if (is_joined[v] || network.adhesion_id[v] == 0) continue;
+    if (is_joined[v]) held.insert(network.adhesion_id[v]);
+  }
+  for (std::size_t v = 0; v < n; ++v) {
+    if (is_joined[v] || network.adhesion_id[v] == 0 || !held.insert(network.adhesion_id[v]).second) continue;
     std::size_t nearest = n;
     for (std::size_t w = 0; w < n; ++w) {
       if (w == v || !is_joined[w]) continue;
@@ -151,6 +168,7 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
     const double q = quality(mesh.points_um[t[0]], mesh.points_um[t[1]], mesh.points_um[t[2]]);
     result.mean_quality += q / static_cast<double>(mesh.triangulation.triangles.size());
     result.worst_quality = std::min(result.worst_quality, q);
+    result.n_needles += q < 0.1;
     if (t[0] >= n_of_frame) {  // the smallest of the three
       result.worst_free_quality = std::min(result.worst_free_quality, q);
       sum_of_free += q;
@@ -159,6 +177,13 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
     result.area_um2 +=
         0.5 * std::abs(cross(mesh.points_um[t[1]] - mesh.points_um[t[0]], mesh.points_um[t[2]] - mesh.points_um[t[0]]));
   }
+  int n_even = 0;
+  for (const auto& e : mesh.triangulation.edges) {
+    const double wanted = 0.5 * (mesh.size_um[e.vertex_a] + mesh.size_um[e.vertex_b]);
+    const double relative = norm(mesh.points_um[e.vertex_b] - mesh.points_um[e.vertex_a]) / wanted;
+    n_even += relative >= 0.6 && relative <= 1.5;
+  }
+  result.even_share = n_even / static_cast<double>(mesh.triangulation.edges.size());
   result.mean_free_quality = n_free > 0 ? sum_of_free / n_free : 1;
   result.n_triangles = static_cast<int>(mesh.triangulation.triangles.size());
 }
@@ -168,21 +193,29 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
 void declare(ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
   list.add("edge_length_um", parameters.edge_length_um, Range::positive(), "mean cable length (um)");
+  list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
+           "growth of the edge length with distance from what is resolved finer");
   list.add("seed", parameters.seed, "of the first placement of the vertices");
+  list.add("seeds", parameters.seeds, "first placement of the vertices", {"regular", "jittered", "poisson"});
   list.add("link_weights", parameters.link_weights,
            "tension and stiffness of the actin network's links: the same for all, or by the width of material each "
            "stands for",
            {"equal", "width"});
   list.add("adhesion_anchor", parameters.adhesion_anchor,
-           "what an adhesion holds: every vertex in its ellipse, or the one at its centre", {"ellipse", "centre"});
+           "what an adhesion holds: its rim, which the mesh resolves; every vertex that happens to lie in its ellipse; "
+           "or the one at its centre",
+           {"rim", "ellipse", "centre"});
+  list.add("rim_points", parameters.rim_points, Range{.low = 3}, "vertices round an adhesion's rim, at least");
+  list.add("free_fibre_ends", parameters.free_fibre_ends,
+           "edge length where a fibre ends freely: as elsewhere, or the fibre's width", {"point", "width"});
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {
   check(cell);
   Random random(parameters.seed);
-  const OutlineCurve outline(cell.outline_um, parameters.edge_length_um);
-  const Frame frame = build_frame(cell, outline, parameters.edge_length_um, random);
-  const RelaxedMesh mesh = fill_and_relax(frame, outline, parameters.edge_length_um, random);
+  const Boundary boundary(cell, parameters.edge_length_um);
+  const Frame frame = build_frame(cell, boundary, parameters, random);
+  const RelaxedMesh mesh = fill_and_relax(frame, boundary, parameters.seeds, random);
 
   GeneratedNetwork result;
   result.report = mesh.report;
@@ -190,10 +223,11 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   result.snapped_adhesion_ids = frame.snapped_adhesion_ids;
   result.separated_adhesion_ids = frame.separated_adhesion_ids;
   result.n_shared_segments = frame.n_shared_segments;
+  result.n_filled_holes = boundary.n_filled_holes();
   result.network.vertices_um = mesh.points_um;
   result.network.adhesion_id = frame.adhesion_id;
   result.network.adhesion_id.resize(mesh.points_um.size(), 0);
-  if (parameters.adhesion_anchor == "ellipse") hold_within_ellipses(cell, result.network);
+  if (parameters.adhesion_anchor != "centre") hold_adhesions(cell, frame, result.network);
   result.network.links = links_of(frame, mesh, parameters);
   leave_out_loose_vertices(result.network);
   std::sort(result.network.links.begin(), result.network.links.end(), [](const Link& a, const Link& b) {

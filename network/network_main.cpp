@@ -29,8 +29,9 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
   report.converged = generated.n_parts == 1;
   report.summary = std::to_string(net.vertices_um.size()) + " vertices, " + std::to_string(net.links.size()) +
                    " links" + counted(generated.clipped_fibre_ids.size(), "fibres cut at the outline") +
-                   counted(generated.snapped_adhesion_ids.size(), "adhesions outside the outline drawn in") +
+                   counted(generated.snapped_adhesion_ids.size(), "adhesions outside the cell drawn in") +
                    counted(generated.separated_adhesion_ids.size(), "adhesions at one place moved apart") +
+                   counted(generated.n_filled_holes, "holes smaller than a triangle filled") +
                    (generated.n_parts > 1 ? counted(generated.n_parts, "parts that no link joins") : "");
   report.figures = {{"n_vertices", static_cast<std::int64_t>(net.vertices_um.size())},
                     {"n_links", static_cast<std::int64_t>(net.links.size())},
@@ -39,10 +40,14 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
                     {"n_parts", static_cast<std::int64_t>(generated.n_parts)},
                     {"n_shared_segments", static_cast<std::int64_t>(generated.n_shared_segments)},
                     {"mean_edge_um", mean_edge_um},
+                    {"even_share", generated.even_share},
                     {"mean_quality", generated.mean_quality},
                     {"worst_quality", generated.worst_quality},
+                    {"n_needles", static_cast<std::int64_t>(generated.n_needles)},
                     {"mean_free_quality", generated.mean_free_quality},
                     {"worst_free_quality", generated.worst_free_quality},
+                    {"n_filled_holes", static_cast<std::int64_t>(generated.n_filled_holes)},
+                    {"relaxation_converged", generated.report.converged},
                     {"relaxation_steps", static_cast<std::int64_t>(generated.report.iterations)},
                     {"last_move_edges", generated.report.last_change},
                     {"clipped_fibre_ids", listed(generated.clipped_fibre_ids)},

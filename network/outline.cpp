@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 
+#include "network/polyline.h"
+
 namespace mbtfm::network {
 namespace {
 
@@ -15,29 +17,6 @@ constexpr double kCornerTurn = 50 * std::numbers::pi / 180;
 Polygon positively_oriented(Polygon polygon) {
   if (signed_area_um2(polygon) < 0) std::reverse(polygon.begin(), polygon.end());
   return polygon;
-}
-
-/// The closed line at equal steps of arc length.
-Polygon resampled(const Polygon& polygon, int n) {
-  double perimeter = 0;
-  const std::size_t size = polygon.size();
-  for (std::size_t i = 0; i < size; ++i) perimeter += norm(polygon[(i + 1) % size] - polygon[i]);
-  Polygon points;
-  points.reserve(n);
-  double start = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    const Vec2 a = polygon[i];
-    const Vec2 step = polygon[(i + 1) % size] - a;
-    const double length = norm(step);
-    while (static_cast<int>(points.size()) < n) {
-      const double s = perimeter * static_cast<double>(points.size()) / n;
-      if (s >= start + length) break;
-      points.push_back(a + ((s - start) / length) * step);
-    }
-    start += length;
-  }
-  while (static_cast<int>(points.size()) < n) points.push_back(polygon.front());  // rounding at the very end
-  return points;
 }
 
 double turn(const Polygon& points, int i, int reach) {
@@ -71,7 +50,7 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
   double perimeter = 0;
   for (std::size_t i = 0; i < outline.size(); ++i) perimeter += norm(outline[(i + 1) % outline.size()] - outline[i]);
   const int n = std::max(6 * kSamplesPerEdge, static_cast<int>(std::lround(kSamplesPerEdge * perimeter / edge_um)));
-  const Polygon dense = resampled(outline, n);
+  const Polygon dense = evenly_resampled(outline, n);
   points_um_.resize(n);
   for (int i = 0; i < n; ++i) {
     for (int k = -kHalfWindow; k <= kHalfWindow; ++k) {
@@ -97,6 +76,35 @@ OutlineCurve::OutlineCurve(const Polygon& outline_um, double edge_um) {
   start_um_.resize(n + 1);
   for (int i = 0; i < n; ++i) start_um_[i + 1] = start_um_[i] + norm(points_um_[(i + 1) % n] - points_um_[i]);
   for (const int c : corners) corners_um_.push_back(start_um_[c]);
+  index_stripes();
+}
+
+int OutlineCurve::stripe_of(double y_um) const {
+  return static_cast<int>(std::clamp((y_um - top_um_) / stripe_um_, 0.0, static_cast<double>(stripes_.size()) - 1));
+}
+
+void OutlineCurve::index_stripes() {
+  const auto [low, high] =
+      std::minmax_element(points_um_.begin(), points_um_.end(), [](Vec2 a, Vec2 b) { return a.y < b.y; });
+  const std::size_t n = points_um_.size();
+  top_um_ = low->y;
+  stripe_um_ = std::max((high->y - low->y) / static_cast<double>(n), std::numeric_limits<double>::min());
+  stripes_.resize(n);
+  for (std::size_t i = 0; i < n; ++i) {
+    const auto [y0, y1] = std::minmax(points_um_[i].y, points_um_[(i + 1) % n].y);
+    for (int stripe = stripe_of(y0); stripe <= stripe_of(y1); ++stripe) stripes_[stripe].push_back(static_cast<int>(i));
+  }
+}
+
+bool OutlineCurve::contains(Vec2 point_um) const {
+  bool is_inside = false;
+  for (const int i : stripes_[stripe_of(point_um.y)]) {
+    const Vec2 a = points_um_[i];
+    const Vec2 b = points_um_[(i + 1) % points_um_.size()];
+    if ((a.y > point_um.y) == (b.y > point_um.y)) continue;
+    if (point_um.x < a.x + (point_um.y - a.y) / (b.y - a.y) * (b.x - a.x)) is_inside = !is_inside;
+  }
+  return is_inside;
 }
 
 double OutlineCurve::wrapped(double s_um) const {
@@ -113,21 +121,55 @@ Vec2 OutlineCurve::at(double s_um) const {
   return points_um_[i] + along * (points_um_[(i + 1) % points_um_.size()] - points_um_[i]);
 }
 
-double OutlineCurve::nearest(Vec2 point_um) const {
-  double best = 0;
-  double smallest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < points_um_.size(); ++i) {
-    const Vec2 a = points_um_[i];
-    const Vec2 step = points_um_[(i + 1) % points_um_.size()] - a;
-    const double along = nearest_share(a, a + step, point_um);
-    const Vec2 gap = point_um - (a + along * step);
-    const double distance = dot(gap, gap);
-    if (distance < smallest) {
-      smallest = distance;
-      best = start_um_[i] + along * (start_um_[i + 1] - start_um_[i]);
+OutlineCurve::Nearest OutlineCurve::nearest_on_piece(std::size_t piece, Vec2 point_um) const {
+  const Vec2 a = points_um_[piece];
+  const Vec2 step = points_um_[(piece + 1) % points_um_.size()] - a;
+  const double along = nearest_share(a, a + step, point_um);
+  return {wrapped(start_um_[piece] + along * (start_um_[piece + 1] - start_um_[piece])),
+          norm(point_um - (a + along * step))};
+}
+
+Boundary::Boundary(const Cell& cell, double edge_um) : edge_um_(edge_um) {
+  rings_.emplace_back(cell.outline_um, edge_um);
+  const double smallest_um2 = 0.25 * std::numbers::sqrt3 * edge_um * edge_um;
+  for (const Polygon& hole : cell.holes_um) {
+    if (std::abs(signed_area_um2(hole)) < smallest_um2) {
+      ++n_filled_holes_;
+    } else {
+      rings_.emplace_back(hole, edge_um);
     }
   }
-  return wrapped(best);
+  grid_ = Grid(rings_.front().polygon(), edge_um);
+  for (int ring = 0; ring < static_cast<int>(rings_.size()); ++ring) {
+    const Polygon& corners = rings_[ring].polygon();
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      grid_.add(static_cast<int>(pieces_.size()), corners[i], corners[(i + 1) % corners.size()]);
+      pieces_.push_back({ring, static_cast<int>(i)});
+    }
+  }
+}
+
+BoundaryPlace Boundary::place(Vec2 point_um) const {
+  BoundaryPlace place;
+  for (std::size_t ring = 1; ring < rings_.size(); ++ring) {
+    place.is_in_hole = place.is_in_hole || rings_[ring].contains(point_um);
+  }
+  place.is_inside = is_within_outline(point_um) && !place.is_in_hole;
+  place.distance_um = std::numeric_limits<double>::infinity();
+  const auto look_at = [&](int piece) {
+    const auto [ring, i] = pieces_[piece];
+    const auto [s_um, distance_um] = rings_[ring].nearest_on_piece(i, point_um);
+    if (distance_um >= place.distance_um) return;
+    place.ring = ring;
+    place.s_um = s_um;
+    place.distance_um = distance_um;
+  };
+  grid_.for_each_near(point_um, point_um, edge_um_, look_at);
+  if (!place.is_inside && place.distance_um > edge_um_) {
+    for (int piece = 0; piece < static_cast<int>(pieces_.size()); ++piece) look_at(piece);
+  }
+  if (place.distance_um > edge_um_ && place.is_inside) place.distance_um = std::numeric_limits<double>::infinity();
+  return place;
 }
 
 }  // namespace mbtfm::network

@@ -4,15 +4,17 @@
 
 #include <vector>
 
+#include "network/size_field.h"
 #include "pipeline/contract/types.h"
 
 namespace mbtfm::network {
 
-/// A fibre (or a piece of one), or the outline where fibre_id is 0.
+/// A fibre (or a piece of one), the rim of an adhesion (or a piece of it), or else a ring of the outline.
 struct Chain {
   int fibre_id = 0;
+  int adhesion_id = 0;
   bool is_closed = false;
-  std::vector<int> vertices;
+  std::vector<int> vertices{};
 };
 
 struct PlanarGraph {
@@ -27,17 +29,21 @@ struct PlanarGraph {
   }
 };
 
-inline constexpr int kHeld = 3;  ///< an adhesion's vertex
-inline constexpr int kFibreEnd = 2;
+inline constexpr int kHeld = 4;  ///< an adhesion's centre
+inline constexpr int kFibreEnd = 3;
+inline constexpr int kRimPoint = 2;
 inline constexpr int kFibrePoint = 1;
 inline constexpr int kOutlinePoint = 0;
 
 /// Merge, split and cross until nothing is left to do, at most `kMaxRounds` times: moves a line by the tolerance at
 /// most in each. Vertices that are no longer on a chain stay in the list.
+/// @param tolerance  in wanted edge lengths
 /// @return whether nothing was left to do
-bool make_planar(PlanarGraph& graph, double tolerance_um);
+bool make_planar(PlanarGraph& graph, const SizeField& size, double tolerance);
 
-/// Split the segments of fibres into pieces of about the edge length.
-void subdivide_fibres(PlanarGraph& graph, double edge_um);
+/// Divide fibres and rims into pieces of about the wanted length, evenly between the vertices that must stay: ends,
+/// those held, those where lines meet, and those where a fibre turns by more than 25° (a gentler bend loses less than
+/// 0.06 edges).
+void divide_evenly(PlanarGraph& graph, const SizeField& size);
 
 }  // namespace mbtfm::network

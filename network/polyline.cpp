@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -59,35 +58,45 @@ Polyline without_short_pieces(Polyline points_um, double shortest_um) {
   return points_um;
 }
 
-Polyline evenly_divided(const Polyline& points_um, double edge_um) {
-  constexpr double kKink = 25 * std::numbers::pi / 180;
-  Polyline even = {points_um.front()};
-  std::size_t from = 0;
-  for (std::size_t i = 1; i < points_um.size(); ++i) {
-    if (i + 1 < points_um.size()) {
-      const Vec2 before = points_um[i] - points_um[i - 1];
-      const Vec2 after = points_um[i + 1] - points_um[i];
-      if (std::abs(std::atan2(cross(before, after), dot(before, after))) < kKink) continue;
-    }
-    const Polyline run(points_um.begin() + static_cast<std::ptrdiff_t>(from),
-                       points_um.begin() + static_cast<std::ptrdiff_t>(i) + 1);
-    const double length = length_um(run);
-    const int pieces = std::max(1, static_cast<int>(std::lround(length / edge_um)));
-    std::size_t k = 0;
-    double start = 0;
-    for (int piece = 1; piece < pieces; ++piece) {
-      const double s = length * piece / pieces;
-      while (k + 2 < run.size() && start + norm(run[k + 1] - run[k]) < s) {
-        start += norm(run[k + 1] - run[k]);
-        ++k;
-      }
-      const Vec2 step = run[k + 1] - run[k];
-      even.push_back(run[k] + ((s - start) / norm(step)) * step);
-    }
-    even.push_back(run.back());
-    from = i;
+std::vector<double> even_division_um(double length_um, const std::function<double(double)>& size_um, int fewest) {
+  std::vector<double> at = {0};
+  std::vector<double> count = {0};  // of edges up to there: the integral of 1 / h
+  constexpr double kStep = 0.25;    // of an edge: h grows by at most a third over it
+  double inverse = 1 / size_um(0);
+  while (at.back() < length_um) {
+    const double next = std::min(length_um, at.back() + kStep / inverse);
+    const double next_inverse = 1 / size_um(next);
+    count.push_back(count.back() + 0.5 * (next - at.back()) * (inverse + next_inverse));
+    at.push_back(next);
+    inverse = next_inverse;
   }
-  return even;
+  const int pieces = std::max(fewest, static_cast<int>(std::lround(count.back())));
+  std::vector<double> division;
+  std::size_t k = 0;
+  for (int i = 1; i < pieces; ++i) {
+    const double wanted = count.back() * i / pieces;
+    while (count[k + 1] < wanted) ++k;
+    division.push_back(at[k] + (at[k + 1] - at[k]) * (wanted - count[k]) / (count[k + 1] - count[k]));
+  }
+  return division;
+}
+
+Polyline evenly_divided(const Polyline& points_um, const SizeField& size, int fewest) {
+  std::vector<double> start = {0};
+  for (std::size_t i = 1; i < points_um.size(); ++i) {
+    start.push_back(start.back() + norm(points_um[i] - points_um[i - 1]));
+  }
+  const auto at = [&](double s) {
+    const auto next = std::upper_bound(start.begin() + 1, start.end() - 1, s);
+    const auto i = next - start.begin();
+    return points_um[i - 1] + ((s - start[i - 1]) / (start[i] - start[i - 1])) * (points_um[i] - points_um[i - 1]);
+  };
+  Polyline inner;
+  for (const double s : even_division_um(
+           start.back(), [&](double s) { return size.at(at(s)); }, fewest)) {
+    inner.push_back(at(s));
+  }
+  return inner;
 }
 
 Polyline densified(const Polyline& points_um, double longest_um) {
@@ -99,6 +108,28 @@ Polyline densified(const Polyline& points_um, double longest_um) {
   }
   dense.push_back(points_um.back());
   return dense;
+}
+
+Polygon evenly_resampled(const Polygon& polygon, int n) {
+  double perimeter = 0;
+  const std::size_t size = polygon.size();
+  for (std::size_t i = 0; i < size; ++i) perimeter += norm(polygon[(i + 1) % size] - polygon[i]);
+  Polygon points;
+  points.reserve(n);
+  double start = 0;
+  for (std::size_t i = 0; i < size; ++i) {
+    const Vec2 a = polygon[i];
+    const Vec2 step = polygon[(i + 1) % size] - a;
+    const double length = norm(step);
+    while (static_cast<int>(points.size()) < n) {
+      const double s = perimeter * static_cast<double>(points.size()) / n;
+      if (s >= start + length) break;
+      points.push_back(a + ((s - start) / length) * step);
+    }
+    start += length;
+  }
+  while (static_cast<int>(points.size()) < n) points.push_back(polygon.front());  // rounding at the very end
+  return points;
 }
 
 }  // namespace mbtfm::network

@@ -62,6 +62,43 @@ TEST(Mesh, area_is_that_of_the_outline) {
   EXPECT_GE(area, std::numbers::pi * (1 - kEdge * kEdge * (1.5 * 1.5 / 6 + 1.0 / 48)));
 }
 
+TEST(Mesh, holes_are_left_out) {
+  Cell cell = square(4);
+  cell.holes_um = {{{0.5, 0.5}, {1.5, 0.5}, {1.5, 1.5}, {0.5, 1.5}}, {{2, 2}, {2, 3.5}, {3.5, 3.5}, {3.5, 2}}};
+  for (const double edge : {0.1, 0.3}) {
+    const GeneratedNetwork generated = generate_network(cell, {.edge_length_um = edge});
+    // vertices lie on the sides and corners, as the square's above
+    EXPECT_NEAR(generated.area_um2, 16 - 1 - 2.25, 1e-9) << "edge " << edge;
+    const int n_vertices = static_cast<int>(generated.network.vertices_um.size());
+    const int n_edges = static_cast<int>(generated.network.links.size());
+    EXPECT_EQ(n_vertices - n_edges + generated.n_triangles, 1 - 2) << "edge " << edge;
+  }
+}
+
+TEST(Mesh, edges_grow_from_what_is_resolved_no_faster_than_wanted) {
+  Cell cell = square(30);
+  Adhesion a;
+  a.adhesion_id = 1;
+  a.position_um = {15, 15};
+  a.major_axis_um = a.minor_axis_um = 0.8;
+  a.area_um2 = std::numbers::pi * 0.16;
+  cell.adhesions = {a};
+  NetworkParameters p;
+  p.adhesion_anchor = "rim";
+  for (const double growth : {0.15, 0.3}) {
+    p.edge_growth = growth;
+    const Network net = generate_network(cell, p).network;
+    for (const Link& link : net.links) {
+      if (net.adhesion_id[link.vertex_a] != 0 && net.adhesion_id[link.vertex_b] != 0) continue;
+      const Vec2 middle = 0.5 * (net.vertices_um[link.vertex_a] + net.vertices_um[link.vertex_b]);
+      const double wanted =
+          std::min(1.5, 0.1 * std::numbers::pi + growth * std::max(0.0, norm(middle - a.position_um) - 0.4));
+      EXPECT_LE(link.rest_length_um, 1.8 * wanted) << "growth " << growth;
+      EXPECT_GE(link.rest_length_um, 0.5 * wanted) << "growth " << growth;
+    }
+  }
+}
+
 TEST(Mesh, sheet_of_even_surface_tension_is_at_rest_inside) {
   // Links weighted by width are minus the gradient of the area, which inner vertices do not change; so the forces on
   // them cancel to rounding.

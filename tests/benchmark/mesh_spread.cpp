@@ -1,11 +1,16 @@
-/// mesh_spread [cell] [meshes]: how far the adhesion forces of one simulated cell with given tensions, and their
-/// derivatives by tension, differ from mesh to mesh, by formulation and edge length. A table (CSV) on stdout.
+/// mesh_spread OUT [cell] [meshes] [finest edge, um]: how far the adhesion forces of one simulated cell with given
+/// tensions, and their derivatives by tension, differ from mesh to mesh, by formulation and edge length.
+/// Writes OUT/mesh_spread.csv and OUT/mesh_spread.svg.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
+#include <fstream>
+#include <string>
 
 #include "network/cables.h"
 #include "network/mesh.h"
+#include "pipeline/charts/chart.h"
+#include "pipeline/contract/parallel.h"
 #include "samples/draw.h"
 #include "samples/experiment.h"
 
@@ -17,8 +22,18 @@ struct Formulation {
   const char* name;
   const char* link_weights;
   const char* adhesion_anchor;
+  const char* seeds;
   bool keeps_surface_tension;  ///< links pull in proportion to the edge; the thesis' are the same at any edge
+  double finest_um;            ///< edge length below which it is left out: the rim has small ones of its own
 };
+constexpr Formulation kFormulations[] = {{"thesis: link values, points", "equal", "centre", "jittered", false, 0},
+                                         {"link values per edge, points", "equal", "centre", "jittered", true, 0},
+                                         {"width, points", "width", "centre", "jittered", true, 0},
+                                         {"width, ellipses", "width", "ellipse", "jittered", true, 0},
+                                         {"width, ellipses, regular", "width", "ellipse", "regular", true, 0},
+                                         {"width, ellipses, Poisson disc", "width", "ellipse", "poisson", true, 0},
+                                         {"width, rims", "width", "rim", "jittered", true, 0.9}};
+constexpr double kEdges_um[] = {3, 2, 1.5, 1, 0.7, 0.4};
 
 /// What one mesh gives.
 struct Sample {
@@ -35,6 +50,7 @@ Sample sample(const samples::DrawnCell& drawn, const Formulation& f, double edge
   network::NetworkParameters p;
   p.edge_length_um = edge_um;
   p.seed = seed;
+  p.seeds = f.seeds;
   p.link_weights = f.link_weights;
   p.adhesion_anchor = f.adhesion_anchor;
   Network network = network::generate_network(drawn.cell, p).network;
@@ -63,48 +79,108 @@ double relative_spread(const std::vector<Sample>& samples, Get get) {
   return std::sqrt(squares) / mean.norm();
 }
 
-void print_row(const samples::DrawnCell& drawn, const Formulation& f, double edge_um, int n_meshes) {
-  std::vector<Sample> samples;
-  double vertices = 0, seconds = 0;
-  for (int seed = 1; seed <= n_meshes; ++seed) {
-    samples.push_back(sample(drawn, f, edge_um, static_cast<std::uint64_t>(seed)));
-    vertices += static_cast<double>(samples.back().n_vertices) / n_meshes;
-    seconds += samples.back().seconds / n_meshes;
+constexpr const char* kQuantities[] = {"forces", "d network", "d dorsal", "d arc", "d ventral"};
+
+/// A line of the table.
+struct Row {
+  const Formulation* formulation = nullptr;
+  double edge_um = 0, n_vertices = 0, seconds = 0;
+  double spread[5] = {};  ///< of kQuantities
+};
+
+Row measure(const samples::DrawnCell& drawn, const Formulation& f, double edge_um, int n_meshes) {
+  std::vector<Sample> samples(n_meshes);
+  parallel_for(n_meshes, available_threads(),
+               [&](int m) { samples[m] = sample(drawn, f, edge_um, static_cast<std::uint64_t>(m) + 1); });
+  Row row{.formulation = &f, .edge_um = edge_um};
+  for (const Sample& s : samples) {
+    row.n_vertices += static_cast<double>(s.n_vertices) / n_meshes;
+    row.seconds += s.seconds / n_meshes;
   }
   const auto of_group = [&](Eigen::Index g) {
     return relative_spread(samples, [g](const Sample& s) -> Eigen::VectorXd { return s.derivatives.col(g); });
   };
-  std::printf("%s,%g,%.0f,%.3f,%.4f,%.4f", f.name, edge_um, vertices, seconds,
-              relative_spread(samples, [](const Sample& s) -> Eigen::VectorXd { return s.forces; }), of_group(0));
-  for (const FibreType type : kFibreTypes) {
-    double sum = 0;
+  row.spread[0] = relative_spread(samples, [](const Sample& s) -> Eigen::VectorXd { return s.forces; });
+  row.spread[1] = of_group(0);
+  for (std::size_t k = 0; k < std::size(kFibreTypes); ++k) {
     int n = 0;
+    double sum = 0;
     for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i) {
-      if (drawn.cell.fibres[i].type != type) continue;
+      if (drawn.cell.fibres[i].type != kFibreTypes[k]) continue;
       sum += of_group(static_cast<Eigen::Index>(i) + 1);
       ++n;
     }
-    std::printf(",%.4f", n > 0 ? sum / n : 0.0);
+    row.spread[2 + k] = n > 0 ? sum / n : 0;
   }
-  std::printf("\n");
-  std::fflush(stdout);
+  return row;
+}
+
+void write_table(std::ostream& out, const std::vector<Row>& rows) {
+  out << "formulation,edge_um,vertices,seconds,forces,d_network,d_dorsal,d_arc,d_ventral\n";
+  for (const Row& r : rows) {
+    out << '"' << r.formulation->name << "\"," << r.edge_um << ',' << std::lround(r.n_vertices) << ',' << r.seconds;
+    for (const double s : r.spread) out << ',' << s;
+    out << '\n';
+  }
+}
+
+/// Spread against edge length: a chart by quantity, a curve by formulation.
+std::string drawn_table(const std::vector<Row>& rows, int n_meshes) {
+  std::vector<charts::Chart> all;
+  for (std::size_t q = 0; q < std::size(kQuantities); ++q) {
+    std::vector<double> edges, spreads;
+    for (const Row& r : rows) {
+      edges.push_back(r.edge_um);
+      spreads.push_back(100 * r.spread[q]);
+    }
+    charts::Chart chart(kQuantities[q], charts::axis_over("edge length (um)", edges, charts::Scale::logarithmic),
+                        charts::axis_over("spread from mesh to mesh (%)", spreads, charts::Scale::logarithmic));
+    chart.put_key(charts::Chart::KeySide::left);
+    int colour = 0;
+    for (const Formulation& f : kFormulations) {
+      std::vector<Vec2> points;
+      for (const Row& r : rows)
+        if (r.formulation == &f) points.push_back({r.edge_um, 100 * r.spread[q]});
+      const std::string stroke = charts::kColours[colour % std::size(charts::kColours)];
+      const std::string dashes = colour >= static_cast<int>(std::size(charts::kColours)) ? ";stroke-dasharray:4 3" : "";
+      chart.curve(points, "stroke:" + stroke + ";stroke-width:1.8" + dashes);
+      for (const Vec2 p : points) chart.dot(p, 2.5, "fill:" + stroke);
+      if (q == 0) chart.key(f.name, stroke);
+      ++colour;
+    }
+    all.push_back(std::move(chart));
+  }
+  return charts::svg_file(all, 3,
+                          {"One simulated cell, " + std::to_string(n_meshes) +
+                           " meshes each: root mean square deviation of all adhesion forces from their mean over the "
+                           "meshes, and of their derivatives",
+                           "by the tension of the network or of a fibre (mean over the fibres of a type), in parts of "
+                           "the mean."});
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  const auto cell = static_cast<std::uint64_t>(argc > 1 ? std::atoi(argv[1]) : 1);
-  const int n_meshes = argc > 2 ? std::atoi(argv[2]) : 6;
-  const Formulation formulations[] = {{"thesis", "equal", "centre", false},
-                                      {"equal centre", "equal", "centre", true},
-                                      {"width centre", "width", "centre", true},
-                                      {"equal ellipse", "equal", "ellipse", true},
-                                      {"width ellipse", "width", "ellipse", true}};
+  if (argc < 2) {
+    std::fprintf(stderr, "usage: mesh_spread OUT [cell] [meshes] [finest edge, um]\n");
+    return 2;
+  }
+  const std::string out = argv[1];
+  const auto cell = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 1);
+  const int n_meshes = argc > 3 ? std::atoi(argv[3]) : 20;
+  const double finest_um = argc > 4 ? std::atof(argv[4]) : 0;
   const samples::ScenarioParameters p;
   const samples::DrawnCell drawn = draw_cell(p.cell, p.tension, samples::field_um(p.microscope), cell);
-  std::printf("formulation,edge_um,vertices,seconds,forces,d_network");
-  for (const FibreType type : kFibreTypes) std::printf(",d_%s", std::string(name_of(type)).c_str());
-  std::printf("\n");
-  for (const Formulation& f : formulations)
-    for (const double edge_um : {0.6, 0.9, 1.5, 3.0}) print_row(drawn, f, edge_um, n_meshes);
+  std::vector<Row> rows;
+  for (const Formulation& f : kFormulations) {
+    for (const double edge_um : kEdges_um) {
+      if (edge_um < std::max(f.finest_um, finest_um)) continue;
+      rows.push_back(measure(drawn, f, edge_um, n_meshes));
+      std::fprintf(stderr, "%s, %g um: forces %.3f, %.2f s a mesh\n", f.name, edge_um, rows.back().spread[0],
+                   rows.back().seconds);
+    }
+  }
+  std::ofstream table(out + "/mesh_spread.csv");
+  write_table(table, rows);
+  std::ofstream(out + "/mesh_spread.svg") << drawn_table(rows, n_meshes);
 }

@@ -1,34 +1,21 @@
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include <gtest/gtest.h>
 
+#include "network/adhesions.h"
 #include "pipeline/contract/errors.h"
+#include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
 #include "tests/support/valid_network.h"
 
 namespace mbtfm::network {
 namespace {
 
+using testing::adhesion_at;
 using testing::expect_valid;
-
-Adhesion adhesion_at(int id, Vec2 position) {
-  Adhesion a;
-  a.adhesion_id = id;
-  a.position_um = position;
-  a.area_um2 = 0.5;
-  a.major_axis_um = 1.2;
-  a.minor_axis_um = 0.53;
-  return a;
-}
-
-Fibre fibre_along(int id, Polyline points) {
-  Fibre f;
-  f.fibre_id = id;
-  f.width_um = 0.6;
-  f.points_um = std::move(points);
-  return f;
-}
+using testing::fibre_along;
 
 /// A square of 20 um with an adhesion near each corner.
 Cell square_cell() {
@@ -123,9 +110,9 @@ TEST(HardMesh, fibres_that_leave_the_cell_are_cut_and_named) {
   const GeneratedNetwork generated = generate_network(cell, {});
   expect_valid(generated, cell, 1.5);
   EXPECT_EQ(generated.clipped_fibre_ids, (std::vector<int>{1, 3}));
-  // cut at most a quarter of an edge from the outline
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 10, 0.4 * 1.5);
-  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 3), 20, 0.8 * 1.5);
+  // cut at the outline, but for merging by a tenth of an edge
+  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), std::hypot(10, 0.625), 0.1 * 1.5);
+  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 3), 20, 0.2 * 1.5);
   cell.fibres = {fibre_along(4, {{30, 10}, {36, 11}})};
   EXPECT_THROW(generate_network(cell, {}), InvalidData);
 }
@@ -226,10 +213,30 @@ TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
 }
 
 TEST(HardMesh, cell_smaller_than_an_edge) {
-  Cell cell = square_cell();
-  for (const double edge : {10.0, 20.0, 100.0}) {
-    SCOPED_TRACE("edge " + std::to_string(edge));
-    expect_valid(generate_network(cell, {.edge_length_um = edge}), cell, 0.0);
+  const Cell cell = square_cell();
+  for (const std::string anchor : {"rim", "ellipse"}) {
+    for (const double edge : {10.0, 20.0, 100.0}) {
+      SCOPED_TRACE(anchor + ", edge " + std::to_string(edge));
+      expect_valid(generate_network(cell, {.edge_length_um = edge, .adhesion_anchor = anchor}), cell, 0.0);
+    }
+  }
+}
+
+TEST(HardMesh, adhesions_of_any_size) {
+  for (const double scale : {0.05, 0.3, 3.0, 12.0}) {
+    SCOPED_TRACE("scale " + std::to_string(scale));
+    Cell cell = square_cell();
+    cell.adhesions.push_back(adhesion_at(5, {10, 10}, 0.4));
+    cell.adhesions.back().major_axis_um *= scale;
+    cell.adhesions.back().minor_axis_um *= scale;
+    cell.adhesions.back().area_um2 *= scale * scale;
+    cell.fibres = {fibre_along(1, {{2, 2}, {10, 10}}, 1, 5)};
+    const NetworkParameters parameters{.adhesion_anchor = "rim"};
+    const GeneratedNetwork generated = generate_network(cell, parameters);
+    expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
+    EXPECT_GE(generated.worst_free_quality, 0.3);
+    // the fibre is straight, to the centres of both
+    EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 8 * std::sqrt(2.0), 1e-9);
   }
 }
 
@@ -237,6 +244,80 @@ TEST(HardMesh, points_that_repeat_and_lines_that_run_back) {
   Cell cell = square_cell();
   cell.outline_um = {{0, 0}, {10, 0}, {10, 0}, {20, 0}, {20, 20}, {20, 26}, {20, 20}, {0, 20}};  // a whisker
   expect_valid(generate_network(cell, {}), cell, 1.5);
+}
+
+class HardCell : public ::testing::TestWithParam<testing::HardCell> {};
+
+TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) {
+  const Cell& cell = GetParam().cell;
+  for (const std::string anchor : {"rim", "ellipse", "centre"}) {
+    for (const std::uint64_t seed : {1, 2, 3}) {
+      SCOPED_TRACE(anchor + ", seed " + std::to_string(seed));
+      NetworkParameters parameters{.seed = seed};
+      parameters.adhesion_anchor = anchor;
+      parameters.free_fibre_ends = anchor == "rim" ? "width" : "point";
+      const GeneratedNetwork generated = generate_network(cell, parameters);
+      expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
+      EXPECT_GE(generated.worst_free_quality, 0.3);
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Mesh, HardCell, ::testing::ValuesIn(testing::hard_cells()),
+                         [](const auto& test) { return test.param.name; });
+
+TEST(HardMesh, rims_hold_the_adhesions_areas) {
+  Cell cell = square_cell();
+  const GeneratedNetwork generated = generate_network(cell, {.adhesion_anchor = "rim"});
+  for (const Adhesion& a : cell.adhesions) {
+    Polygon rim;  // round the centre
+    for (std::size_t v = 0; v < generated.network.vertices_um.size(); ++v) {
+      if (generated.network.adhesion_id[v] != a.adhesion_id) continue;
+      Adhesion inner = a;
+      inner.major_axis_um *= 0.8;
+      inner.minor_axis_um *= 0.8;
+      if (!covers(inner, generated.network.vertices_um[v])) rim.push_back(generated.network.vertices_um[v]);
+    }
+    EXPECT_EQ(rim.size(), 8U);
+    const auto angle = [&](Vec2 p) { return std::atan2(p.y - a.position_um.y, p.x - a.position_um.x); };
+    std::sort(rim.begin(), rim.end(), [&](Vec2 p, Vec2 q) { return angle(p) < angle(q); });
+    // the fine line of the rim has 32 points or more, which cut off (2 pi / 32)² / 6 = 0.6 %
+    EXPECT_NEAR(signed_area_um2(rim), a.area_um2, 0.01 * a.area_um2) << "adhesion " << a.adhesion_id;
+  }
+}
+
+TEST(HardMesh, fibre_spans_a_hole) {
+  Cell cell = square_cell();
+  cell.holes_um = {testing::circle({10, 10}, 3, 80)};
+  cell.fibres = {fibre_along(1, {{3, 10}, {17, 10}})};
+  const GeneratedNetwork generated = generate_network(cell, {});
+  expect_valid(generated, cell, 1.5);
+  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 14, 1e-9);
+  for (const Link& link : generated.network.links) {
+    const Vec2 middle =
+        0.5 * (generated.network.vertices_um[link.vertex_a] + generated.network.vertices_um[link.vertex_b]);
+    // chords of the rim lie inside the hole by edge² / 8R
+    EXPECT_TRUE(link.fibre_id > 0 || norm(middle - Vec2{10, 10}) > 3 - 0.2) << "in the hole";
+  }
+}
+
+TEST(HardMesh, free_end_in_a_hole_is_cut_off_and_named) {
+  Cell cell = square_cell();
+  cell.holes_um = {testing::circle({10, 10}, 3, 80)};
+  cell.fibres = {fibre_along(1, {{3, 10}, {10, 10}}), fibre_along(2, {{3, 12}, {17, 12}})};
+  const GeneratedNetwork generated = generate_network(cell, {});
+  expect_valid(generated, cell, 1.5);
+  EXPECT_EQ(generated.clipped_fibre_ids, (std::vector<int>{1}));
+  // averaging the rim draws it in by edge² / 96 R, merging by a tenth of an edge
+  EXPECT_NEAR(testing::length_of_fibre_um(generated.network, 1), 4, 0.1 * 1.5 + 0.01);
+}
+
+TEST(HardMesh, hole_smaller_than_a_triangle_is_filled) {
+  Cell cell = square_cell();
+  cell.holes_um = {testing::circle({10, 10}, 0.4, 30), testing::circle({6, 12}, 2, 30)};
+  const GeneratedNetwork generated = generate_network(cell, {});
+  expect_valid(generated, cell, 1.5);
+  EXPECT_EQ(generated.n_filled_holes, 1);
 }
 
 }  // namespace

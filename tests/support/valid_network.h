@@ -31,6 +31,22 @@ inline int n_ends_of_fibre(const Network& network, int fibre_id) {
   return static_cast<int>(std::count_if(degree.begin(), degree.end(), [](auto& d) { return d.second == 1; }));
 }
 
+/// The finest wanted edge length, but for lines of the frame that are close together.
+inline double finest_edge_um(const Cell& cell, const network::NetworkParameters& parameters) {
+  double finest = parameters.edge_length_um;
+  for (const Adhesion& a : cell.adhesions) {
+    Polygon rim = ellipse_corners(a, 64);
+    rim.push_back(rim.front());
+    if (parameters.adhesion_anchor == "rim") finest = std::min(finest, length_um(rim) / parameters.rim_points);
+  }
+  for (const Fibre& f : cell.fibres) {
+    const bool is_free = !f.start_adhesion_id || !f.end_adhesion_id;
+    if (parameters.free_fibre_ends == "width" && is_free) finest = std::min(finest, f.width_um);
+  }
+  return finest;
+}
+
+/// @param edge_length_um  the finest wanted
 inline void expect_valid(const network::GeneratedNetwork& generated, const Cell& cell, double edge_length_um) {
   const Network& net = generated.network;
   ASSERT_NO_THROW(check(net));
