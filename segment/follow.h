@@ -1,4 +1,4 @@
-/// Inside of the bead tracker: where each bead has gone, and whether that can be.
+/// Inside of the bead tracker: where each bead has gone.
 #pragma once
 
 #include "segment/coarse_field.h"
@@ -17,11 +17,5 @@ std::vector<Track> follow(const Scene& scene, const GridField& grid, const Track
 
 /// Flag tracks that contradict those around them "neighbours disagree"; how many.
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks);
-
-/// Measure each bead with the narrow window; flag what is less similar than the picture's noise explains.
-void measure(const Scene& scene, double least_similarity, std::vector<Track>& tracks);
-
-/// Registered from where it went, a bead must come back to where it was; no two beads go to one place.
-void verify(const Scene& scene, std::vector<Track>& tracks);
 
 }  // namespace mbtfm::segment

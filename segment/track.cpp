@@ -11,6 +11,7 @@
 #include "segment/coarse_field.h"
 #include "segment/far_field.h"
 #include "segment/follow.h"
+#include "segment/measure.h"
 #include "segment/pool.h"
 #include "segment/scene.h"
 
