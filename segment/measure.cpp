@@ -80,11 +80,13 @@ struct Dissimilarity {
   double granted = 0.4;  ///< whatever the reason
   /// What similarity a right match has depends on the noise, so the picture itself tells: a bead that is less similar
   /// by eight times the median lack of it shows another bead. Steep places cost similarity too: a tenth is granted.
-  /// A dim bead lacks more, noise²/variance; it may lack twice of that.
-  double most(const Registered& found) const {
-    return std::min(std::max({0.1, 8 * median, 2 * noise * noise / std::max(found.variance, 1e-12)}), granted);
+  /// A dim bead lacks more, noise²/variance; it may lack half more than that. Of a bead `alone`, which any other may
+  /// be taken for, twice as much is asked.
+  bool is_same(const Track& track) const {
+    const double share = track.others ? 0.5 : 1;
+    const double by_noise = 1.5 * noise * noise / std::max(track.found.variance, 1e-12);
+    return 1 - track.found.similarity <= std::min(std::max(share * std::max(0.1, 8 * median), by_noise), granted);
   }
-  bool is_same(const Registered& found) const { return 1 - found.similarity <= most(found); }
 };
 
 Dissimilarity dissimilarity(const Scene& scene, double least_similarity, const std::vector<Track>& tracks) {
@@ -211,9 +213,9 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
     if (!track.is_good()) return;
     if (is_spoilt(track)) {
       const auto alone = measured_alone(scene, k, guesses[k].found.motion, stressed);
-      if (alone && alone->found.similarity > track.found.similarity) track = *alone;
+      if (alone && alone->found.similarity > track.found.similarity && allowed.is_same(*alone)) track = *alone;
     }
-    if (!allowed.is_same(track.found)) track.flag = "no partner";
+    if (!allowed.is_same(track)) track.flag = "no partner";
   });
   flag_changed_light(scene, tracks);
 }
