@@ -16,12 +16,13 @@ bool is_inside(const Plane& plane, Vec2 place, double margin) {
 
 /// The beads in the stressed image as the tracks expect them, fitted together: that two lie in one blot is known from
 /// the relaxed image. Those of untracked beads have no height; the beads that no track leads to come last.
-std::vector<DetectedBead> expected_spots(const Scene& scene, const std::vector<Track>& tracks) {
+std::vector<DetectedBead> expected_spots(const Scene& scene, const std::vector<Track>& tracks,
+                                         const std::vector<Motion>& motions) {
   std::vector<DetectedBead> spots;
   std::vector<Vec2> ends;
   for (int k = 0; k < scene.n_beads(); ++k) {
     const bool is_good = tracks[k].is_good();
-    ends.push_back(scene.position(k) + (is_good ? tracks[k].found.motion.u : Vec2{}));
+    ends.push_back(scene.position(k) + (is_good ? motions[k].u : Vec2{}));
     spots.push_back({ends.back(), is_good ? scene.relaxed->beads[k].brightness : 0});
   }
   const Neighbours near(std::move(ends), std::max(4.0, scene.spacing()));
@@ -97,6 +98,41 @@ Dissimilarity dissimilarity(const Scene& scene, double least_similarity, const s
   return {.median = quantile(std::move(lacks), 0.5),
           .noise = std::hypot(scene.relaxed->noise, scene.stressed.noise) / std::sqrt(2.0),
           .granted = 1 - least_similarity};
+}
+
+/// Where the narrow window loses the bead, or finds another, it has no likeness.
+void measure_narrowly(const Scene& scene, std::vector<Track>& tracks) {
+  for_each_bead(scene, [&](int k) {
+    Track& track = tracks[k];
+    if (!track.is_good()) return;
+    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, scene.position(k),
+                                        track.found.motion, scene.narrow);
+    const bool is_near = norm(found.motion.u - track.found.motion.u) < 2 * scene.bead_sigma();
+    track.found.similarity = -1;
+    if (found.is_converged && is_near) track.found = found;
+  });
+}
+
+/// Windows less alike than most may be spoilt by beads that went elsewhere: those are measured without them, and the
+/// more similar answer counts.
+void look_again(const Scene& scene, const Dissimilarity& allowed, const std::vector<Motion>& guesses,
+                std::vector<Track>& tracks) {
+  constexpr double kNoMatter = 0.05;  // half of what steepness alone is granted
+  const auto is_spoilt = [&](const Track& track) {
+    return track.is_good() && 1 - track.found.similarity > std::max(kNoMatter, 2 * allowed.median);
+  };
+  if (std::none_of(tracks.begin(), tracks.end(), is_spoilt)) return;
+  std::vector<Motion> starts = motions_of(tracks);
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (is_spoilt(tracks[k])) starts[k] = guesses[k];
+  }
+  const Spots stressed = sorted(expected_spots(scene, tracks, starts), std::max(4.0, scene.spacing()));
+  for_each_bead(scene, [&](int k) {
+    if (!is_spoilt(tracks[k])) return;
+    auto alone = measured_alone(scene, k, guesses[k], stressed);
+    if (!alone || alone->found.similarity <= tracks[k].found.similarity || !allowed.is_same(*alone)) return;
+    tracks[k] = std::move(*alone);
+  });
 }
 
 /// A bead keeps its light. One whose gain differs from its neighbours' by more than five robust standard deviations
@@ -188,35 +224,13 @@ void check_claims(const Scene& scene, std::vector<Track>& tracks) {
 }  // namespace
 
 void measure(const Scene& scene, double least_similarity, std::vector<Track>& tracks) {
-  const std::vector<Track> guesses = tracks;
-  for_each_bead(scene, [&](int k) {
-    Track& track = tracks[k];
-    if (!track.is_good()) return;
-    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, scene.position(k),
-                                        track.found.motion, scene.narrow);
-    const bool is_near = norm(found.motion.u - track.found.motion.u) < 2 * scene.bead_sigma();
-    track.found.similarity = -1;
-    if (found.is_converged && is_near) track.found = found;
-  });
+  const std::vector<Motion> guesses = motions_of(tracks);
+  measure_narrowly(scene, tracks);
   const Dissimilarity allowed = dissimilarity(scene, least_similarity, tracks);
-  // worth a second look, which a picture with few of them does not pay for
-  const auto is_spoilt = [&](const Track& track) {
-    return 1 - track.found.similarity > std::max(0.05, 2 * allowed.median);
-  };
-  std::vector<Track> starts = tracks;
-  for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (is_spoilt(tracks[k])) starts[k].found.motion = guesses[k].found.motion;
+  look_again(scene, allowed, guesses, tracks);
+  for (Track& track : tracks) {
+    if (track.is_good() && !allowed.is_same(track)) track.flag = "no partner";
   }
-  const Spots stressed = sorted(expected_spots(scene, starts), std::max(4.0, scene.spacing()));
-  for_each_bead(scene, [&](int k) {
-    Track& track = tracks[k];
-    if (!track.is_good()) return;
-    if (is_spoilt(track)) {
-      const auto alone = measured_alone(scene, k, guesses[k].found.motion, stressed);
-      if (alone && alone->found.similarity > track.found.similarity && allowed.is_same(*alone)) track = *alone;
-    }
-    if (!allowed.is_same(track)) track.flag = "no partner";
-  });
   flag_changed_light(scene, tracks);
 }
 
