@@ -90,26 +90,35 @@ std::vector<Track> follow(const Scene& scene, const GridField& grid, const Track
   return tracks;
 }
 
-int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks) {
+std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks) {
   const std::vector<Motion> motions = motions_of(tracks);
   std::vector<std::optional<LocalMotion>> around(tracks.size());
   for_each_bead(scene, [&](int k) {
     if (!tracks[k].is_good()) return;
     around[k] = local_motion(scene.position(k), good_around(scene, tracks, k, 12), scene.relaxed->positions, motions);
   });
+  return around;
+}
+
+double typical_spread(const std::vector<std::optional<LocalMotion>>& around) {
   std::vector<double> spreads;
   for (const auto& local : around) {
     if (local && local->n_beads >= 3) spreads.push_back(local->spread_px);
   }
+  return quantile(std::move(spreads), 0.5);
+}
+
+int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks) {
+  const auto around = motions_around(scene, tracks);
   // Twelve neighbours know their spread to a third: it is no smaller than the picture's.
-  const double typical = quantile(std::move(spreads), 0.5);
+  const double typical = typical_spread(around);
   int n_outliers = 0;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (!tracks[k].is_good()) continue;
     const auto& local = around[k];
     if (local && local->n_beads >= 3) {
       const double spread = std::max(local->spread_px, typical);
-      const double misfit = norm(motions[k].u - local->motion.u);
+      const double misfit = norm(tracks[k].found.motion.u - local->motion.u);
       // The floor is what a field's curvature within the reach may do without being wrong.
       if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + 0.3) continue;
     }

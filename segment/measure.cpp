@@ -5,6 +5,7 @@
 #include <optional>
 
 #include "segment/beads.h"
+#include "segment/follow.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -113,15 +114,18 @@ void measure_narrowly(const Scene& scene, std::vector<Track>& tracks) {
   });
 }
 
-/// Windows less alike than most may be spoilt by beads that went elsewhere: those are measured without them, and the
-/// more similar answer counts.
+/// Where beads are loose, windows less alike than most may be spoilt by beads that went elsewhere: those are measured
+/// without them, and the more similar answer counts.
 void look_again(const Scene& scene, const Dissimilarity& allowed, const std::vector<Motion>& guesses,
                 std::vector<Track>& tracks) {
   constexpr double kNoMatter = 0.05;  // half of what steepness alone is granted
   const auto is_spoilt = [&](const Track& track) {
     return track.is_good() && 1 - track.found.similarity > std::max(kNoMatter, 2 * allowed.median);
   };
-  if (std::none_of(tracks.begin(), tracks.end(), is_spoilt)) return;
+  // Where beads scatter by a tenth of their width, two of them differ by 0.4 widths at three standard deviations, which
+  // costs a twentieth of likeness; with less, it is steepness or another bead that a dissimilar window shows.
+  constexpr double kLoose = 0.1;
+  if (typical_spread(motions_around(scene, tracks)) < kLoose * scene.bead_sigma()) return;
   std::vector<Motion> starts = motions_of(tracks);
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (is_spoilt(tracks[k])) starts[k] = guesses[k];
