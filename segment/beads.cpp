@@ -158,6 +158,25 @@ DetectedBead improved(const DetectedBead& bead, const Plane& plane, const Plane&
 
 double background_sigma(double bead_sigma) { return std::max(6 * bead_sigma, 8.0); }
 
+std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, double bead_sigma,
+                                       int rounds, int threads) {
+  for (int round = 0; round < rounds; ++round) {
+    const Plane model = picture_of(spots, plane, bead_sigma);
+    std::vector<DetectedBead> next(spots.size());
+    constexpr int kChunk = 256;
+    const int n = static_cast<int>(spots.size());
+    parallel_for((n + kChunk - 1) / kChunk, threads, [&](int chunk) {
+      for (int k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k) {
+        next[k] = improved(spots[k], plane, model, bead_sigma);
+      }
+    });
+    for (int k = 0; k < n; ++k) {  // a fit that runs away from its maximum is not believed
+      if (norm(next[k].position_px - spots[k].position_px) < bead_sigma) spots[k] = next[k];
+    }
+  }
+  return spots;
+}
+
 std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, double noise, double detection_snr,
                                      int threads) {
   const BandPass band{0.8 * bead_sigma, 1.6 * bead_sigma};
@@ -170,20 +189,7 @@ std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, doub
   const double dimmest = 0.1 * quantile(heights, 0.9);
   std::erase_if(beads, [&](const DetectedBead& bead) { return bead.brightness < dimmest; });
   constexpr int kRounds = 4;
-  for (int round = 0; round < kRounds; ++round) {
-    const Plane model = picture_of(beads, plane, bead_sigma);
-    std::vector<DetectedBead> next(beads.size());
-    constexpr int kChunk = 256;
-    const int n = static_cast<int>(beads.size());
-    parallel_for((n + kChunk - 1) / kChunk, threads, [&](int chunk) {
-      for (int k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k) {
-        next[k] = improved(beads[k], plane, model, bead_sigma);
-      }
-    });
-    for (int k = 0; k < n; ++k) {  // a fit that runs away from its maximum is not believed
-      if (norm(next[k].position_px - beads[k].position_px) < bead_sigma) beads[k] = next[k];
-    }
-  }
+  beads = fitted_spots(plane, std::move(beads), bead_sigma, kRounds, threads);
   std::erase_if(beads, [&](const DetectedBead& b) {
     return b.position_px.x < 0 || b.position_px.y < 0 || b.position_px.x > plane.width - 1 ||
            b.position_px.y > plane.height - 1;

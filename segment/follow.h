@@ -1,7 +1,11 @@
-/// Inside of the bead tracker: where each bead has gone, and whether that can be.
+/// Inside of the bead tracker: where each bead has gone.
 #pragma once
 
+#include <optional>
+#include <vector>
+
 #include "segment/coarse_field.h"
+#include "segment/local_motion.h"
 #include "segment/scene.h"
 
 namespace mbtfm::segment {
@@ -15,13 +19,13 @@ void require_common_beads(int n_found, int n_beads);
 /// @throws InvalidData where the two images do not show the same beads
 std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
 
+/// What the good tracks around say of each good one.
+std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks);
+
+/// Median standard deviation (px) of single beads about those around them.
+double typical_spread(const std::vector<std::optional<LocalMotion>>& around);
+
 /// Flag tracks that contradict those around them "neighbours disagree"; how many.
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks);
-
-/// Measure each bead with the narrow window; flag what is less similar than the picture's noise explains.
-void measure(const Scene& scene, double least_similarity, std::vector<Track>& tracks);
-
-/// Registered from where it went, a bead must come back to where it was; no two beads go to one place.
-void verify(const Scene& scene, std::vector<Track>& tracks);
 
 }  // namespace mbtfm::segment

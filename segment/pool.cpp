@@ -111,13 +111,14 @@ Pooling pooled(const Scene& scene, const std::vector<Track>& tracks) {
     const double within = 2 * scene.narrow.sigma / here.reach_px;  // weights fall to 1/e² at the reach
     const double own = own_variance(k) - loose + std::pow(within, 4) * missed;
     result.beads[k].sigma_px = std::sqrt(own + loose);
-    if (!(own > 0) || here.misfit > 4.5 * (own + loose + missed)) return;  // three standard deviations: it knows better
-    constexpr double kFineEnough = 0.02;                                   // px
+    // Beyond four standard deviations the bead knows better. Three would leave one in ninety for noise alone to its own
+    // error, and a third of all the error is theirs.
+    if (!(own > 0) || here.misfit > 8 * (own + loose + missed)) return;
+    constexpr double kFineEnough = 0.02;  // px
     const double weight = std::min(1 / (missed + loose), std::max(0.0, 1 / (kFineEnough * kFineEnough) - 1 / own));
-    const double total = 1 / own + weight;
-    const double variance_of_mean = (1 / own + weight * weight * (missed + loose)) / (total * total);
-    result.beads[k] = {(1 / (own * total)) * tracks[k].found.motion.u + (weight / total) * here.u,
-                       std::sqrt(variance_of_mean + loose)};
+    const double share = 1 / (1 + own * weight);  // of the bead's own measurement
+    const double variance_of_mean = share * share * (own + loose) + (1 - share) * (1 - share) * missed;
+    result.beads[k] = {share * tracks[k].found.motion.u + (1 - share) * here.u, std::sqrt(variance_of_mean)};
   });
   return result;
 }

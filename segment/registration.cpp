@@ -82,6 +82,9 @@ struct Products {
   }
 };
 
+/// What a spot of height 1 adds at a place, by the squared distance in px.
+float shape(float squared, double sigma) { return std::exp(-0.5f * squared / static_cast<float>(sigma * sigma)); }
+
 /// Everything of a window that does not change from step to step.
 struct Patch {
   std::vector<float> x, y;           ///< of its pixels, from the bead
@@ -92,7 +95,23 @@ struct Patch {
   double total_weight = 0, total_squared = 0, variance = 0;
 };
 
-Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& window) {
+/// Take the other beads of the reference away from values and slopes.
+void take_away(Patch& patch, Vec2 place, const Others& others) {
+  const float per_square = static_cast<float>(1 / (others.sigma * others.sigma));
+  for (const Others::Spot& spot : others.in_reference) {
+    const float sx = static_cast<float>(spot.place.x - place.x), sy = static_cast<float>(spot.place.y - place.y);
+    for (std::size_t k = 0; k < patch.value.size(); ++k) {
+      const float x = patch.x[k], y = patch.y[k], dx = x - sx, dy = y - sy;
+      const float light = static_cast<float>(spot.height) * shape(dx * dx + dy * dy, others.sigma);
+      const float gx = -light * dx * per_square, gy = -light * dy * per_square;
+      patch.value[k] -= light;
+      const Slope own{gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0};
+      for (int a = 0; a < 6; ++a) patch.slope[k][a] -= own[a];
+    }
+  }
+}
+
+Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& window, const Others& others) {
   const double sigma = window.sigma;
   Patch patch;
   const int reach = static_cast<int>(std::ceil(2 * sigma));
@@ -100,7 +119,6 @@ Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& windo
   const std::size_t most = static_cast<std::size_t>(2 * reach + 1) * (2 * reach + 1);
   for (auto* list : {&patch.x, &patch.y, &patch.weight, &patch.value}) list->reserve(most);
   patch.slope.reserve(most);
-  double mean = 0;
   for (int j = std::max(0, cj - reach); j <= std::min(reference.plane.height - 1, cj + reach); ++j) {
     for (int i = std::max(0, ci - reach); i <= std::min(reference.plane.width - 1, ci + reach); ++i) {
       const float x = static_cast<float>(i - place.x), y = static_cast<float>(j - place.y);
@@ -112,9 +130,11 @@ Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& windo
       patch.value.push_back(reference.plane.at(i, j));
       patch.slope.push_back({gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0});
       patch.total_weight += weight, patch.total_squared += weight * weight;
-      mean += weight * patch.value.back();
     }
   }
+  take_away(patch, place, others);
+  double mean = 0;
+  for (std::size_t k = 0; k < patch.value.size(); ++k) mean += patch.weight[k] * patch.value[k];
   for (float& value : patch.value) value -= static_cast<float>(mean / patch.total_weight);
   return patch;
 }
@@ -168,14 +188,19 @@ struct Compared {
   double mean = 0;  ///< of the target
 };
 
-Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& motion) {
+Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& motion, const Others& others) {
   Compared result;
   Slope mismatch{};
   double sum = 0, squares = 0, products = 0;
   const Warp warp(place, motion);
   for (std::size_t k = 0; k < patch.value.size(); ++k) {
     const float x = patch.x[k], y = patch.y[k];
-    const float value = interpolated(target, warp.x_of(x, y), warp.y_of(x, y));
+    const float there_x = warp.x_of(x, y), there_y = warp.y_of(x, y);
+    float value = interpolated(target, there_x, there_y);
+    for (const Others::Spot& spot : others.in_target) {
+      const float dx = there_x - static_cast<float>(spot.place.x), dy = there_y - static_cast<float>(spot.place.y);
+      value -= static_cast<float>(spot.height) * shape(dx * dx + dy * dy, others.sigma);
+    }
     patch.target[k] = value;
     const float weighted = patch.weight[k] * value;
     sum += weighted;
@@ -295,10 +320,10 @@ SmoothImage smooth_image(Plane plane, int threads) {
 }
 
 Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,
-                      const Window& window) {
+                      const Window& window, const Others& others) {
   Registered result;
   result.motion = guess;
-  Patch patch = patch_around(reference, place, window);
+  Patch patch = patch_around(reference, place, window, others);
   complete(patch);
   if (!(patch.variance > 0)) return result;
   Mat6 prior;
@@ -309,7 +334,7 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
   if (!is_regular) return result;
   Compared now;
   for (int step = 0; step < window.max_steps; ++step) {
-    now = compared(patch, target, place, result.motion);
+    now = compared(patch, target, place, result.motion, others);
     if (!(now.gain > 0)) return result;
     const Vec6 change = inverse * (now.mismatch * (1 / now.gain) + prior * gradient_difference(result.motion, guess));
     const double shift = std::hypot(change[0], change[1]);
@@ -322,6 +347,7 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
     }
   }
   result.similarity = now.similarity;
+  result.variance = patch.variance;
   result.gain = now.gain;
   result.sigma_px = std::sqrt(std::max(
       0.0, variance_of(patch, Warp(place, result.motion), inverse, now, stiffness * window.noise * window.noise)));

@@ -40,11 +40,22 @@ struct Window {
   double settled_px = 2e-3;  ///< the last step: a tenth of the best standard errors
 };
 
+/// Pictures of other beads that a registration takes away from both images: Gaussians of one width.
+struct Others {
+  struct Spot {
+    Vec2 place;
+    double height = 0;
+  };
+  std::vector<Spot> in_reference, in_target;
+  double sigma = 1;  ///< px
+};
+
 struct Registered {
   Motion motion;           ///< at the bead
   double sigma_px = 0;     ///< standard error of a component of u
   double similarity = -1;  ///< weighted correlation of the two windows
   double gain = 0;         ///< of the target's light over the reference's
+  double variance = 0;     ///< weighted, of the reference's window
   bool is_converged = false;
 };
 
@@ -56,6 +67,6 @@ struct Registered {
 /// offset are projected out. The standard error is that of a weighted fit with the window's own residual:
 /// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹.
 Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,
-                      const Window& window);
+                      const Window& window, const Others& others = {});
 
 }  // namespace mbtfm::segment

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <memory>
+#include <optional>
+#include <string>
 
 #include "pipeline/contract/parallel.h"
 #include "segment/registration.h"
@@ -39,6 +41,7 @@ Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads);
 struct Track {
   Registered found;
   std::string flag = "no partner";
+  std::optional<Others> others = {};  ///< whose pictures were taken away
   bool is_good() const { return flag.empty(); }
 };
 

@@ -11,6 +11,7 @@
 #include "segment/coarse_field.h"
 #include "segment/far_field.h"
 #include "segment/follow.h"
+#include "segment/measure.h"
 #include "segment/pool.h"
 #include "segment/scene.h"
 
@@ -122,10 +123,11 @@ void declare(ParameterList& list, TrackParameters& p) {
   list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("track");
-  list.add("stressed_page", p.stressed_page, {.low = 1}, "page of the stressed bead image to read, from 1");
-  list.add("last_stressed_page", p.last_stressed_page, {.low = 0},
-           "last page of a time series, each tracked against the relaxed image; 0: stressed_page only");
-  list.add("relaxed_page", p.relaxed_page, {.low = 1}, "page of the relaxed bead image to read, from 1");
+  declare(list, p.stressed_plane, "stressed", "the stressed bead image");
+  declare(list, p.relaxed_plane, "relaxed", "the relaxed bead image");
+  list.add(
+      "stressed_last", p.stressed_last, {.low = 0},
+      "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
   list.add("detection_snr", p.detection_snr, Range::positive(),
            "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::not_negative(),

@@ -14,9 +14,9 @@ namespace mbtfm::segment {
 
 struct TrackParameters {
   std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
-  int stressed_page = 1;                ///< counted from 1, as ImageJ shows them
-  int last_stressed_page = 0;           ///< 0: the first one only
-  int relaxed_page = 1;
+  PlaneChoice stressed_plane;           ///< of a time series the first
+  PlaneChoice relaxed_plane;
+  int stressed_last = 0;               ///< of a time series the last time or page; 0: a single image
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
   std::string drift = "translation";   ///< a stage drifts; a dish put back on it is turned, too

@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
@@ -35,7 +36,7 @@ void write_field(StageContext& context, const DisplacementField& field, const st
 }
 
 struct FieldFigures {
-  std::int64_t n_good = 0;
+  std::int64_t n_good = 0, n_moving = 0;
   double largest_um = 0, sigma_um = 0;
 };
 
@@ -45,6 +46,7 @@ FieldFigures figures_of(const DisplacementField& field) {
   for (const Bead& bead : field) {
     if (!bead.flag.empty()) continue;
     ++result.n_good;
+    if (norm(bead.displacement_um) > 3 * bead.sigma_um) ++result.n_moving;
     result.largest_um = std::max(result.largest_um, norm(bead.displacement_um));
     squares += bead.sigma_um * bead.sigma_um;
   }
@@ -59,10 +61,16 @@ StageReport report_of(const DisplacementField& field) {
   StageReport report;
   report.figures = {{"n_beads", static_cast<std::int64_t>(field.size())},
                     {"n_tracked", figures.n_good},
+                    {"n_moving", figures.n_moving},
                     {"largest_displacement_um", figures.largest_um},
                     {"sigma_um", figures.sigma_um},
                     {"outwardness", outwardness(field)}};
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged in displacement.csv";
+  // chance moves one in ninety beyond three standard errors
+  if (static_cast<double>(figures.n_moving) < 0.02 * static_cast<double>(figures.n_good)) {
+    report.summary += "; WARNING: nothing moves: " + std::to_string(figures.n_moving) + " of " +
+                      std::to_string(figures.n_good) + " beads by more than three standard errors";
+  }
   // a contracting cell has -0.7 or so; a layer of cells about 0
   if (outwardness(field) > 0.3) {
     report.summary += "; WARNING: the gel is pushed outward everywhere: are stressed and relaxed swapped?";
@@ -89,22 +97,34 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
   return report;
 }
 
-/// A stressed image: a page of a file.
+/// A stressed image.
 struct Frame {
   fs::path file;
-  int page = 1;
-  std::string name() const { return file.string() + (page > 1 ? ", page " + std::to_string(page) : ""); }
+  PlaneChoice plane;
+  std::string name() const {
+    if (plane.page) return file.string() + ", page " + std::to_string(*plane.page);
+    return file.string() + (plane.time ? ", time " + std::to_string(*plane.time) : "");
+  }
 };
 
-/// The images of a folder in the order of their names, or the pages of a file.
+/// The frames or pages of a file from the chosen one to the last.
+std::vector<Frame> frames_of_file(const fs::path& file, const TrackParameters& parameters) {
+  Frame frame{file, parameters.stressed_plane};
+  if (parameters.stressed_last == 0) return {frame};
+  std::optional<int>& at = frame.plane.page ? frame.plane.page : frame.plane.time;
+  if (!at || *at > parameters.stressed_last) {
+    throw UsageError("stressed_last = " + std::to_string(parameters.stressed_last) +
+                     " needs stressed_time or stressed_page, the first of the time series, which is not after it");
+  }
+  std::vector<Frame> frames;
+  for (; *at <= parameters.stressed_last; ++*at) frames.push_back(frame);
+  return frames;
+}
+
+/// The images of a folder in the order of their names, or those of a file.
 std::vector<Frame> frames_of(StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
-  std::vector<Frame> frames;
-  if (!fs::is_directory(given)) {
-    const int last = std::max(parameters.stressed_page, parameters.last_stressed_page);
-    for (int page = parameters.stressed_page; page <= last; ++page) frames.push_back({context.input("stressed"), page});
-    return frames;
-  }
+  if (!fs::is_directory(given)) return frames_of_file(context.input("stressed"), parameters);
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
     const std::string extension = entry.path().extension().string();
@@ -115,51 +135,114 @@ std::vector<Frame> frames_of(StageContext& context, const TrackParameters& param
   if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png)", "none");
   std::sort(names.begin(), names.end());
   context.input("stressed", names);
-  for (const std::string& name : names) frames.push_back({given / name, parameters.stressed_page});
+  std::vector<Frame> frames;
+  for (const std::string& name : names) frames.push_back({given / name, parameters.stressed_plane});
   return frames;
+}
+
+/// @throws InputError naming the images where they cannot be tracked
+template <class Body>
+auto with_names(const std::string& names, const Body& body) {
+  try {
+    return body();
+  } catch (const InvalidData& error) {
+    throw InputError(names + ": " + error.element, error.expected, error.found,
+                     "are these the bead channels of one place, in focus? Check the planes, detection_snr, and where "
+                     "one may be turned against the other, drift = rotation");
+  }
+}
+
+struct TrackedFrame {
+  Tracking tracking;
+  double pixel_size_um = 0;
+};
+
+TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
+                     const TrackParameters& parameters, const Progress& progress) {
+  const Channel stressed{frame.name(), read_image(frame.file, frame.plane)};
+  require_equal_sizes(relaxed, stressed);
+  const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
+  if (stressed.image.pixels == relaxed.image.pixels) {
+    throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
+  }
+  return {with_names(relaxed.name + ", " + stressed.name,
+                     [&] { return beads.track(stressed.image, pixel_size_um, progress); }),
+          pixel_size_um};
+}
+
+/// What came of the frames of a time series, one row each.
+class FrameList {
+ public:
+  void add(const Frame& frame, const Tracking& t) {
+    begin(frame).add(t.n_good).add(t.drift_um.x).add(t.drift_um.y).add(t.turn_rad * kRadian_deg).add(t.noise_um);
+    list_.add(figures_of(t.field).largest_um).add("").end_row();
+  }
+  void add_refused(const Frame& frame, const std::string& why) {
+    begin(frame);
+    for (int column = 0; column < 6; ++column) list_.add("");
+    list_.add(why).end_row();
+  }
+  std::string str() const { return list_.str(); }
+
+ private:
+  CsvText& begin(const Frame& frame) { return list_.add(++n_).add(frame.name()); }
+  int n_ = 0;
+  CsvText list_{{"frame", "image", "n_tracked", "drift_x_um", "drift_y_um", "turn_deg", "noise_um",
+                 "largest_displacement_um", "refused"}};
+};
+
+/// The first frame that could be tracked stands for the series; one that could not does not stop the others.
+StageReport track_series(const std::vector<Frame>& frames, StageContext& context,
+                         const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
+  FrameList list;
+  std::optional<StageReport> first;
+  std::vector<InputError> refused;
+  for (std::size_t k = 0; k < frames.size(); ++k) {
+    const double n = static_cast<double>(frames.size());
+    const Progress progress = [&](double fraction, std::string_view what) {
+      context.progress((static_cast<double>(k) + fraction) / n, what);
+    };
+    try {
+      const auto [tracking, pixel_size_um] = tracked_frame(frames[k], progress);
+      char number[16];
+      std::snprintf(number, sizeof number, "_%04zu", k + 1);
+      write_field(context, tracking.field, "displacement" + std::string(number));
+      list.add(frames[k], tracking);
+      if (first) continue;
+      write_field(context, tracking.field, "displacement");
+      first = report_of(tracking, pixel_size_um);
+    } catch (const InputError& error) {
+      list.add_refused(frames[k], error.what());
+      refused.push_back(error);
+    }
+  }
+  if (!first) throw refused.front();
+  write_text(context.output("out", "frames.csv"), list.str());
+  StageReport& report = *first;
+  report.figures.emplace_back("n_frames", static_cast<std::int64_t>(frames.size()));
+  report.figures.emplace_back("n_frames_refused", static_cast<std::int64_t>(refused.size()));
+  report.summary = std::to_string(frames.size()) + " frames; the first tracked: " + report.summary;
+  if (!refused.empty()) {
+    report.converged = false;
+    report.summary = std::to_string(refused.size()) + " of " + report.summary +
+                     "; refused (see frames.csv): " + refused.front().what();
+  }
+  return report;
 }
 
 StageReport track(const TrackParameters& parameters, StageContext& context) {
   const std::vector<Frame> frames = frames_of(context, parameters);
   const fs::path relaxed_file = context.input("relaxed");
-  const Channel relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_page - 1)};
-  CsvText list(
-      {"frame", "image", "n_tracked", "drift_x_um", "drift_y_um", "turn_deg", "noise_um", "largest_displacement_um"});
-  StageReport report;
-  std::optional<RelaxedBeads> beads;
-  for (std::size_t k = 0; k < frames.size(); ++k) {
-    const Channel stressed{frames[k].name(), read_image(frames[k].file, frames[k].page - 1)};
-    require_equal_sizes(relaxed, stressed);
-    const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
-    const double n = static_cast<double>(frames.size());
-    const Progress progress = [&](double fraction, std::string_view what) {
-      context.progress((static_cast<double>(k) + fraction) / n, what);
-    };
-    Tracking tracking;
-    try {
-      if (!beads) beads.emplace(relaxed.image, parameters, context.threads);
-      tracking = beads->track(stressed.image, pixel_size_um, progress);
-    } catch (const InvalidData& error) {
-      throw InputError(relaxed.name + ", " + stressed.name + ": " + error.element, error.expected, error.found,
-                       "are these the bead channels of one place, in focus? Check the pages, detection_snr, and where "
-                       "one may be turned against the other, drift = rotation");
-    }
-    if (k == 0) {
-      write_field(context, tracking.field, "displacement");
-      report = report_of(tracking, pixel_size_um);
-    }
-    if (frames.size() == 1) return report;
-    char number[16];
-    std::snprintf(number, sizeof number, "_%04zu", k + 1);
-    write_field(context, tracking.field, "displacement" + std::string(number));
-    list.add(static_cast<int>(k + 1)).add(stressed.name).add(tracking.n_good).add(tracking.drift_um.x);
-    list.add(tracking.drift_um.y).add(tracking.turn_rad * kRadian_deg).add(tracking.noise_um);
-    list.add(figures_of(tracking.field).largest_um).end_row();
-  }
-  write_text(context.output("out", "frames.csv"), list.str());
-  report.figures.emplace_back("n_frames", static_cast<std::int64_t>(frames.size()));
-  report.summary = std::to_string(frames.size()) + " frames; the first: " + report.summary;
-  return report;
+  const Channel relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_plane)};
+  const RelaxedBeads beads =
+      with_names(relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads); });
+  const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
+    return tracked(relaxed, beads, frame, parameters, progress);
+  };
+  if (frames.size() > 1) return track_series(frames, context, tracked_frame);
+  const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
+  write_field(context, tracking.field, "displacement");
+  return report_of(tracking, pixel_size_um);
 }
 
 StageReport run(const TrackParameters& parameters, StageContext& context) {

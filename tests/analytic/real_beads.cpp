@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "segment/track.h"
+#include "tests/support/piv.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -27,52 +28,6 @@ std::vector<std::array<double, 4>> rows_of_four(const std::filesystem::path& fil
   return rows;
 }
 
-/// Image correlation over a window of 32 px sees what most of its beads do: the mode of their displacements, as wide
-/// as the correlation of two beads.
-Vec2 as_correlation_sees(const Tracking& tracking, Vec2 place) {
-  constexpr double kWindow = 10;  // px: about the standard deviation of a square of 32
-  Vec2 mode;
-  for (int step = 0; step < 30; ++step) {
-    const double width = step < 3 ? 4 : std::sqrt(2.0) * tracking.bead_sigma_um;
-    double weights = 0;
-    Vec2 sum;
-    for (const Bead& bead : tracking.field) {
-      if (!bead.flag.empty()) continue;
-      const Vec2 u = bead.displacement_um + tracking.drift_um, apart = u - mode;
-      const Vec2 d = bead.position_um - Vec2{0.5, 0.5} - place;
-      const double weight = std::exp(-dot(d, d) / (2 * kWindow * kWindow) - dot(apart, apart) / (2 * width * width));
-      weights += weight;
-      sum += weight * u;
-    }
-    mode = (1 / weights) * sum;
-  }
-  return mode;
-}
-
-struct Agreement {
-  double median_px = 0, correlation = 0;
-};
-
-Agreement agreement(const Tracking& tracking, const std::vector<std::array<double, 4>>& reference) {
-  std::vector<double> apart;
-  std::vector<Vec2> ours, theirs;
-  Vec2 our_mean, their_mean;
-  for (const auto& row : reference) {
-    ours.push_back(as_correlation_sees(tracking, {row[0], row[1]}));
-    theirs.push_back({row[2], row[3]});
-    apart.push_back(norm(ours.back() - theirs.back()));
-    our_mean += (1.0 / static_cast<double>(reference.size())) * ours.back();
-    their_mean += (1.0 / static_cast<double>(reference.size())) * theirs.back();
-  }
-  double both = 0, our = 0, their = 0;
-  for (std::size_t k = 0; k < ours.size(); ++k) {
-    const Vec2 a = ours[k] - our_mean, b = theirs[k] - their_mean;
-    both += dot(a, b), our += dot(a, a), their += dot(b, b);
-  }
-  std::nth_element(apart.begin(), apart.begin() + apart.size() / 2, apart.end());
-  return {apart[apart.size() / 2], both / std::sqrt(our * their)};
-}
-
 TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
   const auto folder = kBeads / "mdck_pdms_bism";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
@@ -81,7 +36,12 @@ TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
     const auto image = [&](int k) { return read_image(folder / "forPIV" / ("000" + std::to_string(k) + ".tif")); };
     const Tracking tracking = track_beads(image(2 * frame - 2), image(2 * frame - 1), 1.0, {}, 2);
     const auto piv = rows_of_four(folder / "reference" / ("PIV" + std::to_string(frame) + ".txt"));
-    const Agreement found = agreement(tracking, piv);
+    std::vector<Vec2> ours, theirs;
+    for (const auto& row : piv) {
+      ours.push_back(test::as_correlation_sees(test::moved_beads(tracking), {row[0], row[1]}, tracking.bead_sigma_um));
+      theirs.push_back({row[2], row[3]});
+    }
+    const test::Agreement found = test::agreement(ours, theirs);
     RecordProperty("median_px_" + std::to_string(frame), std::to_string(found.median_px));
     // What a field means over a window is a matter of the window where it turns within it: a registration at the very
     // points, in windows of 10 to 16 px, differs from this reference by 0.13 to 0.22 px.

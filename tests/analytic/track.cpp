@@ -99,6 +99,62 @@ TEST(Track, a_dish_put_back_turned_is_turned_back) {
   }
 }
 
+struct Similarity {
+  double turn_rad, growth;
+  Vec2 drift;
+};
+
+Tracking tracked_similarity(const test::BeadPair& pair) {
+  TrackParameters parameters;
+  parameters.drift = "similarity";
+  return track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
+}
+
+/// Some 1 300 beads of the frame, each known to 0.02 px, tell turn and growth to 0.02 / (140 sqrt 1300) = 4e-6; the
+/// cell's tail, which the frame is fitted with, leaves 0.02 px at the border, 140 px from the centre.
+void expect_recovered(const Tracking& tracking, const Similarity& truth) {
+  EXPECT_NEAR(tracking.turn_rad, truth.turn_rad, 1.5e-4);
+  EXPECT_NEAR(tracking.growth, truth.growth, 1.5e-4);
+  EXPECT_NEAR(tracking.drift_um.x, truth.drift.x, 0.02);
+  EXPECT_NEAR(tracking.drift_um.y, truth.drift.y, 0.02);
+}
+
+TEST(Track, a_picture_turned_grown_and_shifted_is_brought_back) {
+  const auto peaks = test::ring_of_adhesions(384, 4);
+  for (const Similarity truth : {Similarity{0.05, 0.02, {4, -7}},
+                                 {-0.05, 0.02, {-4, 7}},
+                                 {0.05, -0.02, {0, 0}},
+                                 {0, 0.01, {2, 3}},
+                                 {0, 0, {0, 0}}}) {
+    SCOPED_TRACE(testing::Message() << truth.turn_rad << " rad, " << truth.growth);
+    const auto pair = draw_bead_pair(peaks, {.width = 384,
+                                             .n_beads = 2950,
+                                             .turn_rad = truth.turn_rad,
+                                             .growth = truth.growth,
+                                             .drift = truth.drift,
+                                             .seed = 103});
+    const Tracking tracking = tracked_similarity(pair);
+    expect_recovered(tracking, truth);
+    const test::TrackingErrors e = test::errors_of(tracking, peaks);
+    EXPECT_GE(e.n_good, 0.88 * e.n_beads);  // growth takes 4 % of the area out, the drift 3 %, the turn 2.5 %
+    EXPECT_LE(e.all.root(), 0.12);
+    EXPECT_LE(e.n_wrong, 2);
+  }
+}
+
+TEST(Track, swapped_images_have_the_inverse_turn_and_growth_and_mirrored_ones_the_opposite_turn) {
+  const Similarity truth{0.04, 0.015, {0, 0}};
+  auto pair = draw_bead_pair(
+      {}, {.width = 384, .n_beads = 2950, .turn_rad = truth.turn_rad, .growth = truth.growth, .seed = 104});
+  std::swap(pair.relaxed, pair.stressed);
+  expect_recovered(tracked_similarity(pair), {-truth.turn_rad, 1 / (1 + truth.growth) - 1, {0, 0}});
+  std::swap(pair.relaxed, pair.stressed);
+  for (Image* image : {&pair.relaxed, &pair.stressed}) {
+    for (int j = 0; j < 384; ++j) std::reverse(&image->at(0, j), &image->at(0, j) + 384);
+  }
+  expect_recovered(tracked_similarity(pair), {-truth.turn_rad, truth.growth, {0, 0}});
+}
+
 TEST(Track, beads_are_found_to_a_tenth_of_a_pixel) {
   const auto pair = draw_bead_pair({}, {.width = 256, .n_beads = 250, .brightness_spread = 0.2});
   const auto beads = detect_beads(pair.relaxed);

@@ -1,5 +1,6 @@
-/// tracking_accuracy [first seed] [last seed] [threads] [peak_px] [brightness]: errors of tracked beads on simulated
-/// pairs of 512² pixels with 5 242 beads of 1.3 px that shot and read noise blur; one line a seed, then the mean.
+/// tracking_accuracy [first seed] [last seed] [threads] [peak_px] [brightness] [beads]: errors of tracked beads on
+/// simulated pairs of 512² pixels with 5 242 (or `beads`) beads of 1.3 px that shot and read noise blur; one line a
+/// seed, then the mean.
 #include <chrono>
 #include <cstdio>
 #include <cstdlib>
@@ -11,7 +12,8 @@ int main(int argc, char** argv) {
   const auto argument = [&](int k, double otherwise) { return argc > k ? std::atof(argv[k]) : otherwise; };
   const int first = static_cast<int>(argument(1, 1)), last = static_cast<int>(argument(2, 4));
   const auto peaks = test::ring_of_adhesions(512, argument(4, 8.3));
-  test::BeadScene scene{.brightness = argument(5, 1500), .drift = {1.7, -0.6}};
+  test::BeadScene scene{
+      .n_beads = static_cast<int>(argument(6, 5242)), .brightness = argument(5, 1500), .drift = {1.7, -0.6}};
   std::printf("seed   tracked  rms    <.5    >2     >6     var    steep  drift  wrong  s\n");
   test::TrackingErrors sum;
   for (int seed = first; seed <= last; ++seed) {

@@ -1,7 +1,9 @@
 #include <gtest/gtest.h>
 #include <sys/wait.h>
+#include <tiffio.h>
 
 #include <fstream>
+#include <limits>
 #include <sstream>
 
 #include "pipeline/contract/csv.h"
@@ -117,6 +119,156 @@ TEST(TrackEndToEnd, what_is_wrong_with_the_images_is_said_and_nothing_is_left) {
       EXPECT_NE(ended.said.find(word), std::string::npos) << word << ": " << ended.said;
     EXPECT_FALSE(std::filesystem::exists(folder / "out/displacement.csv")) << c.stressed;
   }
+}
+
+TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
+  const test::TemporaryFolder folder;
+  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
+  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
+  const auto dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
+  write(folder / "r.tif", one.relaxed, 0.2);
+  std::filesystem::create_directory(folder / "frames");
+  write(folder / "frames/a.tif", dark.stressed, 0.2);
+  write(folder / "frames/b.tif", one.stressed, 0.2);
+  write_text(folder / "frames/c.tif", "no image");
+  write(folder / "frames/d.tif", two.stressed, 0.2);
+  const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
+  EXPECT_EQ(ended.code, 4) << ended.said;
+  EXPECT_NE(ended.said.find("2 of 4 frames"), std::string::npos) << ended.said;
+  const CsvTable frames(folder / "out/frames.csv");
+  ASSERT_EQ(frames.n_rows(), 4);
+  EXPECT_NE(frames.text(0, "refused").find("bright beads"), std::string::npos);
+  EXPECT_EQ(frames.text(0, "n_tracked"), "");
+  EXPECT_EQ(frames.text(1, "refused"), "");
+  EXPECT_NE(frames.text(2, "refused").find("c.tif"), std::string::npos);
+  EXPECT_NEAR(frames.number(3, "drift_x_um"), -0.6, 0.005);
+  for (const char* missing : {"1", "3"})
+    EXPECT_FALSE(std::filesystem::exists(folder / ("out/displacement_000" + std::string(missing) + ".csv")));
+  EXPECT_EQ(read_text(folder / "out/displacement.csv"), read_text(folder / "out/displacement_0002.csv"));
+  EXPECT_EQ(read_displacement(folder / "out/displacement_0004.csv").size(),
+            read_displacement(folder / "out/displacement.csv").size());
+  std::filesystem::remove(folder / "frames/b.tif");
+  std::filesystem::remove(folder / "frames/d.tif");
+  std::filesystem::remove_all(folder / "out");
+  EXPECT_EQ(run_track(folder, files(folder, "r.tif", "frames")).code, 3);  // of no frame is there a field
+  EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+}
+
+/// A float TIFF of these images, as ImageJ writes a hyperstack.
+void write_stack(const std::filesystem::path& file, const std::vector<const segment::Image*>& images,
+                 const std::string& dimensions) {
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  const std::string description = "ImageJ=1.53t\nimages=" + std::to_string(images.size()) + "\n" + dimensions;
+  for (const segment::Image* image : images) {
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, image->width);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, image->height);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 32);
+    TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_IEEEFP);
+    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    if (image == images.front()) TIFFSetField(tiff, TIFFTAG_IMAGEDESCRIPTION, description.c_str());
+    for (int j = 0; j < image->height; ++j) {
+      std::vector<float> row(image->pixels.begin() + static_cast<std::ptrdiff_t>(j) * image->width,
+                             image->pixels.begin() + static_cast<std::ptrdiff_t>(j + 1) * image->width);
+      TIFFWriteScanline(tiff, row.data(), static_cast<std::uint32_t>(j), 0);
+    }
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+}
+
+TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
+  const test::TemporaryFolder folder;
+  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
+  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
+  const segment::Image other = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  // times 1 and 2 pull, 3 is relaxed; channel 1 shows something else
+  write_stack(folder / "s.tif", {&other, &one.stressed, &other, &two.stressed, &other, &one.relaxed},
+              "channels=2\nslices=1\nframes=3\nhyperstack=true\n");
+  const std::string both = files(folder, "s.tif", "s.tif") + " --pixel_size_um 0.2";
+  const std::string relaxed = " --relaxed_channel 2 --relaxed_time 3", beads = " --stressed_channel 2";
+  Ended ended = run_track(folder, both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
+  ASSERT_EQ(ended.code, 0) << ended.said;
+  const CsvTable frames(folder / "out/frames.csv");
+  ASSERT_EQ(frames.n_rows(), 2);
+  EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
+  EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
+  const std::string of_time = read_text(folder / "out/displacement_0002.csv");
+  ended = run_track(folder, both + " --relaxed_page 6 --stressed_page 4");
+  ASSERT_EQ(ended.code, 0) << ended.said;
+  EXPECT_EQ(read_text(folder / "out/displacement.csv"), of_time);
+  EXPECT_EQ(run_track(folder, both).code, 3);                                           // which of them?
+  EXPECT_EQ(run_track(folder, both + relaxed + beads).code, 3);                         // of which time?
+  EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_last 2").code, 2);  // from where?
+  EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
+}
+
+TEST(TrackEndToEnd, swapped_images_are_tracked_with_a_warning) {
+  const test::TemporaryFolder folder;
+  const auto pair = test::draw_bead_pair(test::ring_of_adhesions(256, 5), {.width = 256, .n_beads = 1300});
+  write(folder / "r.tif", pair.relaxed, 0.2);
+  write(folder / "s.tif", pair.stressed, 0.2);
+  const Ended right = run_track(folder, files(folder, "r.tif", "s.tif"));
+  EXPECT_EQ(right.code, 0);
+  EXPECT_EQ(right.said.find("WARNING"), std::string::npos) << right.said;
+  const Ended swapped = run_track(folder, files(folder, "s.tif", "r.tif"));
+  EXPECT_EQ(swapped.code, 0);
+  EXPECT_NE(swapped.said.find("outward everywhere: are stressed and relaxed swapped?"), std::string::npos)
+      << swapped.said;
+}
+
+TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
+  const test::TemporaryFolder folder;
+  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
+  segment::Image dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  segment::Image one = dark;
+  test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
+  segment::Image broken = pair.stressed;
+  broken.at(6, 11) = std::numeric_limits<float>::quiet_NaN();
+  write(folder / "r.tif", pair.relaxed, 0.2);
+  write(folder / "s.tif", pair.stressed, 0.2);
+  write(folder / "dark.tif", dark, 0.2);
+  write(folder / "one.tif", one, 0.2);
+  write_stack(folder / "nan.tif", {&broken}, "");
+  const struct {
+    const char *relaxed, *stressed;
+    std::vector<std::string> said;
+  } cases[] = {{"dark.tif", "s.tif", {"dark.tif", "the relaxed image", "beads", "none"}},
+               {"r.tif", "dark.tif", {"dark.tif", "the stressed image", "beads", "none"}},
+               {"dark.tif", "dark.tif", {"beads", "none"}},
+               {"one.tif", "s.tif", {"one.tif", "8 beads at least", "found 1"}},
+               {"r.tif", "one.tif", {"one.tif", "8 beads at least", "found 1"}},
+               {"r.tif", "nan.tif", {"nan.tif", "finite pixel values", "NaN"}},
+               {"nan.tif", "s.tif", {"nan.tif", "finite pixel values", "NaN"}},
+               {"r.tif", "r.tif", {"two images", "the same pixels in both"}}};
+  for (const auto& c : cases) {
+    const Ended ended = run_track(folder, files(folder, c.relaxed, c.stressed));
+    EXPECT_EQ(ended.code, 3) << c.relaxed << ' ' << c.stressed << ended.said;
+    for (const std::string& word : c.said) EXPECT_NE(ended.said.find(word), std::string::npos) << word << ended.said;
+    EXPECT_FALSE(std::filesystem::exists(folder / "out"));
+  }
+}
+
+TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
+  const test::TemporaryFolder folder;
+  std::string still = "x_um,y_um,ux_um,uy_um\n", twice = still;
+  for (int k = 0; k < 64; ++k) {
+    const std::string place = std::to_string(k % 8) + "," + std::to_string(k / 8) + ",";
+    still += place + "0,0\n";
+    twice += place + std::to_string(0.01 * (k % 8)) + ",0\n";
+  }
+  write_text(folder / "still.csv", still);
+  write_text(folder / "twice.csv", twice + "3,3,0.03,0\n");
+  const auto given = [&](const char* file) {
+    return run_track(folder, "--displacement " + (folder / file).string() + " --out " + (folder / "out").string());
+  };
+  const Ended of_still = given("still.csv");
+  EXPECT_EQ(of_still.code, 0);
+  EXPECT_NE(of_still.said.find("WARNING: nothing moves: 0 of 64 beads"), std::string::npos) << of_still.said;
+  const Ended of_twice = given("twice.csv");
+  EXPECT_EQ(of_twice.code, 0);
+  EXPECT_NE(of_twice.said.find("1 flagged"), std::string::npos) << of_twice.said;
+  EXPECT_EQ(read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
 }
 
 }  // namespace

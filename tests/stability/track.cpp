@@ -2,6 +2,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "segment/given_field.h"
+#include "segment/plane.h"
 #include "segment/track.h"
 #include "tests/support/bead_pair.h"
 
@@ -26,6 +27,33 @@ TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but
   // one bead in ten has lost its partner, and crowded as they are (one in two touches another) its neighbours suffer
   EXPECT_GE(tracking.n_good, 0.8 * static_cast<double>(tracking.field.size()));
   EXPECT_LE(share_wrong(tracking, peaks, 1.0), 0.01);
+}
+
+/// Loose beads: each takes a step of its own, so that most windows hold beads that moved otherwise.
+TEST(TrackStability, loose_beads_are_followed_and_their_steps_are_in_the_standard_errors) {
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  constexpr double kStep = 0.6;  // px
+  double squares = 0, n = 0, n_beads = 0, n_wrong = 0;
+  for (const std::uint64_t seed : {101u, 102u}) {
+    const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 1500, .jitter = kStep, .seed = seed});
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    n_beads += static_cast<double>(tracking.field.size());
+    const Neighbours truth(pair.positions, 8);
+    for (const Bead& bead : tracking.field) {
+      const Vec2 place = bead.position_um - Vec2{0.5, 0.5};
+      const auto around = truth.within(place, 2, 3);
+      if (!bead.flag.empty() || around.empty()) continue;
+      const Vec2 error = bead.displacement_um - test::displacement(peaks, place);
+      squares += 0.5 * dot(error, error) / (bead.sigma_um * bead.sigma_um);
+      ++n;
+      n_wrong += std::none_of(around.begin(), around.end(),
+                              [&](int k) { return norm(bead.displacement_um - pair.displacements[k]) < 1; });
+    }
+  }
+  EXPECT_GE(n, 0.93 * n_beads);
+  EXPECT_LE(n_wrong, 0.01 * n);
+  EXPECT_GE(squares / n, 0.7);
+  EXPECT_LE(squares / n, 1.4);
 }
 
 TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {

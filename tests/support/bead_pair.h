@@ -68,6 +68,7 @@ struct BeadScene {
   double gain = 1;          ///< of the stressed image over the relaxed one
   double offset = 0;
   double turn_rad = 0;  ///< of the stressed image about its centre, before the drift
+  double growth = 0;    ///< relative, of the same
   Vec2 drift{};
   std::uint64_t seed = 1;
 };
@@ -112,7 +113,8 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
     const bool is_in_stressed = uniform(random) >= scene.lost;
     if (is_in_relaxed) add_bead(pair.relaxed, at, peak, scene.bead_sigma);
     const Vec2 centre{0.5 * (scene.width - 1), 0.5 * (scene.width - 1)}, d = at + moved - centre;
-    const double c = std::cos(scene.turn_rad), s = std::sin(scene.turn_rad);
+    const double larger = 1 + scene.growth, c = larger * std::cos(scene.turn_rad),
+                 s = larger * std::sin(scene.turn_rad);
     const Vec2 there = centre + scene.drift + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
     if (is_in_stressed) add_bead(pair.stressed, there, peak, scene.bead_sigma);
     const bool is_inside = at.x >= 0 && at.y >= 0 && at.x <= scene.width - 1 && at.y <= scene.width - 1;

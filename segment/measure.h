@@ -1,0 +1,14 @@
+/// Inside of the bead tracker: how far each bead has gone, and whether that can be.
+#pragma once
+
+#include "segment/scene.h"
+
+namespace mbtfm::segment {
+
+/// Measure each bead with the narrow window; flag what is less similar than the picture's noise explains.
+void measure(const Scene& scene, double least_similarity, std::vector<Track>& tracks);
+
+/// Registered from where it went, a bead must come back to where it was; no two beads go to one place.
+void verify(const Scene& scene, std::vector<Track>& tracks);
+
+}  // namespace mbtfm::segment
