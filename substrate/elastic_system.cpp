@@ -62,9 +62,9 @@ double allowed_GB(double memory_limit_GB) {
   return 0.8e-9 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-ElasticSystem::ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, int blas_threads, double memory_limit_GB)
+ElasticSystem::ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, double memory_limit_GB)
     : mesh_(std::move(mesh)),
-      factor_((number_nodes(), assemble(gel)), threads, blas_threads, allowed_GB(memory_limit_GB)) {}
+      factor_((number_nodes(), assemble(gel)), threads, allowed_GB(memory_limit_GB)) {}
 
 void ElasticSystem::number_nodes() {
   const std::size_t n_nodes = mesh_.position_um.size();

@@ -18,9 +18,8 @@ namespace mbtfm::substrate {
 
 class ElasticSystem {
  public:
-  /// @param blas_threads  as SparseCholesky's
   /// @throws NotSolved where memory would not suffice
-  ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, int blas_threads, double memory_limit_GB);
+  ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, double memory_limit_GB);
 
   const BlockMesh& mesh() const { return mesh_; }
   const SparseCholesky& factor() const { return factor_; }

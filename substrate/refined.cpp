@@ -4,6 +4,7 @@
 #include <cmath>
 #include <mutex>
 #include <numbers>
+#include <numeric>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -67,6 +68,23 @@ Target target_of(const Ellipse& ellipse, const GridLines& lines, const Substrate
   Target target{.side_um = side, .radius_um = b, .centres_um = {}};
   for (int k = -n; k <= n; ++k) target.centres_um.push_back(ellipse.centre_um + (n == 0 ? 0 : reach * k / n) * along);
   return target;
+}
+
+/// Columns of the matrix, those of neighbouring ellipses side by side: along a Z-shaped (Morton) curve of 1024 x 1024.
+std::vector<int> columns_by_place(const std::vector<Ellipse>& ellipses) {
+  const Extent extent = extent_of({}, ellipses);
+  const Vec2 size = extent.high_um - extent.low_um;
+  const auto key = [&](int column) {
+    const Vec2 at = ellipses[column / 2].centre_um - extent.low_um;
+    const auto x = static_cast<unsigned>(1023 * at.x / size.x), y = static_cast<unsigned>(1023 * at.y / size.y);
+    unsigned bits = 0;
+    for (unsigned b = 0; b < 10; ++b) bits |= (x >> b & 1) << 2 * b | (y >> b & 1) << (2 * b + 1);
+    return bits;
+  };
+  std::vector<int> columns(2 * ellipses.size());
+  std::iota(columns.begin(), columns.end(), 0);
+  std::stable_sort(columns.begin(), columns.end(), [&](int a, int b) { return key(a) < key(b); });
+  return columns;
 }
 
 double distance(const Box& box, Vec2 point) {
@@ -143,31 +161,24 @@ class Refined final : public Substrate {
     if (columns.size() == 0 || ellipses.empty()) return;
     const auto start = std::chrono::steady_clock::now();
     const Extent scene = extent_of(points_um, ellipses);
-    // the factorisation is most of the work: worth the BLAS' threads, at the price of the last bits
-    const ElasticSystem system(gel_, mesh_for(scene, ellipses), threads_, threads_, parameters_.memory_limit_GB);
+    const ElasticSystem system(gel_, mesh_for(scene, ellipses), threads_, parameters_.memory_limit_GB);
     const double setup_s = seconds_since(start);
     std::vector<std::vector<NodeWeight>> samples(points_um.size()), loads(ellipses.size());
     parallel_for(static_cast<int>(samples.size()), threads_,
                  [&](int i) { samples[i] = system.surface_weights(points_um[i]); });
     parallel_for(static_cast<int>(loads.size()), threads_, [&](int j) { loads[j] = system.load_weights(ellipses[j]); });
+    const std::vector<int> order = columns.cols() == 1 ? std::vector<int>{0} : columns_by_place(ellipses);
     system.factor().solve(
-        static_cast<int>(columns.cols()),
-        [&](int column, double* b) {
-          for (const auto& [j, force] : case_of_column(column)) {
+        static_cast<int>(columns.cols()), nodes_of(samples),
+        [&](int k, const NodalColumn& b) {
+          for (const auto& [j, force] : case_of_column(order[k])) {
             for (const auto& [node, weight] : loads[j]) {
-              b[3 * node] += weight * force.x;
-              b[3 * node + 1] += weight * force.y;
+              b(node, 0) += weight * force.x;
+              b(node, 1) += weight * force.y;
             }
           }
         },
-        [&](int column, const double* u) {
-          for (std::size_t i = 0; i < samples.size(); ++i) {
-            for (const auto& [node, weight] : samples[i]) {
-              columns(2 * i, column) += weight * u[3 * node];
-              columns(2 * i + 1, column) += weight * u[3 * node + 1];
-            }
-          }
-        });
+        [&](int k, const NodalColumn& u) { add_samples(samples, u, columns.col(order[k]).data()); });
     note(system, ellipses, setup_s, seconds_since(start));
   }
 

@@ -122,23 +122,16 @@ class Split final : public Substrate {
     parallel_for(static_cast<int>(samples.size()), threads_,
                  [&](int i) { samples[i] = block.system.surface_weights(points_um[i]); });
     block.system.factor().solve(
-        n_columns,
-        [&](int column, double* b) {
+        n_columns, nodes_of(samples),
+        [&](int column, const NodalColumn& b) {
           for (const auto& [j, force] : case_of_column(column)) add_data(block, ellipses[j], force, b);
         },
-        [&](int column, const double* w) {
-          for (std::size_t i = 0; i < samples.size(); ++i) {
-            for (const auto& [node, weight] : samples[i]) {
-              columns(2 * i, column) += weight * w[3 * node];
-              columns(2 * i + 1, column) += weight * w[3 * node + 1];
-            }
-          }
-        });
+        [&](int column, const NodalColumn& w) { add_samples(samples, w, columns.col(column).data()); });
     solve_s_ = seconds_since(start);
   }
 
   /// Right-hand side of w for a force on one ellipse.
-  void add_data(const SplitBlock& block, const Ellipse& ellipse, Vec2 force, double* b) const {
+  void add_data(const SplitBlock& block, const Ellipse& ellipse, Vec2 force, const NodalColumn& b) const {
     // the field's nearest singularity seen from bottom and sides is about h away: leaves 1e-5 of it
     const double ratio = ellipse.semi_major_um / gel_.thickness_um;
     const int degree = ratio < 0.05 ? 3 : static_cast<int>(std::ceil(std::log(1e-5) / std::log(std::min(0.8, ratio))));
@@ -153,7 +146,8 @@ class Split final : public Substrate {
       }
     }
     // w = -u_c there, on the left side
-    Eigen::Map<Eigen::VectorXd>(b, system.n_unknowns()) += system.bottom_stiffness() * on_bottom;
+    const Eigen::VectorXd data = system.bottom_stiffness() * on_bottom;
+    for (Eigen::Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
 
     const double mu = shear_modulus_kPa(gel_);
     const double lambda = 2 * mu * gel_.poisson_ratio / (1 - 2 * gel_.poisson_ratio);
@@ -168,7 +162,7 @@ class Split final : public Substrate {
       const int n = point.normal_axis;
       for (int i = 0; i < 3; ++i) {
         const double stress = mu * (g[i][n] + g[n][i]) + (i == n ? lambda * (g[0][0] + g[1][1] + g[2][2]) : 0);
-        for (const auto& [node, weight] : point.weights) b[3 * node + i] -= point.area_um2 * weight * stress;
+        for (const auto& [node, weight] : point.weights) b(node, i) -= point.area_um2 * weight * stress;
       }
     }
   }

@@ -81,9 +81,8 @@ std::unique_ptr<SplitBlock> make_split_block(const Squares& squares, const Gel& 
   const GridLines lines = grid_of(squares, gel, parameters);
   BlockMesh mesh = make_block_mesh(
       lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
-  // one thread in the BLAS: the grid is small, and the same bits matter more
   auto block = std::unique_ptr<SplitBlock>(
-      new SplitBlock{squares, ElasticSystem(gel, std::move(mesh), threads, 1, parameters.memory_limit_GB), {}});
+      new SplitBlock{squares, ElasticSystem(gel, std::move(mesh), threads, parameters.memory_limit_GB), {}});
   block->side_points = side_points_of(block->system);
   return block;
 }
