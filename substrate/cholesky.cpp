@@ -3,11 +3,13 @@
 #include <cholmod.h>
 #include <dlfcn.h>
 
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
-#include "substrate/fronts.h"
+#include "substrate/factor_file.h"
 
 namespace mbtfm::substrate {
 
@@ -87,10 +89,32 @@ std::string shown_GB(double value) {
   return text;
 }
 
-// columns solved at a time: wide enough for the BLAS, few enough that a block's unknowns stay below 100 MB
-constexpr int kBlockColumns = 32;
+// columns solved at a time: wide enough for the BLAS, few enough that a block of 300 000 unknowns stays
+// below 250 MB
+constexpr int kBlockColumns = 96;
 
 }  // namespace
+
+/// Factorise, or say why not.
+Panels factor_of(const BlockMatrix& matrix, const Supernodes& s, int threads, double memory_limit_GB) {
+  const double needed_GB = 8e-9 * (most_numbers(s) + static_cast<double>(matrix.value.size()) +
+                                   3.0 * matrix.n * kBlockColumns * threads);
+  if (needed_GB > memory_limit_GB) {
+    // a factor grows at most as the power 4/3 of the unknowns (nested dissection of a cube)
+    const auto fitting = static_cast<std::int64_t>(3 * matrix.n * std::pow(memory_limit_GB / needed_GB, 0.75));
+    throw NotSolved(Report{.reason = "the substrate's " + std::to_string(3 * matrix.n) + " unknowns take " +
+                                     shown_GB(needed_GB) + " of memory, allowed are " + shown_GB(memory_limit_GB) +
+                                     ", which a mesh of " + std::to_string(fitting) +
+                                     " unknowns would fit: ask for a coarser one (tolerance, elements_across_adhesion), "
+                                     "allow more (memory_limit_GB), or take the model 'layer'"});
+  }
+  Panels panels;
+  if (!factorise(matrix, s, threads, panels)) {
+    throw NotSolved(Report{.reason = "the substrate's stiffness matrix is not positive definite to rounding: the "
+                                     "Poisson ratio is too near 1/2"});
+  }
+  return panels;
+}
 
 struct SparseCholesky::Impl {
   Supernodes supernodes;
@@ -98,32 +122,38 @@ struct SparseCholesky::Impl {
   int n = 0;
   int threads = 1;
   double factor_GB = 0;
+  std::string cache_note;
 };
 
-SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB)
+SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB,
+                               const std::string& cache_folder)
     : impl_(std::make_unique<Impl>()) {
   impl_->n = 3 * matrix.n;
   impl_->threads = threads;
   impl_->supernodes = analyse(matrix);
   const Supernodes& s = impl_->supernodes;
   for (int k = 0; k < s.count(); ++k) impl_->factor_GB += 72e-9 * s.n_rows(k) * s.n_columns(k);
-  const double needed_GB = 8e-9 * (most_numbers(s) + static_cast<double>(matrix.value.size()));
-  if (needed_GB > memory_limit_GB) {
-    throw NotSolved(Report{.reason = "the substrate's " + std::to_string(impl_->n) + " unknowns take " +
-                                     shown_GB(needed_GB) + " of memory, allowed are " + shown_GB(memory_limit_GB) +
-                                     ": allow more (memory_limit_GB), ask for a coarser mesh, or take the model "
-                                     "'layer'"});
-  }
   keep_blas_to_one_thread();
-  if (!factorise(matrix, s, threads, impl_->panels)) {
-    throw NotSolved(Report{.reason = "the substrate's stiffness matrix is not positive definite to rounding: the "
-                                     "Poisson ratio is too near 1/2"});
+  if (cache_folder.empty()) {
+    impl_->panels = factor_of(matrix, s, threads, memory_limit_GB);
+    return;
+  }
+  const FactorFile file(cache_folder, matrix, s);
+  CachedFactor cached = file.read();
+  impl_->cache_note = cached.note;
+  if (cached.panels) {
+    impl_->panels = std::move(*cached.panels);
+  } else {
+    impl_->panels = factor_of(matrix, s, threads, memory_limit_GB);
+    impl_->cache_note += file.write(impl_->panels);
   }
 }
 
 SparseCholesky::~SparseCholesky() = default;
 
 double SparseCholesky::factor_GB() const { return impl_->factor_GB; }
+
+const std::string& SparseCholesky::cache_note() const { return impl_->cache_note; }
 
 void SparseCholesky::solve(int n_columns, const std::vector<int>& needed, const Use& fill, const Use& take) const {
   const Supernodes& s = impl_->supernodes;

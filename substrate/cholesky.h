@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <functional>
 #include <memory>
+#include <string>
 #include <vector>
 
 namespace mbtfm::substrate {
@@ -39,9 +40,11 @@ class NodalColumn {
 
 class SparseCholesky {
  public:
+  /// @param cache_folder  where the factor is read from, or left; empty: nowhere. A file is called by the hash of the
+  ///                      matrix, so it is never that of another; one that is damaged is ignored.
   /// @throws NotSolved where the factor would take more than `memory_limit_GB` (known before it is allocated), or the
   ///         matrix is not positive definite
-  SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB);
+  SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB, const std::string& cache_folder = {});
   ~SparseCholesky();
   SparseCholesky(const SparseCholesky&) = delete;
   SparseCholesky& operator=(const SparseCholesky&) = delete;
@@ -52,6 +55,8 @@ class SparseCholesky {
   using Use = std::function<void(int column, const NodalColumn& values)>;
   void solve(int n_columns, const std::vector<int>& needed, const Use& fill, const Use& take) const;
   double factor_GB() const;
+  /// What became of the file in the cache; empty where there is no cache.
+  const std::string& cache_note() const;
 
  private:
   struct Impl;

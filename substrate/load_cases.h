@@ -29,12 +29,13 @@ inline std::vector<int> nodes_of(const std::vector<std::vector<NodeWeight>>& sam
   return nodes;
 }
 
-/// Add a solution at the points to a column of x, y by point.
-inline void add_samples(const std::vector<std::vector<NodeWeight>>& samples, const NodalColumn& u, double* column) {
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    for (const auto& [node, weight] : samples[i]) {
-      column[2 * i] += weight * u(node, 0);
-      column[2 * i + 1] += weight * u(node, 1);
+/// Add a solution at the points to a column, along some axes by point.
+inline void add_samples(const std::vector<std::vector<NodeWeight>>& samples, const std::vector<int>& axes,
+                        const NodalColumn& u, double* column) {
+  for (const auto& sample : samples) {
+    for (const int axis : axes) {
+      for (const auto& [node, weight] : sample) *column += weight * u(node, axis);
+      ++column;
     }
   }
 }

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "pipeline/contract/errors.h"
+#include "substrate/models.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -22,7 +22,7 @@ std::vector<double> lines_of(int index_low, int index_high, double step, double 
 
 GridLines grid_of(const Squares& squares, const Gel& gel, const SubstrateParameters& parameters) {
   const double step = gel.thickness_um / parameters.cells_per_thickness;
-  const double margin = parameters.margin_thicknesses * gel.thickness_um;
+  const double margin = margin_um(gel, parameters);
   GridLines lines;
   lines.x_um = lines_of(squares[0], squares[1], step, margin);
   lines.y_um = lines_of(squares[2], squares[3], step, margin);
@@ -82,7 +82,7 @@ std::unique_ptr<SplitBlock> make_split_block(const Squares& squares, const Gel& 
   BlockMesh mesh = make_block_mesh(
       lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
   auto block = std::unique_ptr<SplitBlock>(
-      new SplitBlock{squares, ElasticSystem(gel, std::move(mesh), threads, parameters.memory_limit_GB), {}});
+      new SplitBlock{squares, ElasticSystem({gel, {}}, std::move(mesh), threads, parameters.memory_limit_GB, parameters.cache_folder), {}});
   block->side_points = side_points_of(block->system);
   return block;
 }

@@ -5,7 +5,7 @@
 #include <fstream>
 
 #include "pipeline/contract/errors.h"
-#include "substrate/surface_vtu.h"
+#include "substrate/gel_vtu.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/temporary_folder.h"
 
