@@ -113,7 +113,7 @@ void write_at_points(StageContext& context, const substrate::Substrate& model, c
     csv.add(points[i].x).add(points[i].y).add(displacements[i].x).add(displacements[i].y).add(0.0).add(vertical[i]);
     csv.end_row();
   }
-  csv.write(context.output("out"));
+  write_text(context.output("out"), csv.str());
 }
 
 void write_result(StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
