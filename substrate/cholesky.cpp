@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <mutex>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
@@ -70,7 +71,13 @@ Supernodes analyse(const BlockMatrix& matrix) {
   cholmod_sparse pattern = pattern_of(matrix);
   std::vector<int> order(matrix.n);
   cholmod_factor* factor = nullptr;
-  if (cholmod_metis(&pattern, nullptr, 0, 1, order.data(), &c)) {
+  // METIS draws from the C library's one generator, which it seeds: two at a time would order at random
+  static std::mutex one_at_a_time;
+  const bool is_ordered = [&] {
+    const std::lock_guard lock(one_at_a_time);
+    return cholmod_metis(&pattern, nullptr, 0, 1, order.data(), &c) != 0;
+  }();
+  if (is_ordered) {
     factor = cholmod_analyze_p(&pattern, order.data(), nullptr, 0, &c);
   }
   Supernodes supernodes;

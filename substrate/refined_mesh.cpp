@@ -38,13 +38,14 @@ double coarsest_side_um(const Material& material) {
   return std::min(side, kMostFlat * (material.gel.thickness_um - before));
 }
 
-/// Cubes, flatter over thin layers, around the scene and its margin.
+/// Boxes over the scene and its margin, nearly cubes; flatter over thin layers.
 GridLines boxes_around(const Extent& scene, const Material& material, double margin_um) {
   const double side = coarsest_side_um(material);
   const auto line = [&](double low, double high) {
-    const int n = static_cast<int>(std::ceil((high - low + 2 * margin_um) / side - 1e-9));
+    const double length = high - low + 2 * margin_um;
+    const int n = std::max(1, static_cast<int>(std::ceil(length / side - 1e-9)));
     std::vector<double> values;
-    for (int k = 0; k <= n; ++k) values.push_back(0.5 * (low + high) + (k - 0.5 * n) * side);
+    for (int k = 0; k <= n; ++k) values.push_back(0.5 * (low + high) + (static_cast<double>(k) / n - 0.5) * length);
     return values;
   };
   return {line(scene.low_um.x, scene.high_um.x), line(scene.low_um.y, scene.high_um.y), depths_of(material, side)};
@@ -74,7 +75,7 @@ struct Target {
 
 Target target_of(const Ellipse& ellipse, const GridLines& lines, const Fineness& fineness, int halvings) {
   const double wanted = std::sqrt(pi * ellipse.semi_major_um * ellipse.semi_minor_um) / fineness.across;
-  double side = lines.x_um[1] - lines.x_um[0];
+  double side = std::max(lines.x_um[1] - lines.x_um[0], lines.y_um[1] - lines.y_um[0]);
   const Vec2 origin = {lines.x_um.front(), lines.y_um.front()};
   while (side > wanted || n_touched(ellipse, origin, side) < fineness.fewest_elements) side /= 2;
   side = std::ldexp(side, -halvings);
@@ -107,7 +108,7 @@ BlockMesh refined_mesh(const Material& material, const Extent& scene, const std:
     targets.push_back(target_of(ellipses[j], lines, fineness, fineness.halvings[j]));
   }
   const auto is_too_large = [&](const Box& box) {
-    const double side = box.size_um[0];
+    const double side = std::max(box.size_um[0], box.size_um[1]);
     for (const Target& target : targets) {
       // the side grows with the distance: the field's own scale
       if (side <= target.side_um * (1 + 1e-9)) continue;

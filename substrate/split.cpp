@@ -120,11 +120,11 @@ class Split final : public Substrate {
   }
 
   const SplitBlock& block_around(const Extent& scene) const {
-    const Squares squares = squares_of(scene, gel_, parameters_);
-    if (block_ && block_->squares == squares) return *block_;
+    const Footprint footprint = footprint_of(scene, gel_, parameters_);
+    if (block_ && block_->footprint == footprint) return *block_;
     block_.reset();  // not two at a time in memory
     const auto start = std::chrono::steady_clock::now();
-    block_ = make_split_block(squares, gel_, parameters_, threads_);
+    block_ = make_split_block(footprint, gel_, parameters_, threads_);
     setup_s_ = seconds_since(start);
     return *block_;
   }

@@ -186,17 +186,16 @@ TEST(Split, agrees_with_refined_elements_where_the_sides_are_near) {
   // both have the same free sides one thickness away, which change the field by several per cent
   const Gel gel = gel_of(0.45, 10);
   const std::vector<Ellipse> ellipse = {{{0, 0}, 0.8, 0.5, 0.5}};
-  // the corners of the block asked of both: cubes of 10 um around +-5 um
-  std::vector<Vec2> points = {{-5, -5}, {5 - 1e-9, 5 - 1e-9}};
+  std::vector<Vec2> points = {{-5, -4}, {4.7, 5.5}};
   for (int k = 0; k < 400; ++k) {
     const double direction = 0.1 * k;
     points.push_back({(1.5 + 0.008 * k) * std::cos(direction), (1.5 + 0.008 * k) * std::sin(direction)});
   }
   SubstrateParameters split = test::model_named("split");
-  split.margin_thicknesses = 1;
+  split.side_distance_um = 10;
   split.cells_per_thickness = 4;
   SubstrateParameters refined = test::model_named("refined");
-  refined.margin_thicknesses = 1;
+  refined.side_distance_um = 10;
   refined.tolerance = 0;
   refined.elements_across_adhesion = 6;
   const Eigen::MatrixXd by_split = compliance(gel, split, points, ellipse);
