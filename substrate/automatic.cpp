@@ -54,8 +54,10 @@ Choice choice_for(const Gel& gel, const SubstrateParameters& p, double scene_um)
     if (bias > p.tolerance) {
       const double elements = sides * cells;
       const bool is_smooth = elements >= 2;
-      return {is_smooth ? "split" : "refined", found + "; that is " + brief(elements) + " elements of the grid of split, " +
-              (is_smooth ? "enough" : "fewer than the 2 it needs"), cells};
+      return {is_smooth ? "split" : "refined",
+              found + "; that is " + brief(elements) + " elements of the grid of split, " +
+                  (is_smooth ? "enough" : "fewer than the 2 it needs"),
+              cells};
     }
   }
   if (p.vertical) return {"split", "the vertical displacement is asked for, on a base", cells};

@@ -42,7 +42,7 @@ Eigen::MatrixXd box_stiffness(const Material& material, int order, const Box& bo
   const int n_pressures = order == 1 ? 1 : 4;  // 1, and x, y, z from the centre
   const double volume = size_um[0] * size_um[1] * size_um[2];
   Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(3 * n_nodes, 3 * n_nodes);
-  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(3 * n_nodes, n_pressures);          // (q_m, div v)
+  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(3 * n_nodes, n_pressures);       // (q_m, div v)
   Eigen::MatrixXd compressibility = Eigen::MatrixXd::Zero(n_pressures, n_pressures);  // (q_m, q_n / lambda)
   const double middle_um = box.low_um[2] + 0.5 * size_um[2];
   const GaussRule gauss = gauss_legendre(order + 1);
@@ -71,7 +71,8 @@ Eigen::MatrixXd box_stiffness(const Material& material, int order, const Box& bo
         for (int k = 0; k < 3; ++k) product += slope[a][k] * slope[b][k];
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) {
-            stiffness(3 * a + i, 3 * b + j) += mu * modulus * weight * ((i == j ? product : 0) + slope[a][j] * slope[b][i]);
+            stiffness(3 * a + i, 3 * b + j) +=
+                mu * modulus * weight * ((i == j ? product : 0) + slope[a][j] * slope[b][i]);
           }
         }
       }

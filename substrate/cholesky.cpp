@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <cstdio>
 #include <mutex>
+#include <variant>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
@@ -100,60 +101,81 @@ std::string shown_GB(double value) {
 // below 250 MB
 constexpr int kBlockColumns = 96;
 
-}  // namespace
-
 /// Factorise, or say why not.
-Panels factor_of(const BlockMatrix& matrix, const Supernodes& s, int threads, double memory_limit_GB) {
-  const double needed_GB = 8e-9 * (most_numbers(s) + static_cast<double>(matrix.value.size()) +
-                                   3.0 * matrix.n * kBlockColumns * threads);
+template <class Real>
+Panels<Real> factor_of(const BlockMatrix& matrix, const Supernodes& s, const FactorOptions& options) {
+  const double memory_limit_GB = options.memory_limit_GB;
+  const double needed_GB =
+      1e-9 * sizeof(Real) * most_numbers(s) +
+      8e-9 * (static_cast<double>(matrix.value.size()) + 3.0 * matrix.n * kBlockColumns * options.threads);
   if (needed_GB > memory_limit_GB) {
     // a factor grows at most as the power 4/3 of the unknowns (nested dissection of a cube)
     const auto fitting = static_cast<std::int64_t>(3 * matrix.n * std::pow(memory_limit_GB / needed_GB, 0.75));
-    throw NotSolved(Report{.reason = "the substrate's " + std::to_string(3 * matrix.n) + " unknowns take " +
-                                     shown_GB(needed_GB) + " of memory, allowed are " + shown_GB(memory_limit_GB) +
-                                     ", which a mesh of " + std::to_string(fitting) +
-                                     " unknowns would fit: ask for a coarser one (tolerance, elements_across_adhesion), "
-                                     "allow more (memory_limit_GB), or take the model 'layer'"});
+    throw NotSolved(
+        Report{.reason = "the substrate's " + std::to_string(3 * matrix.n) + " unknowns take " + shown_GB(needed_GB) +
+                         " of memory, allowed are " + shown_GB(memory_limit_GB) + ", which a mesh of " +
+                         std::to_string(fitting) +
+                         " unknowns would fit: ask for a coarser one (tolerance, elements_across_adhesion), "
+                         "allow more (memory_limit_GB), or take the model 'layer'"});
   }
-  Panels panels;
-  if (!factorise(matrix, s, threads, panels)) {
+  Panels<Real> panels;
+  if (!factorise(matrix, s, options.threads, panels)) {
     throw NotSolved(Report{.reason = "the substrate's stiffness matrix is not positive definite to rounding: the "
                                      "Poisson ratio is too near 1/2"});
   }
   return panels;
 }
 
+void solve_block(const Supernodes& s, const Panels<double>& panels, const std::vector<char>& is_needed, int width,
+                 std::vector<double>& values) {
+  solve_panels(s, panels, is_needed, width, values.data());
+}
+
+void solve_block(const Supernodes& s, const Panels<float>& panels, const std::vector<char>& is_needed, int width,
+                 std::vector<double>& values) {
+  std::vector<float> rounded(values.begin(), values.end());
+  solve_panels(s, panels, is_needed, width, rounded.data());
+  std::copy(rounded.begin(), rounded.end(), values.begin());
+}
+
+}  // namespace
+
 struct SparseCholesky::Impl {
   Supernodes supernodes;
-  Panels panels;
+  std::variant<Panels<double>, Panels<float>> panels;
   int n = 0;
   int threads = 1;
   double factor_GB = 0;
   std::string cache_note;
 };
 
-SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, double memory_limit_GB,
-                               const std::string& cache_folder)
+SparseCholesky::SparseCholesky(const BlockMatrix& matrix, const FactorOptions& options)
     : impl_(std::make_unique<Impl>()) {
   impl_->n = 3 * matrix.n;
-  impl_->threads = threads;
+  impl_->threads = options.threads;
   impl_->supernodes = analyse(matrix);
   const Supernodes& s = impl_->supernodes;
-  for (int k = 0; k < s.count(); ++k) impl_->factor_GB += 72e-9 * s.n_rows(k) * s.n_columns(k);
+  const bool is_single = options.precision == Precision::single_;
+  for (int k = 0; k < s.count(); ++k) impl_->factor_GB += (is_single ? 36e-9 : 72e-9) * s.n_rows(k) * s.n_columns(k);
   keep_blas_to_one_thread();
-  if (cache_folder.empty()) {
-    impl_->panels = factor_of(matrix, s, threads, memory_limit_GB);
+  if (is_single) {
+    impl_->panels = factor_of<float>(matrix, s, options);
     return;
   }
-  const FactorFile file(cache_folder, matrix, s);
+  if (options.cache_folder.empty()) {
+    impl_->panels = factor_of<double>(matrix, s, options);
+    return;
+  }
+  const FactorFile file(options.cache_folder, matrix, s);
   CachedFactor cached = file.read();
   impl_->cache_note = cached.note;
   if (cached.panels) {
     impl_->panels = std::move(*cached.panels);
-  } else {
-    impl_->panels = factor_of(matrix, s, threads, memory_limit_GB);
-    impl_->cache_note += file.write(impl_->panels);
+    return;
   }
+  Panels<double> panels = factor_of<double>(matrix, s, options);
+  impl_->cache_note += file.write(panels);
+  impl_->panels = std::move(panels);
 }
 
 SparseCholesky::~SparseCholesky() = default;
@@ -177,7 +199,7 @@ void SparseCholesky::solve(int n_columns, const std::vector<int>& needed, const 
     const int width = std::min(kBlockColumns, n_columns - first);
     std::vector<double> values(static_cast<std::size_t>(impl_->n) * width, 0.0);
     for (int k = 0; k < width; ++k) fill(first + k, {&values[k], width, s.place});
-    solve_panels(s, impl_->panels, is_needed, width, values.data());
+    std::visit([&](const auto& panels) { solve_block(s, panels, is_needed, width, values); }, impl_->panels);
     for (int k = 0; k < width; ++k) take(first + k, {&values[k], width, s.place});
   });
 }

@@ -36,6 +36,7 @@ struct SubstrateParameters {
   // refined
   std::string element = "q2-p1disc";      ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
   double elements_across_adhesion = 1.4;  ///< square root of its area over their side: 2 % of a column; 1 % at 2
+  std::string precision = "auto";         ///< half the memory and time where the last digits do not matter
   int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
   double growth = 4;                      ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
 
@@ -52,8 +53,9 @@ void declare(ParameterList& list, SubstrateParameters& parameters);
 /// A solution inside the gel, on boxes.
 struct VolumeField {
   std::vector<std::array<double, 3>> points_um, displacement_um;
-  std::vector<int> box_corners;                   ///< 8 points a box: the upper face round, then the lower one
-  std::vector<std::array<double, 6>> stress_kPa;  ///< at the centre of each box: xx, yy, zz, xy, yz, xz; empty: not asked
+  std::vector<int> box_corners;  ///< 8 points a box: the upper face round, then the lower one
+  std::vector<std::array<double, 6>>
+      stress_kPa;  ///< at the centre of each box: xx, yy, zz, xy, yz, xz; empty: not asked
 };
 
 class Substrate {

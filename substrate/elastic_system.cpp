@@ -23,13 +23,16 @@ class StiffnessOfBox {
     constexpr double kDigits = 1e9;  // sides equal to rounding are equal
     const std::array<double, 3>& size = box.size_um;
     const auto even = even_modulus(material_, box.low_um[2], box.low_um[2] + size[2]);
-    std::array<long, 4> key = {std::lround(kDigits * size[1] / size[0]), std::lround(kDigits * size[2] / size[0]), 0, 0};
+    std::array<long, 4> key = {std::lround(kDigits * size[1] / size[0]), std::lround(kDigits * size[2] / size[0]), 0,
+                               0};
     if (!even) key[2] = std::lround(kDigits * box.low_um[2]), key[3] = std::lround(kDigits * size[0]);
     auto found = known_.find(key);
     if (found == known_.end()) {
       const Box unit = {{}, {1, size[1] / size[0], size[2] / size[0]}};
-      found = known_.emplace(key, even ? box_stiffness({material_.gel, {}}, order_, unit)
-                                       : box_stiffness(material_, order_, box)).first;
+      found = known_
+                  .emplace(key, even ? box_stiffness({material_.gel, {}}, order_, unit)
+                                     : box_stiffness(material_, order_, box))
+                  .first;
     }
     return (even ? *even * size[0] : 1) * found->second;
   }
@@ -67,10 +70,8 @@ double allowed_GB(double memory_limit_GB) {
   return 0.8e-9 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-ElasticSystem::ElasticSystem(const Material& material, BlockMesh mesh, int threads, double memory_limit_GB,
-                             const std::string& cache_folder)
-    : mesh_(std::move(mesh)),
-      factor_((number_nodes(), assemble(material)), threads, allowed_GB(memory_limit_GB), cache_folder) {}
+ElasticSystem::ElasticSystem(const Material& material, BlockMesh mesh, const FactorOptions& options)
+    : mesh_(std::move(mesh)), factor_((number_nodes(), assemble(material)), options) {}
 
 void ElasticSystem::number_nodes() {
   const std::size_t n_nodes = mesh_.position_um.size();

@@ -19,10 +19,8 @@ namespace mbtfm::substrate {
 
 class ElasticSystem {
  public:
-  /// @param cache_folder  as SparseCholesky's
   /// @throws NotSolved where memory would not suffice
-  ElasticSystem(const Material& material, BlockMesh mesh, int threads, double memory_limit_GB,
-                const std::string& cache_folder = {});
+  ElasticSystem(const Material& material, BlockMesh mesh, const FactorOptions& options);
 
   const BlockMesh& mesh() const { return mesh_; }
   const SparseCholesky& factor() const { return factor_; }

@@ -48,7 +48,7 @@ CachedFactor FactorFile::read() const {
   const bool is_whole = bytes.size() == n + kHashLength &&
                         std::string_view(bytes).substr(n) == sha256(std::string_view(bytes).substr(0, n));
   if (!is_whole) return {.panels = {}, .note = "damaged, ignored: " + file_.string()};
-  Panels panels(supernodes_.count());
+  Panels<double> panels(supernodes_.count());
   const char* from = bytes.data();
   for (int k = 0; k < supernodes_.count(); ++k) {
     const std::size_t size = sizeof(double) * n_values(supernodes_, k);
@@ -59,7 +59,7 @@ CachedFactor FactorFile::read() const {
   return {.panels = std::move(panels), .note = "used"};
 }
 
-std::string FactorFile::write(const Panels& panels) const {
+std::string FactorFile::write(const Panels<double>& panels) const {
   std::string bytes;
   bytes.reserve(n_bytes(supernodes_) + kHashLength);
   for (int k = 0; k < supernodes_.count(); ++k) {

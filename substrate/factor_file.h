@@ -10,7 +10,7 @@
 namespace mbtfm::substrate {
 
 struct CachedFactor {
-  std::optional<Panels> panels;
+  std::optional<Panels<double>> panels;
   std::string note;  ///< for the record: found, absent or damaged
 };
 
@@ -21,7 +21,7 @@ class FactorFile {
   FactorFile(const std::filesystem::path& folder, const BlockMatrix& matrix, const Supernodes& supernodes);
   CachedFactor read() const;
   /// @return a note: written, or why not; a factor that cannot be kept is no error
-  std::string write(const Panels& panels) const;
+  std::string write(const Panels<double>& panels) const;
 
  private:
   std::filesystem::path file_;

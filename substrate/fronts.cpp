@@ -9,30 +9,57 @@
 
 // Of BLAS and LAPACK, by their Fortran names: no header of theirs is the same everywhere.
 extern "C" {
-void dgemm_(const char*, const char*, const int*, const int*, const int*, const double*, const double*, const int*,
-            const double*, const int*, const double*, double*, const int*);
-void dsyrk_(const char*, const char*, const int*, const int*, const double*, const double*, const int*, const double*,
-            double*, const int*);
-void dtrsm_(const char*, const char*, const char*, const char*, const int*, const int*, const double*, const double*,
-            const int*, double*, const int*);
-void dpotrf_(const char*, const int*, double*, const int*, int*);
+#define MBTFM_BLAS(letter, Real)                                                                              \
+  void letter##gemm_(const char*, const char*, const int*, const int*, const int*, const Real*, const Real*,  \
+                     const int*, const Real*, const int*, const Real*, Real*, const int*);                    \
+  void letter##syrk_(const char*, const char*, const int*, const int*, const Real*, const Real*, const int*,  \
+                     const Real*, Real*, const int*);                                                         \
+  void letter##trsm_(const char*, const char*, const char*, const char*, const int*, const int*, const Real*, \
+                     const Real*, const int*, Real*, const int*);                                             \
+  void letter##potrf_(const char*, const int*, Real*, const int*, int*);
+MBTFM_BLAS(s, float)
+MBTFM_BLAS(d, double)
+#undef MBTFM_BLAS
 }
 
 namespace mbtfm::substrate {
 namespace {
 
-constexpr double kOne = 1, kMinus = -1, kZero = 0;
+/// BLAS and LAPACK by type.
+template <class Real>
+struct Blas;
+template <>
+struct Blas<float> {
+  static constexpr auto gemm = sgemm_;
+  static constexpr auto syrk = ssyrk_;
+  static constexpr auto trsm = strsm_;
+  static constexpr auto potrf = spotrf_;
+};
+template <>
+struct Blas<double> {
+  static constexpr auto gemm = dgemm_;
+  static constexpr auto syrk = dsyrk_;
+  static constexpr auto trsm = dtrsm_;
+  static constexpr auto potrf = dpotrf_;
+};
+template <class Real>
+constexpr Real kOne = 1;
+template <class Real>
+constexpr Real kMinus = -1;
+template <class Real>
+constexpr Real kZero = 0;
+
 // Widths that fill the caches of the BLAS, and leave a dozen tiles of a large front to share among threads
 constexpr int kPanelColumns = 192;
 constexpr int kTileRows = 384;
 // Subtrees of at most this share of the work run side by side: enough of them to balance a handful of threads
 constexpr double kSubtreeShare = 1.0 / 32;
 
-using Update = std::unique_ptr<double[]>;
-
-/// C -= A B^T, or its lower triangle
-void subtract_product(int m, int n, int k, const double* a, int lda, const double* b, int ldb, double* c, int ldc) {
-  if (m > 0 && n > 0 && k > 0) dgemm_("N", "T", &m, &n, &k, &kMinus, a, &lda, b, &ldb, &kOne, c, &ldc);
+/// C -= A B^T
+template <class Real>
+void subtract_product(int m, int n, int k, const Real* a, int lda, const Real* b, int ldb, Real* c, int ldc) {
+  if (m > 0 && n > 0 && k > 0)
+    Blas<Real>::gemm("N", "T", &m, &n, &k, &kMinus<Real>, a, &lda, b, &ldb, &kOne<Real>, c, &ldc);
 }
 
 int n_tiles(int n, int size) { return (n + size - 1) / size; }
@@ -123,9 +150,10 @@ Entries entries_of(const BlockMatrix& m, const std::vector<int>& place) {
   return e;
 }
 
+template <class Real>
 class Factorisation {
  public:
-  Factorisation(const BlockMatrix& matrix, const Supernodes& supernodes, int threads, Panels& panels)
+  Factorisation(const BlockMatrix& matrix, const Supernodes& supernodes, int threads, Panels<Real>& panels)
       : matrix_(matrix),
         s_(supernodes),
         threads_(threads),
@@ -147,25 +175,25 @@ class Factorisation {
   void eliminate(int k, int threads) {
     if (!is_positive_) return;
     const int rows = 3 * s_.n_rows(k), columns = 3 * s_.n_columns(k), below = rows - columns;
-    panels_[k] = std::make_unique_for_overwrite<double[]>(panel_size(s_, k));
-    updates_[k] = std::make_unique_for_overwrite<double[]>(update_size(s_, k));
-    double* panel = panels_[k].get();
-    double* update = updates_[k].get();
+    panels_[k] = std::make_unique_for_overwrite<Real[]>(panel_size(s_, k));
+    updates_[k] = std::make_unique_for_overwrite<Real[]>(update_size(s_, k));
+    Real* panel = panels_[k].get();
+    Real* update = updates_[k].get();
     gather(k, threads);
     if (!factorise_panel(panel, rows, columns, threads)) {
       is_positive_ = false;
       return;
     }
-    const double* lower = panel + columns;
+    const Real* lower = panel + columns;
     const int n = n_tiles(below, kTileRows);
     parallel_for(n * (n + 1) / 2, threads, [&](int t) {
       int j = 0;
       for (; t >= n - j; ++j) t -= n - j;  // tiles of the lower triangle, column by column
       const int row = (j + t) * kTileRows, column = j * kTileRows;
       const int m = std::min(kTileRows, below - row), w = std::min(kTileRows, below - column);
-      double* c = update + static_cast<std::size_t>(column) * below + row;
+      Real* c = update + static_cast<std::size_t>(column) * below + row;
       if (t == 0) {
-        dsyrk_("L", "N", &m, &columns, &kMinus, lower + row, &rows, &kOne, c, &below);
+        Blas<Real>::syrk("L", "N", &m, &columns, &kMinus<Real>, lower + row, &rows, &kOne<Real>, c, &below);
       } else {
         subtract_product(m, w, columns, lower + row, rows, lower + column, rows, c, below);
       }
@@ -173,21 +201,21 @@ class Factorisation {
   }
 
   /// Blocked Cholesky factorisation of the columns of one front.
-  bool factorise_panel(double* panel, int rows, int columns, int threads) const {
+  bool factorise_panel(Real* panel, int rows, int columns, int threads) const {
     for (int begin = 0; begin < columns; begin += kPanelColumns) {
       const int width = std::min(kPanelColumns, columns - begin);
-      double* diagonal = panel + static_cast<std::size_t>(begin) * rows + begin;
-      const double* before = panel + begin;  // row `begin` of the columns done
+      Real* diagonal = panel + static_cast<std::size_t>(begin) * rows + begin;
+      const Real* before = panel + begin;  // row `begin` of the columns done
       subtract_product(width, width, begin, before, rows, before, rows, diagonal, rows);
       int info = 0;
-      dpotrf_("L", &width, diagonal, &rows, &info);
+      Blas<Real>::potrf("L", &width, diagonal, &rows, &info);
       if (info != 0) return false;
       const int below = rows - begin - width;
       parallel_for(n_tiles(below, kTileRows), threads, [&](int t) {
         const int row = width + t * kTileRows;
         const int m = std::min(kTileRows, below - t * kTileRows);
         subtract_product(m, width, begin, before + row, rows, before, rows, diagonal + row, rows);
-        dtrsm_("R", "L", "T", "N", &m, &width, &kOne, diagonal, &rows, diagonal + row, &rows);
+        Blas<Real>::trsm("R", "L", "T", "N", &m, &width, &kOne<Real>, diagonal, &rows, diagonal + row, &rows);
       });
     }
     return true;
@@ -197,17 +225,17 @@ class Factorisation {
   void gather(int k, int threads) {
     const int n_columns = s_.n_columns(k), n_rows = s_.n_rows(k), ld = 3 * n_rows, below = 3 * (n_rows - n_columns);
     const int* rows = s_.rows(k);
-    double* panel = panels_[k].get();
-    double* update = updates_[k].get();
+    Real* panel = panels_[k].get();
+    Real* update = updates_[k].get();
     std::vector<std::vector<int>> local;  // by child and row: the row here
     for (const int child : tree_.children[k]) local.push_back(rows_in(k, child));
     // by column, so that each is summed by one thread, in the order of the children
     constexpr int kColumnsATime = 16;
     parallel_for(n_tiles(n_rows, kColumnsATime), threads, [&](int t) {
       for (int j = t * kColumnsATime; j < std::min((t + 1) * kColumnsATime, n_rows); ++j) {
-        double* column = j < n_columns ? panel + 9 * static_cast<std::size_t>(j) * n_rows
-                                       : update + 3 * static_cast<std::size_t>(j - n_columns) * below;
-        std::fill(column, column + 3 * static_cast<std::size_t>(j < n_columns ? ld : below), 0.0);
+        Real* column = j < n_columns ? panel + 9 * static_cast<std::size_t>(j) * n_rows
+                                     : update + 3 * static_cast<std::size_t>(j - n_columns) * below;
+        std::fill(column, column + 3 * static_cast<std::size_t>(j < n_columns ? ld : below), Real(0));
         if (j < n_columns) add_matrix(s_.first[k] + j, rows, n_rows, column, ld);
         for (std::size_t c = 0; c < local.size(); ++c) {
           add_child(tree_.children[k][c], local[c], j, n_columns, column, j < n_columns ? ld : below);
@@ -228,28 +256,30 @@ class Factorisation {
     return local;
   }
 
-  void add_matrix(int column_here, const int* rows, int n_rows, double* column, int ld) const {
+  void add_matrix(int column_here, const int* rows, int n_rows, Real* column, int ld) const {
     for (std::size_t e = entries_.start[column_here]; e < entries_.start[column_here + 1]; ++e) {
       const auto at = 3 * (std::lower_bound(rows, rows + n_rows, entries_.row[e]) - rows);
       const double* block = &matrix_.value[9 * entries_.at[e]];
       for (int p = 0; p < 3; ++p) {
-        for (int q = 0; q < 3; ++q) column[q * ld + at + p] += entries_.is_turned[e] ? block[3 * q + p] : block[3 * p + q];
+        for (int q = 0; q < 3; ++q) {
+          column[q * ld + at + p] += static_cast<Real>(entries_.is_turned[e] ? block[3 * q + p] : block[3 * p + q]);
+        }
       }
     }
   }
 
   /// Add the child's columns that stand for column j here, if any.
-  void add_child(int child, const std::vector<int>& local, int j, int n_columns, double* column, int ld) const {
+  void add_child(int child, const std::vector<int>& local, int j, int n_columns, Real* column, int ld) const {
     const auto found = std::lower_bound(local.begin(), local.end(), j);
     if (found == local.end() || *found != j) return;
     const int first = static_cast<int>(found - local.begin());
     const int n = static_cast<int>(local.size());
     const int offset = j < n_columns ? 0 : n_columns;  // an update has no rows of the columns themselves
     for (int q = 0; q < 3; ++q) {
-      const double* from = updates_[child].get() + (3 * static_cast<std::size_t>(first) + q) * 3 * n;
-      double* to = column + static_cast<std::size_t>(q) * ld;
+      const Real* from = updates_[child].get() + (3 * static_cast<std::size_t>(first) + q) * 3 * n;
+      Real* to = column + static_cast<std::size_t>(q) * ld;
       for (int i = first; i < n; ++i) {
-        double* at = to + 3 * (local[i] - offset);
+        Real* at = to + 3 * (local[i] - offset);
         at[0] += from[3 * i];  // above the diagonal of a first block: never read
         at[1] += from[3 * i + 1];
         at[2] += from[3 * i + 2];
@@ -260,10 +290,10 @@ class Factorisation {
   const BlockMatrix& matrix_;
   const Supernodes& s_;
   int threads_;
-  Panels& panels_;
+  Panels<Real>& panels_;
   Entries entries_;
   Tree tree_;
-  std::vector<Update> updates_;
+  std::vector<std::unique_ptr<Real[]>> updates_;
   std::atomic<bool> is_positive_ = true;
 };
 
@@ -286,12 +316,14 @@ double most_numbers(const Supernodes& s) {
   return factor + most;
 }
 
-bool factorise(const BlockMatrix& matrix, const Supernodes& supernodes, int threads, Panels& panels) {
-  return Factorisation(matrix, supernodes, threads, panels).run();
+template <class Real>
+bool factorise(const BlockMatrix& matrix, const Supernodes& supernodes, int threads, Panels<Real>& panels) {
+  return Factorisation<Real>(matrix, supernodes, threads, panels).run();
 }
 
-void solve_panels(const Supernodes& s, const Panels& panels, const std::vector<char>& is_needed, int k, double* b) {
-  std::vector<double> below;  // k rows, as b
+template <class Real>
+void solve_panels(const Supernodes& s, const Panels<Real>& panels, const std::vector<char>& is_needed, int k, Real* b) {
+  std::vector<Real> below;  // k rows, as b
   std::vector<char> is_active(s.count(), 0);
   const auto gathered = [&](int node, int n_columns) {
     const int n = s.n_rows(node) - n_columns;
@@ -301,36 +333,43 @@ void solve_panels(const Supernodes& s, const Panels& panels, const std::vector<c
   const auto row_of = [&](int node, int i) { return b + 3 * static_cast<std::size_t>(s.rows(node)[i]) * k; };
   for (int node = 0; node < s.count(); ++node) {
     const int n_columns = s.n_columns(node), columns = 3 * n_columns, ld = 3 * s.n_rows(node);
-    double* own = b + 3 * static_cast<std::size_t>(s.first[node]) * k;
-    const auto is_zero = [](double x) { return x == 0; };
+    Real* own = b + 3 * static_cast<std::size_t>(s.first[node]) * k;
+    const auto is_zero = [](Real x) { return x == 0; };
     if (!is_active[node] && std::all_of(own, own + static_cast<std::size_t>(columns) * k, is_zero)) continue;
     if (s.parent[node] >= 0) is_active[s.parent[node]] = 1;
-    const double* panel = panels[node].get();
-    dtrsm_("R", "L", "T", "N", &k, &columns, &kOne, panel, &ld, own, &k);
+    const Real* panel = panels[node].get();
+    Blas<Real>::trsm("R", "L", "T", "N", &k, &columns, &kOne<Real>, panel, &ld, own, &k);
     const int n = gathered(node, n_columns), m = 3 * n;
     if (n == 0) continue;
-    dgemm_("N", "T", &k, &m, &columns, &kOne, own, &k, panel + columns, &ld, &kZero, below.data(), &k);
+    Blas<Real>::gemm("N", "T", &k, &m, &columns, &kOne<Real>, own, &k, panel + columns, &ld, &kZero<Real>, below.data(),
+                     &k);
     for (int i = 0; i < n; ++i) {
-      double* to = row_of(node, n_columns + i);
-      const double* from = &below[3 * static_cast<std::size_t>(i) * k];
+      Real* to = row_of(node, n_columns + i);
+      const Real* from = &below[3 * static_cast<std::size_t>(i) * k];
       for (int q = 0; q < 3 * k; ++q) to[q] -= from[q];
     }
   }
   for (int node = s.count() - 1; node >= 0; --node) {
     if (!is_needed[node]) continue;
     const int n_columns = s.n_columns(node), columns = 3 * n_columns, ld = 3 * s.n_rows(node);
-    double* own = b + 3 * static_cast<std::size_t>(s.first[node]) * k;
-    const double* panel = panels[node].get();
+    Real* own = b + 3 * static_cast<std::size_t>(s.first[node]) * k;
+    const Real* panel = panels[node].get();
     const int n = gathered(node, n_columns), m = 3 * n;
     for (int i = 0; i < n; ++i) {
-      const double* from = row_of(node, n_columns + i);
+      const Real* from = row_of(node, n_columns + i);
       std::copy(from, from + 3 * k, &below[3 * static_cast<std::size_t>(i) * k]);
     }
     if (n > 0) {
-      dgemm_("N", "N", &k, &columns, &m, &kMinus, below.data(), &k, panel + columns, &ld, &kOne, own, &k);
+      Blas<Real>::gemm("N", "N", &k, &columns, &m, &kMinus<Real>, below.data(), &k, panel + columns, &ld, &kOne<Real>,
+                       own, &k);
     }
-    dtrsm_("R", "L", "N", "N", &k, &columns, &kOne, panel, &ld, own, &k);
+    Blas<Real>::trsm("R", "L", "N", "N", &k, &columns, &kOne<Real>, panel, &ld, own, &k);
   }
 }
+
+template bool factorise(const BlockMatrix&, const Supernodes&, int, Panels<float>&);
+template bool factorise(const BlockMatrix&, const Supernodes&, int, Panels<double>&);
+template void solve_panels(const Supernodes&, const Panels<float>&, const std::vector<char>&, int, float*);
+template void solve_panels(const Supernodes&, const Panels<double>&, const std::vector<char>&, int, double*);
 
 }  // namespace mbtfm::substrate

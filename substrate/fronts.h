@@ -23,18 +23,21 @@ struct Supernodes {
 };
 
 /// The factor: by supernode its columns, each with the rows of the supernode, as one dense matrix of 3 n_rows(s) rows.
-using Panels = std::vector<std::unique_ptr<double[]>>;
+template <class Real>
+using Panels = std::vector<std::unique_ptr<Real[]>>;
 
 /// The most numbers that factor and fronts take at a time, for any number of threads.
 double most_numbers(const Supernodes& supernodes);
 
 /// Subtrees run side by side; the fronts above them one after the other, cut into tiles. Neither depends on the number
 /// of threads, so the bits do not. @return false where the matrix is not positive definite to rounding
-bool factorise(const BlockMatrix& matrix, const Supernodes& supernodes, int threads, Panels& panels);
+template <class Real>  // float or double
+bool factorise(const BlockMatrix& matrix, const Supernodes& supernodes, int threads, Panels<Real>& panels);
 
 /// Solve L L^T x = b for k right-hand sides at a time, x over b: column-major, a column for each unknown in the order
 /// of elimination, k rows. Skips the supernodes below which no b is, and those above which no x is needed.
-void solve_panels(const Supernodes& supernodes, const Panels& panels, const std::vector<char>& is_needed, int k,
-                  double* b);
+template <class Real>
+void solve_panels(const Supernodes& supernodes, const Panels<Real>& panels, const std::vector<char>& is_needed, int k,
+                  Real* b);
 
 }  // namespace mbtfm::substrate

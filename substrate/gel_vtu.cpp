@@ -58,8 +58,8 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
   }
   const std::vector<Vec2> displacements = substrate.displacements_um(points, ellipses, forces_nN);
 
-  const std::vector<double> vertical =
-      substrate.has_vertical() ? substrate.vertical_um(points, ellipses, forces_nN) : std::vector<double>(points.size());
+  const std::vector<double> vertical = substrate.has_vertical() ? substrate.vertical_um(points, ellipses, forces_nN)
+                                                                : std::vector<double>(points.size());
 
   Grid grid;
   grid.point_arrays = {{"displacement_um", 3, {}}};

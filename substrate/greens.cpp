@@ -15,14 +15,18 @@ void declare(ParameterList& list, SubstrateParameters& p) {
   list.add("modulus_profile", p.modulus_profile,
            "refined: depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
            "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
-  list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
-           "split, refined: from the adhesions and beads to the sides of the block where the gel's own are far away, in "
-           "gel thicknesses");
+  list.add(
+      "margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
+      "split, refined: from the adhesions and beads to the sides of the block where the gel's own are far away, in "
+      "gel thicknesses");
   list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
            "split: cells of the correction's grid over the gel's thickness");
   list.add("element", p.element, "refined: finite element", {"q2-p1disc", "q1-p0"});
   list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
            "refined: square root of an adhesion's area over the side of the elements that carry it, in the first mesh");
+  list.add("precision", p.precision,
+           "refined: of the factor; auto: single up to a Poisson ratio of 0.495, above it double",
+           {"auto", "single", "double"});
   list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
            "refined: elements that touch each adhesion, at least");
   list.add("growth", p.growth, Range::between(0.1, 10),

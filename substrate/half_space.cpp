@@ -235,8 +235,8 @@ std::vector<double> half_space_vertical_um(const Gel& gel, const std::vector<Vec
       const std::complex<double> root = std::sqrt(z - focus) * std::sqrt(z + focus);
       const std::complex<double> field =
           is_inside ? pi * (std::conj(z) - (a - b) / (a + b) * z) : 2 * pi * a * b / (z + root);
-      vertical[i] += (1 - 2 * gel.poisson_ratio) / (4 * pi * shear_modulus_kPa(gel) * pi * a * b) *
-                     (force * field).real();
+      vertical[i] +=
+          (1 - 2 * gel.poisson_ratio) / (4 * pi * shear_modulus_kPa(gel) * pi * a * b) * (force * field).real();
     }
   });
   return vertical;

@@ -99,8 +99,7 @@ double distance(const Box& box, Vec2 point) {
 }  // namespace
 
 BlockMesh refined_mesh(const Material& material, const Extent& scene, const std::vector<Ellipse>& ellipses,
-                       const Fineness& fineness, double margin_um, int order, std::int64_t most_cells,
-                       int threads) {
+                       const Fineness& fineness, double margin_um, int order, std::int64_t most_cells, int threads) {
   check_size(scene, coarsest_side_um(material), most_cells);
   const GridLines lines = boxes_around(scene, material, margin_um);
   std::vector<Target> targets;

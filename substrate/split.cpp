@@ -107,7 +107,8 @@ class Split final : public Substrate {
     figures.emplace_back("substrate_block_x_um", lines.x_um.back() - lines.x_um.front());
     figures.emplace_back("substrate_block_y_um", lines.y_um.back() - lines.y_um.front());
     figures.emplace_back("substrate_factor_GB", block_->system.factor().factor_GB());
-    if (!parameters_.cache_folder.empty()) figures.emplace_back("substrate_cache", block_->system.factor().cache_note());
+    if (!parameters_.cache_folder.empty())
+      figures.emplace_back("substrate_cache", block_->system.factor().cache_note());
     figures.emplace_back("substrate_setup_s", setup_s_);
     figures.emplace_back("substrate_solve_s", solve_s_);
     return figures;

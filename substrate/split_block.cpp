@@ -92,9 +92,8 @@ Footprint footprint_of(const Extent& scene, const Gel& gel, const SubstrateParam
                      below(scene.high_um.y) + 1};
   const double margin = margin_um(gel, parameters);
   // the gel's own sides stand where they do; far ones may stand at whole squares, alike for many scenes
-  const Extent from = parameters.side_distance_um
-                          ? scene
-                          : Extent{{s[0] * step, s[2] * step}, {s[1] * step, s[3] * step}};
+  const Extent from =
+      parameters.side_distance_um ? scene : Extent{{s[0] * step, s[2] * step}, {s[1] * step, s[3] * step}};
   return {s, {from.low_um - Vec2{margin, margin}, from.high_um + Vec2{margin, margin}}};
 }
 
@@ -103,8 +102,11 @@ std::unique_ptr<SplitBlock> make_split_block(const Footprint& footprint, const G
   const GridLines lines = grid_of(footprint, gel, parameters);
   BlockMesh mesh = make_block_mesh(
       lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
-  auto block = std::unique_ptr<SplitBlock>(
-      new SplitBlock{footprint, ElasticSystem({gel, {}}, std::move(mesh), threads, parameters.memory_limit_GB, parameters.cache_folder), {}});
+  const FactorOptions options = {.threads = threads,
+                                 .memory_limit_GB = allowed_GB(parameters.memory_limit_GB),
+                                 .cache_folder = parameters.cache_folder};
+  auto block =
+      std::unique_ptr<SplitBlock>(new SplitBlock{footprint, ElasticSystem({gel, {}}, std::move(mesh), options), {}});
   block->side_points = side_points_of(block->system);
   return block;
 }

@@ -49,7 +49,7 @@ std::array<double, 6> stress_kPa(const BlockMesh& mesh, int cell, const Material
   const double nu = material.gel.poisson_ratio;
   const Gradient g = gradient_at_centre(mesh, cell, u);
   const double even = 2 * mu * nu / (1 - 2 * nu) * mean_divergence(mesh, cell, u);
-  return {2 * mu * g[0][0] + even, 2 * mu * g[1][1] + even, 2 * mu * g[2][2] + even,
+  return {2 * mu * g[0][0] + even,  2 * mu * g[1][1] + even,  2 * mu * g[2][2] + even,
           mu * (g[0][1] + g[1][0]), mu * (g[1][2] + g[2][1]), mu * (g[0][2] + g[2][0])};
 }
 

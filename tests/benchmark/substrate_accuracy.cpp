@@ -66,8 +66,7 @@ int run(const std::vector<std::string>& arguments) {
   }
   substrate::SubstrateParameters exact;
   exact.model = "layer";
-  const Eigen::MatrixXd reference =
-      substrate::make_greens(study.gel, exact, 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd reference = substrate::make_greens(study.gel, exact, 2)->compliance_um_per_nN(points, ellipses);
   const test::ColumnErrors error = test::column_errors(matrix, reference, points, ellipses);
   std::printf("all %.3f %%,outside %.3f %%,inside %.3f %%,worst %.3f %%\n", 100 * error.all, 100 * error.outside,
               100 * error.inside, 100 * error.worst_outside);

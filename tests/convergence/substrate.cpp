@@ -90,7 +90,8 @@ TEST(ElasticSystem, the_base_bears_the_whole_load) {
     const auto is_too_large = [](const Box& box) {
       return box.low_um[2] == 0 && box.size_um[0] > 1 && std::abs(box.low_um[0]) < 3 && std::abs(box.low_um[1]) < 3;
     };
-    const ElasticSystem system({gel_of(0.4999, 10), {}}, make_block_mesh(lines, order, is_too_large, 100000, 2), 2, 2);
+    const ElasticSystem system({gel_of(0.4999, 10), {}}, make_block_mesh(lines, order, is_too_large, 100000, 2),
+                               {.threads = 2, .memory_limit_GB = 2});
     const auto load = system.load_weights(ellipse);
     double share = 0;
     for (const auto& [node, weight] : load) share += weight;

@@ -14,7 +14,8 @@ namespace fs = std::filesystem;
 class SubstrateProgram : public testing::Test {
  protected:
   SubstrateProgram() {
-    write("gel.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.45\nthickness_um = 20\n");
+    write("gel.toml",
+          "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.45\nthickness_um = 20\n");
     write("adhesions.csv",
           "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity\n"
           "1,20,20,3.141592653589793,2,2,0,0,1\n");
@@ -26,7 +27,9 @@ class SubstrateProgram : public testing::Test {
   test::Outcome run(const std::string& arguments) {
     return test::run_program("mbtfm-substrate --quiet --gel " + file("gel.toml") + " " + arguments);
   }
-  std::string forces() const { return "--adhesions " + file("adhesions.csv") + " --forces " + file("forces.csv") + " "; }
+  std::string forces() const {
+    return "--adhesions " + file("adhesions.csv") + " --forces " + file("forces.csv") + " ";
+  }
 
   test::TemporaryFolder folder_;
 };
@@ -42,7 +45,8 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
       const double x = 0.1 * (i + 0.5), y = 0.1 * (j + 0.5);
       const bool is_inside = std::hypot(x, y) < 1;
       n += is_inside ? 1 : 0;
-      rows += shortest(20 + x) + "," + shortest(20 + y) + (is_inside ? ",0.954929658551372,0.318309886183791\n" : ",0,0\n");
+      rows +=
+          shortest(20 + x) + "," + shortest(20 + y) + (is_inside ? ",0.954929658551372,0.318309886183791\n" : ",0,0\n");
     }
   }
   write("traction.csv", rows);

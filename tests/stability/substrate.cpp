@@ -23,11 +23,12 @@ Eigen::MatrixXd compliance(const std::string& model, const Gel& gel, const std::
 }
 
 class Model : public testing::TestWithParam<const char*> {};
-INSTANTIATE_TEST_SUITE_P(All, Model, testing::Values("half-space", "layer", "split", "refined", "auto"), [](const auto& test) {
-  std::string name = test.param;
-  std::replace(name.begin(), name.end(), '-', '_');
-  return name;
-});
+INSTANTIATE_TEST_SUITE_P(All, Model, testing::Values("half-space", "layer", "split", "refined", "auto"),
+                         [](const auto& test) {
+                           std::string name = test.param;
+                           std::replace(name.begin(), name.end(), '-', '_');
+                           return name;
+                         });
 
 /// Largest part of the displacement of a point in the middle of a loaded ellipse that may differ between models.
 double tolerance_of(const std::string& model) {
@@ -119,7 +120,8 @@ TEST(Substrate, names_the_models_it_knows) {
     make_substrate(kGel, test::model_named("layr"), 1);
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, auto"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, auto"), std::string::npos)
+        << error.what();
   }
   EXPECT_THROW(make_greens(kGel, test::model_named("split"), 1), UsageError);
 }
@@ -247,7 +249,8 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
   SubstrateParameters layer = test::model_named("layer");
   layer.vertical = true;
   EXPECT_THROW(make_substrate(kGel, layer, 1), UsageError);
-  EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}), UsageError);
+  EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
+               UsageError);
 }
 
 /// The only file of a folder.

@@ -1,7 +1,7 @@
 /// A gel of even layers on a rigid base, wave by wave: shares nothing with finite elements.
 ///
-/// Plane part: u = (U cos kx, W sin kx); in each layer (U, W) is a sum of (1, -1) e^(-kz), (z, -z - kappa/k) e^(-kz) and
-/// their mirror images (1, 1) e^(kz), (z, z - kappa/k) e^(kz), kappa = 3 - 4 nu; displacements and tractions are
+/// Plane part: u = (U cos kx, W sin kx); in each layer (U, W) is a sum of (1, -1) e^(-kz), (z, -z - kappa/k) e^(-kz)
+/// and their mirror images (1, 1) e^(kz), (z, z - kappa/k) e^(kz), kappa = 3 - 4 nu; displacements and tractions are
 /// continuous. Antiplane part: V = a cosh kz + b sinh kz. Source: Navier's equations, solved here.
 #pragma once
 
