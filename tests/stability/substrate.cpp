@@ -151,6 +151,7 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
 TEST(Substrate, says_which_mesh_would_fit_the_memory) {
   SubstrateParameters parameters = test::model_named("refined");
   parameters.tolerance = 0;
+  parameters.precision = "double";
   for (const auto& [limit_GB, fitting] : {std::pair{0.2, "elements; one of"}, std::pair{0.5, "unknowns would fit"}}) {
     parameters.memory_limit_GB = limit_GB;
     try {
