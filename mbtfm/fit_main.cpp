@@ -10,7 +10,7 @@
 #include "pipeline/contract/parallel.h"
 #include "pipeline/contract/stage.h"
 #include "substrate/compliance.h"
-#include "substrate/surface_vtu.h"
+#include "substrate/gel_vtu.h"
 
 namespace mbtfm::inverse {
 namespace {

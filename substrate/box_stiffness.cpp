@@ -1,3 +1,5 @@
+#include <Eigen/Cholesky>
+
 #include "substrate/elastic_system.h"
 #include "substrate/half_space.h"
 
@@ -31,14 +33,18 @@ Shapes shapes_at(int order, std::array<double, 3> size, std::array<double, 3> t)
 
 }  // namespace
 
-Eigen::MatrixXd box_stiffness(const Gel& gel, int order, std::array<double, 3> size_um) {
+Eigen::MatrixXd box_stiffness(const Material& material, int order, const Box& box) {
+  const Gel& gel = material.gel;
+  const std::array<double, 3>& size_um = box.size_um;
   const double mu = shear_modulus_kPa(gel);
   const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
   const int n_nodes = (order + 1) * (order + 1) * (order + 1);
-  const int n_pressures = order == 1 ? 1 : 4;  // 1, and x, y, z from the centre: orthogonal on a box
+  const int n_pressures = order == 1 ? 1 : 4;  // 1, and x, y, z from the centre
   const double volume = size_um[0] * size_um[1] * size_um[2];
   Eigen::MatrixXd stiffness = Eigen::MatrixXd::Zero(3 * n_nodes, 3 * n_nodes);
-  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(3 * n_nodes, n_pressures);  // (q_m, div v)
+  Eigen::MatrixXd divergence = Eigen::MatrixXd::Zero(3 * n_nodes, n_pressures);       // (q_m, div v)
+  Eigen::MatrixXd compressibility = Eigen::MatrixXd::Zero(n_pressures, n_pressures);  // (q_m, q_n / lambda)
+  const double middle_um = box.low_um[2] + 0.5 * size_um[2];
   const GaussRule gauss = gauss_legendre(order + 1);
   const int n = order + 1;
   for (int point = 0; point < n * n * n; ++point) {
@@ -51,6 +57,10 @@ Eigen::MatrixXd box_stiffness(const Gel& gel, int order, std::array<double, 3> s
     }
     const auto slope = shapes_at(order, size_um, t).slope;
     const double pressure[4] = {1, 2 * t[0] - 1, 2 * t[1] - 1, 2 * t[2] - 1};
+    const double modulus = relative_modulus(material, box.low_um[2] + t[2] * size_um[2], middle_um);
+    for (int m = 0; m < n_pressures; ++m) {
+      for (int l = 0; l < n_pressures; ++l) compressibility(m, l) += weight / modulus * pressure[m] * pressure[l];
+    }
     for (int a = 0; a < n_nodes; ++a) {
       for (int i = 0; i < 3; ++i) {
         for (int m = 0; m < n_pressures; ++m) divergence(3 * a + i, m) += weight * pressure[m] * slope[a][i];
@@ -61,16 +71,14 @@ Eigen::MatrixXd box_stiffness(const Gel& gel, int order, std::array<double, 3> s
         for (int k = 0; k < 3; ++k) product += slope[a][k] * slope[b][k];
         for (int i = 0; i < 3; ++i) {
           for (int j = 0; j < 3; ++j) {
-            stiffness(3 * a + i, 3 * b + j) += mu * weight * ((i == j ? product : 0) + slope[a][j] * slope[b][i]);
+            stiffness(3 * a + i, 3 * b + j) +=
+                mu * modulus * weight * ((i == j ? product : 0) + slope[a][j] * slope[b][i]);
           }
         }
       }
     }
   }
-  for (int m = 0; m < n_pressures; ++m) {
-    const double square = m == 0 ? volume : volume / 3;  // (q_m, q_m)
-    stiffness += lambda / square * divergence.col(m) * divergence.col(m).transpose();
-  }
+  stiffness += lambda * divergence * compressibility.ldlt().solve(divergence.transpose());
   return stiffness;
 }
 

@@ -3,33 +3,24 @@
 #include <cholmod.h>
 #include <dlfcn.h>
 
-#include <algorithm>
+#include <cmath>
+#include <cstdint>
 #include <cstdio>
+#include <mutex>
+#include <variant>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
+#include "substrate/factor_file.h"
 
 namespace mbtfm::substrate {
 
 namespace {
 
-/// CHOLMOD's settings and scratch: one for each thread.
-struct Common {
-  cholmod_common c;
-  Common() {
-    cholmod_start(&c);
-    c.print = 0;
-    c.supernodal = CHOLMOD_SUPERNODAL;
-  }
-  ~Common() { cholmod_finish(&c); }
-  Common(const Common&) = delete;
-  Common& operator=(const Common&) = delete;
-};
-
-/// OpenBLAS' own threads, where the BLAS is OpenBLAS: it pays in the factorisation, and harms in concurrent solves.
-void set_blas_threads(int threads) {
+/// The BLAS' own threads off: ours share its work, and other numbers of them round differently.
+void keep_blas_to_one_thread() {
   static const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
-  if (set) set(threads);
+  if (set) set(1);
 }
 
 /// Pattern of the block matrix as a sparse matrix of CHOLMOD that owns nothing.
@@ -47,27 +38,57 @@ cholmod_sparse pattern_of(const BlockMatrix& m) {
   return a;
 }
 
-cholmod_sparse* expand(const BlockMatrix& m, cholmod_common& c) {
-  const std::size_t entries = 9 * m.row.size() - 3 * static_cast<std::size_t>(m.n);  // diagonal blocks have 6
-  cholmod_sparse* a = cholmod_allocate_sparse(3 * m.n, 3 * m.n, entries, 1, 1, -1, CHOLMOD_REAL, &c);
-  if (!a) return nullptr;
-  int* start = static_cast<int*>(a->p);
-  int* row = static_cast<int*>(a->i);
-  double* value = static_cast<double*>(a->x);
-  int next = 0;
-  for (int column = 0; column < m.n; ++column) {
-    for (int q = 0; q < 3; ++q) {
-      start[3 * column + q] = next;
-      for (int k = m.start[column]; k < m.start[column + 1]; ++k) {
-        for (int p = m.row[k] == column ? q : 0; p < 3; ++p) {
-          row[next] = 3 * m.row[k] + p;
-          value[next++] = m.value[9 * static_cast<std::size_t>(k) + 3 * p + q];
-        }
-      }
-    }
+Supernodes supernodes_of(const cholmod_factor& factor) {
+  const auto copy = [](const void* from, std::size_t n) {
+    return std::vector<int>(static_cast<const int*>(from), static_cast<const int*>(from) + n);
+  };
+  Supernodes s;
+  s.first = copy(factor.super, factor.nsuper + 1);
+  s.row_start = copy(factor.pi, factor.nsuper + 1);
+  s.row = copy(factor.s, factor.ssize);
+  s.place.resize(factor.n);
+  for (std::size_t column = 0; column < factor.n; ++column) {
+    s.place[static_cast<const int*>(factor.Perm)[column]] = static_cast<int>(column);
   }
-  start[3 * m.n] = next;
-  return a;
+  std::vector<int> supernode_of(factor.n);
+  for (std::size_t k = 0; k < factor.nsuper; ++k) {
+    for (int column = s.first[k]; column < s.first[k + 1]; ++column) supernode_of[column] = static_cast<int>(k);
+  }
+  for (std::size_t k = 0; k < factor.nsuper; ++k) {
+    const int below = s.row_start[k] + s.first[k + 1] - s.first[k];
+    s.parent.push_back(below < s.row_start[k + 1] ? supernode_of[s.row[below]] : -1);
+  }
+  return s;
+}
+
+/// Order and group the nodes, not the unknowns: a ninth of the graph, the same fill.
+Supernodes analyse(const BlockMatrix& matrix) {
+  cholmod_common c;
+  cholmod_start(&c);
+  c.print = 0;
+  c.supernodal = CHOLMOD_SUPERNODAL;
+  c.nmethods = 1;
+  c.method[0].ordering = CHOLMOD_GIVEN;
+  cholmod_sparse pattern = pattern_of(matrix);
+  std::vector<int> order(matrix.n);
+  cholmod_factor* factor = nullptr;
+  // METIS draws from the C library's one generator, which it seeds: two at a time would order at random
+  static std::mutex one_at_a_time;
+  const bool is_ordered = [&] {
+    const std::lock_guard lock(one_at_a_time);
+    return cholmod_metis(&pattern, nullptr, 0, 1, order.data(), &c) != 0;
+  }();
+  if (is_ordered) {
+    factor = cholmod_analyze_p(&pattern, order.data(), nullptr, 0, &c);
+  }
+  Supernodes supernodes;
+  if (factor && factor->is_super) supernodes = supernodes_of(*factor);
+  cholmod_free_factor(&factor, &c);
+  cholmod_finish(&c);
+  if (supernodes.first.empty()) {
+    throw NotSolved(Report{.reason = "the substrate's equations could not be ordered: out of memory"});
+  }
+  return supernodes;
 }
 
 std::string shown_GB(double value) {
@@ -76,89 +97,110 @@ std::string shown_GB(double value) {
   return text;
 }
 
-// 16 columns: the fastest measured width of a block; wider ones leave the cache
-constexpr int kBlockColumns = 16;
+// columns solved at a time: wide enough for the BLAS, few enough that a block of 300 000 unknowns stays
+// below 250 MB
+constexpr int kBlockColumns = 96;
+
+/// Factorise, or say why not.
+template <class Real>
+Panels<Real> factor_of(const BlockMatrix& matrix, const Supernodes& s, const FactorOptions& options) {
+  const double memory_limit_GB = options.memory_limit_GB;
+  const double needed_GB =
+      1e-9 * sizeof(Real) * most_numbers(s) +
+      8e-9 * (static_cast<double>(matrix.value.size()) + 3.0 * matrix.n * kBlockColumns * options.threads);
+  if (needed_GB > memory_limit_GB) {
+    // a factor grows at most as the power 4/3 of the unknowns (nested dissection of a cube)
+    const auto fitting = static_cast<std::int64_t>(3 * matrix.n * std::pow(memory_limit_GB / needed_GB, 0.75));
+    throw NotSolved(
+        Report{.reason = "the substrate's " + std::to_string(3 * matrix.n) + " unknowns take " + shown_GB(needed_GB) +
+                         " of memory, allowed are " + shown_GB(memory_limit_GB) + ", which a mesh of " +
+                         std::to_string(fitting) +
+                         " unknowns would fit: ask for a coarser one (tolerance, elements_across_adhesion), "
+                         "allow more (memory_limit_GB), or take the model 'layer'"});
+  }
+  Panels<Real> panels;
+  if (!factorise(matrix, s, options.threads, panels)) {
+    throw NotSolved(Report{.reason = "the substrate's stiffness matrix is not positive definite to rounding: the "
+                                     "Poisson ratio is too near 1/2"});
+  }
+  return panels;
+}
+
+void solve_block(const Supernodes& s, const Panels<double>& panels, const std::vector<char>& is_needed, int width,
+                 std::vector<double>& values) {
+  solve_panels(s, panels, is_needed, width, values.data());
+}
+
+void solve_block(const Supernodes& s, const Panels<float>& panels, const std::vector<char>& is_needed, int width,
+                 std::vector<double>& values) {
+  std::vector<float> rounded(values.begin(), values.end());
+  solve_panels(s, panels, is_needed, width, rounded.data());
+  std::copy(rounded.begin(), rounded.end(), values.begin());
+}
 
 }  // namespace
 
 struct SparseCholesky::Impl {
-  Common common;
-  cholmod_factor* factor = nullptr;
+  Supernodes supernodes;
+  std::variant<Panels<double>, Panels<float>> panels;
   int n = 0;
   int threads = 1;
-  ~Impl() { cholmod_free_factor(&factor, &common.c); }
+  double factor_GB = 0;
+  std::string cache_note;
 };
 
-SparseCholesky::SparseCholesky(const BlockMatrix& matrix, int threads, int blas_threads, double memory_limit_GB)
+SparseCholesky::SparseCholesky(const BlockMatrix& matrix, const FactorOptions& options)
     : impl_(std::make_unique<Impl>()) {
-  cholmod_common& c = impl_->common.c;
   impl_->n = 3 * matrix.n;
-  impl_->threads = threads;
-  // order the nodes, not the unknowns: a third of the graph, the same fill
-  std::vector<int> node_order(matrix.n), order(3 * matrix.n);
-  cholmod_sparse pattern = pattern_of(matrix);
-  if (!cholmod_metis(&pattern, nullptr, 0, 1, node_order.data(), &c)) throw InternalError("cholmod_metis failed");
-  for (int k = 0; k < 3 * matrix.n; ++k) order[k] = 3 * node_order[k / 3] + k % 3;
-
-  cholmod_sparse* a = expand(matrix, c);
-  if (!a) throw NotSolved(Report{.reason = "out of memory for the stiffness matrix of the substrate"});
-  c.nmethods = 1;
-  c.method[0].ordering = CHOLMOD_GIVEN;
-  impl_->factor = cholmod_analyze_p(a, order.data(), nullptr, 0, &c);
-  if (!impl_->factor) {
-    cholmod_free_sparse(&a, &c);
-    throw NotSolved(Report{.reason = "the substrate's equations could not be analysed: out of memory"});
+  impl_->threads = options.threads;
+  impl_->supernodes = analyse(matrix);
+  const Supernodes& s = impl_->supernodes;
+  const bool is_single = options.precision == Precision::single_;
+  for (int k = 0; k < s.count(); ++k) impl_->factor_GB += (is_single ? 36e-9 : 72e-9) * s.n_rows(k) * s.n_columns(k);
+  keep_blas_to_one_thread();
+  if (is_single) {
+    impl_->panels = factor_of<float>(matrix, s, options);
+    return;
   }
-  const double needed_GB = factor_GB() + 24e-9 * static_cast<double>(a->nzmax);  // and the matrix, twice while copied
-  if (needed_GB > memory_limit_GB) {
-    cholmod_free_sparse(&a, &c);
-    throw NotSolved(Report{.reason = "the substrate's " + std::to_string(impl_->n) + " unknowns take " +
-                                     shown_GB(needed_GB) + " of memory, allowed are " + shown_GB(memory_limit_GB) +
-                                     ": allow more (memory_limit_GB), ask for a coarser mesh, or take the model "
-                                     "'layer'"});
+  if (options.cache_folder.empty()) {
+    impl_->panels = factor_of<double>(matrix, s, options);
+    return;
   }
-  set_blas_threads(blas_threads);
-  cholmod_factorize(a, impl_->factor, &c);
-  set_blas_threads(1);
-  cholmod_free_sparse(&a, &c);
-  if (c.status != CHOLMOD_OK) {
-    throw NotSolved(Report{.reason = c.status == CHOLMOD_NOT_POSDEF
-                                         ? "the substrate's stiffness matrix is not positive definite to rounding: "
-                                           "the Poisson ratio is too near 1/2"
-                                         : "the substrate's factorisation failed: out of memory"});
+  const FactorFile file(options.cache_folder, matrix, s);
+  CachedFactor cached = file.read();
+  impl_->cache_note = cached.note;
+  if (cached.panels) {
+    impl_->panels = std::move(*cached.panels);
+    return;
   }
+  Panels<double> panels = factor_of<double>(matrix, s, options);
+  impl_->cache_note += file.write(panels);
+  impl_->panels = std::move(panels);
 }
 
 SparseCholesky::~SparseCholesky() = default;
 
-double SparseCholesky::factor_GB() const { return 8e-9 * static_cast<double>(impl_->factor->xsize); }
+double SparseCholesky::factor_GB() const { return impl_->factor_GB; }
 
-void SparseCholesky::solve(int n_columns, const std::function<void(int, double*)>& fill,
-                           const std::function<void(int, const double*)>& take) const {
-  const std::size_t n = impl_->n;
+const std::string& SparseCholesky::cache_note() const { return impl_->cache_note; }
+
+void SparseCholesky::solve(int n_columns, const std::vector<int>& needed, const Use& fill, const Use& take) const {
+  const Supernodes& s = impl_->supernodes;
+  std::vector<char> is_column_needed(impl_->n / 3, 0), is_needed(s.count(), 0);
+  for (const int node : needed) is_column_needed[s.place[node]] = 1;
+  for (int k = 0; k < s.count(); ++k) {
+    for (int column = s.first[k]; column < s.first[k + 1]; ++column) is_needed[k] |= is_column_needed[column];
+    if (is_needed[k] && s.parent[k] >= 0) is_needed[s.parent[k]] = 1;
+  }
+  keep_blas_to_one_thread();
   const int n_blocks = (n_columns + kBlockColumns - 1) / kBlockColumns;
   parallel_for(n_blocks, impl_->threads, [&](int block) {
     const int first = block * kBlockColumns;
-    const int columns = std::min(kBlockColumns, n_columns - first);
-    Common common;
-    std::vector<double> b(n * columns, 0.0);
-    for (int k = 0; k < columns; ++k) fill(first + k, &b[k * n]);
-    cholmod_dense rhs{};
-    rhs.nrow = rhs.d = n;
-    rhs.ncol = columns;
-    rhs.nzmax = b.size();
-    rhs.x = b.data();
-    rhs.xtype = CHOLMOD_REAL;
-    rhs.dtype = CHOLMOD_DOUBLE;
-    cholmod_dense *x = nullptr, *y = nullptr, *e = nullptr;
-    const bool is_solved = cholmod_solve2(CHOLMOD_A, impl_->factor, &rhs, nullptr, &x, nullptr, &y, &e, &common.c);
-    if (is_solved) {
-      for (int k = 0; k < columns; ++k) take(first + k, static_cast<const double*>(x->x) + k * n);
-    }
-    cholmod_free_dense(&x, &common.c);
-    cholmod_free_dense(&y, &common.c);
-    cholmod_free_dense(&e, &common.c);
-    if (!is_solved) throw NotSolved(Report{.reason = "out of memory while solving for the substrate"});
+    const int width = std::min(kBlockColumns, n_columns - first);
+    std::vector<double> values(static_cast<std::size_t>(impl_->n) * width, 0.0);
+    for (int k = 0; k < width; ++k) fill(first + k, {&values[k], width, s.place});
+    std::visit([&](const auto& panels) { solve_block(s, panels, is_needed, width, values); }, impl_->panels);
+    for (int k = 0; k < width; ++k) take(first + k, {&values[k], width, s.place});
   });
 }
 

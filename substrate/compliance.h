@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,6 +25,8 @@ Ellipse ellipse_of(const Adhesion& adhesion);
 
 struct SubstrateParameters {
   std::string model = "split";  ///< exact near field, real sides and bottom, a second a cell
+  double tolerance = 0.02;      ///< a third of the beads' noise in good experiments; `split` and `layer` are far below
+  std::string modulus_profile;  ///< empty: youngs_modulus_kPa at every depth
 
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
@@ -32,12 +36,27 @@ struct SubstrateParameters {
   // refined
   std::string element = "q2-p1disc";      ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
   double elements_across_adhesion = 1.4;  ///< square root of its area over their side: 2 % of a column; 1 % at 2
+  std::string precision = "auto";         ///< half the memory and time where the last digits do not matter
   int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
-  double growth = 2;                      ///< their side over the distance to the adhesion: what halving gives anyway
+  double growth = 4;                      ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
+
+  std::optional<double> side_distance_um;  ///< a gel is centimetres wide: its sides are far away
+  std::string cache_folder;                ///< empty: factors stay in memory
+
+  bool vertical = false;  ///< adhesions pull along the surface and beads are seen from above
+  bool stress = false;    ///< of the gel's inside, where it is written
 
   double memory_limit_GB = 0;  ///< of split and refined; 0: four fifths of what the machine has
 };
 void declare(ParameterList& list, SubstrateParameters& parameters);
+
+/// A solution inside the gel, on boxes.
+struct VolumeField {
+  std::vector<std::array<double, 3>> points_um, displacement_um;
+  std::vector<int> box_corners;  ///< 8 points a box: the upper face round, then the lower one
+  std::vector<std::array<double, 6>>
+      stress_kPa;  ///< at the centre of each box: xx, yy, zz, xy, yz, xz; empty: not asked
+};
 
 class Substrate {
  public:
@@ -52,14 +71,21 @@ class Substrate {
   /// @throws as compliance_um_per_nN, and InvalidData where a force is not finite or their number differs
   virtual std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                              const std::vector<Vec2>& forces_nN) const;
+  /// Displacement (um) of each point of the surface into the gel. Computed nowhere else.
+  /// @throws as displacements_um, and UsageError where the model has none
+  virtual std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                          const std::vector<Vec2>& forces_nN) const;
+  /// Whether the parameters ask for it.
+  virtual bool has_vertical() const { return false; }
+  /// Displacement and, where the parameters ask for it, stress inside the gel. @throws as vertical_um
+  virtual VolumeField volume(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) const;
   /// What it took into account.
   virtual std::vector<Effect> effects() const = 0;
   /// Its size, and what the calls so far cost.
   virtual Figures figures() const = 0;
 };
 
-/// The model named in the parameters. The same bits for any number of threads, but for `refined`: its factorisation
-/// uses the threads of the BLAS and differs in the last digits. @throws UsageError, InvalidData
+/// The model named in the parameters. The same bits for any number of threads. @throws UsageError, InvalidData
 std::unique_ptr<Substrate> make_substrate(const Gel& gel, const SubstrateParameters& parameters, int threads);
 
 /// The same for `half-space` and `layer` alone, which need no finite elements: links without deal.II.

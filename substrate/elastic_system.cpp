@@ -14,25 +14,33 @@ namespace mbtfm::substrate {
 
 namespace {
 
-/// Stiffness by shape of box: similar boxes have the same but for their length.
+/// Stiffness by shape of box: similar boxes of one modulus have the same but for length and modulus. Where the modulus
+/// changes within them, by shape, length and depth.
 class StiffnessOfBox {
  public:
-  StiffnessOfBox(const Gel& gel, int order) : gel_(gel), order_(order) {}
-  Eigen::MatrixXd operator()(const std::array<double, 3>& size) {
+  StiffnessOfBox(const Material& material, int order) : material_(material), order_(order) {}
+  Eigen::MatrixXd operator()(const Box& box) {
     constexpr double kDigits = 1e9;  // sides equal to rounding are equal
-    const std::array<long, 2> key = {std::lround(kDigits * size[1] / size[0]),
-                                     std::lround(kDigits * size[2] / size[0])};
+    const std::array<double, 3>& size = box.size_um;
+    const auto even = even_modulus(material_, box.low_um[2], box.low_um[2] + size[2]);
+    std::array<long, 4> key = {std::lround(kDigits * size[1] / size[0]), std::lround(kDigits * size[2] / size[0]), 0,
+                               0};
+    if (!even) key[2] = std::lround(kDigits * box.low_um[2]), key[3] = std::lround(kDigits * size[0]);
     auto found = known_.find(key);
     if (found == known_.end()) {
-      found = known_.emplace(key, box_stiffness(gel_, order_, {1, size[1] / size[0], size[2] / size[0]})).first;
+      const Box unit = {{}, {1, size[1] / size[0], size[2] / size[0]}};
+      found = known_
+                  .emplace(key, even ? box_stiffness({material_.gel, {}}, order_, unit)
+                                     : box_stiffness(material_, order_, box))
+                  .first;
     }
-    return size[0] * found->second;
+    return (even ? *even * size[0] : 1) * found->second;
   }
 
  private:
-  Gel gel_;
+  Material material_;
   int order_;
-  std::map<std::array<long, 2>, Eigen::MatrixXd> known_;
+  std::map<std::array<long, 4>, Eigen::MatrixXd> known_;
 };
 
 /// Merge weights of equal nodes, by rising node.
@@ -62,9 +70,8 @@ double allowed_GB(double memory_limit_GB) {
   return 0.8e-9 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
 }
 
-ElasticSystem::ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, int blas_threads, double memory_limit_GB)
-    : mesh_(std::move(mesh)),
-      factor_((number_nodes(), assemble(gel)), threads, blas_threads, allowed_GB(memory_limit_GB)) {}
+ElasticSystem::ElasticSystem(const Material& material, BlockMesh mesh, const FactorOptions& options)
+    : mesh_(std::move(mesh)), factor_((number_nodes(), assemble(material)), options) {}
 
 void ElasticSystem::number_nodes() {
   const std::size_t n_nodes = mesh_.position_um.size();
@@ -122,7 +129,7 @@ BlockMatrix ElasticSystem::pattern() const {
   return matrix;
 }
 
-BlockMatrix ElasticSystem::assemble(const Gel& gel) {
+BlockMatrix ElasticSystem::assemble(const Material& material) {
   BlockMatrix matrix = pattern();
   std::vector<Eigen::Triplet<double>> bottom;
   const auto add = [&](const NodeWeight& at_a, const NodeWeight& at_b, const auto& block) {
@@ -142,9 +149,9 @@ BlockMatrix ElasticSystem::assemble(const Gel& gel) {
       }
     }
   };
-  StiffnessOfBox stiffness_of(gel, mesh_.order);
+  StiffnessOfBox stiffness_of(material, mesh_.order);
   for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
-    const Eigen::MatrixXd stiffness = stiffness_of(mesh_.cells[cell].size_um);
+    const Eigen::MatrixXd stiffness = stiffness_of(mesh_.cells[cell]);
     const int* nodes = mesh_.nodes_of(static_cast<int>(cell));
     for (int b = 0; b < mesh_.nodes_per_cell(); ++b) {
       for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
@@ -157,6 +164,17 @@ BlockMatrix ElasticSystem::assemble(const Gel& gel) {
   bottom_stiffness_.resize(3 * n_free_, 3 * static_cast<Eigen::Index>(bottom_nodes_.size()));
   bottom_stiffness_.setFromTriplets(bottom.begin(), bottom.end());
   return matrix;
+}
+
+std::vector<std::array<double, 3>> ElasticSystem::at_all_nodes(const NodalColumn& u) const {
+  std::vector<std::array<double, 3>> values(mesh_.position_um.size());
+  for (std::size_t node = 0; node < values.size(); ++node) {
+    for (const NodeWeight& carrier : carriers(static_cast<int>(node))) {
+      const int from = free_of_node_[carrier.node];
+      for (int axis = 0; from >= 0 && axis < 3; ++axis) values[node][axis] += carrier.weight * u(from, axis);
+    }
+  }
+  return values;
 }
 
 std::vector<NodeWeight> ElasticSystem::cell_weights(int cell, std::array<double, 3> unit) const {

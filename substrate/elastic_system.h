@@ -13,14 +13,14 @@
 #include "substrate/block_mesh.h"
 #include "substrate/cholesky.h"
 #include "substrate/ellipse.h"
+#include "substrate/material.h"
 
 namespace mbtfm::substrate {
 
 class ElasticSystem {
  public:
-  /// @param blas_threads  as SparseCholesky's
   /// @throws NotSolved where memory would not suffice
-  ElasticSystem(const Gel& gel, BlockMesh mesh, int threads, int blas_threads, double memory_limit_GB);
+  ElasticSystem(const Material& material, BlockMesh mesh, const FactorOptions& options);
 
   const BlockMesh& mesh() const { return mesh_; }
   const SparseCholesky& factor() const { return factor_; }
@@ -38,6 +38,8 @@ class ElasticSystem {
   const std::vector<int>& bottom_nodes() const { return bottom_nodes_; }
   /// Rows: free unknowns.
   const Eigen::SparseMatrix<double>& bottom_stiffness() const { return bottom_stiffness_; }
+  /// The solution at every node of the mesh, free or not.
+  std::vector<std::array<double, 3>> at_all_nodes(const NodalColumn& u) const;
   /// Elements of the surface that an ellipse touches.
   std::vector<int> touched_cells(const Ellipse& ellipse) const;
 
@@ -46,7 +48,7 @@ class ElasticSystem {
   /// The nodes that carry a node: itself, or what it hangs on.
   std::span<const NodeWeight> carriers(int node) const;
   BlockMatrix pattern() const;
-  BlockMatrix assemble(const Gel& gel);
+  BlockMatrix assemble(const Material& material);
 
   BlockMesh mesh_;
   int n_free_ = 0;
@@ -59,7 +61,7 @@ class ElasticSystem {
 };
 
 /// Stiffness of one box of order 1 or 2, (3 nodes)² by columns; unknown 3 k + i is axis i of node k, x fastest.
-Eigen::MatrixXd box_stiffness(const Gel& gel, int order, std::array<double, 3> size_um);
+Eigen::MatrixXd box_stiffness(const Material& material, int order, const Box& box);
 
 /// What `memory_limit_GB` stands for: 0 is four fifths of the machine's memory.
 double allowed_GB(double memory_limit_GB);

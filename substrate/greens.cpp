@@ -8,18 +8,35 @@ namespace mbtfm::substrate {
 
 void declare(ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
-  list.add("model", p.model, "elastic model of the gel", {"half-space", "layer", "split", "refined"});
-  list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
-           "split, refined: from the adhesions and beads to the sides of the block, in gel thicknesses");
+  list.add("model", p.model, "elastic model of the gel", {"half-space", "layer", "split", "refined", "auto"});
+  list.add("tolerance", p.tolerance, Range::between(0, 1),
+           "refined: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is refined "
+           "until it is estimated to have; 0: the first mesh, no error estimated. auto: bias a model may have");
+  list.add("modulus_profile", p.modulus_profile,
+           "refined: depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
+           "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
+  list.add(
+      "margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
+      "split, refined: from the adhesions and beads to the sides of the block where the gel's own are far away, in "
+      "gel thicknesses");
   list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
            "split: cells of the correction's grid over the gel's thickness");
   list.add("element", p.element, "refined: finite element", {"q2-p1disc", "q1-p0"});
   list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
-           "refined: square root of an adhesion's area over the side of the elements that carry it");
+           "refined: square root of an adhesion's area over the side of the elements that carry it, in the first mesh");
+  list.add("precision", p.precision,
+           "refined: of the factor; auto: single up to a Poisson ratio of 0.495, above it double",
+           {"auto", "single", "double"});
   list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
            "refined: elements that touch each adhesion, at least");
   list.add("growth", p.growth, Range::between(0.1, 10),
            "refined: largest side of an element over its distance to the nearest adhesion");
+  list.add("side_distance_um", p.side_distance_um, Range::positive(),
+           "split, refined, auto: from the adhesions and beads to the gel's own sides (um); unset: they are far away");
+  list.add("cache_folder", p.cache_folder,
+           "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
+  list.add("vertical", p.vertical, "write the displacement into the gel, too (half-space, split, refined)");
+  list.add("stress", p.stress, "write the stress inside the gel, too (refined)");
   list.add("memory_limit_GB", p.memory_limit_GB, Range::not_negative(),
            "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
 }
@@ -69,10 +86,31 @@ std::unique_ptr<Substrate> make_greens(const Gel& gel, const SubstrateParameters
   return make_from({{"half-space", make_half_space}, {"layer", make_layer}}, gel, parameters, threads);
 }
 
-Effect vertical_displacement_off() {
+std::vector<double> Substrate::vertical_um(const std::vector<Vec2>&, const std::vector<Ellipse>&,
+                                           const std::vector<Vec2>&) const {
+  throw UsageError("substrate.vertical: the model has no vertical displacement: take half-space, split or refined");
+}
+
+VolumeField Substrate::volume(const std::vector<Ellipse>&, const std::vector<Vec2>&) const {
+  throw UsageError("the model knows the gel's surface alone: take the model refined");
+}
+
+Effect vertical_effect(const SubstrateParameters& parameters) {
   return {.name = "vertical displacement",
-          .is_on = false,
-          .why = "adhesions pull along the surface and beads are seen from above; it does not couple back"};
+          .is_on = parameters.vertical,
+          .why = parameters.vertical
+                     ? "asked for (substrate.vertical)"
+                     : "adhesions pull along the surface and beads are seen from above; it does not couple back"};
+}
+
+double margin_um(const Gel& gel, const SubstrateParameters& parameters) {
+  return parameters.side_distance_um.value_or(parameters.margin_thicknesses * gel.thickness_um);
+}
+
+void check_uniform(const SubstrateParameters& parameters) {
+  if (parameters.modulus_profile.empty()) return;
+  throw UsageError("substrate.modulus_profile: the model '" + parameters.model +
+                   "' holds for one modulus at every depth: take the model refined");
 }
 
 }  // namespace mbtfm::substrate

@@ -2,7 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <complex>
 #include <numbers>
+
+#include "pipeline/contract/parallel.h"
 
 namespace mbtfm::substrate {
 
@@ -213,6 +216,30 @@ PointForceField cerruti_field(const Gel& gel, double x_um, double y_um, double z
     }
   }
   return field;
+}
+
+std::vector<double> half_space_vertical_um(const Gel& gel, const std::vector<Vec2>& points_um,
+                                           const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN,
+                                           int threads) {
+  std::vector<double> vertical(points_um.size());
+  parallel_for(static_cast<int>(points_um.size()), threads, [&](int i) {
+    for (std::size_t j = 0; j < ellipses.size(); ++j) {
+      const double a = ellipses[j].semi_major_um, b = ellipses[j].semi_minor_um;
+      const std::complex<double> turn = std::polar(1.0, -ellipses[j].angle_rad);
+      const Vec2 offset = points_um[i] - ellipses[j].centre_um;
+      const std::complex<double> z = turn * std::complex(offset.x, offset.y);
+      const std::complex<double> force = turn * std::complex(forces_nN[j].x, forces_nN[j].y);
+      const bool is_inside = std::hypot(z.real() / a, z.imag() / b) <= 1;
+      // the root that grows as z: of two factors, each with its cut on the line between the foci
+      const double focus = std::sqrt(std::max(0.0, a * a - b * b));
+      const std::complex<double> root = std::sqrt(z - focus) * std::sqrt(z + focus);
+      const std::complex<double> field =
+          is_inside ? pi * (std::conj(z) - (a - b) / (a + b) * z) : 2 * pi * a * b / (z + root);
+      vertical[i] +=
+          (1 - 2 * gel.poisson_ratio) / (4 * pi * shear_modulus_kPa(gel) * pi * a * b) * (force * field).real();
+    }
+  });
+  return vertical;
 }
 
 }  // namespace mbtfm::substrate

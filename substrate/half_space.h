@@ -46,6 +46,17 @@ class HalfSpaceEllipse {
   double scale_;  ///< 1 / (2 pi mu A)
 };
 
+/// Displacement (um) of points of the surface into the half-space, by forces spread evenly over ellipses; exact:
+///
+///   w = (1 - 2 nu) / (4 pi mu A) F . I,   I = integral of r / |r|² over the ellipse
+///
+/// With z = x + i y in the ellipse's frame, I_x - i I_y is pi (conj(z) - z (a-b)/(a+b)) inside it and
+/// 2 pi a b / (z + sqrt(z² - a² + b²)) outside. Source: Johnson (1985), eq. 3.75c at z = 0; the field of an even
+/// elliptic cylinder of charge.
+std::vector<double> half_space_vertical_um(const Gel& gel, const std::vector<Vec2>& points_um,
+                                           const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN,
+                                           int threads);
+
 /// Displacement of the half-space below its surface by unit point forces at the origin of its surface.
 /// Index [f]: force along x (0) or y (1).
 struct PointForceField {

@@ -1,3 +1,4 @@
+#include "pipeline/contract/errors.h"
 #include "substrate/greens_model.h"
 #include "substrate/layer.h"
 #include "substrate/models.h"
@@ -7,7 +8,8 @@ namespace {
 
 class LayerModel final : public Substrate {
  public:
-  LayerModel(const Gel& gel, int threads) : threads_(threads), layer_(gel) {}
+  LayerModel(const Gel& gel, const SubstrateParameters& parameters, int threads)
+      : parameters_(parameters), threads_(threads), layer_(gel) {}
 
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<Ellipse>& ellipses) const override {
@@ -17,21 +19,26 @@ class LayerModel final : public Substrate {
   std::vector<Effect> effects() const override {
     return {{.name = "finite thickness", .is_on = true, .why = "layer on a rigid base, to 1e-6 of the field"},
             {.name = "finite sides", .is_on = false, .why = "layer: a gel is centimetres wide, a cell 0.1 mm"},
-            vertical_displacement_off()};
+            vertical_effect(parameters_)};
   }
   Figures figures() const override {
     return {{"substrate_model", "layer"}, {"substrate_thickness_um", layer_.gel().thickness_um}};
   }
 
  private:
+  SubstrateParameters parameters_;
   int threads_;
   Layer layer_;
 };
 
 }  // namespace
 
-std::unique_ptr<Substrate> make_layer(const Gel& gel, const SubstrateParameters&, int threads) {
-  return std::make_unique<LayerModel>(gel, threads);
+std::unique_ptr<Substrate> make_layer(const Gel& gel, const SubstrateParameters& parameters, int threads) {
+  check_uniform(parameters);
+  if (parameters.vertical) {
+    throw UsageError("substrate.vertical: the model 'layer' has none: take half-space, split or refined");
+  }
+  return std::make_unique<LayerModel>(gel, parameters, threads);
 }
 
 }  // namespace mbtfm::substrate

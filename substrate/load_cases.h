@@ -4,7 +4,7 @@
 #include <utility>
 #include <vector>
 
-#include "substrate/compliance.h"
+#include "substrate/elastic_system.h"
 
 namespace mbtfm::substrate {
 
@@ -18,6 +18,26 @@ inline LoadCase case_of(const std::vector<Vec2>& forces_nN) {
   LoadCase load;
   for (std::size_t j = 0; j < forces_nN.size(); ++j) load.emplace_back(static_cast<int>(j), forces_nN[j]);
   return load;
+}
+
+/// Nodes that any of the points is a mean of.
+inline std::vector<int> nodes_of(const std::vector<std::vector<NodeWeight>>& samples) {
+  std::vector<int> nodes;
+  for (const auto& sample : samples) {
+    for (const NodeWeight& w : sample) nodes.push_back(w.node);
+  }
+  return nodes;
+}
+
+/// Add a solution at the points to a column, along some axes by point.
+inline void add_samples(const std::vector<std::vector<NodeWeight>>& samples, const std::vector<int>& axes,
+                        const NodalColumn& u, double* column) {
+  for (const auto& sample : samples) {
+    for (const int axis : axes) {
+      for (const auto& [node, weight] : sample) *column += weight * u(node, axis);
+      ++column;
+    }
+  }
 }
 
 /// A column of x, y by point.

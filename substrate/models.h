@@ -16,6 +16,7 @@ struct Model {
 std::unique_ptr<Substrate> make_half_space(const Gel& gel, const SubstrateParameters& parameters, int threads);
 std::unique_ptr<Substrate> make_layer(const Gel& gel, const SubstrateParameters& parameters, int threads);
 std::unique_ptr<Substrate> make_split(const Gel& gel, const SubstrateParameters& parameters, int threads);
+std::unique_ptr<Substrate> make_automatic(const Gel& gel, const SubstrateParameters& parameters, int threads);
 std::unique_ptr<Substrate> make_refined(const Gel& gel, const SubstrateParameters& parameters, int threads);
 
 /// @throws UsageError where no model of the table has the name, InvalidData as check(gel)
@@ -25,7 +26,13 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
 /// @throws InvalidData where a force is not finite or their number is not that of the ellipses
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
 
-/// What the models that hold no finite elements leave out, and why.
-Effect vertical_displacement_off();
+/// Of the displacement along z.
+Effect vertical_effect(const SubstrateParameters& parameters);
+
+/// From the scene to the block's sides: the gel's own, or so far that they do not matter.
+double margin_um(const Gel& gel, const SubstrateParameters& parameters);
+
+/// @throws UsageError where the modulus changes with depth, which only `refined` takes
+void check_uniform(const SubstrateParameters& parameters);
 
 }  // namespace mbtfm::substrate

@@ -45,7 +45,7 @@ class Split final : public Substrate {
     const std::lock_guard lock(mutex_);
     Eigen::MatrixXd matrix = near_field(points_um, ellipses);
     if (matrix.size() == 0) return matrix;
-    add_correction(points_um, ellipses, static_cast<int>(matrix.cols()), unit_case, matrix);
+    add_correction(points_um, ellipses, unit_case, {0, 1}, matrix);
     return matrix;
   }
 
@@ -68,17 +68,33 @@ class Split final : public Substrate {
     });
     const LoadCase all = case_of(forces_nN);
     add_correction(
-        points_um, ellipses, 1, [&all](int) { return all; }, field);
+        points_um, ellipses, [&all](int) { return all; }, {0, 1}, field);
     return vectors_of(field);
   }
+
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN) const override {
+    check_forces(ellipses, forces_nN);
+    if (points_um.empty() || ellipses.empty()) return std::vector<double>(points_um.size());
+    check_points(points_um);
+    check(ellipses);
+    const std::lock_guard lock(mutex_);
+    const std::vector<double> near = half_space_vertical_um(gel_, points_um, ellipses, forces_nN, threads_);
+    Eigen::MatrixXd field = Eigen::Map<const Eigen::VectorXd>(near.data(), static_cast<Eigen::Index>(near.size()));
+    const LoadCase all = case_of(forces_nN);
+    add_correction(
+        points_um, ellipses, [&all](int) { return all; }, {2}, field);
+    return {field.data(), field.data() + field.size()};
+  }
+  bool has_vertical() const override { return parameters_.vertical; }
 
   std::vector<Effect> effects() const override {
     return {{.name = "finite thickness", .is_on = true, .why = "split: finite element correction for the rigid base"},
             {.name = "finite sides",
              .is_on = true,
-             .why = "split: free sides " + brief(parameters_.margin_thicknesses) +
-                    " thicknesses beyond adhesions and beads; further away they would change less than 0.1 %"},
-            vertical_displacement_off()};
+             .why = "split: free sides " + brief(margin_um(gel_, parameters_)) + " um beyond adhesions and beads, " +
+                    (parameters_.side_distance_um ? "where the gel ends" : "at least; real ones are further away")},
+            vertical_effect(parameters_)};
   }
 
   Figures figures() const override {
@@ -91,6 +107,8 @@ class Split final : public Substrate {
     figures.emplace_back("substrate_block_x_um", lines.x_um.back() - lines.x_um.front());
     figures.emplace_back("substrate_block_y_um", lines.y_um.back() - lines.y_um.front());
     figures.emplace_back("substrate_factor_GB", block_->system.factor().factor_GB());
+    if (!parameters_.cache_folder.empty())
+      figures.emplace_back("substrate_cache", block_->system.factor().cache_note());
     figures.emplace_back("substrate_setup_s", setup_s_);
     figures.emplace_back("substrate_solve_s", solve_s_);
     return figures;
@@ -103,42 +121,35 @@ class Split final : public Substrate {
   }
 
   const SplitBlock& block_around(const Extent& scene) const {
-    const Squares squares = squares_of(scene, gel_, parameters_);
-    if (block_ && block_->squares == squares) return *block_;
+    const Footprint footprint = footprint_of(scene, gel_, parameters_);
+    if (block_ && block_->footprint == footprint) return *block_;
     block_.reset();  // not two at a time in memory
     const auto start = std::chrono::steady_clock::now();
-    block_ = make_split_block(squares, gel_, parameters_, threads_);
+    block_ = make_split_block(footprint, gel_, parameters_, threads_);
     setup_s_ = seconds_since(start);
     return *block_;
   }
 
-  /// Add w at the points to each column, whose forces on ellipses are given by `case_of_column`.
+  /// Add w at the points, along these axes, to each column, whose forces on ellipses are given by `case_of_column`.
   template <class CaseOf>
-  void add_correction(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses, int n_columns,
-                      const CaseOf& case_of_column, Eigen::MatrixXd& columns) const {
+  void add_correction(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                      const CaseOf& case_of_column, const std::vector<int>& axes, Eigen::MatrixXd& columns) const {
     const SplitBlock& block = block_around(extent_of(points_um, ellipses));
     const auto start = std::chrono::steady_clock::now();
     std::vector<std::vector<NodeWeight>> samples(points_um.size());
     parallel_for(static_cast<int>(samples.size()), threads_,
                  [&](int i) { samples[i] = block.system.surface_weights(points_um[i]); });
     block.system.factor().solve(
-        n_columns,
-        [&](int column, double* b) {
+        static_cast<int>(columns.cols()), nodes_of(samples),
+        [&](int column, const NodalColumn& b) {
           for (const auto& [j, force] : case_of_column(column)) add_data(block, ellipses[j], force, b);
         },
-        [&](int column, const double* w) {
-          for (std::size_t i = 0; i < samples.size(); ++i) {
-            for (const auto& [node, weight] : samples[i]) {
-              columns(2 * i, column) += weight * w[3 * node];
-              columns(2 * i + 1, column) += weight * w[3 * node + 1];
-            }
-          }
-        });
+        [&](int column, const NodalColumn& w) { add_samples(samples, axes, w, columns.col(column).data()); });
     solve_s_ = seconds_since(start);
   }
 
   /// Right-hand side of w for a force on one ellipse.
-  void add_data(const SplitBlock& block, const Ellipse& ellipse, Vec2 force, double* b) const {
+  void add_data(const SplitBlock& block, const Ellipse& ellipse, Vec2 force, const NodalColumn& b) const {
     // the field's nearest singularity seen from bottom and sides is about h away: leaves 1e-5 of it
     const double ratio = ellipse.semi_major_um / gel_.thickness_um;
     const int degree = ratio < 0.05 ? 3 : static_cast<int>(std::ceil(std::log(1e-5) / std::log(std::min(0.8, ratio))));
@@ -153,7 +164,8 @@ class Split final : public Substrate {
       }
     }
     // w = -u_c there, on the left side
-    Eigen::Map<Eigen::VectorXd>(b, system.n_unknowns()) += system.bottom_stiffness() * on_bottom;
+    const Eigen::VectorXd data = system.bottom_stiffness() * on_bottom;
+    for (Eigen::Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
 
     const double mu = shear_modulus_kPa(gel_);
     const double lambda = 2 * mu * gel_.poisson_ratio / (1 - 2 * gel_.poisson_ratio);
@@ -168,7 +180,7 @@ class Split final : public Substrate {
       const int n = point.normal_axis;
       for (int i = 0; i < 3; ++i) {
         const double stress = mu * (g[i][n] + g[n][i]) + (i == n ? lambda * (g[0][0] + g[1][1] + g[2][2]) : 0);
-        for (const auto& [node, weight] : point.weights) b[3 * node + i] -= point.area_um2 * weight * stress;
+        for (const auto& [node, weight] : point.weights) b(node, i) -= point.area_um2 * weight * stress;
       }
     }
   }
@@ -184,6 +196,7 @@ class Split final : public Substrate {
 }  // namespace
 
 std::unique_ptr<Substrate> make_split(const Gel& gel, const SubstrateParameters& parameters, int threads) {
+  check_uniform(parameters);
   return std::make_unique<Split>(gel, parameters, threads);
 }
 

@@ -2,30 +2,40 @@
 
 #include <cmath>
 
-#include "pipeline/contract/errors.h"
+#include "substrate/models.h"
 
 namespace mbtfm::substrate {
 namespace {
 
-/// Lines at index_low … index_high times `step`, then towards either side growing steps over `margin`.
-std::vector<double> lines_of(int index_low, int index_high, double step, double margin) {
+/// Steps that grow from `step` until they fill `reach`: their ends.
+std::vector<double> growing_steps(double step, double reach) {
   constexpr double kGrowth = 1.5;  // the correction fades over distances that grow with the distance itself
-  std::vector<double> growing;
-  double reach = 0;
-  for (double size = step; reach < margin; size *= kGrowth) growing.push_back(reach += size);
+  std::vector<double> ends;
+  double end = 0;
+  for (double size = step; end < reach * (1 - 1e-9); size *= kGrowth) ends.push_back(end += size);
+  for (double& e : ends) e *= reach / end;
+  return ends;
+}
+
+/// Lines at index_low … index_high times `step`, then towards either side growing steps.
+std::vector<double> lines_of(int index_low, int index_high, double step, double low, double high) {
+  // near sides may cut squares: no slivers
+  while (index_low * step - low < 0.25 * step && index_low < index_high) ++index_low;
+  while (high - index_high * step < 0.25 * step && index_high > index_low) --index_high;
   std::vector<double> lines;
-  for (auto d = growing.rbegin(); d != growing.rend(); ++d) lines.push_back(index_low * step - *d * margin / reach);
+  const std::vector<double> before = growing_steps(step, index_low * step - low);
+  for (auto d = before.rbegin(); d != before.rend(); ++d) lines.push_back(index_low * step - *d);
   for (int index = index_low; index <= index_high; ++index) lines.push_back(index * step);
-  for (const double d : growing) lines.push_back(index_high * step + d * margin / reach);
+  for (const double d : growing_steps(step, high - index_high * step)) lines.push_back(index_high * step + d);
   return lines;
 }
 
-GridLines grid_of(const Squares& squares, const Gel& gel, const SubstrateParameters& parameters) {
+GridLines grid_of(const Footprint& footprint, const Gel& gel, const SubstrateParameters& parameters) {
   const double step = gel.thickness_um / parameters.cells_per_thickness;
-  const double margin = parameters.margin_thicknesses * gel.thickness_um;
+  const auto& [squares, outer] = footprint;
   GridLines lines;
-  lines.x_um = lines_of(squares[0], squares[1], step, margin);
-  lines.y_um = lines_of(squares[2], squares[3], step, margin);
+  lines.x_um = lines_of(squares[0], squares[1], step, outer.low_um.x, outer.high_um.x);
+  lines.y_um = lines_of(squares[2], squares[3], step, outer.low_um.y, outer.high_um.y);
   for (int k = 0; k <= parameters.cells_per_thickness; ++k) lines.z_um.push_back(k * step);
   lines.z_um.back() = gel.thickness_um;
   return lines;
@@ -69,21 +79,34 @@ std::vector<SidePoint> side_points_of(const ElasticSystem& system) {
 
 }  // namespace
 
-Squares squares_of(const Extent& scene, const Gel& gel, const SubstrateParameters& parameters) {
+bool operator==(const Footprint& a, const Footprint& b) {
+  const auto numbers = [](const Extent& e) { return std::array{e.low_um.x, e.low_um.y, e.high_um.x, e.high_um.y}; };
+  return a.squares == b.squares && numbers(a.outer) == numbers(b.outer);
+}
+
+Footprint footprint_of(const Extent& scene, const Gel& gel, const SubstrateParameters& parameters) {
   const double step = gel.thickness_um / parameters.cells_per_thickness;
   check_size(scene, step, most_cells(parameters));
   const auto below = [step](double x) { return static_cast<int>(std::floor(x / step)); };
-  return {below(scene.low_um.x), below(scene.high_um.x) + 1, below(scene.low_um.y), below(scene.high_um.y) + 1};
+  const Squares s = {below(scene.low_um.x), below(scene.high_um.x) + 1, below(scene.low_um.y),
+                     below(scene.high_um.y) + 1};
+  const double margin = margin_um(gel, parameters);
+  // the gel's own sides stand where they do; far ones may stand at whole squares, alike for many scenes
+  const Extent from =
+      parameters.side_distance_um ? scene : Extent{{s[0] * step, s[2] * step}, {s[1] * step, s[3] * step}};
+  return {s, {from.low_um - Vec2{margin, margin}, from.high_um + Vec2{margin, margin}}};
 }
 
-std::unique_ptr<SplitBlock> make_split_block(const Squares& squares, const Gel& gel,
+std::unique_ptr<SplitBlock> make_split_block(const Footprint& footprint, const Gel& gel,
                                              const SubstrateParameters& parameters, int threads) {
-  const GridLines lines = grid_of(squares, gel, parameters);
+  const GridLines lines = grid_of(footprint, gel, parameters);
   BlockMesh mesh = make_block_mesh(
       lines, 2, [](const Box&) { return false; }, most_cells(parameters), threads);
-  // one thread in the BLAS: the grid is small, and the same bits matter more
-  auto block = std::unique_ptr<SplitBlock>(
-      new SplitBlock{squares, ElasticSystem(gel, std::move(mesh), threads, 1, parameters.memory_limit_GB), {}});
+  const FactorOptions options = {.threads = threads,
+                                 .memory_limit_GB = allowed_GB(parameters.memory_limit_GB),
+                                 .cache_folder = parameters.cache_folder};
+  auto block =
+      std::unique_ptr<SplitBlock>(new SplitBlock{footprint, ElasticSystem({gel, {}}, std::move(mesh), options), {}});
   block->side_points = side_points_of(block->system);
   return block;
 }

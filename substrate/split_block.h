@@ -20,17 +20,24 @@ struct SidePoint {
   std::vector<NodeWeight> weights;
 };
 
-struct SplitBlock {
+/// Where a grid lies: the squares that are cut alike, and the sides.
+struct Footprint {
   Squares squares;
+  Extent outer;
+};
+bool operator==(const Footprint& a, const Footprint& b);
+
+struct SplitBlock {
+  Footprint footprint;
   ElasticSystem system;
   std::vector<SidePoint> side_points;
 };
 
 /// @throws NotSolved where the gel is so thin beside the scene that no grid of it fits
-Squares squares_of(const Extent& scene, const Gel& gel, const SubstrateParameters& parameters);
+Footprint footprint_of(const Extent& scene, const Gel& gel, const SubstrateParameters& parameters);
 
 /// @throws NotSolved where memory would not suffice
-std::unique_ptr<SplitBlock> make_split_block(const Squares& squares, const Gel& gel,
+std::unique_ptr<SplitBlock> make_split_block(const Footprint& footprint, const Gel& gel,
                                              const SubstrateParameters& parameters, int threads);
 
 }  // namespace mbtfm::substrate

@@ -1,10 +1,13 @@
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <numbers>
 #include <string>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
-#include "substrate/compliance.h"
+#include "substrate/gel_vtu.h"
 
 namespace mbtfm {
 namespace {
@@ -24,17 +27,16 @@ struct Load {
   std::vector<Vec2> forces_nN;
 };
 
-Load read_load(StageContext& context) {
+Load read_forces(const Path& adhesions_file, const Path& file) {
   std::map<int, substrate::Ellipse> ellipse_of_id;
-  for (const Adhesion& adhesion : read_adhesions(context.input("adhesions"))) {
+  for (const Adhesion& adhesion : read_adhesions(adhesions_file)) {
     ellipse_of_id[adhesion.adhesion_id] = substrate::ellipse_of(adhesion);
   }
-  const Path file = context.input("forces");
   Load load;
   for (const AdhesionForce& force : read_adhesion_forces(file)) {
     const auto found = ellipse_of_id.find(force.adhesion_id);
     if (found == ellipse_of_id.end()) {
-      throw InputError(file.string(), "the adhesion_id of a row of " + context.input("adhesions").string(),
+      throw InputError(file.string(), "the adhesion_id of a row of " + adhesions_file.string(),
                        "'" + std::to_string(force.adhesion_id) + "'",
                        "both files must come from the same segmentation");
     }
@@ -44,26 +46,97 @@ Load read_load(StageContext& context) {
   return load;
 }
 
-StageReport run(const Parameters& parameters, StageContext& context) {
-  const auto model = substrate::make_substrate(parameters.gel, parameters.substrate, context.threads);
-  const Load load = read_load(context);
+/// Steps of a lattice: the smallest distance between its columns and between its rows.
+Vec2 spacing_of(const std::vector<Vec2>& points, const Path& file) {
+  const auto step = [&](double Vec2::*axis) {
+    std::vector<double> values;
+    for (const Vec2& p : points) values.push_back(p.*axis);
+    std::sort(values.begin(), values.end());
+    double smallest = 0;
+    for (std::size_t k = 1; k < values.size(); ++k) {
+      const double gap = values[k] - values[k - 1];
+      // columns of a lattice, written with some digits
+      if (gap > 1e-6 * (values.back() - values.front()) && (smallest == 0 || gap < smallest)) smallest = gap;
+    }
+    return smallest;
+  };
+  const Vec2 spacing = {step(&Vec2::x), step(&Vec2::y)};
+  if (spacing.x > 0 && spacing.y > 0) return spacing;
+  throw InputError(file.string(), "tractions on a lattice of at least two columns and rows, or a column area_um2",
+                   std::to_string(points.size()) + " rows");
+}
+
+/// Each patch as a disc of its area: the same force; the second moment is 5 % off, a side away 0.4 % of its field.
+Load read_tractions(const Path& file) {
+  const CsvTable table(file);
+  const std::vector<Vec2> points = read_points(file);
+  const bool has_areas = table.has("area_um2");
+  const Vec2 spacing = has_areas ? Vec2{} : spacing_of(points, file);
+  Load load;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    const double area = has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y;
+    const Vec2 traction = {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")};
+    if (traction.x == 0 && traction.y == 0) continue;
+    const double radius = std::sqrt(area / std::numbers::pi);
+    load.ellipses.push_back({points[row], radius, radius, 0});
+    load.forces_nN.push_back(area * traction);
+  }
+  return load;
+}
+
+Load read_load(StageContext& context) {
+  const bool has_forces = context.has_input("forces") && context.has_input("adhesions");
+  const bool has_tractions = context.has_input("traction");
+  if (has_forces == has_tractions) {
+    throw UsageError("expected either --adhesions and --forces, or --traction");
+  }
+  if (has_tractions) return read_tractions(context.input("traction"));
+  return read_forces(context.input("adhesions"), context.input("forces"));
+}
+
+/// displacement.csv at the points; uz_um after its columns where the model has it.
+void write_at_points(StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
   const std::vector<Vec2> points = read_points(context.input("points"));
-  context.progress(0.1, "solving for the substrate");
-  const std::vector<Vec2> displacements = model->displacements_um(points, load.ellipses, load.forces_nN);
-  DisplacementField field;
+  const std::vector<Vec2> displacements = model.displacements_um(points, load.ellipses, load.forces_nN);
   double largest_um = 0;
+  DisplacementField field;
   for (std::size_t i = 0; i < points.size(); ++i) {
     field.push_back({.position_um = points[i], .displacement_um = displacements[i], .sigma_um = 0, .flag = {}});
     largest_um = std::max(largest_um, norm(displacements[i]));
   }
-  write_displacement(context.output("out"), field);
+  figures.emplace_back("n_points", static_cast<std::int64_t>(points.size()));
+  figures.emplace_back("largest_displacement_um", largest_um);
+  if (!model.has_vertical()) return write_displacement(context.output("out"), field);
+  const std::vector<double> vertical = model.vertical_um(points, load.ellipses, load.forces_nN);
+  CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um", "uz_um"});
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    csv.add(points[i].x).add(points[i].y).add(displacements[i].x).add(displacements[i].y).add(0.0).add(vertical[i]);
+    csv.end_row();
+  }
+  write_text(context.output("out"), csv.str());
+}
 
+void write_result(StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
+  if (context.has_input("points")) return write_at_points(context, model, load, figures);
+  const Path file = context.output("out");
+  if (context.outputs_.at("out").extension() != ".vtu") {
+    throw UsageError("expected --points, or an --out that ends with .vtu or volume.vtu");
+  }
+  if (context.outputs_.at("out").stem().string().ends_with("volume")) {
+    substrate::write_volume_vtu(file, model.volume(load.ellipses, load.forces_nN));
+  } else {
+    substrate::write_substrate_vtu(file, model, load.ellipses, load.forces_nN);
+  }
+}
+
+StageReport run(const Parameters& parameters, StageContext& context) {
+  const auto model = substrate::make_substrate(parameters.gel, parameters.substrate, context.threads);
+  const Load load = read_load(context);
+  context.progress(0.1, "solving for the substrate");
   StageReport report;
-  report.summary = std::to_string(points.size()) + " points, " + std::to_string(load.ellipses.size()) +
-                   " loaded adhesions, model " + parameters.substrate.model;
-  report.figures = {{"n_points", static_cast<std::int64_t>(points.size())},
-                    {"n_adhesions", static_cast<std::int64_t>(load.ellipses.size())},
-                    {"largest_displacement_um", largest_um}};
+  write_result(context, *model, load, report.figures);
+  report.summary = std::to_string(load.ellipses.size()) + " loaded patches, model " + parameters.substrate.model;
+  report.figures.emplace_back("n_loads", static_cast<std::int64_t>(load.ellipses.size()));
   for (const auto& figure : model->figures()) report.figures.push_back(figure);
   report.effects = model->effects();
   return report;
@@ -75,11 +148,16 @@ StageReport run(const Parameters& parameters, StageContext& context) {
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using Kind = FileArgument::Kind;
-  return run_stage<Parameters>({.name = "substrate",
-                                .purpose = "displace the surface of a gel by forces spread over adhesions",
-                                .files = {{"adhesions", Kind::input, "adhesions.csv: the ellipses"},
-                                          {"forces", Kind::input, "adhesion_forces.csv: adhesion_id, fx_nN, fy_nN"},
-                                          {"points", Kind::input, "points of the surface: x_um, y_um"},
-                                          {"out", Kind::output, "displacement.csv at the points"}}},
-                               argc, argv, run);
+  return run_stage<Parameters>(
+      {.name = "substrate",
+       .purpose = "displace a gel by forces spread over adhesions, or by tractions",
+       .files = {{"adhesions", Kind::optional_input, "adhesions.csv: the ellipses"},
+                 {"forces", Kind::optional_input, "adhesion_forces.csv: adhesion_id, fx_nN, fy_nN"},
+                 {"traction", Kind::optional_input,
+                  "instead of those: tractions on a lattice: x_um, y_um, tx_kPa, ty_kPa; area_um2 where it is none"},
+                 {"points", Kind::optional_input, "points of the surface: x_um, y_um"},
+                 {"out", Kind::output,
+                  "displacement.csv at the points; without points a .vtu of the surface, or of the gel's inside where "
+                  "its name ends with volume.vtu"}}},
+      argc, argv, run);
 }

@@ -2,6 +2,7 @@
 /// Readers throw InputError with the line, the column and the label of the row; writers throw OutputError.
 #pragma once
 
+#include <array>
 #include <filesystem>
 #include <istream>
 #include <ostream>
@@ -81,6 +82,21 @@ void write_figures(const Path& file, const Figures& figures);
 
 Network read_network(const Path& file);
 void write_network(const Path& file, const Network& network);
+
+/// Values of a grid in space, some numbers each; the name carries the unit.
+struct GridArray {
+  std::string name;
+  int components = 1;
+  std::vector<double> values;
+};
+/// Quadrilaterals (4 corners, round) or hexahedra (8 corners: one face round, then the face across).
+struct Grid {
+  int corners = 4;
+  std::vector<std::array<double, 3>> points_um;
+  std::vector<int> cells;  ///< points of the corners, cell by cell
+  std::vector<GridArray> point_arrays, cell_arrays;
+};
+void write_grid_vtu(const Path& file, const Grid& grid);
 
 /// Outline, adhesion ellipses and fibres as polygons and lines, with adhesion_id, fibre_id and fibre_type by cell.
 void write_cell_vtp(const Path& file, const Cell& cell);

@@ -13,6 +13,8 @@
 #include <vtkXMLUnstructuredGridReader.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
+#include <algorithm>
+
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
@@ -109,6 +111,15 @@ vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Ve
   grid->GetCellData()->AddArray(double_array(rest));
   grid->GetCellData()->AddArray(double_array(share));
   return grid;
+}
+
+vtkNew<vtkDoubleArray> double_array(const GridArray& values) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(values.name.c_str());
+  array->SetNumberOfComponents(values.components);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(values.values.size()) / values.components);
+  for (std::size_t k = 0; k < values.values.size(); ++k) array->SetValue(static_cast<vtkIdType>(k), values.values[k]);
+  return array;
 }
 
 vtkDataArray* array_of(vtkDataSetAttributes* attributes, const char* name, vtkIdType n, const Path& file,
@@ -278,6 +289,24 @@ void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions
     poly->GetCellData()->AddArray(double_array(array));
   }
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+void write_grid_vtu(const Path& file, const Grid& grid) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const auto& p : grid.points_um) points->InsertNextPoint(p.data());
+  vtkNew<vtkUnstructuredGrid> data;
+  data->SetPoints(points);
+  const int type = grid.corners == 4 ? VTK_QUAD : VTK_HEXAHEDRON;
+  data->Allocate(static_cast<vtkIdType>(grid.cells.size()) / grid.corners);
+  for (std::size_t first = 0; first < grid.cells.size(); first += grid.corners) {
+    vtkIdType corners[8];
+    std::copy_n(grid.cells.begin() + static_cast<std::ptrdiff_t>(first), grid.corners, corners);
+    data->InsertNextCell(type, grid.corners, corners);
+  }
+  for (const GridArray& array : grid.point_arrays) data->GetPointData()->AddArray(double_array(array));
+  for (const GridArray& array : grid.cell_arrays) data->GetCellData()->AddArray(double_array(array));
+  write_xml<vtkXMLUnstructuredGridWriter>(file, data.Get());
 }
 
 }  // namespace mbtfm

@@ -1,6 +1,7 @@
 /// Scenes and measures for tests of the substrate.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 #include <random>
@@ -50,6 +51,44 @@ inline double mean_column_difference(const Eigen::MatrixXd& matrix, const Eigen:
     sum += (matrix - reference).middleCols(j, 2).norm() / reference.middleCols(j, 2).norm();
   }
   return 2 * sum / static_cast<double>(matrix.cols());
+}
+
+struct ColumnErrors {
+  double all = 0, outside = 0, inside = 0;  ///< relative L2 by ellipse, mean over those with points there
+  double worst_outside = 0;
+};
+
+inline bool is_inside(const Ellipse& e, Vec2 point) {
+  const Vec2 along = {std::cos(e.angle_rad), std::sin(e.angle_rad)};
+  const Vec2 offset = point - e.centre_um;
+  return std::hypot(dot(offset, along) / e.semi_major_um, cross(along, offset) / e.semi_minor_um) <= 1;
+}
+
+/// Errors of each ellipse's pair of columns, at the points beside the ellipse itself and at those on it.
+inline ColumnErrors column_errors(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& reference,
+                                  const std::vector<Vec2>& points, const std::vector<Ellipse>& ellipses) {
+  ColumnErrors errors;
+  int n_inside = 0;
+  for (std::size_t j = 0; j < ellipses.size(); ++j) {
+    double error[2] = {}, size[2] = {};
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const int where = is_inside(ellipses[j], points[i]) ? 1 : 0;
+      const auto exact = reference.block<2, 2>(2 * i, 2 * j);
+      error[where] += (matrix.block<2, 2>(2 * i, 2 * j) - exact).squaredNorm();
+      size[where] += exact.squaredNorm();
+    }
+    const double outside = std::sqrt(error[0] / size[0]);
+    errors.all += std::sqrt((error[0] + error[1]) / (size[0] + size[1]));
+    errors.outside += outside;
+    errors.worst_outside = std::max(errors.worst_outside, outside);
+    if (size[1] == 0) continue;
+    errors.inside += std::sqrt(error[1] / size[1]);
+    ++n_inside;
+  }
+  errors.all /= static_cast<double>(ellipses.size());
+  errors.outside /= static_cast<double>(ellipses.size());
+  if (n_inside > 0) errors.inside /= n_inside;
+  return errors;
 }
 
 inline substrate::SubstrateParameters model_named(const std::string& name) {

@@ -1,4 +1,4 @@
-/// The gel's surface under given forces, for ParaView.
+/// The gel under given forces, for ParaView.
 #pragma once
 
 #include <filesystem>
@@ -12,5 +12,9 @@ namespace mbtfm::substrate {
 /// @throws OutputError; InvalidData and NotSolved as Substrate::displacements_um
 void write_substrate_vtu(const std::filesystem::path& file, const Substrate& substrate,
                          const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
+
+/// Write the gel's inside: the boxes of `field`, with `displacement_um` by point and `stress_kPa` by box (xx, yy, zz,
+/// xy, yz, xz) where it has one. @throws OutputError
+void write_volume_vtu(const std::filesystem::path& file, const VolumeField& field);
 
 }  // namespace mbtfm::substrate

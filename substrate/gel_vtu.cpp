@@ -1,0 +1,101 @@
+#include "substrate/gel_vtu.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/files.h"
+#include "substrate/scene.h"
+
+namespace mbtfm::substrate {
+
+namespace {
+
+constexpr int kLinesInside = 160;  // over the longer side of the scene: half a micrometre for a cell of 80
+constexpr int kLinesOutside = 12;  // on either side, growing
+constexpr double kGrowth = 1.25;   // of a step over the one before: 12 steps reach 68 inner ones
+
+std::vector<double> graded_lines(double low, double high, double step) {
+  std::vector<double> before;
+  double reach = 0;
+  double size = step;
+  for (int k = 0; k < kLinesOutside; ++k) before.push_back(reach += size *= kGrowth);
+  std::vector<double> lines;
+  for (auto d = before.rbegin(); d != before.rend(); ++d) lines.push_back(low - *d);
+  const int n = std::max(1, static_cast<int>(std::ceil((high - low) / step)));
+  for (int k = 0; k <= n; ++k) lines.push_back(low + (high - low) * k / n);
+  for (const double d : before) lines.push_back(high + d);
+  return lines;
+}
+
+bool is_inside(const Ellipse& e, Vec2 point) {
+  const Vec2 along = {std::cos(e.angle_rad), std::sin(e.angle_rad)};
+  const Vec2 offset = point - e.centre_um;
+  return std::hypot(dot(offset, along) / e.semi_major_um, cross(along, offset) / e.semi_minor_um) <= 1;
+}
+
+Vec2 traction_kPa(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN, Vec2 point) {
+  Vec2 sum;
+  for (std::size_t j = 0; j < ellipses.size(); ++j) {
+    if (!is_inside(ellipses[j], point)) continue;
+    sum += 1 / (std::numbers::pi * ellipses[j].semi_major_um * ellipses[j].semi_minor_um) * forces_nN[j];
+  }
+  return sum;
+}
+
+}  // namespace
+
+void write_substrate_vtu(const std::filesystem::path& file, const Substrate& substrate,
+                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {
+  const Extent scene = extent_of({}, ellipses);
+  const Vec2 size = scene.high_um - scene.low_um;
+  const double step = std::max(size.x, size.y) / kLinesInside;
+  const std::vector<double> x = graded_lines(scene.low_um.x, scene.high_um.x, step);
+  const std::vector<double> y = graded_lines(scene.low_um.y, scene.high_um.y, step);
+  std::vector<Vec2> points;
+  for (const double y_um : y) {
+    for (const double x_um : x) points.push_back({x_um, y_um});
+  }
+  const std::vector<Vec2> displacements = substrate.displacements_um(points, ellipses, forces_nN);
+
+  const std::vector<double> vertical = substrate.has_vertical() ? substrate.vertical_um(points, ellipses, forces_nN)
+                                                                : std::vector<double>(points.size());
+
+  Grid grid;
+  grid.point_arrays = {{"displacement_um", 3, {}}};
+  grid.cell_arrays = {{"traction_kPa", 3, {}}};
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    grid.points_um.push_back({points[i].x, points[i].y, 0});
+    for (const double u : {displacements[i].x, displacements[i].y, vertical[i]}) {
+      grid.point_arrays[0].values.push_back(u);
+    }
+  }
+  const int columns = static_cast<int>(x.size()) - 1;
+  const int n_cells = columns * (static_cast<int>(y.size()) - 1);
+  for (int cell = 0; cell < n_cells; ++cell) {
+    const int i = cell % columns, j = cell / columns;
+    const int first = j * (columns + 1) + i, next = first + columns + 1;
+    for (const int corner : {first, first + 1, next + 1, next}) grid.cells.push_back(corner);
+    const Vec2 t = traction_kPa(ellipses, forces_nN, {0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])});
+    for (const double value : {t.x, t.y, 0.0}) grid.cell_arrays[0].values.push_back(value);
+  }
+  write_grid_vtu(file, grid);
+}
+
+void write_volume_vtu(const std::filesystem::path& file, const VolumeField& field) {
+  Grid grid;
+  grid.corners = 8;
+  grid.points_um = field.points_um;
+  grid.cells = field.box_corners;
+  GridArray displacement{"displacement_um", 3, {}};
+  for (const auto& u : field.displacement_um) displacement.values.insert(displacement.values.end(), u.begin(), u.end());
+  grid.point_arrays.push_back(std::move(displacement));
+  if (!field.stress_kPa.empty()) {
+    GridArray stress{"stress_kPa", 6, {}};
+    for (const auto& s : field.stress_kPa) stress.values.insert(stress.values.end(), s.begin(), s.end());
+    grid.cell_arrays.push_back(std::move(stress));
+  }
+  write_grid_vtu(file, grid);
+}
+
+}  // namespace mbtfm::substrate

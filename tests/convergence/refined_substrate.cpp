@@ -1,0 +1,273 @@
+/// What `refined` promises beyond convergence: the error it reports, layered gels, symmetries, the gel's inside.
+#include <gtest/gtest.h>
+
+#include "substrate/layer.h"
+#include "tests/support/layered_gel.h"
+#include "tests/support/substrate_scene.h"
+
+namespace mbtfm::substrate {
+namespace {
+
+using std::numbers::pi;
+
+Gel gel_of(double poisson_ratio, double thickness_um) {
+  return {.youngs_modulus_kPa = 8.4, .poisson_ratio = poisson_ratio, .thickness_um = thickness_um};
+}
+
+SubstrateParameters refined_to(double tolerance) {
+  SubstrateParameters parameters = test::model_named("refined");
+  parameters.tolerance = tolerance;
+  return parameters;
+}
+
+double reported_error(const Substrate& model) {
+  for (const auto& [name, value] : model.figures()) {
+    if (name == "substrate_estimated_error") return std::get<double>(value);
+  }
+  ADD_FAILURE() << "no error reported";
+  return 0;
+}
+
+struct Case {
+  double poisson_ratio, thickness_um, tolerance;
+  int adhesions;
+  const char* element = "q2-p1disc";
+};
+
+TEST(Refined, reports_its_error_within_a_factor_of_two_and_meets_the_tolerance) {
+  for (const Case& c : {Case{0.3, 30, 0.03, 3}, Case{0.49, 30, 0.01, 2}, Case{0.4999, 60, 0.02, 3},
+                        Case{0.49, 8, 0.02, 3}, Case{0.4999, 12, 0.02, 1}, Case{0.45, 30, 0.04, 2, "q1-p0"}}) {
+    const Gel gel = gel_of(c.poisson_ratio, c.thickness_um);
+    const auto points = test::scattered_points(2000, 20);
+    const auto ellipses = test::scattered_ellipses(c.adhesions, 15, 7);
+    SubstrateParameters parameters = refined_to(c.tolerance);
+    parameters.element = c.element;
+    const auto model = make_substrate(gel, parameters, 2);
+    const Eigen::MatrixXd matrix = model->compliance_um_per_nN(points, ellipses);
+    const double error = test::mean_column_difference(
+        matrix, make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses));
+    const double reported = reported_error(*model);
+    EXPECT_LE(reported, c.tolerance);
+    EXPECT_LT(reported, 2 * error) << c.element << " nu " << c.poisson_ratio << " h " << c.thickness_um;
+    EXPECT_GT(reported, error / 2) << c.element << " nu " << c.poisson_ratio << " h " << c.thickness_um;
+  }
+}
+
+TEST(LayeredGel, of_one_modulus_is_the_layer) {
+  const Gel gel = gel_of(0.45, 20);
+  const test::LayeredGel layered({{5, 8.4}, {3, 8.4}, {12, 8.4}}, 0.45);
+  const Layer layer(gel);
+  const Ellipse ellipse = {{1, 2}, 1, 0.5, 0.4};
+  for (const Vec2 point : {Vec2{1, 2}, Vec2{4, 2}, Vec2{-12, 20}}) {
+    const Sym2 a = layered.compliance_um_per_nN(ellipse, point);
+    const Sym2 b = LayerEllipse(layer, ellipse).compliance_um_per_nN(point);
+    // the layered gel's own averages are of degree 5 over an ellipse of a fifth of its first layer: (1/20)^6 = 2e-8
+    EXPECT_NEAR(a.xx, b.xx, 1e-6 * std::abs(b.xx));
+    EXPECT_NEAR(a.xy, b.xy, 1e-6 * std::abs(b.xx));
+    EXPECT_NEAR(a.yy, b.yy, 1e-6 * std::abs(b.xx));
+  }
+}
+
+Eigen::MatrixXd compliance(const test::LayeredGel& gel, const std::vector<Vec2>& points,
+                           const std::vector<Ellipse>& ellipses) {
+  Eigen::MatrixXd matrix(2 * points.size(), 2 * ellipses.size());
+  for (std::size_t j = 0; j < ellipses.size(); ++j) {
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const Sym2 g = gel.compliance_um_per_nN(ellipses[j], points[i]);
+      matrix.block<2, 2>(2 * i, 2 * j) << g.xx, g.xy, g.xy, g.yy;
+    }
+  }
+  return matrix;
+}
+
+TEST(Refined, takes_layers_and_graded_gels) {
+  const double nu = 0.49;
+  const auto points = test::scattered_points(150, 15);
+  const std::vector<Ellipse> ellipses = {{{1, 2}, 1.2, 0.6, 0.4}};
+  const Gel gel = gel_of(nu, 20);
+  const Eigen::MatrixXd even = make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
+  std::vector<test::EvenLayer> graded;
+  // 20 kPa to 4 kPa: steps of a 24th of the depth differ from the line by less than the tolerance squared
+  for (int k = 0; k < 24; ++k) graded.push_back({20.0 / 24, 20 - 16 * (k + 0.5) / 24});
+  for (const auto& [profile, layers] :
+       {std::pair{std::string("0:20, 6:20, 6:4, 20:4"), std::vector<test::EvenLayer>{{6, 20}, {14, 4}}},
+        std::pair{std::string("0:4, 8:4, 8:40"), std::vector<test::EvenLayer>{{8, 4}, {12, 40}}},
+        std::pair{std::string("0:20, 20:4"), graded}}) {
+    SubstrateParameters parameters = refined_to(0.02);
+    parameters.modulus_profile = profile;
+    const Eigen::MatrixXd matrix = make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses);
+    const Eigen::MatrixXd exact = compliance(test::LayeredGel(layers, nu), points, ellipses);
+    EXPECT_GT(test::mean_column_difference(even, exact), 0.2) << profile;  // not the even gel's
+    EXPECT_LT(test::mean_column_difference(matrix, exact), 2 * 0.02) << profile;
+  }
+}
+
+TEST(Refined, split_and_layer_agree_on_a_wide_block) {
+  const Gel gel = gel_of(0.49, 15);
+  const auto points = test::scattered_points(800, 12);
+  const auto ellipses = test::scattered_ellipses(3, 8);
+  const Eigen::MatrixXd layer = make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd split =
+      make_substrate(gel, test::model_named("split"), 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd refined = make_substrate(gel, refined_to(0.01), 2)->compliance_um_per_nN(points, ellipses);
+  EXPECT_LT(test::mean_column_difference(split, layer), 1e-3);
+  EXPECT_LT(test::mean_column_difference(refined, layer), 0.02);
+  EXPECT_LT(test::mean_column_difference(refined, split), 0.02);
+}
+
+/// A scene whose rectangle is a square about the origin, so that its mesh turns and mirrors with it.
+struct SquareScene {
+  std::vector<Vec2> points = test::scattered_points(100, 8);
+  std::vector<Ellipse> ellipses = {{{1, 2}, 1.2, 0.6, 0.4}, {{-4, 3}, 0.8, 0.5, 2}};
+  SquareScene() {
+    for (const Vec2 corner : {Vec2{-9, -9}, Vec2{9, 9}}) points.push_back(corner);
+  }
+};
+
+TEST(Refined, turns_mirrors_scales_and_superposes_with_the_scene) {
+  const Gel gel = gel_of(0.49, 15);
+  SubstrateParameters exact = refined_to(0);
+  exact.precision = "double";
+  const auto model = make_substrate(gel, exact, 2);
+  const SquareScene scene;
+  const Eigen::MatrixXd before = model->compliance_um_per_nN(scene.points, scene.ellipses);
+  SquareScene turned, mirrored;
+  for (Vec2& p : turned.points) p = {-p.y, p.x};
+  for (Vec2& p : mirrored.points) p.x = -p.x;
+  for (Ellipse& e : turned.ellipses) {
+    e.centre_um = {-e.centre_um.y, e.centre_um.x};
+    e.angle_rad += 0.5 * pi;
+  }
+  for (Ellipse& e : mirrored.ellipses) {
+    e.centre_um.x = -e.centre_um.x;
+    e.angle_rad = pi - e.angle_rad;
+  }
+  const Eigen::MatrixXd after = model->compliance_um_per_nN(turned.points, turned.ellipses);
+  const Eigen::MatrixXd across = model->compliance_um_per_nN(mirrored.points, mirrored.ellipses);
+  Gel stiff = gel;
+  stiff.youngs_modulus_kPa *= 3;
+  const Eigen::MatrixXd scaled = make_substrate(stiff, exact, 2)->compliance_um_per_nN(scene.points, scene.ellipses);
+  // solved to rounding times the condition: 1e4 nodes and lambda / mu = 50
+  const double tiny = 1e-9 * before.cwiseAbs().maxCoeff();
+  EXPECT_LT((3 * scaled - before).cwiseAbs().maxCoeff(), tiny);
+  for (Eigen::Index i = 0; i < before.rows(); i += 2) {
+    for (Eigen::Index j = 0; j < before.cols(); j += 2) {
+      EXPECT_NEAR(after(i, j), before(i + 1, j + 1), tiny);
+      EXPECT_NEAR(after(i + 1, j), -before(i, j + 1), tiny);
+      EXPECT_NEAR(across(i, j), before(i, j), tiny);
+      EXPECT_NEAR(across(i + 1, j), -before(i + 1, j), tiny);
+    }
+  }
+  const auto sum = model->displacements_um(scene.points, scene.ellipses, {{1, 2}, {-3, 0.5}});
+  const Eigen::VectorXd expected = before * Eigen::Vector4d(1, 2, -3, 0.5);
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    EXPECT_NEAR(sum[i].x, expected[2 * i], 4 * tiny);
+    EXPECT_NEAR(sum[i].y, expected[2 * i + 1], 4 * tiny);
+  }
+}
+
+TEST(Refined, is_the_same_for_any_number_of_threads) {
+  const SquareScene scene;
+  for (const double nu : {0.49, 0.4999}) {  // in single and double precision
+    const Gel gel = gel_of(nu, 15);
+    const Eigen::MatrixXd one =
+        make_substrate(gel, refined_to(0.03), 1)->compliance_um_per_nN(scene.points, scene.ellipses);
+    for (const int threads : {2, 4}) {
+      EXPECT_TRUE(one ==
+                  make_substrate(gel, refined_to(0.03), threads)->compliance_um_per_nN(scene.points, scene.ellipses));
+    }
+  }
+}
+
+TEST(Refined, is_reciprocal_between_two_loaded_ellipses) {
+  // the mean displacement of ellipse B by a force on A is that of A by the same force on B: on one mesh for both, to
+  // the rule that averages over a kinked field
+  const std::vector<Ellipse> pair = {{{0, 0}, 1.5, 0.6, 0.3}, {{4, 1.5}, 1.2, 0.8, 2}};
+  std::vector<Vec2> points;
+  const std::size_t n = ellipse_rule(pair[0], 39).size();
+  for (const Ellipse& ellipse : pair) {
+    for (const DiscPoint& p : ellipse_rule(ellipse, 39)) points.push_back(ellipse.centre_um + p.position);
+  }
+  const Eigen::MatrixXd g = make_substrate(gel_of(0.49, 10), refined_to(0), 2)->compliance_um_per_nN(points, pair);
+  Eigen::Matrix2d mean[2] = {Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Zero()};
+  for (int at = 0; at < 2; ++at) {
+    const auto rule = ellipse_rule(pair[at], 39);
+    for (std::size_t k = 0; k < n; ++k) mean[at] += rule[k].weight * g.block<2, 2>(2 * (at * n + k), 2 * (1 - at));
+  }
+  EXPECT_LT((mean[0] - mean[1].transpose()).norm(), 1e-4 * mean[0].norm());
+}
+
+TEST(Vertical, of_the_half_space_is_the_average_of_the_point_force) {
+  const Gel gel = gel_of(0.3, 1000);
+  const Ellipse ellipse = {{1, 2}, 1.5, 0.4, 0.7};
+  const auto model = make_substrate(gel, test::model_named("half-space"), 1);
+  for (const Vec2 point : {Vec2{4, 3}, Vec2{-1, 4}, Vec2{2.5, 0}}) {
+    double expected = 0;
+    for (const DiscPoint& p : ellipse_rule(ellipse, 99)) {
+      const Vec2 offset = point - ellipse.centre_um - p.position;
+      const PointForceField field = cerruti_field(gel, offset.x, offset.y, 0);
+      expected += p.weight * (2 * field.u_um_per_nN[0][2] - field.u_um_per_nN[1][2]);
+    }
+    EXPECT_NEAR(model->vertical_um({point}, {ellipse}, {{2, -1}})[0], expected, 1e-9 * std::abs(expected));
+  }
+  // within, at the rim, continuous: slopes grow as log(1 / distance)
+  const Vec2 rim = ellipse.centre_um + 1.5 * Vec2{std::cos(0.7), std::sin(0.7)};
+  const Vec2 step = {1e-9 * std::cos(0.7), 1e-9 * std::sin(0.7)};
+  const auto near = model->vertical_um({rim - step, rim + step}, {ellipse}, {{2, -1}});
+  EXPECT_NEAR(near[0], near[1], 1e-4 * std::abs(near[0]));
+}
+
+TEST(Vertical, of_split_and_refined_agree) {
+  const SquareScene scene;
+  for (const double nu : {0.3, 0.49}) {
+    const Gel gel = gel_of(nu, 15);
+    const std::vector<Vec2> forces = {{1, 2}, {-3, 0.5}};
+    const auto by_split = make_substrate(gel, test::model_named("split"), 2);
+    const auto split = by_split->vertical_um(scene.points, scene.ellipses, forces);
+    const auto along = by_split->displacements_um(scene.points, scene.ellipses, forces);
+    const auto refined = make_substrate(gel, refined_to(0.02), 2)->vertical_um(scene.points, scene.ellipses, forces);
+    double difference = 0, size = 0;
+    for (std::size_t i = 0; i < split.size(); ++i) {
+      difference += (split[i] - refined[i]) * (split[i] - refined[i]);
+      size += split[i] * split[i] + dot(along[i], along[i]);
+    }
+    EXPECT_LT(std::sqrt(difference / size), 2 * 0.02) << nu;  // the tolerance, estimated within a factor of 2
+  }
+}
+
+TEST(Volume, holds_the_stress_of_the_half_space_where_the_base_is_far) {
+  SubstrateParameters parameters = refined_to(0);
+  parameters.stress = true;
+  parameters.growth = 0.5;
+  for (const double nu : {0.3, 0.4999}) {
+    const Gel gel = gel_of(nu, 200);
+    const double mu = shear_modulus_kPa(gel), lambda = 2 * mu * nu / (1 - 2 * nu);
+    const Ellipse disc = {{0, 0}, 0.8, 0.8, 0};
+    const VolumeField field = make_substrate(gel, parameters, 2)->volume({disc}, {{3, 0}});
+    ASSERT_EQ(field.stress_kPa.size() * 8, field.box_corners.size());
+    double difference = 0, size = 0;
+    for (std::size_t box = 0; box < field.stress_kPa.size(); ++box) {
+      const auto& low = field.points_um[field.box_corners[8 * box]];
+      const auto& high = field.points_um[field.box_corners[8 * box + 6]];
+      double x[3];
+      for (int k = 0; k < 3; ++k) x[k] = 0.5 * (low[k] + high[k]);
+      const double r = std::hypot(x[0], x[1], x[2]);
+      if (r < 4 || r > 20) continue;
+      const auto g = cerruti_field(gel, x[0], x[1], x[2]).gradient_per_nN[0];
+      const double even = lambda * (g[0][0] + g[1][1] + g[2][2]);
+      const double exact[6] = {even + 2 * mu * g[0][0],  even + 2 * mu * g[1][1],  even + 2 * mu * g[2][2],
+                               mu * (g[0][1] + g[1][0]), mu * (g[1][2] + g[2][1]), mu * (g[0][2] + g[2][0])};
+      for (int k = 0; k < 6; ++k) {
+        difference += std::pow(field.stress_kPa[box][k] - 3 * exact[k], 2);
+        size += std::pow(3 * exact[k], 2);
+      }
+    }
+    // boxes of half their distance: a cell's share of it squared over the slopes' own 24, 1/96, four times over for a
+    // field that falls as 1/r²; the point force's own difference from a disc is (0.8/4)²/4
+    EXPECT_GT(size, 0);
+    EXPECT_LT(std::sqrt(difference / size), 0.05) << nu;
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::substrate
