@@ -1,5 +1,8 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
 #include <algorithm>
+#include <cmath>
+#include <memory>
+#include <mutex>
 #include <set>
 
 #include "mbtfm/fit_results.h"
@@ -74,6 +77,37 @@ Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const FitIn
   return substrate.compliance_um_per_nN(points, ellipses_of(inputs.cell));
 }
 
+std::vector<bool> beads_in_region(const FitInputs& inputs, const FitParameters& p) {
+  std::vector<bool> is_used;
+  for (const Bead& b : inputs.beads) {
+    is_used.push_back(!p.region_um || contains(inputs.cell.outline_um, b.position_um) ||
+                      distance_to_boundary_um(inputs.cell.outline_um, b.position_um) <= *p.region_um);
+  }
+  return is_used;
+}
+
+/// The thesis' way: the displacements of each trial are solved for. One at a time, as the solver has threads of its
+/// own.
+SolvedMisfit solved_misfit(const substrate::Substrate& substrate, const FitInputs& inputs, const LinearData& data) {
+  std::vector<Vec2> points;
+  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
+  const auto one_at_a_time = std::make_shared<std::mutex>();
+  return
+      [&substrate, &data, points, ellipses = ellipses_of(inputs.cell), one_at_a_time](const Eigen::VectorXd& forces) {
+        std::vector<Vec2> forces_nN;
+        for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
+        const std::lock_guard lock(*one_at_a_time);
+        const std::vector<Vec2> u = substrate.displacements_um(points, ellipses, forces_nN);
+        double sum = 0;
+        for (std::size_t i = 0; i < u.size(); ++i) {
+          const auto row = 2 * static_cast<Eigen::Index>(i);
+          const Vec2 misfit_um = u[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
+          sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
+        }
+        return sum;
+      };
+}
+
 /// The given network first, then further ones over the same cell from other seeds.
 std::vector<network::CableNetwork> span_ensemble(const FitInputs& inputs, const FitStageParameters& p, int threads) {
   std::vector<Network> networks(p.fit.n_meshes);
@@ -114,11 +148,13 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   const FitInputs inputs = read_inputs(context);
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  const LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs));
+  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));
   context.progress(0.3, "spanning networks");
   const std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
-  const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
-                                       [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); });
+  const EnsembleFit fit = fit_ensemble(
+      networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
+      [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
+      p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{});
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
