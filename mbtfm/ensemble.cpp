@@ -14,6 +14,14 @@ namespace mbtfm::inverse {
 
 namespace {
 
+void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
+  if (n_components >= n_tensions) return;
+  throw InvalidData("displacement",
+                    "at least " + std::to_string((n_tensions + 1) / 2) + " good beads in the region of the fit for " +
+                        std::to_string(n_tensions) + " tensions",
+                    std::to_string(n_components / 2));
+}
+
 /// Forces with every fibre at the network's tension.
 Eigen::VectorXd network_forces_nN(const TensionProblem& problem, const Trial& trial) {
   const double tension = trial.tensions_nN[0];
@@ -173,6 +181,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   EnsembleFit all;
   all.fibre_ids = networks.front().fibre_ids();
   for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == all.fibre_ids);
+  check_suffice(data.n_used, static_cast<Eigen::Index>(all.fibre_ids.size()));
   all.meshes.resize(networks.size());
   std::mutex mutex;
   int n_done = 0;

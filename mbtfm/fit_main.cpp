@@ -3,9 +3,9 @@
 #include <cmath>
 #include <memory>
 #include <mutex>
-#include <set>
 
 #include "mbtfm/fit_results.h"
+#include "mbtfm/model_checks.h"
 #include "network/mesh.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -47,14 +47,6 @@ FitInputs read_inputs(StageContext& context) {
       inputs.beads.push_back(std::move(bead));
     else
       ++inputs.n_flagged;
-  }
-  std::set<int> groups = {0};
-  for (const Link& link : inputs.network.links) groups.insert(link.fibre_id);
-  if (2 * inputs.beads.size() < groups.size()) {
-    throw InputError(field.string(),
-                     "at least " + std::to_string((groups.size() + 1) / 2) + " good beads for " +
-                         std::to_string(groups.size()) + " tensions",
-                     std::to_string(inputs.beads.size()));
   }
   return inputs;
 }
@@ -143,6 +135,49 @@ std::vector<Effect> effects_of(const substrate::Substrate& substrate, const FitI
   return effects;
 }
 
+/// "3 + 7: 5.2 ± 0.1 nN; …"
+std::string names_of_groups(const EnsembleFit& fit) {
+  std::string text;
+  for (const FibreGroup& group : fibres_not_told_apart(fit)) {
+    if (!text.empty()) text += "; ";
+    for (std::size_t k = 0; k < group.indices.size(); ++k) {
+      text += (k > 0 ? " + " : "") + std::to_string(fit.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
+    }
+    text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error()) + " nN";
+  }
+  return text;
+}
+
+/// The checks of the model in a few figures.
+Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models,
+                   const std::vector<FibreLeftOut>& left_out, const std::vector<MissingFibre>& missing) {
+  const auto best = std::min_element(models.begin(), models.end(),
+                                     [](const ModelScore& a, const ModelScore& b) { return a.bic < b.bic; });
+  std::string unsupported;
+  for (const FibreLeftOut& f : left_out) {
+    if (f.aic_rise <= 0) unsupported += (unsupported.empty() ? "" : ", ") + std::to_string(f.fibre_id);
+  }
+  return {{"best_model_by_bic", best->name},
+          {"fibres_not_told_apart", names_of_groups(fit)},
+          {"fibres_without_support", unsupported},
+          {"n_missing_fibres_hinted", std::int64_t(missing.size())}};
+}
+
+PointArray most_informed_array(const EnsembleFit& fit, const LinearData& data) {
+  PointArray array{.name = "informs_fibre_id", .scalars = {}, .vectors = {}};
+  for (const int id : most_informed_fibre(fit, data)) array.scalars.push_back(id);
+  return array;
+}
+
+/// What the loss and the region leave of each bead.
+PointArray weight_array(const LinearData& data) {
+  PointArray array{.name = "weight", .scalars = {}, .vectors = {}};
+  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
+    array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
+  }
+  return array;
+}
+
 StageReport fit(const FitStageParameters& p, StageContext& context) {
   context.progress(0, "reading");
   const FitInputs inputs = read_inputs(context);
@@ -159,14 +194,23 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const DisplacementField fitted = fitted_field(inputs, data, fit);
-  const FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
+  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
+  const std::vector<MissingFibre> missing = missing_fibres(fit, data, inputs.cell.adhesions);
+  for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
+  write_correlations(context.output("out", "correlations.csv"), fit);
+  write_models(context.output("out", "models.csv"), models);
+  write_fibres_left_out(context.output("out", "fibres_left_out.csv"), left_out);
+  write_missing_fibres(context.output("out", "missing_fibres.csv"), missing);
   write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
   write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
   write_fit_summary(context.output("out", "fit.json"), summary);
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
-  write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted);
+  write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
+                         {most_informed_array(fit, data), weight_array(data)});
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
   context.progress(1, "done");
@@ -178,6 +222,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
                                 brief(summary.total_force_nN) + " nN, relative L2 " + brief(summary.relative_l2),
                      .figures = summary.more,
                      .effects = effects_of(*substrate, inputs, p.fit)};
+  const std::string together = names_of_groups(fit);
+  if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
   if (inputs.n_flagged > 0) report.summary += "; " + std::to_string(inputs.n_flagged) + " flagged beads left out";
   if (!fit.report.converged) report.summary = fit.report.reason;

@@ -129,7 +129,8 @@ DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, 
   return field;
 }
 
-void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted) {
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
+                            const std::vector<PointArray>& more) {
   std::vector<Vec2> points;
   PointArray u{.name = "measured_um", .scalars = {}, .vectors = {}};
   PointArray model{.name = "fitted_um", .scalars = {}, .vectors = {}};
@@ -140,7 +141,9 @@ void write_displacement_vtp(const Path& file, const DisplacementField& measured,
     model.vectors.push_back(fitted[i].displacement_um);
     residual.vectors.push_back(measured[i].displacement_um - fitted[i].displacement_um);
   }
-  write_points_vtp(file, points, {u, model, residual});
+  std::vector<PointArray> arrays = {std::move(u), std::move(model), std::move(residual)};
+  arrays.insert(arrays.end(), more.begin(), more.end());
+  write_points_vtp(file, points, arrays);
 }
 
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces) {

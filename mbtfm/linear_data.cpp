@@ -45,6 +45,7 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   const auto vectors = eigen.eigenvectors().rightCols(n_felt);
   data.reduced.compliance = roots.asDiagonal() * vectors.transpose();
   data.reduced.target = roots.cwiseInverse().asDiagonal() * (vectors.transpose() * (weighted.transpose() * weighted_u));
+  data.reduced.n_components = data.n_used;
   data.reduced.floor_squared = std::max(0.0, weighted_u.squaredNorm() - data.reduced.target.squaredNorm());
 }
 

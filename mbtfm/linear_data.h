@@ -10,9 +10,10 @@ namespace mbtfm::inverse {
 
 /// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, with C of at most as many rows as R is long.
 struct ReducedData {
-  Eigen::MatrixXd compliance;  ///< C
-  Eigen::VectorXd target;      ///< y
-  double floor_squared = 0;    ///< what no force can explain
+  Eigen::MatrixXd compliance;     ///< C
+  Eigen::VectorXd target;         ///< y
+  double floor_squared = 0;       ///< what no force can explain
+  Eigen::Index n_components = 0;  ///< of the beads' displacements that it stands for
 };
 
 struct LinearData {

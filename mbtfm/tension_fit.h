@@ -29,10 +29,17 @@ void declare(ParameterList& list, FitParameters& parameters);
 /// Of the largest tension: a network's tension below this is as good as none.
 inline constexpr double kNoTension = 1e-6;
 
+/// The misfit that a method had reached after so many equilibria.
+struct Milestone {
+  int n_evaluations = 0;
+  double objective = 0;
+};
+
 struct TensionFit {
   Trial trial;  ///< the best one
   Report report;
   int n_evaluations = 0;  ///< equilibria solved, those of finite differences included
+  std::vector<Milestone> history;
 };
 
 /// @throws UsageError for a method it does not know
