@@ -2,6 +2,7 @@
 
 #include <random>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 
@@ -37,6 +38,14 @@ CrossValidation cross_validate(const TensionProblem& problem, const LinearData& 
         relative_l2(data, problem.evaluate(drawn, &around).forces_nN);
   });
   return result;
+}
+
+void write_cross_validation(const Path& file, const CrossValidation& result) {
+  CsvText csv({"draw", "own", "exchanged"});
+  for (std::size_t i = 0; i < result.own.size(); ++i) {
+    csv.add(static_cast<int>(i) + 1).add(result.own[i]).add(result.exchanged[i]).end_row();
+  }
+  write_text(file, csv.str());
 }
 
 }  // namespace mbtfm::inverse

@@ -8,6 +8,7 @@
 
 #include "mbtfm/linear_data.h"
 #include "mbtfm/tension_problem.h"
+#include "pipeline/contract/files.h"
 
 namespace mbtfm::inverse {
 
@@ -24,5 +25,8 @@ struct CrossValidation {
 CrossValidation cross_validate(const TensionProblem& problem, const LinearData& data, const Trial& around,
                                const std::vector<FibreType>& types, const TypeTensions& tensions, int n_draws,
                                std::uint64_t seed, int threads);
+
+/// Columns draw, own, exchanged.
+void write_cross_validation(const Path& file, const CrossValidation& result);
 
 }  // namespace mbtfm::inverse

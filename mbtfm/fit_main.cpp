@@ -1,9 +1,11 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <mutex>
 
+#include "mbtfm/cross_validation.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/model_checks.h"
 #include "network/mesh.h"
@@ -178,6 +180,43 @@ PointArray weight_array(const LinearData& data) {
   return array;
 }
 
+/// The tensions of the frame before, by the network's groups; fibres that are new since then at the others' mean.
+std::optional<Eigen::VectorXd> start_of(StageContext& context, const std::vector<int>& fibre_ids) {
+  if (!context.has_input("start")) return std::nullopt;
+  std::map<int, double> known;
+  double sum = 0;
+  for (const Tension& t : read_tensions(context.input("start"))) {
+    known[t.fibre_id] = t.tension_nN;
+    sum += t.tension_nN;
+  }
+  Eigen::VectorXd start(static_cast<Eigen::Index>(fibre_ids.size()));
+  for (std::size_t i = 0; i < fibre_ids.size(); ++i) {
+    const auto found = known.find(fibre_ids[i]);
+    start[static_cast<Eigen::Index>(i)] =
+        found != known.end() ? found->second : sum / static_cast<double>(std::max<std::size_t>(1, known.size()));
+  }
+  return start;
+}
+
+/// Draws take the tensions of this cell's own fibres of a type. None where it lacks dorsal or ventral ones.
+std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const LinearData& data,
+                                                   const network::CableNetwork& network, const Cell& cell,
+                                                   const FitParameters& p, int threads) {
+  TypeTensions tensions;
+  std::vector<FibreType> types;
+  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+    const auto fibre = std::find_if(cell.fibres.begin(), cell.fibres.end(),
+                                    [&](const Fibre& f) { return f.fibre_id == fit.fibre_ids[i]; });
+    types.push_back(fibre->type);
+    tensions[fibre->type].push_back(fit.tensions_nN[i].value);
+  }
+  if (p.cross_validation == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) {
+    return std::nullopt;
+  }
+  const TensionProblem problem(network, data.reduced, adhesion_ids_of(cell));
+  return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
+}
+
 StageReport fit(const FitStageParameters& p, StageContext& context) {
   context.progress(0, "reading");
   const FitInputs inputs = read_inputs(context);
@@ -189,7 +228,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   const EnsembleFit fit = fit_ensemble(
       networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
       [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
-      p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{});
+      p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{},
+      start_of(context, networks.front().fibre_ids()));
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
@@ -203,6 +243,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_models(context.output("out", "models.csv"), models);
   write_fibres_left_out(context.output("out", "fibres_left_out.csv"), left_out);
   write_missing_fibres(context.output("out", "missing_fibres.csv"), missing);
+  const auto drawn = cross_validation_of(fit, data, networks.front(), inputs.cell, p.fit, context.threads);
+  if (drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *drawn);
   write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
   write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
   write_fit_summary(context.output("out", "fit.json"), summary);
@@ -248,6 +290,7 @@ int main(int argc, char** argv) {
                   "folder with adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
                  {"network", FileArgument::Kind::input, "network.vtu"},
                  {"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
+                 {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
                  {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
       argc, argv, fit);
 }

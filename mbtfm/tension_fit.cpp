@@ -26,6 +26,9 @@ void declare(ParameterList& list, FitParameters& p) {
            "beads this far outside the outline tell the noise level (um)");
   list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
            "parametric bootstrap draws for the intervals; 0: from the misfit's profile");
+  list.add("cross_validation", p.cross_validation, Range::between(0, 1000000),
+           "draws of the tensions by fibre type, and with dorsal and ventral exchanged, whose misfits are compared; 0: "
+           "none");
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,

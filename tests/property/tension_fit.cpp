@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mbtfm/cross_validation.h"
 #include "mbtfm/model_checks.h"
 #include "mbtfm/robust.h"
 #include "tests/support/tension_scene.h"
@@ -253,6 +254,32 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
   EXPECT_EQ(missing[0].end_adhesion_id, 12);
   // a lone fibre pulls both adhesions with its tension; the network around it takes up some
   EXPECT_NEAR(missing[0].tension_nN, 5, 1);
+}
+
+TEST(ModelChecks, tensions_drawn_by_type_explain_the_beads_better_than_with_types_exchanged) {
+  Cell cell = test::round_cell(15, 16);
+  for (const auto& [start, end] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, start, end);
+  for (const int start : {2, 8, 11}) {
+    test::add_ventral(cell, start, start);
+    Fibre& f = cell.fibres.back();
+    f.type = FibreType::dorsal;
+    f.end_adhesion_id = {};
+    f.points_um[1] = f.points_um[0] + 0.4 * (Vec2{30, 30} - f.points_um[0]);
+  }
+  Eigen::VectorXd tensions(7);
+  tensions << 0.06, 4, 5, 6, 0.5, 0.8, 0.6;
+  TensionScene scene = test::scene_of(cell, tensions, 1000, 0.05, 11);
+  const EnsembleFit fit = fit_own_network(scene);
+  std::vector<FibreType> types;
+  for (const Fibre& f : cell.fibres) types.push_back(f.type);
+  const TypeTensions usual = {{FibreType::ventral, {4, 5, 6}}, {FibreType::dorsal, {0.5, 0.8, 0.6}}};
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const auto draw = [&](int threads) {
+    return cross_validate(problem, scene.data, fit.meshes[0].fit.trial, types, usual, 20, 1, threads);
+  };
+  const CrossValidation result = draw(1);
+  for (std::size_t i = 0; i < result.own.size(); ++i) EXPECT_LT(result.own[i], result.exchanged[i]) << "draw " << i;
+  EXPECT_EQ(result.own, draw(4).own);
 }
 
 }  // namespace

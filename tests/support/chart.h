@@ -78,7 +78,8 @@ inline Axis axis_of(const Panel& panel, bool is_x) {
 
 inline std::string panel_svg(const Panel& panel, double left_px, double width_px, double height_px) {
   Axis x = axis_of(panel, true), y = axis_of(panel, false);
-  x.from_px = left_px + 62, x.to_px = left_px + width_px - 12, y.from_px = height_px - 48, y.to_px = 34;
+  x.from_px = left_px + 62, x.to_px = left_px + width_px - 20, y.from_px = height_px - 48, y.to_px = 30;
+  if (panel.series.size() > 1) y.to_px += 15.0 * static_cast<double>(panel.series.size());  // names above the lines
   std::string svg =
       format("<text x=\"%.0f\" y=\"18\" font-weight=\"bold\">%s</text>\n", left_px + 62, panel.title.c_str());
   for (const double v : y.ticks()) {
@@ -106,10 +107,8 @@ inline std::string panel_svg(const Panel& panel, double left_px, double width_px
     }
     if (s.is_line) svg += "<path d=\"" + path + "\" fill=\"none\" stroke=\"" + colour + "\" stroke-width=\"1.8\"/>\n";
     if (panel.series.size() > 1) {
-      svg += format(
-          "<text x=\"%.1f\" y=\"%.1f\" text-anchor=\"end\" fill=\"%s\" stroke=\"#fff\" stroke-width=\"3\" "
-          "paint-order=\"stroke\">%s</text>\n",
-          x.to_px - 4, y.to_px + 12 + 15.0 * static_cast<double>(k), colour, s.name.c_str());
+      svg += format("<text x=\"%.1f\" y=\"%.1f\" fill=\"%s\">%s</text>\n", x.from_px,
+                    33 + 15.0 * static_cast<double>(k), colour, s.name.c_str());
     }
   }
   return svg;
