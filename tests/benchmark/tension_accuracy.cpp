@@ -490,8 +490,9 @@ void speed(const Arguments&) {
     scene.cables = network::CableNetwork(network::generate_network(cell, p).network);
     std::printf("fit by vertices,%zu,%.3f\n", scene.cables.network().vertices_um.size(), fit_seconds(scene));
   }
-  for (const int n_fibres : {5, 10, 20, 40}) {
+  for (const int n_fibres : {5, 10, 20, 30}) {
     samples::ScenarioParameters p;
+    p.cell.fibre_spacing_um = 1;  // room for the many
     p.cell.n_ventral = n_fibres - 2 * (n_fibres / 3), p.cell.n_dorsal = p.cell.n_arc = n_fibres / 3;
     const Cell other = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1).cell;
     const TensionScene scene = test::scene_of(other, thesis_tensions_nN(other.fibres.size(), 1), 2000, 0.07, 1);
@@ -502,6 +503,7 @@ void speed(const Arguments&) {
 }  // namespace
 
 int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 1 << 12);
   const Arguments a{.n_repeats = argc > 2 ? std::atoi(argv[2]) : 10,
                     .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
                     .folder = argc > 4 ? argv[4] : "."};
