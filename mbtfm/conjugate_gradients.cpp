@@ -56,6 +56,7 @@ class Minimisation {
       if (refined.objective < best.objective) best = std::move(refined);
     }
     fit_.trial = std::move(best);
+    fit_.history.push_back({.n_evaluations = fit_.n_evaluations, .objective = fit_.trial.objective});
     return step;
   }
 

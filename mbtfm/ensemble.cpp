@@ -1,13 +1,12 @@
 #include "mbtfm/ensemble.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
-#include <limits>
 #include <mutex>
 
+#include "mbtfm/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 
@@ -15,24 +14,12 @@ namespace mbtfm::inverse {
 
 namespace {
 
-/// What one mesh says.
-struct MeshFit {
-  TensionFit fit;
-  Eigen::MatrixXd tension_covariance;         ///< from the beads' noise
-  Eigen::MatrixXd force_covariance_diagonal;  ///< adhesions × (xx, xy, yy)
-  Eigen::VectorXd network_forces_nN, torques_nN_um;
-};
-
-/// (JᵀJ)⁻¹; a direction in which no bead tells anything gets an infinite variance.
-Eigen::MatrixXd covariance_of(const Eigen::MatrixXd& jacobian) {
-  const Eigen::VectorXd scale = jacobian.colwise().norm().cwiseMax(1e-300);
-  const Eigen::MatrixXd scaled = jacobian * scale.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled.transpose() * scaled);
-  const double smallest = 1e-12 * eigen.eigenvalues().maxCoeff();  // rounding of JᵀJ
-  const Eigen::VectorXd inverse = eigen.eigenvalues().unaryExpr([&](double v) { return 1 / std::max(v, smallest); });
-  const Eigen::MatrixXd half =
-      scale.cwiseInverse().asDiagonal() * eigen.eigenvectors() * inverse.cwiseSqrt().asDiagonal();
-  return half * half.transpose();
+void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
+  if (n_components >= n_tensions) return;
+  throw InvalidData("displacement",
+                    "at least " + std::to_string((n_tensions + 1) / 2) + " good beads in the region of the fit for " +
+                        std::to_string(n_tensions) + " tensions",
+                    std::to_string(n_components / 2));
 }
 
 /// Forces with every fibre at the network's tension.
@@ -42,24 +29,55 @@ Eigen::VectorXd network_forces_nN(const TensionProblem& problem, const Trial& tr
   return problem.evaluate(Eigen::VectorXd::Constant(trial.tensions_nN.size(), tension), &trial).forces_nN;
 }
 
-MeshFit fit_mesh(const network::CableNetwork& network, const LinearData& data, const std::vector<int>& adhesion_ids,
-                 const FitParameters& parameters, int threads) {
-  const TensionProblem problem(network, data, adhesion_ids);
+MeshFit describe(const TensionProblem& problem, TensionFit fit) {
   MeshFit mesh;
-  mesh.fit = fit_tensions(problem, parameters, threads, uniform_start_nN(problem));
+  mesh.fit = std::move(fit);
   const Trial& trial = mesh.fit.trial;
-  const Eigen::MatrixXd derivatives = problem.force_derivatives(trial);
-  mesh.tension_covariance = covariance_of(data.reduced * derivatives);
-  const Eigen::Index n_adhesions = derivatives.rows() / 2;
-  mesh.force_covariance_diagonal.resize(n_adhesions, 3);
-  for (Eigen::Index a = 0; a < n_adhesions; ++a) {
-    const auto rows = derivatives.middleRows<2>(2 * a);
-    const Eigen::Matrix2d c = rows * mesh.tension_covariance * rows.transpose();
-    mesh.force_covariance_diagonal.row(a) << c(0, 0), c(0, 1), c(1, 1);
-  }
+  mesh.force_derivatives = problem.force_derivatives(trial);
+  mesh.local = local_misfit(trial, problem.data().compliance * mesh.force_derivatives);
   mesh.network_forces_nN = network_forces_nN(problem, trial);
   mesh.torques_nN_um = problem.torques_nN_um(trial);
   return mesh;
+}
+
+/// A bound matters to the intervals where any tension is within three standard errors of it.
+bool is_near_a_bound(const MeshFit& mesh) {
+  for (Eigen::Index i = 0; i < mesh.local.tensions_nN.size(); ++i) {
+    if (mesh.local.tensions_nN[i] < 3 * std::sqrt(mesh.covariance_nN2(i, i))) return true;
+  }
+  return false;
+}
+
+void add_errors(MeshFit& mesh, double variance) {
+  mesh.covariance_nN2 = covariance_nN2(mesh.local, variance);
+  if (!is_near_a_bound(mesh)) return;
+  for (int i = 0; i < static_cast<int>(mesh.local.g.size()); ++i) {
+    mesh.intervals_95.push_back(profile_95(mesh.local, variance, i));
+  }
+}
+
+/// Draws shared out over the meshes in turn; replaces the profile.
+void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& networks, const ReducedData& data,
+                   const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads) {
+  const std::size_t n_meshes = all.meshes.size();
+  std::vector<std::vector<double>> deviations(all.tensions_nN.size());
+  for (std::size_t m = 0; m < n_meshes; ++m) {
+    std::vector<std::uint64_t> draws;
+    for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
+    const TensionProblem problem(networks[m], data, adhesion_ids);
+    const Eigen::MatrixXd of_mesh =
+        bootstrap_deviations_nN(problem, parameters, all.meshes[m].fit.trial, all.variance, draws, threads);
+    for (std::size_t i = 0; i < deviations.size(); ++i) {
+      const auto row = of_mesh.row(static_cast<Eigen::Index>(i));
+      deviations[i].insert(deviations[i].end(), row.begin(), row.end());
+    }
+  }
+  for (std::size_t i = 0; i < deviations.size(); ++i) {
+    double sum = 0;
+    for (const double d : deviations[i]) sum += d * d;
+    all.tensions_nN[i].noise = std::sqrt(sum / parameters.bootstrap);
+    all.tensions_nN[i].noise_95 = percentiles_95(deviations[i]);
+  }
 }
 
 /// Spread of one further mesh about the mean of these: s² (1 + 1/n).
@@ -72,86 +90,145 @@ double spread_of(const std::vector<double>& values) {
   return std::sqrt(sum / (n - 1) * (1 + 1 / n));
 }
 
-double chi_squared_per_degree(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions) {
-  const double misfit = (data.reduced * forces_nN - data.target).squaredNorm() + data.floor_squared;
-  const Eigen::Index degrees = data.displacement_um.size() - n_tensions;
-  return misfit / static_cast<double>(std::max<Eigen::Index>(1, degrees));
+/// Mean, noise and spread of a quantity that is linear in the tensions about each mesh's solution.
+/// @param value_of  of a mesh; @param gradient_of  by tension
+template <class ValueOf, class GradientOf>
+Estimate estimate_of(const std::vector<MeshFit>& meshes, const ValueOf& value_of, const GradientOf& gradient_of) {
+  const auto n_meshes = static_cast<double>(meshes.size());
+  std::vector<double> values;
+  Estimate estimate;
+  for (const MeshFit& mesh : meshes) {
+    values.push_back(value_of(mesh));
+    estimate.value += values.back() / n_meshes;
+    const Eigen::VectorXd gradient = gradient_of(mesh);
+    estimate.noise += gradient.dot(mesh.covariance_nN2 * gradient) / n_meshes;
+  }
+  estimate.noise = std::sqrt(std::max(0.0, estimate.noise));
+  estimate.spread = spread_of(values);
+  return estimate;
+}
+
+/// The beads' part of a tension's interval: the mean of the meshes'.
+std::optional<Sides> mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
+  const bool any = std::any_of(meshes.begin(), meshes.end(), [](const MeshFit& m) { return !m.intervals_95.empty(); });
+  if (!any) return {};
+  Sides mean;
+  for (const MeshFit& mesh : meshes) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double half = 1.96 * std::sqrt(mesh.covariance_nN2(at, at));
+    const Sides sides = mesh.intervals_95.empty() ? Sides{half, half} : mesh.intervals_95[i];
+    mean.below += sides.below / static_cast<double>(meshes.size());
+    mean.above += sides.above / static_cast<double>(meshes.size());
+  }
+  return mean;
+}
+
+void add_means(EnsembleFit& all) {
+  const auto n_meshes = static_cast<double>(all.meshes.size());
+  const MeshFit& first = all.meshes.front();
+  all.forces_nN = all.network_forces_nN = Eigen::VectorXd::Zero(first.fit.trial.forces_nN.size());
+  all.torques_nN_um = Eigen::VectorXd::Zero(first.torques_nN_um.size());
+  all.report.converged = true;
+  for (const MeshFit& mesh : all.meshes) {
+    const Report& report = mesh.fit.report;
+    all.forces_nN += mesh.fit.trial.forces_nN / n_meshes;
+    all.network_forces_nN += mesh.network_forces_nN / n_meshes;
+    all.torques_nN_um += mesh.torques_nN_um / n_meshes;
+    all.report.iterations = std::max(all.report.iterations, report.iterations);
+    all.report.last_change = std::max(all.report.last_change, report.last_change);
+    if (all.report.reason.empty() || (all.report.converged && !report.converged)) all.report.reason = report.reason;
+    all.report.converged = all.report.converged && report.converged;
+  }
+}
+
+void add_estimates(EnsembleFit& all) {
+  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
+  all.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
+  for (const MeshFit& mesh : all.meshes) {
+    all.covariance_nN2 += mesh.covariance_nN2 / static_cast<double>(all.meshes.size());
+  }
+  for (Eigen::Index i = 0; i < n_tensions; ++i) {
+    all.tensions_nN.push_back(sum_of(all, {static_cast<int>(i)}));
+    all.tensions_nN.back().noise_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
+  }
+  for (Eigen::Index row = 0; row < all.forces_nN.size(); row += 2) {
+    const Eigen::Vector2d force = all.forces_nN.segment<2>(row);
+    const Eigen::Vector2d along = force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+    all.force_magnitudes_nN.push_back(estimate_of(
+        all.meshes, [&](const MeshFit& mesh) { return along.dot(mesh.fit.trial.forces_nN.segment<2>(row)); },
+        [&](const MeshFit& mesh) -> Eigen::VectorXd {
+          return mesh.force_derivatives.middleRows<2>(row).transpose() * along;
+        }));
+  }
 }
 
 }  // namespace
 
-EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, const LinearData& data,
+Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
+  Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
+  for (const int i : indices) ones[i] = 1;
+  return estimate_of(
+      fit.meshes, [&](const MeshFit& mesh) { return ones.dot(mesh.fit.trial.tensions_nN); },
+      [&](const MeshFit&) { return ones; });
+}
+
+EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, LinearData& data,
                          const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
-                         const Progress& progress) {
+                         const Progress& progress, const SolvedMisfit& solved_misfit,
+                         const std::optional<Eigen::VectorXd>& start_nN) {
   const int n_meshes = static_cast<int>(networks.size());
   MBTFM_ASSERT(n_meshes >= 1);
-  std::vector<MeshFit> meshes(n_meshes);
-  std::mutex mutex;
-  int n_done = 0;
-  parallel_for(n_meshes, threads, [&](int m) {
-    meshes[m] = fit_mesh(networks[m], data, adhesion_ids, parameters, n_meshes == 1 ? threads : 1);
-    const std::lock_guard lock(mutex);
-    if (progress) progress(double(++n_done) / n_meshes, "fitting tensions on " + std::to_string(n_meshes) + " meshes");
-  });
-
   EnsembleFit all;
   all.fibre_ids = networks.front().fibre_ids();
   for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == all.fibre_ids);
-  const Eigen::Index n_forces = data.compliance_um_per_nN.cols();
-  all.forces_nN = all.network_forces_nN = Eigen::VectorXd::Zero(n_forces);
-  all.torques_nN_um = Eigen::VectorXd::Zero(n_forces / 2);
-  all.report.converged = true;
-  for (const MeshFit& mesh : meshes) {
-    all.forces_nN += mesh.fit.trial.forces_nN / n_meshes;
-    all.network_forces_nN += mesh.network_forces_nN / n_meshes;
-    all.torques_nN_um += mesh.torques_nN_um / n_meshes;
-    all.report.iterations = std::max(all.report.iterations, mesh.fit.report.iterations);
-    all.report.last_change = std::max(all.report.last_change, mesh.fit.report.last_change);
-    if (!mesh.fit.report.converged || all.report.reason.empty()) all.report.reason = mesh.fit.report.reason;
-    all.report.converged = all.report.converged && mesh.fit.report.converged;
+  check_suffice(data.n_used, static_cast<Eigen::Index>(all.fibre_ids.size()));
+  all.meshes.resize(networks.size());
+  std::mutex mutex;
+  int n_done = 0;
+  const auto tell = [&] {
+    const std::lock_guard lock(mutex);
+    if (progress) progress(double(++n_done) / n_meshes, "fitting tensions on " + std::to_string(n_meshes) + " meshes");
+  };
+  {
+    TensionFit first;
+    if (parameters.loss == "squares") {
+      const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, solved_misfit);
+      first = fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
+    } else {
+      first = fit_reweighted(data, networks.front(), adhesion_ids, parameters, threads, start_nN);
+    }
+    all.meshes.front() = describe(TensionProblem(networks.front(), data.reduced, adhesion_ids), std::move(first));
+    tell();
   }
+  const Eigen::VectorXd answer = all.meshes.front().fit.trial.tensions_nN;
+  parallel_for(n_meshes - 1, threads, [&](int m) {
+    const auto i = static_cast<std::size_t>(m) + 1;
+    const TensionProblem problem(networks[i], data.reduced, adhesion_ids, solved_misfit);
+    all.meshes[i] = describe(problem, fit_tensions(problem, parameters, 1, answer));
+    tell();
+  });
+  add_means(all);
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
-  all.chi_squared_per_degree = chi_squared_per_degree(data, all.forces_nN, n_tensions);
-  // A misfit beyond the stated noise is the model's; it widens the error bars as if it were noise.
-  const double widening = data.has_errors ? std::max(1.0, all.chi_squared_per_degree) : all.chi_squared_per_degree;
-
-  for (Eigen::Index i = 0; i < n_tensions; ++i) {
-    std::vector<double> values;
-    Estimate estimate;
-    for (const MeshFit& mesh : meshes) {
-      values.push_back(mesh.fit.trial.tensions_nN[i]);
-      estimate.value += values.back() / n_meshes;
-      estimate.noise += mesh.tension_covariance(i, i) * widening / n_meshes;
-    }
-    estimate.noise = std::sqrt(estimate.noise);
-    estimate.spread = spread_of(values);
-    all.tensions_nN.push_back(estimate);
-  }
-  for (Eigen::Index a = 0; a < n_forces / 2; ++a) {
-    const Eigen::Vector2d force = all.forces_nN.segment<2>(2 * a);
-    const Eigen::Vector2d along = force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
-    std::vector<double> values;
-    Estimate estimate{.value = force.norm()};
-    for (const MeshFit& mesh : meshes) {
-      values.push_back(along.dot(mesh.fit.trial.forces_nN.segment<2>(2 * a)));
-      const auto c = mesh.force_covariance_diagonal.row(a);
-      const double variance = along[0] * along[0] * c[0] + 2 * along[0] * along[1] * c[1] + along[1] * along[1] * c[2];
-      estimate.noise += variance * widening / n_meshes;
-    }
-    estimate.noise = std::sqrt(std::max(0.0, estimate.noise));
-    estimate.spread = spread_of(values);
-    all.force_magnitudes_nN.push_back(estimate);
-  }
-  for (MeshFit& mesh : meshes) all.fits.push_back(std::move(mesh.fit));
+  all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
+                               static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
+  all.variance = misfit_variance(data, all.forces_nN, n_tensions, parameters.loss);
+  parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all.variance); });
+  add_estimates(all);
+  if (parameters.bootstrap > 0) add_bootstrap(all, networks, data.reduced, adhesion_ids, parameters, threads);
   return all;
 }
 
-double half_width_95(const Estimate& estimate, int n_meshes) {
-  const double error = estimate.standard_error();
-  if (n_meshes < 2 || estimate.spread <= 0) return boost::math::quantile(boost::math::normal(), 0.975) * error;
-  const double part = std::pow(estimate.spread / error, 4);
-  const double degrees = (n_meshes - 1) / part;
-  return boost::math::quantile(boost::math::students_t(std::min(degrees, 1e6)), 0.975) * error;
+Interval interval_95(const Estimate& estimate, int n_meshes) {
+  const double normal = boost::math::quantile(boost::math::normal(), 0.975);
+  const auto half_width = [&](double noise) {
+    const double error = std::hypot(noise, estimate.spread);
+    if (n_meshes < 2 || estimate.spread <= 0) return normal * error;
+    const double degrees = (n_meshes - 1) / std::pow(estimate.spread / error, 4);
+    return boost::math::quantile(boost::math::students_t(std::min(degrees, 1e6)), 0.975) * error;
+  };
+  const Sides sides = estimate.noise_95.value_or(Sides{normal * estimate.noise, normal * estimate.noise});
+  return {.low = std::max(0.0, estimate.value - half_width(sides.below / normal)),
+          .high = estimate.value + half_width(sides.above / normal)};
 }
 
 }  // namespace mbtfm::inverse

@@ -1,8 +1,13 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
 #include <algorithm>
-#include <set>
+#include <cmath>
+#include <map>
+#include <memory>
+#include <mutex>
 
+#include "mbtfm/cross_validation.h"
 #include "mbtfm/fit_results.h"
+#include "mbtfm/model_checks.h"
 #include "network/mesh.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -45,14 +50,6 @@ FitInputs read_inputs(StageContext& context) {
     else
       ++inputs.n_flagged;
   }
-  std::set<int> groups = {0};
-  for (const Link& link : inputs.network.links) groups.insert(link.fibre_id);
-  if (2 * inputs.beads.size() < groups.size()) {
-    throw InputError(field.string(),
-                     "at least " + std::to_string((groups.size() + 1) / 2) + " good beads for " +
-                         std::to_string(groups.size()) + " tensions",
-                     std::to_string(inputs.beads.size()));
-  }
   return inputs;
 }
 
@@ -72,6 +69,37 @@ Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const FitIn
   std::vector<Vec2> points;
   for (const Bead& b : inputs.beads) points.push_back(b.position_um);
   return substrate.compliance_um_per_nN(points, ellipses_of(inputs.cell));
+}
+
+std::vector<bool> beads_in_region(const FitInputs& inputs, const FitParameters& p) {
+  std::vector<bool> is_used;
+  for (const Bead& b : inputs.beads) {
+    is_used.push_back(!p.region_um || contains(inputs.cell.outline_um, b.position_um) ||
+                      distance_to_boundary_um(inputs.cell.outline_um, b.position_um) <= *p.region_um);
+  }
+  return is_used;
+}
+
+/// The thesis' way: the displacements of each trial are solved for. One at a time, as the solver has threads of its
+/// own.
+SolvedMisfit solved_misfit(const substrate::Substrate& substrate, const FitInputs& inputs, const LinearData& data) {
+  std::vector<Vec2> points;
+  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
+  const auto one_at_a_time = std::make_shared<std::mutex>();
+  return
+      [&substrate, &data, points, ellipses = ellipses_of(inputs.cell), one_at_a_time](const Eigen::VectorXd& forces) {
+        std::vector<Vec2> forces_nN;
+        for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
+        const std::lock_guard lock(*one_at_a_time);
+        const std::vector<Vec2> u = substrate.displacements_um(points, ellipses, forces_nN);
+        double sum = 0;
+        for (std::size_t i = 0; i < u.size(); ++i) {
+          const auto row = 2 * static_cast<Eigen::Index>(i);
+          const Vec2 misfit_um = u[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
+          sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
+        }
+        return sum;
+      };
 }
 
 /// The given network first, then further ones over the same cell from other seeds.
@@ -109,28 +137,122 @@ std::vector<Effect> effects_of(const substrate::Substrate& substrate, const FitI
   return effects;
 }
 
+/// "3 + 7: 5.2 ± 0.1 nN; …"
+std::string names_of_groups(const EnsembleFit& fit) {
+  std::string text;
+  for (const FibreGroup& group : fibres_not_told_apart(fit)) {
+    if (!text.empty()) text += "; ";
+    for (std::size_t k = 0; k < group.indices.size(); ++k) {
+      text += (k > 0 ? " + " : "") + std::to_string(fit.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
+    }
+    text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error()) + " nN";
+  }
+  return text;
+}
+
+/// The checks of the model in a few figures.
+Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models,
+                   const std::vector<FibreLeftOut>& left_out, const std::vector<MissingFibre>& missing) {
+  const auto best = std::min_element(models.begin(), models.end(),
+                                     [](const ModelScore& a, const ModelScore& b) { return a.bic < b.bic; });
+  std::string unsupported;
+  for (const FibreLeftOut& f : left_out) {
+    if (f.aic_rise <= 0) unsupported += (unsupported.empty() ? "" : ", ") + std::to_string(f.fibre_id);
+  }
+  return {{"best_model_by_bic", best->name},
+          {"fibres_not_told_apart", names_of_groups(fit)},
+          {"fibres_without_support", unsupported},
+          {"n_missing_fibres_hinted", std::int64_t(missing.size())}};
+}
+
+PointArray most_informed_array(const EnsembleFit& fit, const LinearData& data) {
+  PointArray array{.name = "informs_fibre_id", .scalars = {}, .vectors = {}};
+  for (const int id : most_informed_fibre(fit, data)) array.scalars.push_back(id);
+  return array;
+}
+
+/// What the loss and the region leave of each bead.
+PointArray weight_array(const LinearData& data) {
+  PointArray array{.name = "weight", .scalars = {}, .vectors = {}};
+  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
+    array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
+  }
+  return array;
+}
+
+/// The tensions of the frame before, by the network's groups; fibres that are new since then at the others' mean.
+std::optional<Eigen::VectorXd> start_of(StageContext& context, const std::vector<int>& fibre_ids) {
+  if (!context.has_input("start")) return std::nullopt;
+  std::map<int, double> known;
+  double sum = 0;
+  for (const Tension& t : read_tensions(context.input("start"))) {
+    known[t.fibre_id] = t.tension_nN;
+    sum += t.tension_nN;
+  }
+  Eigen::VectorXd start(static_cast<Eigen::Index>(fibre_ids.size()));
+  for (std::size_t i = 0; i < fibre_ids.size(); ++i) {
+    const auto found = known.find(fibre_ids[i]);
+    start[static_cast<Eigen::Index>(i)] =
+        found != known.end() ? found->second : sum / static_cast<double>(std::max<std::size_t>(1, known.size()));
+  }
+  return start;
+}
+
+/// Draws take the tensions of this cell's own fibres of a type. None where it lacks dorsal or ventral ones.
+std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const LinearData& data,
+                                                   const network::CableNetwork& network, const Cell& cell,
+                                                   const FitParameters& p, int threads) {
+  TypeTensions tensions;
+  std::vector<FibreType> types;
+  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+    const auto fibre = std::find_if(cell.fibres.begin(), cell.fibres.end(),
+                                    [&](const Fibre& f) { return f.fibre_id == fit.fibre_ids[i]; });
+    types.push_back(fibre->type);
+    tensions[fibre->type].push_back(fit.tensions_nN[i].value);
+  }
+  if (p.cross_validation == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) {
+    return std::nullopt;
+  }
+  const TensionProblem problem(network, data.reduced, adhesion_ids_of(cell));
+  return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
+}
+
 StageReport fit(const FitStageParameters& p, StageContext& context) {
   context.progress(0, "reading");
   const FitInputs inputs = read_inputs(context);
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  const LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs));
+  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));
   context.progress(0.3, "spanning networks");
   const std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
-  const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
-                                       [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); });
+  const EnsembleFit fit = fit_ensemble(
+      networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
+      [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
+      p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{},
+      start_of(context, networks.front().fibre_ids()));
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const DisplacementField fitted = fitted_field(inputs, data, fit);
-  const FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
+  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
+  const std::vector<MissingFibre> missing = missing_fibres(fit, data, inputs.cell.adhesions);
+  for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
+  write_correlations(context.output("out", "correlations.csv"), fit);
+  write_models(context.output("out", "models.csv"), models);
+  write_fibres_left_out(context.output("out", "fibres_left_out.csv"), left_out);
+  write_missing_fibres(context.output("out", "missing_fibres.csv"), missing);
+  const auto drawn = cross_validation_of(fit, data, networks.front(), inputs.cell, p.fit, context.threads);
+  if (drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *drawn);
   write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
   write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
   write_fit_summary(context.output("out", "fit.json"), summary);
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
-  write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted);
+  write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
+                         {most_informed_array(fit, data), weight_array(data)});
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
   context.progress(1, "done");
@@ -142,6 +264,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
                                 brief(summary.total_force_nN) + " nN, relative L2 " + brief(summary.relative_l2),
                      .figures = summary.more,
                      .effects = effects_of(*substrate, inputs, p.fit)};
+  const std::string together = names_of_groups(fit);
+  if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
   if (inputs.n_flagged > 0) report.summary += "; " + std::to_string(inputs.n_flagged) + " flagged beads left out";
   if (!fit.report.converged) report.summary = fit.report.reason;
@@ -166,6 +290,7 @@ int main(int argc, char** argv) {
                   "folder with adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
                  {"network", FileArgument::Kind::input, "network.vtu"},
                  {"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
+                 {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
                  {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
       argc, argv, fit);
 }

@@ -42,19 +42,19 @@ double surface_tension_nN_per_um(const Network& network, const Polygon& outline_
 }  // namespace
 
 std::vector<Tension> tensions_of(const EnsembleFit& fit) {
-  const int n_meshes = static_cast<int>(fit.fits.size());
+  const int n_meshes = static_cast<int>(fit.meshes.size());
   double largest_nN = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
   std::vector<Tension> tensions;
   for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
     const Estimate& e = fit.tensions_nN[i];
-    const double half_width = half_width_95(e, n_meshes);
+    const Interval interval = interval_95(e, n_meshes);
     // A tension that could be anything that occurs in this cell was not measured.
     const double scale = i == 0 ? e.value : largest_nN;
     tensions.push_back({.fibre_id = fit.fibre_ids[i],
                         .tension_nN = e.value,
-                        .low_nN = std::max(0.0, e.value - half_width),
-                        .high_nN = e.value + half_width,
+                        .low_nN = interval.low,
+                        .high_nN = interval.high,
                         .identifiable = e.noise < scale});
   }
   return tensions;
@@ -95,7 +95,7 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
   s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
   s.network_surface_tension_nN_per_um =
       surface_tension_nN_per_um(networks.front().network(), inputs.cell.outline_um, fit.tensions_nN[0].value);
-  s.n_meshes = static_cast<int>(fit.fits.size());
+  s.n_meshes = static_cast<int>(fit.meshes.size());
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
   const Imbalance balance = imbalance(fit);
@@ -113,6 +113,7 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"n_beads", std::int64_t(inputs.beads.size())},
             {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
             {"method", parameters.method},
+            {"loss", parameters.loss},
             {"reason", fit.report.reason}};
   return s;
 }
@@ -128,7 +129,8 @@ DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, 
   return field;
 }
 
-void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted) {
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
+                            const std::vector<PointArray>& more) {
   std::vector<Vec2> points;
   PointArray u{.name = "measured_um", .scalars = {}, .vectors = {}};
   PointArray model{.name = "fitted_um", .scalars = {}, .vectors = {}};
@@ -139,7 +141,9 @@ void write_displacement_vtp(const Path& file, const DisplacementField& measured,
     model.vectors.push_back(fitted[i].displacement_um);
     residual.vectors.push_back(measured[i].displacement_um - fitted[i].displacement_um);
   }
-  write_points_vtp(file, points, {u, model, residual});
+  std::vector<PointArray> arrays = {std::move(u), std::move(model), std::move(residual)};
+  arrays.insert(arrays.end(), more.begin(), more.end());
+  write_points_vtp(file, points, arrays);
 }
 
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces) {
@@ -155,7 +159,7 @@ void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<A
 void write_contracted(const Path& file, const network::CableNetwork& network, const EnsembleFit& fit) {
   std::vector<double> tensions;
   for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
-  const network::Equilibrium e = network.equilibrium(tensions, fit.fits.front().trial.equilibrium.positions_um);
+  const network::Equilibrium e = network.equilibrium(tensions, fit.meshes.front().fit.trial.equilibrium.positions_um);
   write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN, e.link_states);
 }
 

@@ -24,7 +24,9 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
 /// The model's displacement at the beads.
 DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, const EnsembleFit& fit);
 
-void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted);
+/// @param more  further arrays, by bead
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
+                            const std::vector<PointArray>& more = {});
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces);
 /// The first network, contracted by the mean tensions.
 void write_contracted(const Path& file, const network::CableNetwork& network, const EnsembleFit& fit);

@@ -20,11 +20,37 @@ std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
   return indices;
 }
 
-// Of the network's tension in one step: without it the links hang loose and the next derivative tells nothing of them.
-constexpr double kLargestDrop = 0.9;
+// Of a tension in one step. A cable without tension hangs loose, and its derivative then tells nothing of a taut one:
+// who lets a fibre go slack on the word of a far-off derivative may never see it pull again.
+constexpr double kLargestDrop = 0.7;
+// Of the largest tension: below this a fibre may go to zero.
+constexpr double kLetGo = 0.01;
 
-// Part of the whole misfit: of 10 000 beads' chi² of 20 000 this is 0.001, a thirtieth of a standard error.
-constexpr double kNegligible = 5e-8;
+// Of the variance of one component, in 2 Phi: 0.001 is a thirtieth of a standard error.
+constexpr double kNegligible = 1e-3;
+
+/// What no bead could tell, in Phi.
+double negligible(const TensionProblem& problem, double objective) {
+  const double whole = objective + 0.5 * problem.data().floor_squared;
+  return kNegligible * whole / static_cast<double>(std::max<Eigen::Index>(1, problem.data().n_components));
+}
+
+double middle_of(const Eigen::VectorXd& values) {
+  std::vector<double> sorted(values.data(), values.data() + values.size());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  return *middle;
+}
+
+/// How far each tension may fall in one step.
+Eigen::VectorXd lowest_step(const Eigen::VectorXd& tensions_nN) {
+  const double largest = tensions_nN.maxCoeff();
+  Eigen::VectorXd low = -tensions_nN;
+  for (Eigen::Index i = 0; i < low.size(); ++i) {
+    if (tensions_nN[i] > (i == 0 ? kNoTension : kLetGo) * largest) low[i] *= kLargestDrop;
+  }
+  return low;
+}
 
 /// None where these tensions have no equilibrium that can be found: a step too far, to be shortened.
 std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, TensionFit& fit) {
@@ -34,6 +60,76 @@ std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::Ve
   } catch (const NotSolved&) {
     return std::nullopt;
   }
+}
+
+/// Levenberg–Marquardt from fit.trial.
+void descend(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit) {
+  fit.report = {};
+  double gain_of_late = 0;
+  double damping = 1e-3;  // relative to the diagonal; small, as forces are nearly linear in the tensions
+  Eigen::MatrixXd jacobian = problem.jacobian(fit.trial);
+  for (int i = 0; i < parameters.max_steps; ++i) {
+    fit.report.iterations = i + 1;
+    fit.history.push_back({.n_evaluations = fit.n_evaluations, .objective = fit.trial.objective});
+    Eigen::MatrixXd H = jacobian.transpose() * jacobian;
+    const Eigen::VectorXd gradient = jacobian.transpose() * fit.trial.residual;
+    // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
+    // damps its steps, but moves no minimum.
+    const Eigen::VectorXd weak = Eigen::VectorXd::Constant(H.rows(), 1e-6 * middle_of(H.diagonal()) + 1e-300);
+    const Eigen::VectorXd scale = H.diagonal();
+    const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale + weak).asDiagonal());
+    const double largest = fit.trial.tensions_nN.maxCoeff();
+    const Eigen::VectorXd low = lowest_step(fit.trial.tensions_nN);
+    const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, low);
+    fit.report.last_change = step.cwiseAbs().maxCoeff() / std::max(largest, std::numeric_limits<double>::min());
+
+    const double predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step));
+    if (predicted <= 1e-15 * fit.trial.objective || step.cwiseAbs().maxCoeff() == 0) {
+      fit.report.converged = true;
+      fit.report.reason = "no step lowers the misfit any further";
+      break;
+    }
+    const Eigen::VectorXd moved = (fit.trial.tensions_nN + step).cwiseMax(0.0);
+    const std::optional<Trial> next = try_evaluate(problem, moved, fit);
+    const double gain = next ? (fit.trial.objective - next->objective) / predicted : -1;
+    if (gain > 0) fit.trial = *next;
+    // A step that is short because it is damped says nothing of convergence.
+    if (fit.report.last_change < parameters.tolerance && damping <= 1e-2) {
+      fit.report.converged = true;
+      fit.report.reason = "the tensions change by less than the tolerance";
+      break;
+    }
+    if (gain > 0) jacobian = problem.jacobian(fit.trial);
+    // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
+    gain_of_late = 0.5 * gain_of_late + std::max(0.0, gain) * predicted;
+    if (i >= 5 && gain > 0 && gain_of_late < negligible(problem, fit.trial.objective)) {
+      fit.report.converged = true;
+      fit.report.reason = "the last steps lower the misfit by less than any bead could tell";
+      break;
+    }
+    if (gain > 0.75) damping = std::max(1e-12, damping / 10);
+    if (gain < 0.25) damping = std::max(10 * damping, gain > 0 ? 0.0 : 1e-2);
+  }
+  if (!fit.report.converged) {
+    fit.report.reason = "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +
+                        std::to_string(fit.report.iterations) + " steps";
+  }
+}
+
+/// Tensions that came out as good as zero, set to the median of the others; none where there are none.
+std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions_nN) {
+  const double limit = kLetGo * tensions_nN.maxCoeff();
+  std::vector<double> taut;
+  for (Eigen::Index i = 1; i < tensions_nN.size(); ++i) {
+    if (tensions_nN[i] > limit) taut.push_back(tensions_nN[i]);
+  }
+  if (taut.empty() || taut.size() + 1 == static_cast<std::size_t>(tensions_nN.size())) return std::nullopt;
+  std::nth_element(taut.begin(), taut.begin() + static_cast<std::ptrdiff_t>(taut.size() / 2), taut.end());
+  Eigen::VectorXd raised = tensions_nN;
+  for (Eigen::Index i = 1; i < raised.size(); ++i) {
+    if (raised[i] <= limit) raised[i] = taut[taut.size() / 2];
+  }
+  return raised;
 }
 
 }  // namespace
@@ -91,52 +187,20 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
   TensionFit fit;
   fit.trial = problem.evaluate(scaled_to_data_nN(problem, start_nN));
   fit.n_evaluations = 2;
-  double gain_of_late = 0;
-  double damping = 1e-3;  // relative to the diagonal; small, as forces are nearly linear in the tensions
-  Eigen::MatrixXd jacobian = problem.jacobian(fit.trial);
-  for (int i = 0; i < parameters.max_steps; ++i) {
-    fit.report.iterations = i + 1;
-    Eigen::MatrixXd H = jacobian.transpose() * jacobian;
-    const Eigen::VectorXd gradient = jacobian.transpose() * fit.trial.residual;
-    // A tension that no bead feels has a zero diagonal; the floor keeps it where it is.
-    const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-12 * H.diagonal().maxCoeff() + 1e-300);
-    const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale).asDiagonal());
-    const double largest = fit.trial.tensions_nN.maxCoeff();
-    Eigen::VectorXd low = -fit.trial.tensions_nN;
-    if (fit.trial.tensions_nN[0] > kNoTension * largest) low[0] *= kLargestDrop;
-    const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, low);
-    fit.report.last_change = step.cwiseAbs().maxCoeff() / std::max(largest, std::numeric_limits<double>::min());
-
-    const double predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step));
-    if (predicted <= 1e-15 * fit.trial.objective || step.cwiseAbs().maxCoeff() == 0) {
-      fit.report.converged = true;
-      fit.report.reason = "no step lowers the misfit any further";
-      break;
-    }
-    const Eigen::VectorXd moved = (fit.trial.tensions_nN + step).cwiseMax(0.0);
-    const std::optional<Trial> next = try_evaluate(problem, moved, fit);
-    const double gain = next ? (fit.trial.objective - next->objective) / predicted : -1;
-    if (gain > 0) fit.trial = *next;
-    // A step that is short because it is damped says nothing of convergence.
-    if (fit.report.last_change < parameters.tolerance && damping <= 1e-2) {
-      fit.report.converged = true;
-      fit.report.reason = "the tensions change by less than the tolerance";
-      break;
-    }
-    if (gain > 0) jacobian = problem.jacobian(fit.trial);
-    // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
-    gain_of_late = 0.5 * gain_of_late + std::max(0.0, gain) * predicted;
-    if (i >= 5 && gain > 0 && gain_of_late < kNegligible * (fit.trial.objective + 0.5 * problem.data().floor_squared)) {
-      fit.report.converged = true;
-      fit.report.reason = "the last steps lower the misfit by less than any bead could tell";
-      break;
-    }
-    if (gain > 0.75) damping = std::max(1e-12, damping / 10);
-    if (gain < 0.25) damping = std::max(10 * damping, gain > 0 ? 0.0 : 1e-2);
-  }
-  if (!fit.report.converged) {
-    fit.report.reason = "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +
-                        std::to_string(fit.report.iterations) + " steps";
+  descend(problem, parameters, fit);
+  // A slack fibre may be a minimum of its own beside that of the taut one: try the other side as long as it pays.
+  constexpr int kMaxRounds = 3;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
+    if (!raised) break;
+    TensionFit other = fit;
+    const std::optional<Trial> start = try_evaluate(problem, *raised, other);
+    if (!start) break;
+    other.trial = *start;
+    descend(problem, parameters, other);
+    fit.n_evaluations = other.n_evaluations;
+    if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
+    fit = std::move(other);
   }
   return fit;
 }

@@ -8,24 +8,33 @@
 
 namespace mbtfm::inverse {
 
-LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN) {
+LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
+                  const std::vector<bool>& is_used) {
   const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
   MBTFM_ASSERT(compliance_um_per_nN.rows() == n_rows);
-  const bool has_sigmas = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
   LinearData data;
-  data.has_errors = has_sigmas;
+  data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
   data.displacement_um.resize(n_rows);
-  data.weight_per_um.resize(n_rows);
+  data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
     data.displacement_um.segment<2>(row) << beads[i].displacement_um.x, beads[i].displacement_um.y;
-    data.weight_per_um.segment<2>(row).setConstant(has_sigmas ? 1 / beads[i].sigma_um : 1);
+    if (!is_used.empty() && !is_used[i]) continue;
+    data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);
+    data.n_used += 2;
   }
   data.compliance_um_per_nN = std::move(compliance_um_per_nN);
+  reweight(data, Eigen::VectorXd::Ones(n_rows / 2));
+  return data;
+}
 
+void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
+  data.bead_weight = bead_weight;
+  Eigen::VectorXd weight = data.weight_per_um;
+  for (Eigen::Index i = 0; i < bead_weight.size(); ++i) weight.segment<2>(2 * i) *= std::sqrt(bead_weight[i]);
   // A = (W G)ᵀ W G = V Λ Vᵀ; then C = Λ^½ Vᵀ and y = Λ^−½ Vᵀ (W G)ᵀ W u. Directions that no bead feels drop out.
-  const Eigen::MatrixXd weighted = data.weight_per_um.asDiagonal() * data.compliance_um_per_nN;
-  const Eigen::VectorXd weighted_u = data.weight_per_um.cwiseProduct(data.displacement_um);
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * data.compliance_um_per_nN;
+  const Eigen::VectorXd weighted_u = weight.cwiseProduct(data.displacement_um);
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(weighted.cols(), weighted.cols());
   normal.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
@@ -34,15 +43,20 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
   while (n_felt < normal.cols() && eigen.eigenvalues()[normal.cols() - 1 - n_felt] > smallest) ++n_felt;
   const auto roots = eigen.eigenvalues().tail(n_felt).cwiseSqrt();
   const auto vectors = eigen.eigenvectors().rightCols(n_felt);
-  data.reduced = roots.asDiagonal() * vectors.transpose();
-  data.target = roots.cwiseInverse().asDiagonal() * (vectors.transpose() * (weighted.transpose() * weighted_u));
-  data.floor_squared = std::max(0.0, weighted_u.squaredNorm() - data.target.squaredNorm());
-  return data;
+  data.reduced.compliance = roots.asDiagonal() * vectors.transpose();
+  data.reduced.target = roots.cwiseInverse().asDiagonal() * (vectors.transpose() * (weighted.transpose() * weighted_u));
+  data.reduced.n_components = data.n_used;
+  data.reduced.floor_squared = std::max(0.0, weighted_u.squaredNorm() - data.reduced.target.squaredNorm());
+}
+
+Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+  return data.weight_per_um.cwiseProduct(data.displacement_um - data.compliance_um_per_nN * forces_nN);
 }
 
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
-  const double scale = data.displacement_um.norm();
-  const double misfit = (data.displacement_um - data.compliance_um_per_nN * forces_nN).norm();
+  const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
+  const double scale = is_used.cwiseProduct(data.displacement_um).norm();
+  const double misfit = is_used.cwiseProduct(data.displacement_um - data.compliance_um_per_nN * forces_nN).norm();
   return scale > 0 ? misfit / scale : misfit;
 }
 

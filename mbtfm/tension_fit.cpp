@@ -10,6 +10,12 @@ void declare(ParameterList& list, FitParameters& p) {
   list.table("fit");
   list.add("method", p.method, "how the tensions are found", {"gauss-newton", "blockwise-cg", "plain-cg"});
   list.add("gradients", p.gradients, "of the conjugate gradient methods", {"exact", "finite-difference"});
+  list.add("loss", p.loss, "what a bead's residual costs; all but squares bear outliers",
+           {"squares", "huber", "tukey", "l1"});
+  list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial",
+           {"compliance", "per-evaluation"});
+  list.add("region_um", p.region_um, Range::not_negative(),
+           "beads further than this outside the outline are left out of the fit (um); unset: none is");
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
            "networks to fit on; tensions are their mean, and their spread is part of the error bars");
   list.add("tolerance", p.tolerance, Range::positive(), "relative change of the tensions at which the fit stops");
@@ -18,6 +24,11 @@ void declare(ParameterList& list, FitParameters& p) {
            "equilibria solved by a conjugate gradient method at most");
   list.add("far_distance_um", p.far_distance_um, Range::not_negative(),
            "beads this far outside the outline tell the noise level (um)");
+  list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
+           "parametric bootstrap draws for the intervals; 0: from the misfit's profile");
+  list.add("cross_validation", p.cross_validation, Range::between(0, 1000000),
+           "draws of the tensions by fibre type, and with dorsal and ventral exchanged, whose misfits are compared; 0: "
+           "none");
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,

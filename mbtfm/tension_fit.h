@@ -1,6 +1,7 @@
 /// Tensions from bead displacements (thesis 3.2.5): minimise Phi(t) over t >= 0, by several methods.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,23 +12,35 @@
 namespace mbtfm::inverse {
 
 struct FitParameters {
-  std::string method = "gauss-newton";  ///< converges in about ten steps; the others are kept for comparison
-  std::string gradients = "exact";      ///< finite-difference: as in the thesis, one equilibrium a tension and side
+  std::string method = "gauss-newton";   ///< converges in about ten steps; the others are kept for comparison
+  std::string gradients = "exact";       ///< finite-difference: as in the thesis, one equilibrium a tension and side
+  std::string loss = "squares";          ///< best where the noise is Gaussian, which tracking's is but for its flags
+  std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
+  std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
   int n_meshes = 8;         ///< the spread between meshes is the largest error; its mean over eight is close to settled
   double tolerance = 1e-6;  ///< relative change of the tensions at which the fit stops: far below any error bar
   int max_steps = 100;      ///< of Gauss–Newton: every loop ends
   int max_evaluations = 5000;   ///< of the conjugate gradients
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
+  int bootstrap = 0;            ///< draws; 0: intervals from the misfit's profile, which are as good and cost nothing
+  int cross_validation = 0;     ///< draws; 0: not asked for, as it takes an equilibrium each
 };
 void declare(ParameterList& list, FitParameters& parameters);
 
 /// Of the largest tension: a network's tension below this is as good as none.
 inline constexpr double kNoTension = 1e-6;
 
+/// The misfit that a method had reached after so many equilibria.
+struct Milestone {
+  int n_evaluations = 0;
+  double objective = 0;
+};
+
 struct TensionFit {
   Trial trial;  ///< the best one
   Report report;
   int n_evaluations = 0;  ///< equilibria solved, those of finite differences included
+  std::vector<Milestone> history;
 };
 
 /// @throws UsageError for a method it does not know

@@ -2,7 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
+#include <functional>
 #include <vector>
 
 #include "mbtfm/linear_data.h"
@@ -19,15 +19,22 @@ struct Trial {
   double objective = 0;
 };
 
+/// |W (u(R) − u)|² with the displacement u(R) solved afresh for these adhesion forces, as the thesis does (3.2.5).
+using SolvedMisfit = std::function<double(const Eigen::VectorXd& forces_nN)>;
+
 class TensionProblem {
  public:
-  /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance; every adhesion that holds the
-  ///                      network must be among them
-  TensionProblem(const network::CableNetwork& cables, const LinearData& data, const std::vector<int>& adhesion_ids);
+  /// @param adhesion_ids  the adhesion of each pair of forces of the data; every adhesion that holds the network must
+  ///                      be among them
+  /// @param solved_misfit  where given, the objective of every trial comes from it, and not from the data's compliance:
+  ///                       the same to rounding, at the thesis' cost
+  TensionProblem(const network::CableNetwork& cables, const ReducedData& data, const std::vector<int>& adhesion_ids,
+                 SolvedMisfit solved_misfit = {});
 
   int n_tensions() const { return static_cast<int>(cables_.fibre_ids().size()); }
   const network::CableNetwork& cables() const { return cables_; }
-  const LinearData& data() const { return data_; }
+  const ReducedData& data() const { return data_; }
+  const std::vector<int>& adhesion_ids() const { return adhesion_ids_; }
 
   /// @param nearby  a trial whose equilibrium is a good place to start, or none
   Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr) const;
@@ -36,7 +43,7 @@ class TensionProblem {
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
   Eigen::MatrixXd force_derivatives(const Trial& trial) const;
   /// d(C R)/dt
-  Eigen::MatrixXd jacobian(const Trial& trial) const { return data_.reduced * force_derivatives(trial); }
+  Eigen::MatrixXd jacobian(const Trial& trial) const { return data_.compliance * force_derivatives(trial); }
   /// dPhi/dt, exact.
   Eigen::VectorXd gradient(const Trial& trial) const { return jacobian(trial).transpose() * trial.residual; }
   /// dPhi/dt by central differences over threads, as the thesis does (3.2.5); for comparison.
@@ -45,7 +52,9 @@ class TensionProblem {
  private:
   Eigen::MatrixXd to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const;
   const network::CableNetwork& cables_;
-  const LinearData& data_;
+  const ReducedData& data_;
+  std::vector<int> adhesion_ids_;
+  SolvedMisfit solved_misfit_;
   std::vector<Eigen::Index> pair_of_;  ///< of the network's i-th adhesion in the data
 };
 

@@ -1,9 +1,15 @@
 /// A network of known tensions on a gel with beads: the smallest scene for the tension fit.
 #pragma once
 
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numbers>
 #include <random>
 
-#include "mbtfm/tension_problem.h"
+#include "mbtfm/ensemble.h"
+#include "network/mesh.h"
 #include "substrate/compliance.h"
 #include "tests/support/reference_network.h"
 
@@ -13,55 +19,166 @@ struct TensionScene {
   network::CableNetwork cables;
   Eigen::VectorXd tensions_nN;
   std::vector<int> adhesion_ids;
-  DisplacementField beads;
+  std::vector<substrate::Ellipse> ellipses;
+  std::vector<Vec2> points_um;  ///< of the beads
+  Eigen::MatrixXd compliance_um_per_nN;
+  Eigen::VectorXd forces_nN, displacement_um;  ///< true
+  double largest_um = 0;                       ///< displacement
+  DisplacementField beads;                     ///< measured
   inverse::LinearData data;
-  Eigen::VectorXd forces_nN;
 };
 
-/// Reference network `name` on an 8.4 kPa layer; noise is Gaussian, in parts of the largest displacement.
-inline TensionScene tension_scene(const std::string& name, int n_beads, double noise, unsigned seed) {
-  ReferenceNetwork reference = reference_network(name);
-  TensionScene scene{.cables = network::CableNetwork(reference.network),
-                     .tensions_nN = Eigen::Map<Eigen::VectorXd>(
-                         reference.tensions_nN.data(), static_cast<Eigen::Index>(reference.tensions_nN.size())),
-                     .adhesion_ids = {},
-                     .beads = {},
-                     .data = {},
-                     .forces_nN = {}};
-  scene.adhesion_ids = scene.cables.adhesion_ids();
-  std::vector<substrate::Ellipse> ellipses;
-  Vec2 low{1e9, 1e9}, high{-1e9, -1e9};
-  for (const int id : scene.adhesion_ids) {
-    const Vec2 centre = reference.network.vertices_um[id - 1];
-    ellipses.push_back({.centre_um = centre, .semi_major_um = 0.5, .semi_minor_um = 0.3, .angle_rad = 0.1 * id});
-    low = {std::min(low.x, centre.x), std::min(low.y, centre.y)};
-    high = {std::max(high.x, centre.x), std::max(high.y, centre.y)};
-  }
+/// Measure again: Gaussian noise of `noise` largest displacements, and these are stated as the beads' errors.
+inline void measure(TensionScene& scene, double noise, unsigned seed) {
   std::mt19937_64 random(seed);
-  std::vector<Vec2> points;
-  for (int i = 0; i < n_beads; ++i) {
-    const double a = std::generate_canonical<double, 53>(random), b = std::generate_canonical<double, 53>(random);
-    points.push_back({low.x - 15 + a * (high.x - low.x + 30), low.y - 15 + b * (high.y - low.y + 30)});
-  }
-  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
-  const auto greens = substrate::make_greens(gel, {.model = "layer"}, 2);
-  const Eigen::MatrixXd G = greens->compliance_um_per_nN(points, ellipses);
-  const network::Equilibrium equilibrium = scene.cables.equilibrium(reference.tensions_nN);
-  scene.forces_nN = scene.cables.adhesion_forces_nN(reference.tensions_nN, equilibrium);
-  const Eigen::VectorXd u = G * scene.forces_nN;
-  double largest_um = 0;
-  for (Eigen::Index i = 0; i < u.size(); i += 2) largest_um = std::max(largest_um, u.segment<2>(i).norm());
-  const double sigma_um = noise * largest_um;
   std::normal_distribution<double> normal(0, 1);
-  for (int i = 0; i < n_beads; ++i) {
+  const double sigma_um = noise * scene.largest_um;
+  scene.beads.clear();
+  for (std::size_t i = 0; i < scene.points_um.size(); ++i) {
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const double x = normal(random), y = normal(random);
     scene.beads.push_back(
-        {.position_um = points[i],
-         .displacement_um = {u[2 * i] + sigma_um * normal(random), u[2 * i + 1] + sigma_um * normal(random)},
+        {.position_um = scene.points_um[i],
+         .displacement_um = {scene.displacement_um[row] + sigma_um * x, scene.displacement_um[row + 1] + sigma_um * y},
          .sigma_um = sigma_um,
          .flag = {}});
   }
-  scene.data = inverse::reduce(scene.beads, G);
+  scene.data = inverse::reduce(scene.beads, scene.compliance_um_per_nN);
+}
+
+/// The exact displacements for other tensions.
+inline void contract(TensionScene& scene, const Eigen::VectorXd& tensions_nN) {
+  scene.tensions_nN = tensions_nN;
+  const std::vector<double> tensions(tensions_nN.data(), tensions_nN.data() + tensions_nN.size());
+  const network::Equilibrium equilibrium = scene.cables.equilibrium(tensions);
+  const Eigen::VectorXd held = scene.cables.adhesion_forces_nN(tensions, equilibrium);
+  scene.forces_nN = Eigen::VectorXd::Zero(scene.compliance_um_per_nN.cols());
+  for (std::size_t i = 0; i < scene.cables.adhesion_ids().size(); ++i) {
+    const auto at = std::find(scene.adhesion_ids.begin(), scene.adhesion_ids.end(), scene.cables.adhesion_ids()[i]) -
+                    scene.adhesion_ids.begin();
+    scene.forces_nN.segment<2>(2 * at) = held.segment<2>(2 * static_cast<Eigen::Index>(i));
+  }
+  scene.displacement_um = scene.compliance_um_per_nN * scene.forces_nN;
+  scene.largest_um = 0;
+  for (Eigen::Index i = 0; i < scene.displacement_um.size(); i += 2) {
+    scene.largest_um = std::max(scene.largest_um, scene.displacement_um.segment<2>(i).norm());
+  }
+}
+
+/// On an 8.4 kPa layer; beads evenly at random up to 15 um beyond the adhesions.
+inline TensionScene scene_of(const Network& network, const Eigen::VectorXd& tensions_nN,
+                             const std::map<int, substrate::Ellipse>& ellipses, int n_beads, unsigned seed) {
+  TensionScene scene{.cables = network::CableNetwork(network),
+                     .tensions_nN = {},
+                     .adhesion_ids = {},
+                     .ellipses = {},
+                     .points_um = {},
+                     .compliance_um_per_nN = {},
+                     .forces_nN = {},
+                     .displacement_um = {},
+                     .beads = {},
+                     .data = {}};
+  Vec2 low{1e9, 1e9}, high{-1e9, -1e9};
+  for (const auto& [id, ellipse] : ellipses) {
+    scene.adhesion_ids.push_back(id);
+    scene.ellipses.push_back(ellipse);
+    low = {std::min(low.x, ellipse.centre_um.x), std::min(low.y, ellipse.centre_um.y)};
+    high = {std::max(high.x, ellipse.centre_um.x), std::max(high.y, ellipse.centre_um.y)};
+  }
+  std::mt19937_64 random(seed);
+  for (int i = 0; i < n_beads; ++i) {
+    const double a = std::generate_canonical<double, 53>(random), b = std::generate_canonical<double, 53>(random);
+    scene.points_um.push_back({low.x - 15 + a * (high.x - low.x + 30), low.y - 15 + b * (high.y - low.y + 30)});
+  }
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+  scene.compliance_um_per_nN =
+      substrate::make_greens(gel, {.model = "layer"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
+  contract(scene, tensions_nN);
   return scene;
+}
+
+/// Reference network `name`; noise in parts of the largest displacement.
+inline TensionScene tension_scene(const std::string& name, int n_beads, double noise, unsigned seed) {
+  const ReferenceNetwork reference = reference_network(name);
+  std::map<int, substrate::Ellipse> ellipses;
+  for (const int id : reference.network.adhesion_id) {
+    if (id == 0) continue;
+    ellipses[id] = {.centre_um = reference.network.vertices_um[static_cast<std::size_t>(id) - 1],
+                    .semi_major_um = 0.5,
+                    .semi_minor_um = 0.3,
+                    .angle_rad = 0.1 * id};
+  }
+  const Eigen::VectorXd tensions = Eigen::Map<const Eigen::VectorXd>(
+      reference.tensions_nN.data(), static_cast<Eigen::Index>(reference.tensions_nN.size()));
+  TensionScene scene = scene_of(reference.network, tensions, ellipses, n_beads, seed);
+  measure(scene, noise, seed);
+  return scene;
+}
+
+/// A round cell with a ring of adhesions at its edge, numbered from +x towards +y.
+inline Cell round_cell(double radius_um, int n_adhesions) {
+  Cell cell;
+  for (int i = 0; i < 90; ++i) {
+    const double angle = 2 * std::numbers::pi * i / 90;
+    cell.outline_um.push_back({30 + (radius_um + 1) * std::cos(angle), 30 + (radius_um + 1) * std::sin(angle)});
+  }
+  for (int i = 0; i < n_adhesions; ++i) {
+    const double angle = 2 * std::numbers::pi * i / n_adhesions;
+    Adhesion a;
+    a.adhesion_id = i + 1;
+    a.position_um = {30 + radius_um * std::cos(angle), 30 + radius_um * std::sin(angle)};
+    a.major_axis_um = a.minor_axis_um = 0.8;
+    a.area_um2 = std::numbers::pi * 0.16;
+    a.mean_intensity = 1;
+    cell.adhesions.push_back(a);
+  }
+  return cell;
+}
+
+/// A straight ventral fibre between two of a cell's adhesions.
+inline void add_ventral(Cell& cell, int start_id, int end_id) {
+  Fibre f;
+  f.fibre_id = static_cast<int>(cell.fibres.size()) + 1;
+  f.type = FibreType::ventral;
+  f.width_um = 0.6;
+  f.mean_intensity = 1;
+  f.start_adhesion_id = start_id;
+  f.end_adhesion_id = end_id;
+  f.points_um = {cell.adhesions[static_cast<std::size_t>(start_id) - 1].position_um,
+                 cell.adhesions[static_cast<std::size_t>(end_id) - 1].position_um};
+  cell.fibres.push_back(f);
+}
+
+/// @param tensions_nN  the network's, then the fibres'
+inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_nN, int n_beads, double noise,
+                             unsigned seed) {
+  std::map<int, substrate::Ellipse> ellipses;
+  for (const Adhesion& a : cell.adhesions) ellipses[a.adhesion_id] = substrate::ellipse_of(a);
+  TensionScene scene = scene_of(network::generate_network(cell, {}).network, tensions_nN, ellipses, n_beads, seed);
+  measure(scene, noise, seed);
+  return scene;
+}
+
+/// The fit on the scene's own network.
+inline inverse::EnsembleFit fit_own_network(TensionScene& scene, inverse::FitParameters parameters = {}) {
+  parameters.n_meshes = 1;
+  std::vector<network::CableNetwork> networks;
+  networks.emplace_back(scene.cables.network());
+  return inverse::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
+}
+
+inline Eigen::VectorXd values_of(const inverse::EnsembleFit& fit) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions_nN.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
+  return values;
+}
+
+/// Cramér–Rao limit of each tension's standard error at the truth, for the data's noise; the bound t >= 0 aside.
+inline Eigen::VectorXd cramer_rao_nN(const TensionScene& scene) {
+  const inverse::TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const inverse::Trial truth = problem.evaluate(scene.tensions_nN);
+  const Eigen::MatrixXd J = problem.jacobian(truth);
+  return (J.transpose() * J).inverse().diagonal().cwiseSqrt();
 }
 
 }  // namespace mbtfm::test

@@ -1,0 +1,41 @@
+/// How far the tensions may lie from the best ones, as the beads tell on one mesh.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "mbtfm/tension_fit.h"
+
+namespace mbtfm::inverse {
+
+/// Around a solution t: 2 Phi(t + s) ≈ 2 Phi(t) + 2 gᵀ s + sᵀ H s, times a variance (see misfit_variance).
+struct LocalMisfit {
+  Eigen::VectorXd tensions_nN;
+  Eigen::MatrixXd H;  ///< Jᵀ J
+  Eigen::VectorXd g;  ///< Jᵀ r
+};
+LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian);
+
+/// variance H⁻¹. Tensions that the data press against zero by more than two standard errors are held: they have no
+/// variance and give none to the others. A direction of which no bead tells anything gets a huge variance.
+Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance);
+
+/// Distance to either end of an interval.
+struct Sides {
+  double below = 0, above = 0;
+};
+/// 95 % interval of tension i: where the least misfit over all other tensions >= 0 has risen by 1.96² variances. Ends
+/// at a bound; where no tension is near one it is 1.96 standard errors to either side (profile likelihood; Venzon &
+/// Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit).
+Sides profile_95(const LocalMisfit& local, double variance, int i);
+
+/// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance drawn anew, less
+/// the solution. One column a draw; the draws' random numbers follow from their index.
+Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters,
+                                        const Trial& solution, double variance, const std::vector<std::uint64_t>& draws,
+                                        int threads);
+/// Ends of the middle 95 % of the draws.
+Sides percentiles_95(std::vector<double> deviations);
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,245 @@
+#include "mbtfm/model_checks.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <numeric>
+
+#include "pipeline/contract/csv.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
+
+ModelScore score(const std::string& name, int n_parameters, double misfit, double variance, const LinearData& data) {
+  const double chi_squared = misfit / variance;
+  return {.name = name,
+          .n_parameters = n_parameters,
+          .chi_squared = chi_squared,
+          .relative_l2 = 0,
+          .aic = chi_squared + 2.0 * n_parameters,
+          .bic = chi_squared + n_parameters * std::log(static_cast<double>(data.n_used))};
+}
+
+/// The one tension of all cables that fits best: Gauss–Newton in one variable.
+Trial best_uniform(const TensionProblem& problem) {
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(problem.n_tensions());
+  Trial trial = problem.evaluate(uniform_start_nN(problem));
+  constexpr int kMaxSteps = 20;  // forces are all but proportional to the tension: three do
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const double tension = trial.tensions_nN[0];
+    const Eigen::VectorXd slope = problem.jacobian(trial) * ones;
+    const double step = -slope.dot(trial.residual) / std::max(slope.squaredNorm(), 1e-300);
+    const double next = std::max(0.1 * tension, tension + step);
+    Trial moved = problem.evaluate(next * ones, &trial);
+    if (moved.objective >= trial.objective) break;
+    trial = std::move(moved);
+    if (std::abs(next - tension) < 1e-6 * tension) break;
+  }
+  return trial;
+}
+
+/// The variance of a weighted component that even the freest model, forces independent of each other, leaves.
+double noise_variance(const LinearData& data) {
+  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.compliance.rows()));
+  const double variance = data.reduced.floor_squared / n_free;
+  return std::max(data.has_errors ? 1.0 : 1e-300, variance);
+}
+
+/// Influence of each component of the reduced data, in standard errors of the tension: tensions × components.
+Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data) {
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd J = data.weight_per_um.asDiagonal() * (data.compliance_um_per_nN * mesh.force_derivatives);
+  Eigen::MatrixXd influence = mesh.covariance_nN2 * J.transpose();
+  for (Eigen::Index i = 0; i < influence.rows(); ++i) {
+    influence.row(i) /= std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
+    for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b)
+      influence.row(i).segment<2>(2 * b) *= data.bead_weight[b];
+  }
+  return influence;
+}
+
+}  // namespace
+
+Eigen::MatrixXd correlation_of(const EnsembleFit& fit) {
+  Eigen::VectorXd scale = fit.covariance_nN2.diagonal().cwiseSqrt();
+  for (double& s : scale) s = s > 0 ? 1 / s : 0;
+  return scale.asDiagonal() * fit.covariance_nN2 * scale.asDiagonal();
+}
+
+std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
+  const Eigen::MatrixXd correlation = correlation_of(fit);
+  const int n = static_cast<int>(correlation.rows());
+  std::vector<bool> is_placed(static_cast<std::size_t>(n), false);
+  std::vector<FibreGroup> groups;
+  for (int seed = 1; seed < n; ++seed) {
+    if (is_placed[static_cast<std::size_t>(seed)]) continue;
+    FibreGroup group{.indices = {seed}, .sum_nN = {}};
+    for (std::size_t next = 0; next < group.indices.size(); ++next) {
+      for (int j = seed + 1; j < n; ++j) {
+        const bool is_member = std::find(group.indices.begin(), group.indices.end(), j) != group.indices.end();
+        if (!is_member && correlation(group.indices[next], j) < kTradeOff) group.indices.push_back(j);
+      }
+    }
+    if (group.indices.size() < 2) continue;
+    std::sort(group.indices.begin(), group.indices.end());
+    for (const int i : group.indices) is_placed[static_cast<std::size_t>(i)] = true;
+    group.sum_nN = sum_of(fit, group.indices);
+    groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
+                                       const network::CableNetwork& first_network,
+                                       const std::vector<int>& adhesion_ids) {
+  const ReducedData& reduced = data.reduced;
+  const double variance = noise_variance(data);
+  const auto misfit = [&](const Eigen::VectorXd& forces) {
+    return (reduced.compliance * forces - reduced.target).squaredNorm() + reduced.floor_squared;
+  };
+  const Eigen::VectorXd uniform = best_uniform(TensionProblem(first_network, reduced, adhesion_ids)).forces_nN;
+  const Eigen::VectorXd free = reduced.compliance.transpose() *
+                               (reduced.compliance * reduced.compliance.transpose()).ldlt().solve(reduced.target);
+  std::vector<ModelScore> models = {
+      score("no-fibres", 1, misfit(uniform), variance, data),
+      score("full", static_cast<int>(fit.fibre_ids.size()), misfit(fit.forces_nN), variance, data),
+      score("adhesion-forces", static_cast<int>(reduced.compliance.rows()), reduced.floor_squared, variance, data)};
+  models[0].relative_l2 = relative_l2(data, uniform);
+  models[1].relative_l2 = relative_l2(data, fit.forces_nN);
+  models[2].relative_l2 = relative_l2(data, free);
+  return models;
+}
+
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const LinearData& data) {
+  const Eigen::MatrixXd influence = influence_of(fit, data);
+  std::vector<FibreLeftOut> fibres;
+  for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.fibre_ids.size()); ++i) {
+    FibreLeftOut left{.fibre_id = fit.fibre_ids[static_cast<std::size_t>(i)],
+                      .chi_squared_rise = 0,
+                      .aic_rise = 0,
+                      .n_informing_beads = 0};
+    for (const MeshFit& mesh : fit.meshes) {
+      // Where t_i is held to t_0, 2 Phi rises by (t_i − t_0)² / Var(t_i − t_0), Var in units of the noise.
+      const Eigen::MatrixXd& c = mesh.covariance_nN2;
+      const double difference = mesh.local.tensions_nN[i] - mesh.local.tensions_nN[0];
+      const double variance = c(i, i) + c(0, 0) - 2 * c(i, 0);
+      if (difference <= 0 || variance <= 0) continue;  // no stronger than the network: it costs nothing to leave it out
+      left.chi_squared_rise += difference * difference / variance / static_cast<double>(fit.meshes.size());
+    }
+    left.aic_rise = left.chi_squared_rise - 2;
+    double sum = 0, sum_of_squares = 0;
+    for (Eigen::Index b = 0; b < influence.cols(); b += 2) {
+      const double q = influence.row(i).segment<2>(b).squaredNorm();
+      sum += q;
+      sum_of_squares += q * q;
+    }
+    left.n_informing_beads = sum_of_squares > 0 ? sum * sum / sum_of_squares : 0;
+    fibres.push_back(left);
+  }
+  return fibres;
+}
+
+std::vector<int> most_informed_fibre(const EnsembleFit& fit, const LinearData& data) {
+  const Eigen::MatrixXd influence = influence_of(fit, data);
+  std::vector<int> ids;
+  for (Eigen::Index b = 0; b < influence.cols(); b += 2) {
+    Eigen::Index strongest = 0;
+    influence.middleCols<2>(b).rowwise().squaredNorm().maxCoeff(&strongest);
+    ids.push_back(fit.fibre_ids[static_cast<std::size_t>(strongest)]);
+  }
+  return ids;
+}
+
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const LinearData& data,
+                                         const std::vector<Adhesion>& adhesions) {
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd& C = data.reduced.compliance;
+  const Eigen::VectorXd residual = data.reduced.target - C * fit.forces_nN;
+  // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
+  const Eigen::MatrixXd CJ = C * mesh.force_derivatives;
+  const Eigen::MatrixXd cross_terms = CJ.transpose() * C;
+  Eigen::MatrixXd H = mesh.local.H;
+  H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
+  const Eigen::LDLT<Eigen::MatrixXd> solver(H);
+  const Eigen::MatrixXd K = C.transpose() * C - cross_terms.transpose() * solver.solve(cross_terms);
+  const Eigen::VectorXd q =
+      C.transpose() * residual - cross_terms.transpose() * solver.solve(CJ.transpose() * residual);
+
+  const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
+  if (n_pairs < 1) return {};
+  const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
+  std::vector<MissingFibre> found;
+  for (std::size_t a = 0; a < adhesions.size(); ++a) {
+    for (std::size_t b = a + 1; b < adhesions.size(); ++b) {
+      const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
+      const Vec2 unit = (1 / norm(chord)) * chord;
+      const Eigen::Vector2d e(unit.x, unit.y);  // the fibre pulls a towards b, and b towards a
+      const auto i = 2 * static_cast<Eigen::Index>(a), j = 2 * static_cast<Eigen::Index>(b);
+      const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
+      const double curvature =
+          e.dot((K.block<2, 2>(i, i) + K.block<2, 2>(j, j) - K.block<2, 2>(i, j) - K.block<2, 2>(j, i)) * e);
+      if (slope <= 0 || curvature <= 0) continue;
+      const double gain = slope * slope / curvature / fit.variance;
+      if (gain < limit * limit) continue;
+      found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
+                       .end_adhesion_id = adhesions[b].adhesion_id,
+                       .tension_nN = slope / curvature,
+                       .chi_squared_gain = gain});
+    }
+  }
+  std::stable_sort(found.begin(), found.end(), [](const MissingFibre& x, const MissingFibre& y) {
+    return x.chi_squared_gain > y.chi_squared_gain;
+  });
+  std::vector<MissingFibre> best;
+  for (const MissingFibre& f : found) {
+    const bool is_taken = std::any_of(best.begin(), best.end(), [&](const MissingFibre& other) {
+      return f.start_adhesion_id == other.start_adhesion_id || f.start_adhesion_id == other.end_adhesion_id ||
+             f.end_adhesion_id == other.start_adhesion_id || f.end_adhesion_id == other.end_adhesion_id;
+    });
+    if (!is_taken) best.push_back(f);
+  }
+  return best;
+}
+
+void write_correlations(const Path& file, const EnsembleFit& fit) {
+  const Eigen::MatrixXd correlation = correlation_of(fit);
+  CsvText csv({"fibre_id", "other_fibre_id", "correlation"});
+  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
+    for (std::size_t j = i + 1; j < fit.fibre_ids.size(); ++j) {
+      csv.add(fit.fibre_ids[i]).add(fit.fibre_ids[j]);
+      csv.add(correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))).end_row();
+    }
+  }
+  write_text(file, csv.str());
+}
+
+void write_models(const Path& file, const std::vector<ModelScore>& models) {
+  CsvText csv({"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"});
+  for (const ModelScore& m : models) {
+    csv.add(m.name).add(m.n_parameters).add(m.chi_squared).add(m.relative_l2).add(m.aic).add(m.bic).end_row();
+  }
+  write_text(file, csv.str());
+}
+
+void write_fibres_left_out(const Path& file, const std::vector<FibreLeftOut>& fibres) {
+  CsvText csv({"fibre_id", "chi_squared_rise", "aic_rise", "supported", "n_informing_beads"});
+  for (const FibreLeftOut& f : fibres) {
+    csv.add(f.fibre_id).add(f.chi_squared_rise).add(f.aic_rise).add(f.aic_rise > 0 ? "true" : "false");
+    csv.add(f.n_informing_beads).end_row();
+  }
+  write_text(file, csv.str());
+}
+
+void write_missing_fibres(const Path& file, const std::vector<MissingFibre>& fibres) {
+  CsvText csv({"start_adhesion_id", "end_adhesion_id", "tension_nN", "chi_squared_gain"});
+  for (const MissingFibre& f : fibres) {
+    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.tension_nN).add(f.chi_squared_gain).end_row();
+  }
+  write_text(file, csv.str());
+}
+
+}  // namespace mbtfm::inverse

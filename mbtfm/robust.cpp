@@ -1,0 +1,132 @@
+#include "mbtfm/robust.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+constexpr double kHuber = 1.500, kTukey = 5.123;  // see robust_weight
+// An L1 weight grows without bound at zero; below a hundredth of the noise a residual is as good as none.
+constexpr double kSmallest = 0.01;
+
+/// Length of each bead's residual, of the beads in use.
+std::vector<double> used_lengths(const LinearData& data, const Eigen::VectorXd& residual) {
+  std::vector<double> lengths;
+  for (Eigen::Index i = 0; i < residual.size(); i += 2) {
+    if (data.weight_per_um[i] > 0) lengths.push_back(residual.segment<2>(i).norm());
+  }
+  return lengths;
+}
+
+Eigen::VectorXd weights_of(const std::string& loss, const Eigen::VectorXd& residual, double scale) {
+  Eigen::VectorXd weights(residual.size() / 2);
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
+  }
+  return weights;
+}
+
+/// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
+Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& residual, const Eigen::MatrixXd& J,
+                               const Eigen::VectorXd& low, double scale) {
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(J.cols());
+  Eigen::VectorXd weights = weights_of(loss, residual, scale);
+  constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
+  for (int i = 0; i < kMaxSteps; ++i) {
+    Eigen::VectorXd by_component(residual.size());
+    for (Eigen::Index b = 0; b < weights.size(); ++b) by_component.segment<2>(2 * b).setConstant(weights[b]);
+    const Eigen::MatrixXd weighted = by_component.asDiagonal() * J;
+    Eigen::MatrixXd H = J.transpose() * weighted;
+    H.diagonal() += 1e-12 * H.diagonal().maxCoeff() * Eigen::VectorXd::Ones(H.rows());  // a tension that no bead feels
+    const Eigen::VectorXd next = bounded_quadratic_minimum(H, -(weighted.transpose() * residual), low);
+    const double change = (next - step).norm();
+    step = next;
+    weights = weights_of(loss, residual - J * step, scale);
+    if (change <= 1e-4 * step.norm()) break;
+  }
+  return weights;
+}
+
+TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network, const std::vector<int>& adhesion_ids,
+                         const FitParameters& parameters, int threads, TensionFit fit, const std::string& loss,
+                         std::optional<double> fixed_scale) {
+  constexpr int kMaxRounds = 20;  // each halves the change at least
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const Eigen::VectorXd before = fit.trial.tensions_nN;
+    const Eigen::VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
+    const double scale = fixed_scale ? *fixed_scale : robust_scale(data, residual);
+    // Where the middle bead is explained to rounding there is nothing to be robust against.
+    if (scale <= 1e-9 * data.weight_per_um.cwiseProduct(data.displacement_um).cwiseAbs().maxCoeff()) break;
+    const TensionProblem problem(network, data.reduced, adhesion_ids);
+    const Eigen::MatrixXd J =
+        data.weight_per_um.asDiagonal() * (data.compliance_um_per_nN * problem.force_derivatives(fit.trial));
+    reweight(data, linear_weights(loss, residual, J, -before, scale));
+    const TensionProblem reweighted(network, data.reduced, adhesion_ids);
+    const int n_evaluations = fit.n_evaluations;
+    fit = fit_tensions(reweighted, parameters, threads, before);
+    fit.n_evaluations += n_evaluations;
+    // a thousandth of the largest tension: a tenth of any error bar there is
+    if ((fit.trial.tensions_nN - before).cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
+  }
+  return fit;
+}
+
+}  // namespace
+
+double robust_weight(const std::string& loss, double residual) {
+  if (loss == "squares") return 1;
+  if (loss == "huber") return residual <= kHuber ? 1 : kHuber / residual;
+  if (loss == "tukey") return residual < kTukey ? std::pow(1 - std::pow(residual / kTukey, 2), 2) : 0;
+  if (loss == "l1") return 1 / std::max(residual, kSmallest);
+  throw UsageError("fit: unknown loss '" + loss + "'");
+}
+
+double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
+  std::vector<double> lengths = used_lengths(data, weighted_residual);
+  if (lengths.empty()) return 0;
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  return *middle / std::sqrt(2 * std::log(2.0));
+}
+
+TensionFit fit_reweighted(LinearData& data, const network::CableNetwork& network, const std::vector<int>& adhesion_ids,
+                          const FitParameters& parameters, int threads,
+                          const std::optional<Eigen::VectorXd>& start_nN) {
+  const TensionProblem problem(network, data.reduced, adhesion_ids);
+  TensionFit fit = fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
+  if (parameters.loss == "squares") return fit;
+  const std::string first = parameters.loss == "tukey" ? "huber" : parameters.loss;
+  fit = fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), first, {});
+  if (parameters.loss != "tukey") return fit;
+  const double scale = robust_scale(data, weighted_residual(data, fit.trial.forces_nN));
+  return fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), "tukey", scale);
+}
+
+double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
+                       const std::string& loss) {
+  const Eigen::VectorXd residual = weighted_residual(data, forces_nN);
+  const auto degrees = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
+  double variance = residual.squaredNorm() / degrees;
+  const double scale = robust_scale(data, residual);
+  if (loss != "squares" && scale > 0) {
+    double psi_squared = 0, slope = 0, weight = 0;
+    const std::vector<double> lengths = used_lengths(data, residual);
+    for (const double length : lengths) {
+      const double r = length / scale, w = robust_weight(loss, r);
+      constexpr double kStep = 1e-4;  // psi' by differences: psi is smooth but for one kink
+      const double above = (r + kStep) * robust_weight(loss, r + kStep);
+      psi_squared += w * w * r * r / 2;
+      slope += ((above - w * r) / kStep + w) / 2;
+      weight += w;
+    }
+    variance = scale * scale * psi_squared / (slope * slope) * weight;
+  }
+  return data.has_errors ? std::max(1.0, variance) : variance;
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,523 @@
+/// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
+/// descent, noise, beside-fttc, segmentation, directions, types, meshes, speed. A table (CSV) on stdout; charts (SVG)
+/// into the folder.
+#include <Eigen/Cholesky>
+#include <chrono>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+#include <filesystem>
+
+#include "mbtfm/cross_validation.h"
+#include "mbtfm/traction.h"
+#include "pipeline/contract/csv.h"
+#include "samples/experiment.h"
+#include "tests/support/chart.h"
+#include "tests/support/tension_scene.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::inverse;
+using test::TensionScene;
+
+constexpr double kPi = 3.14159265358979323846;
+
+struct Arguments {
+  int n_repeats = 10, n_cells = 1;
+  std::filesystem::path folder;
+};
+
+double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+
+double total_nN(const Eigen::VectorXd& forces_nN) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) sum += forces_nN.segment<2>(i).norm();
+  return sum;
+}
+
+void save(const Arguments& a, const std::string& name, const std::vector<test::Panel>& panels) {
+  write_text(a.folder / (name + ".svg"), test::chart(panels));
+}
+
+Cell drawn_cell(std::uint64_t seed) {
+  const samples::ScenarioParameters p;
+  return samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), seed).cell;
+}
+
+/// thesis 3.3: t_AN = 0.06 nN, fibres uniform in [0, 10] nN
+Eigen::VectorXd thesis_tensions_nN(std::size_t n_fibres, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Eigen::VectorXd tensions(static_cast<Eigen::Index>(n_fibres) + 1);
+  tensions[0] = 0.06;
+  for (Eigen::Index i = 1; i < tensions.size(); ++i) tensions[i] = 10 * std::generate_canonical<double, 53>(random);
+  return tensions;
+}
+
+TensionScene thesis_scene(std::uint64_t seed, int n_beads, double noise) {
+  const Cell cell = drawn_cell(seed);
+  return test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), seed), n_beads, noise,
+                        static_cast<unsigned>(seed));
+}
+
+/// Measurements at will: white noise on the beads is white on the reduced data, and what it leaves unexplained is
+/// chi² distributed.
+struct Repeats {
+  Eigen::MatrixXd compliance;  ///< for a noise of 1 um
+  Eigen::VectorXd forces_nN;
+  double signal_um = 0;  ///< |u|
+  Eigen::Index n_components = 0;
+
+  explicit Repeats(TensionScene& scene) {
+    for (Bead& b : scene.beads) b.sigma_um = 1;
+    const LinearData data = reduce(scene.beads, scene.compliance_um_per_nN);
+    compliance = data.reduced.compliance;
+    forces_nN = scene.forces_nN;
+    signal_um = scene.displacement_um.norm();
+    n_components = data.n_used;
+  }
+  ReducedData draw(double sigma_um, std::uint64_t seed) const {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal(0, 1);
+    ReducedData data{
+        .compliance = compliance / sigma_um, .target = {}, .floor_squared = 0, .n_components = n_components};
+    data.target = data.compliance * forces_nN;
+    for (double& y : data.target) y += normal(random);
+    const auto n_left = static_cast<double>(n_components - compliance.rows());
+    data.floor_squared = n_left + std::sqrt(2 * n_left) * normal(random);
+    return data;
+  }
+  double relative_l2(const Trial& trial, const ReducedData& data, double sigma_um) const {
+    const double measured = std::hypot(signal_um, sigma_um * std::sqrt(static_cast<double>(n_components)));
+    return sigma_um * std::sqrt(2 * trial.objective + data.floor_squared) / measured;
+  }
+};
+
+// Fig. 3.4: the misfit over the equilibria solved, without noise.
+void descent(const Arguments& a) {
+  const TensionScene scene = thesis_scene(1, 2000, 0);
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const double size = 2 / scene.displacement_um.squaredNorm();
+  const int n = problem.n_tensions();
+  std::vector<int> fibres;
+  for (int i = 1; i < n; ++i) fibres.push_back(i);
+  FitParameters parameters;
+  parameters.max_evaluations = 100 * a.n_repeats;
+  parameters.tolerance = 1e-9;
+  test::Panel panel{.title = "noise-free fit",
+                    .x_label = "equilibria solved",
+                    .y_label = "relative L2",
+                    .series = {},
+                    .is_log_x = true,
+                    .is_log_y = true};
+  std::printf("method,evaluations,relative_l2,error\n");
+  const auto add = [&](const std::string& name, const TensionFit& fit) {
+    test::Series series{.name = name, .x = {}, .y = {}};
+    for (const Milestone& m : fit.history) {
+      series.x.push_back(m.n_evaluations);
+      series.y.push_back(std::max(1e-12, std::sqrt(size * std::max(0.0, m.objective))));
+    }
+    const double error = (fit.trial.tensions_nN - scene.tensions_nN).norm() / scene.tensions_nN.norm();
+    std::printf("%s,%d,%.3g,%.3g\n", name.c_str(), fit.n_evaluations,
+                std::sqrt(size * std::max(0.0, fit.trial.objective)), error);
+    panel.series.push_back(std::move(series));
+  };
+  // thesis: from all tensions at the network's
+  const Eigen::VectorXd start = Eigen::VectorXd::Constant(n, 0.06);
+  for (const std::string method : {"plain-cg", "blockwise-cg"}) {
+    parameters.method = method;
+    add(method, fit_tensions(problem, parameters, 2, start));
+  }
+  add("network fixed", fit_conjugate_gradients(problem, parameters, 2, start, {{.tensions = fibres, .n_steps = 10}}));
+  add("gauss-newton", fit_gauss_newton(problem, parameters, start));
+  save(a, "descent", {panel});
+}
+
+// Fig. 3.6, and how large errors are and are said to be.
+void noise(const Arguments& a) {
+  struct Row {
+    double l2 = 0, total = 0, network = 0, deviation = 0, implied = 0, squares = 0;
+    int n = 0, n_deviations = 0, n_bounded = 0, n_covered = 0;
+  };
+  const std::vector<double> levels = {0.01, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25};
+  std::vector<Row> rows(levels.size());
+  for (int c = 0; c < a.n_cells; ++c) {
+    TensionScene scene = thesis_scene(static_cast<std::uint64_t>(c) + 1, 10000, 0);
+    const Repeats repeats(scene);
+    for (std::size_t l = 0; l < levels.size(); ++l) {
+      const double sigma_um = levels[l] * scene.largest_um;
+      Row& row = rows[l];
+      const ReducedData exact = repeats.draw(sigma_um, 0);
+      const TensionProblem truth(scene.cables, exact, scene.adhesion_ids);
+      const Trial at_truth = truth.evaluate(scene.tensions_nN);
+      const Eigen::VectorXd limit =
+          covariance_nN2(local_misfit(at_truth, truth.jacobian(at_truth)), 1).diagonal().cwiseSqrt();
+      const Eigen::VectorXd equal = Eigen::VectorXd::Constant(limit.size(), scene.tensions_nN[0]);
+      const double network = total_nN(truth.evaluate(equal).forces_nN);
+      for (int r = 0; r < a.n_repeats; ++r) {
+        const ReducedData data = repeats.draw(sigma_um, 1000 * static_cast<std::uint64_t>(c) + r + 1);
+        const TensionProblem problem(scene.cables, data, scene.adhesion_ids);
+        const Trial trial = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
+        const LocalMisfit local = local_misfit(trial, problem.jacobian(trial));
+        const double share = 1.0 / (a.n_repeats * a.n_cells);
+        row.l2 += share * repeats.relative_l2(trial, data, sigma_um);
+        row.total += share * total_nN(trial.forces_nN) / total_nN(scene.forces_nN);
+        const Eigen::VectorXd fitted = Eigen::VectorXd::Constant(limit.size(), trial.tensions_nN[0]);
+        row.network += share * total_nN(problem.evaluate(fitted, &trial).forces_nN) / network;
+        for (Eigen::Index i = 0; i < limit.size(); ++i) {
+          const double t = scene.tensions_nN[i], error = trial.tensions_nN[i] - t;
+          const Sides sides = profile_95(local, 1, static_cast<int>(i));
+          row.n_covered += -sides.above <= error && error <= sides.below ? 1 : 0;
+          ++row.n_bounded;
+          if (i > 0)
+            row.deviation += std::abs(error) / t, row.implied += std::sqrt(2 / kPi) * limit[i] / t, ++row.n_deviations;
+          if (t < 3 * limit[i]) continue;  // the bound makes those better than the limit
+          row.squares += std::pow(error / limit[i], 2);
+          ++row.n;
+        }
+      }
+    }
+  }
+  test::Series l2{.name = "L2", .x = levels, .y = {}}, total{.name = "total", .x = levels, .y = {}},
+      network{.name = "network", .x = levels, .y = {}}, deviation{.name = "found", .x = levels, .y = {}},
+      implied{.name = "Cramér–Rao", .x = levels, .y = {}};
+  std::printf(
+      "noise,relative_l2,total_force,network_force,mean_relative_deviation,implied_by_limit,rms_over_limit,coverage\n");
+  for (std::size_t l = 0; l < levels.size(); ++l) {
+    const Row& r = rows[l];
+    l2.y.push_back(r.l2), total.y.push_back(r.total), network.y.push_back(r.network);
+    deviation.y.push_back(r.deviation / r.n_deviations), implied.y.push_back(r.implied / r.n_deviations);
+    std::printf("%g,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f\n", levels[l], r.l2, r.total, r.network, deviation.y.back(),
+                implied.y.back(), std::sqrt(r.squares / std::max(1, r.n)), double(r.n_covered) / r.n_bounded);
+  }
+  save(a, "noise",
+       {{.title = "misfit", .x_label = "noise / largest displacement", .y_label = "relative L2", .series = {l2}},
+        {.title = "forces, fitted over true",
+         .x_label = "noise / largest displacement",
+         .y_label = "ratio",
+         .series = {total, network}},
+        {.title = "mean relative deviation",
+         .x_label = "noise / largest displacement",
+         .y_label = "of the fibres' tensions",
+         .series = {deviation, implied}}});
+}
+
+/// Arrows of force, at the adhesions or patches.
+std::string arrows(const std::string& title, const Cell& cell, const std::vector<std::pair<Vec2, Vec2>>& forces,
+                   double um_per_nN, double left_px) {
+  constexpr double kScale = 3.6;  // px per um
+  double low_x = 1e9, low_y = 1e9;
+  for (const Vec2 p : cell.outline_um) low_x = std::min(low_x, p.x), low_y = std::min(low_y, p.y);
+  const auto x = [&](double um) { return left_px + 20 + kScale * (um - low_x); };
+  const auto y = [&](double um) { return 40 + kScale * (um - low_y); };
+  std::string svg =
+      test::format("<text x=\"%.0f\" y=\"20\" font-weight=\"bold\">%s</text>\n<path d=\"", left_px + 20, title.c_str());
+  for (std::size_t i = 0; i < cell.outline_um.size(); ++i)
+    svg += test::format("%s%.1f,%.1f", i == 0 ? "M" : "L", x(cell.outline_um[i].x), y(cell.outline_um[i].y));
+  svg += "Z\" fill=\"#f4f4f4\" stroke=\"#999\"/>\n";
+  for (const Fibre& f : cell.fibres) {
+    svg += "<path d=\"";
+    for (std::size_t i = 0; i < f.points_um.size(); ++i)
+      svg += test::format("%s%.1f,%.1f", i == 0 ? "M" : "L", x(f.points_um[i].x), y(f.points_um[i].y));
+    svg += "\" fill=\"none\" stroke=\"#E69F00\" stroke-width=\"1\"/>\n";
+  }
+  svg += "<path d=\"";
+  for (const auto& [at, force] : forces) {
+    const Vec2 tip = at + um_per_nN * force;
+    const Vec2 d = kScale * um_per_nN * force;
+    if (norm(d) < 1) continue;
+    const Vec2 e = (1 / norm(d)) * d;
+    const double head = std::min(5.0, 0.4 * norm(d));
+    svg += test::format("M%.1f,%.1fL%.1f,%.1fm%.1f,%.1fL%.1f,%.1fl%.1f,%.1f", x(at.x), y(at.y), x(tip.x), y(tip.y),
+                        head * (-e.x - 0.5 * e.y), head * (-e.y + 0.5 * e.x), x(tip.x), y(tip.y),
+                        head * (-e.x + 0.5 * e.y), head * (-e.y - 0.5 * e.x));
+  }
+  return svg + "\" fill=\"none\" stroke=\"#0072B2\" stroke-width=\"1.2\"/>\n";
+}
+
+std::vector<std::pair<Vec2, Vec2>> at_adhesions(const Cell& cell, const Eigen::VectorXd& forces_nN) {
+  std::vector<std::pair<Vec2, Vec2>> list;
+  for (std::size_t i = 0; i < cell.adhesions.size(); ++i) {
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    list.push_back({cell.adhesions[i].position_um, {forces_nN[row], forces_nN[row + 1]}});
+  }
+  return list;
+}
+
+// Fig. 3.5: a quarter of noise, beside FTTC.
+void beside_fttc(const Arguments& a) {
+  const Cell cell = drawn_cell(1);
+  TensionScene scene = test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), 1), 10000, 0.25, 1);
+  const EnsembleFit fit = test::fit_own_network(scene);
+  const TractionInputs inputs{.beads = scene.beads,
+                              .gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+                              .adhesions = cell.adhesions,
+                              .outline_um = cell.outline_um};
+  const TractionParameters p;
+  const Reconstruction fttc = reconstruct_fttc(inputs, p, 2);
+  Eigen::VectorXd by_fttc = Eigen::VectorXd::Zero(scene.forces_nN.size());
+  const std::vector<AdhesionForce> forces = forces_by_adhesion(fttc.patches, cell.adhesions, p.grow_um);
+  for (std::size_t i = 0; i < forces.size(); ++i) {
+    by_fttc[2 * static_cast<Eigen::Index>(i)] = forces[i].force_nN.x;
+    by_fttc[2 * static_cast<Eigen::Index>(i) + 1] = forces[i].force_nN.y;
+  }
+  std::printf("method,total_force,force_error\n");
+  for (const auto& [name, f] :
+       {std::pair<const char*, const Eigen::VectorXd&>{"model", fit.forces_nN}, {"fttc", by_fttc}}) {
+    std::printf("%s,%.3f,%.3f\n", name, total_nN(f) / total_nN(scene.forces_nN),
+                (f - scene.forces_nN).norm() / scene.forces_nN.norm());
+  }
+  constexpr double kScale_um_per_nN = 1.2;
+  write_text(a.folder / "beside-fttc.svg",
+             test::open_svg(960, 265) +
+                 arrows("true forces", cell, at_adhesions(cell, scene.forces_nN), kScale_um_per_nN, 0) +
+                 arrows("model-based, 25 % noise", cell, at_adhesions(cell, fit.forces_nN), kScale_um_per_nN, 320) +
+                 arrows("FTTC, 25 % noise", cell, at_adhesions(cell, by_fttc), kScale_um_per_nN, 640) + "</svg>\n");
+}
+
+Network relabelled(Network network, const std::vector<int>& removed) {
+  for (Link& link : network.links) {
+    if (std::find(removed.begin(), removed.end(), link.fibre_id) != removed.end()) link.fibre_id = 0;
+  }
+  return network;
+}
+
+// Fig. 3.7: fibres too many and too few, on the same mesh.
+void segmentation(const Arguments& a) {
+  std::printf("cell,case,relative_l2,expected_l2,change_of_others_nN,largest_extra_nN\n");
+  for (int c = 1; c <= a.n_cells; ++c) {
+    Cell cell = drawn_cell(static_cast<std::uint64_t>(c));
+    const std::size_t n_true = cell.fibres.size();
+    std::mt19937_64 random(static_cast<std::uint64_t>(c));
+    for (int extra = 0; extra < 3; ++extra) {
+      const int start = 1 + static_cast<int>(random() % cell.adhesions.size());
+      int end = start;
+      while (end == start) end = 1 + static_cast<int>(random() % cell.adhesions.size());
+      test::add_ventral(cell, start, end);
+    }
+    const Eigen::VectorXd true_tensions = thesis_tensions_nN(n_true, static_cast<std::uint64_t>(c));
+    Eigen::VectorXd with_extra = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(n_true) + 4, true_tensions[0]);
+    with_extra.head(true_tensions.size()) = true_tensions;  // the extra ones are plain network
+    TensionScene scene = test::scene_of(cell, with_extra, 5000, 0, static_cast<unsigned>(c));
+    const Network whole = scene.cables.network();
+    const int n = static_cast<int>(n_true);
+    std::vector<int> dorsal, ventral;
+    for (std::size_t i = 0; i < n_true; ++i) {
+      if (cell.fibres[i].type == FibreType::dorsal) dorsal.push_back(cell.fibres[i].fibre_id);
+      if (cell.fibres[i].type == FibreType::ventral) ventral.push_back(cell.fibres[i].fibre_id);
+    }
+    std::map<int, double> right;  // tensions with the true fibres
+    const std::vector<int> extras = {n + 1, n + 2, n + 3};
+    std::vector<int> without_dorsal = extras, without_ventral = extras;
+    without_dorsal.insert(without_dorsal.end(), dorsal.begin(), dorsal.begin() + 2);
+    without_ventral.push_back(ventral.front());
+    for (const auto& [name, removed] : {std::pair<const char*, std::vector<int>>{"right", extras},
+                                        {"three too many", {}},
+                                        {"two dorsal missing", without_dorsal},
+                                        {"one ventral missing", without_ventral}}) {
+      scene.cables = network::CableNetwork(relabelled(whole, removed));
+      test::measure(scene, 0.01, static_cast<unsigned>(c));
+      const EnsembleFit fit = test::fit_own_network(scene);
+      double change = 0, largest = 0, expected = 0, measured = 0;
+      int m = 0;
+      for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+        const int id = fit.fibre_ids[i];
+        if (id > n) largest = std::max(largest, fit.tensions_nN[i].value);
+        if (id > n) continue;
+        if (std::strcmp(name, "right") == 0) right[id] = fit.tensions_nN[i].value;
+        change += std::pow(fit.tensions_nN[i].value - right[id], 2);
+        ++m;
+      }
+      for (const Bead& b : scene.beads)
+        measured += dot(b.displacement_um, b.displacement_um), expected += 2 * b.sigma_um * b.sigma_um;
+      std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, relative_l2(scene.data, fit.forces_nN),
+                  std::sqrt(expected / measured), std::sqrt(change / m), largest);
+    }
+  }
+}
+
+// Fig. 3.10: directions of the model's forces against those found without it.
+void directions(const Arguments& a) {
+  std::vector<double> isotropic, full;
+  for (int c = 1; c <= a.n_cells; ++c) {
+    TensionScene scene = thesis_scene(static_cast<std::uint64_t>(c), 10000, 0.07);
+    const EnsembleFit fit = test::fit_own_network(scene);
+    const ReducedData& d = scene.data.reduced;
+    const Eigen::VectorXd free =
+        d.compliance.transpose() * (d.compliance * d.compliance.transpose()).ldlt().solve(d.target);
+    const TensionProblem problem(scene.cables, d, scene.adhesion_ids);
+    const Eigen::VectorXd equal = problem.evaluate(uniform_start_nN(problem)).forces_nN;
+    for (Eigen::Index row = 0; row < free.size(); row += 2) {
+      const Eigen::Vector2d f = free.segment<2>(row);
+      if (f.norm() < 1) continue;  // nN: below the noise its direction is chance
+      isotropic.push_back(f.dot(equal.segment<2>(row)) / (f.norm() * equal.segment<2>(row).norm()));
+      full.push_back(f.dot(fit.forces_nN.segment<2>(row)) / (f.norm() * fit.forces_nN.segment<2>(row).norm()));
+    }
+  }
+  const auto mean = [](const std::vector<double>& v) {
+    double sum = 0;
+    for (const double x : v) sum += x / static_cast<double>(v.size());
+    return sum;
+  };
+  std::printf("model,mean_cosine,adhesions\nisotropic,%.3f,%zu\nfull,%.3f,%zu\n", mean(isotropic), isotropic.size(),
+              mean(full), full.size());
+  save(a, "directions",
+       {{.title = "directions of adhesion forces",
+         .x_label = "cosine to the independently found force",
+         .y_label = "share of the adhesions",
+         .series = {test::histogram("isotropic network", isotropic, -1, 1, 20),
+                    test::histogram("with fibres", full, -1, 1, 20)}}});
+}
+
+// Fig. 3.15: tensions drawn by type, and with dorsal and ventral exchanged.
+void types(const Arguments& a) {
+  const samples::ScenarioParameters p;
+  const samples::DrawnCell drawn = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1);
+  TypeTensions by_type;  // of twenty other cells
+  for (std::uint64_t seed = 101; seed <= 120; ++seed) {
+    const samples::DrawnCell other = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), seed);
+    for (std::size_t i = 0; i < other.tensions_nN.size(); ++i)
+      by_type[other.cell.fibres[i].type].push_back(other.tensions_nN[i]);
+  }
+  Eigen::VectorXd tensions(static_cast<Eigen::Index>(drawn.tensions_nN.size()) + 1);
+  tensions[0] = 0.06;
+  for (std::size_t i = 0; i < drawn.tensions_nN.size(); ++i)
+    tensions[static_cast<Eigen::Index>(i) + 1] = drawn.tensions_nN[i];
+  TensionScene scene = test::scene_of(drawn.cell, tensions, 3000, 0.07, 1);
+  const EnsembleFit fit = test::fit_own_network(scene);
+  std::vector<FibreType> of_fibres;
+  for (const Fibre& f : drawn.cell.fibres) of_fibres.push_back(f.type);
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const double begin = now_s();
+  const CrossValidation result =
+      cross_validate(problem, scene.data, fit.meshes[0].fit.trial, of_fibres, by_type, a.n_repeats, 1, 2);
+  std::vector<double> all = result.own;
+  all.insert(all.end(), result.exchanged.begin(), result.exchanged.end());
+  const auto [low, high] = std::minmax_element(all.begin(), all.end());
+  const auto median = [](std::vector<double> v) {
+    std::nth_element(v.begin(), v.begin() + static_cast<std::ptrdiff_t>(v.size() / 2), v.end());
+    return v[v.size() / 2];
+  };
+  int n_worse = 0;
+  for (std::size_t i = 0; i < result.own.size(); ++i) n_worse += result.exchanged[i] > result.own[i] ? 1 : 0;
+  std::printf(
+      "draws,median_l2_own,median_l2_exchanged,share_exchanged_worse,fitted_l2,seconds\n%d,%.4f,%.4f,%.3f,%.4f,%.1f\n",
+      a.n_repeats, median(result.own), median(result.exchanged), double(n_worse) / a.n_repeats,
+      relative_l2(scene.data, fit.forces_nN), now_s() - begin);
+  save(a, "types",
+       {{.title = "tensions drawn by type",
+         .x_label = "relative L2",
+         .y_label = "share of the draws",
+         .series = {test::histogram("own types", result.own, *low, *high, 24),
+                    test::histogram("dorsal and ventral exchanged", result.exchanged, *low, *high, 24)}}});
+}
+
+// Another network than the truth's: the default ensemble beside one mesh in the thesis' formulation.
+void meshes(const Arguments& a) {
+  std::printf("cell,formulation,meshes,relative_error,rms_error_over_stated,coverage\n");
+  for (int c = 1; c <= a.n_cells; ++c) {
+    samples::ScenarioParameters p;
+    p.seed = static_cast<std::uint64_t>(c);
+    samples::Experiment e = samples::simulate(p, 2);
+    constexpr double kNoise_um = 0.02;
+    std::mt19937_64 random(p.seed);
+    std::normal_distribution<double> normal(0, kNoise_um);
+    std::vector<Vec2> points;
+    for (std::size_t i = 0; i < e.measured.size(); ++i) {
+      const double x = normal(random), y = normal(random);
+      e.measured[i].displacement_um = e.displacement[i].displacement_um + Vec2{x, y};
+      e.measured[i].sigma_um = kNoise_um;
+      points.push_back(e.measured[i].position_um);
+    }
+    std::vector<substrate::Ellipse> ellipses;
+    std::vector<int> ids;
+    for (const Adhesion& adhesion : e.cell.adhesions) {
+      ellipses.push_back(substrate::ellipse_of(adhesion));
+      ids.push_back(adhesion.adhesion_id);
+    }
+    LinearData data = reduce(
+        e.measured, substrate::make_greens(p.gel, {.model = "layer"}, 2)->compliance_um_per_nN(points, ellipses));
+    for (const bool is_thesis : {false, true}) {
+      FitParameters parameters;
+      parameters.n_meshes = is_thesis ? 1 : a.n_repeats;
+      std::vector<network::CableNetwork> networks;
+      for (int m = 0; m < parameters.n_meshes; ++m) {
+        network::NetworkParameters of_network;
+        of_network.seed = static_cast<std::uint64_t>(m) + 1;
+        if (is_thesis) of_network.link_weights = "equal", of_network.adhesion_anchor = "centre";
+        networks.emplace_back(network::generate_network(e.cell, of_network).network);
+      }
+      const EnsembleFit fit = fit_ensemble(networks, data, ids, parameters, 2, {});
+      double error = 0, size = 0, squares = 0;
+      int n_covered = 0, n = 0;
+      for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+        const double t = e.tensions[i].tension_nN, d = fit.tensions_nN[i].value - t;
+        const Interval interval = interval_95(fit.tensions_nN[i], parameters.n_meshes);
+        error += d * d, size += t * t;
+        squares += fit.tensions_nN[i].standard_error() > 0 ? std::pow(d / fit.tensions_nN[i].standard_error(), 2) : 0;
+        n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
+        ++n;
+      }
+      std::printf("%d,%s,%d,%.4f,%.3f,%.3f\n", c, is_thesis ? "thesis" : "default", parameters.n_meshes,
+                  std::sqrt(error / size), std::sqrt(squares / n), double(n_covered) / n);
+      std::fflush(stdout);
+    }
+  }
+}
+
+/// Processor time of one fit, the compliance given.
+double fit_seconds(const TensionScene& scene) {
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const std::clock_t begin = std::clock();
+  fit_gauss_newton(problem, {}, uniform_start_nN(problem));
+  return double(std::clock() - begin) / CLOCKS_PER_SEC;
+}
+
+// How the time grows, and against the thesis' way to the same misfit.
+void speed(const Arguments&) {
+  std::printf("what,size,cpu_seconds\n");
+  for (const int n_beads : {2500, 5000, 10000}) {
+    TensionScene scene = thesis_scene(1, n_beads, 0.07);
+    const std::clock_t begin = std::clock();
+    scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
+    std::printf("reduce beads,%d,%.3f\n", n_beads, double(std::clock() - begin) / CLOCKS_PER_SEC);
+  }
+  const Cell cell = drawn_cell(1);
+  for (const double edge_um : {2.0, 1.4, 1.0, 0.8}) {
+    TensionScene scene = test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), 1), 2000, 0.07, 1);
+    network::NetworkParameters p;
+    p.edge_length_um = edge_um;
+    scene.cables = network::CableNetwork(network::generate_network(cell, p).network);
+    std::printf("fit by vertices,%zu,%.3f\n", scene.cables.network().vertices_um.size(), fit_seconds(scene));
+  }
+  for (const int n_fibres : {5, 10, 20, 30}) {
+    samples::ScenarioParameters p;
+    p.cell.fibre_spacing_um = 1;  // room for the many
+    p.cell.n_ventral = n_fibres - 2 * (n_fibres / 3), p.cell.n_dorsal = p.cell.n_arc = n_fibres / 3;
+    const Cell other = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1).cell;
+    const TensionScene scene = test::scene_of(other, thesis_tensions_nN(other.fibres.size(), 1), 2000, 0.07, 1);
+    std::printf("fit by fibres,%zu,%.3f\n", other.fibres.size(), fit_seconds(scene));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 1 << 12);
+  const Arguments a{.n_repeats = argc > 2 ? std::atoi(argv[2]) : 10,
+                    .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
+                    .folder = argc > 4 ? argv[4] : "."};
+  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {
+      {"descent", descent},       {"noise", noise}, {"beside-fttc", beside_fttc}, {"segmentation", segmentation},
+      {"directions", directions}, {"types", types}, {"meshes", meshes},           {"speed", speed}};
+  for (const auto& [name, run] : studies) {
+    if (argc > 1 && std::strcmp(argv[1], name) == 0) {
+      run(a);
+      return 0;
+    }
+  }
+  std::fprintf(stderr,
+               "tension_accuracy descent|noise|beside-fttc|segmentation|directions|types|meshes|speed [repeats] "
+               "[cells] [folder]\n");
+  return 2;
+}

@@ -1,0 +1,184 @@
+/// Cells and data that make the tension fit hard: the right answer, a wide interval or a clear refusal.
+#include "mbtfm/tension_fit.h"
+
+#include <gtest/gtest.h>
+
+#include "mbtfm/model_checks.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::fit_own_network;
+using test::measure;
+using test::tension_scene;
+using test::TensionScene;
+using test::values_of;
+
+void expect_sound(const EnsembleFit& fit) {
+  EXPECT_TRUE(fit.report.converged) << fit.report.reason;
+  for (const Estimate& e : fit.tensions_nN) {
+    EXPECT_TRUE(std::isfinite(e.value));
+    EXPECT_GE(e.value, 0);
+    const Interval interval = interval_95(e, static_cast<int>(fit.meshes.size()));
+    EXPECT_LE(interval.low, e.value);
+    EXPECT_GE(interval.high, e.value);
+  }
+}
+
+TEST(TensionFitHard, starts_from_1e_6_to_1e3_nN_end_at_the_same_tensions) {
+  const TensionScene scene = tension_scene("case_22", 1000, 0.07, 5);
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const Trial first = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
+  const Eigen::MatrixXd covariance = covariance_nN2(local_misfit(first, problem.jacobian(first)), 1);
+  for (const double start : {1e-6, 1e-3, 1.0, 1e3}) {
+    const Trial other = fit_gauss_newton(problem, {}, Eigen::VectorXd::Constant(problem.n_tensions(), start)).trial;
+    for (Eigen::Index i = 0; i < first.tensions_nN.size(); ++i) {
+      // the fit stops where the last steps tell less than a thirtieth of a standard error; there may be a few
+      EXPECT_NEAR(other.tensions_nN[i], first.tensions_nN[i], 0.2 * std::sqrt(covariance(i, i)))
+          << "tension " << i << ", started at " << start << " nN";
+    }
+  }
+}
+
+TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
+  Cell cell = test::round_cell(12, 12);
+  test::add_ventral(cell, 1, 7);
+  test::add_ventral(cell, 3, 9);
+  Fibre beside = cell.fibres[0];  // in the middle of the cell, with free ends
+  for (Vec2& p : beside.points_um) p = Vec2{30 + 0.4 * (p.x - 30), 30.1};
+  beside.type = FibreType::arc;
+  beside.start_adhesion_id = beside.end_adhesion_id = {};
+  for (int i = 0; i < 2; ++i) {
+    beside.fibre_id = 3 + i;
+    cell.fibres.push_back(beside);
+    for (Vec2& p : beside.points_um) p.y += 0.2;
+  }
+  Eigen::VectorXd tensions(5);
+  tensions << 0.06, 3, 4, 2, 3;
+  TensionScene scene = test::scene_of(cell, tensions, 3000, 0.05, 1);
+  const EnsembleFit fit = fit_own_network(scene);
+  expect_sound(fit);
+  const std::vector<FibreGroup> groups = fibres_not_told_apart(fit);
+  ASSERT_EQ(groups.size(), 1u);
+  EXPECT_EQ(groups[0].indices, (std::vector<int>{3, 4}));
+  EXPECT_LE(std::abs(groups[0].sum_nN.value - 5), 4 * groups[0].sum_nN.noise);
+  // the sum is worth reporting: better known than either by what a correlation of −0.95 means, sqrt(2 (1 − 0.95))
+  EXPECT_LT(groups[0].sum_nN.noise, 0.35 * fit.tensions_nN[3].noise);
+}
+
+TEST(TensionFitHard, a_hundred_fibres) {
+  Cell cell = test::round_cell(30, 100);
+  Eigen::VectorXd tensions(101);
+  tensions[0] = 0.06;
+  for (int i = 0; i < 100; ++i) {  // dorsal ones, inwards from each adhesion
+    const Vec2 start = cell.adhesions[static_cast<std::size_t>(i)].position_um;
+    cell.fibres.push_back({.fibre_id = i + 1,
+                           .type = FibreType::dorsal,
+                           .width_um = 0.6,
+                           .start_adhesion_id = i + 1,
+                           .end_adhesion_id = {},
+                           .mean_intensity = 1,
+                           .points_um = {start, Vec2{30, 30} + 0.75 * (start - Vec2{30, 30})}});
+    tensions[i + 1] = 0.1 * i;
+  }
+  TensionScene scene = test::scene_of(cell, tensions, 3000, 0.03, 2);
+  const EnsembleFit fit = fit_own_network(scene);
+  expect_sound(fit);
+  double sum = 0;
+  int n = 0;
+  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+    const Estimate& e = fit.tensions_nN[i];
+    if (e.value <= 2 * e.noise) continue;  // those at the bound are better than their noise
+    sum += std::pow((e.value - tensions[static_cast<Eigen::Index>(i)]) / e.noise, 2);
+    ++n;
+  }
+  ASSERT_GT(n, 30);
+  // Mean square of errors in standard errors: 1 ± sqrt(2/n), correlated, so twice that; three of those.
+  EXPECT_LT(sum / n, 1 + 6 * std::sqrt(2.0 / n));
+}
+
+TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_would_do) {
+  TensionScene scene = tension_scene("case_21", 4, 0.05, 3);
+  try {
+    fit_own_network(scene);
+    FAIL() << "four beads told " << scene.tensions_nN.size() << " tensions";
+  } catch (const InvalidData& error) {
+    const std::string enough = "at least " + std::to_string((scene.tensions_nN.size() + 1) / 2) + " good beads";
+    EXPECT_NE(std::string(error.what()).find(enough), std::string::npos) << error.what();
+  }
+}
+
+TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_covers) {
+  TensionScene scene = tension_scene("case_21", 3000, 0.05, 4);
+  const EnsembleFit everywhere = fit_own_network(scene);
+  double middle_um = 0;  // beads are kept on one side only
+  for (const Vec2 p : scene.points_um) middle_um += p.x / static_cast<double>(scene.points_um.size());
+  std::vector<bool> is_used;
+  for (const Vec2 p : scene.points_um) is_used.push_back(p.x < middle_um - 5);
+  scene.data = reduce(scene.beads, scene.compliance_um_per_nN, is_used);
+  const EnsembleFit fit = fit_own_network(scene);
+  expect_sound(fit);
+  double widest = 0;
+  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
+    widest = std::max(widest, fit.tensions_nN[i].noise / everywhere.tensions_nN[i].noise);
+    const Interval interval = interval_95(fit.tensions_nN[i], 1);
+    const double sigmas = 2 * fit.tensions_nN[i].noise;  // beyond the interval: four standard errors
+    EXPECT_LE(interval.low - sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
+    EXPECT_GE(interval.high + sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
+  }
+  EXPECT_GT(widest, 2);
+}
+
+TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
+  TensionScene scene = tension_scene("case_21", 1000, 0.05, 5);
+  const double sigma_um = 0.02;
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal(0, 1);
+  for (Bead& bead : scene.beads) {
+    bead.displacement_um = {sigma_um * normal(random), sigma_um * normal(random)};
+    bead.sigma_um = sigma_um;
+  }
+  scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
+  const EnsembleFit fit = fit_own_network(scene);
+  expect_sound(fit);
+  int n_covering = 0;
+  for (const Estimate& e : fit.tensions_nN) n_covering += interval_95(e, 1).low <= 1e-9 ? 1 : 0;
+  // 95 % intervals, at the bound 97.5 %: of a dozen one may miss
+  EXPECT_GE(n_covering, static_cast<int>(fit.tensions_nN.size()) - 1);
+}
+
+TEST(TensionFitHard, one_adhesion_that_carries_everything) {
+  Cell cell = test::round_cell(15, 16);
+  for (const int end : {6, 7, 8, 9, 10, 11, 12}) test::add_ventral(cell, 1, end);
+  Eigen::VectorXd tensions(8);
+  tensions << 0.001, 5, 6, 7, 8, 7, 6, 5;
+  TensionScene scene = test::scene_of(cell, tensions, 3000, 0, 7);
+  const EnsembleFit exact = fit_own_network(scene);
+  expect_sound(exact);
+  // noise-free; the fibres meet at a small angle, which costs digits
+  EXPECT_LE((values_of(exact) - tensions).tail(7).cwiseAbs().maxCoeff(), 1e-5 * 8);
+  measure(scene, 0.1, 8);
+  expect_sound(fit_own_network(scene));
+}
+
+TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
+  TensionScene scene = tension_scene("case_22", 2000, 0.05, 9);
+  const EnsembleFit little = fit_own_network(scene);
+  measure(scene, 1.0, 10);
+  const EnsembleFit much = fit_own_network(scene);
+  expect_sound(much);
+  int n_covering = 0;
+  for (std::size_t i = 0; i < much.tensions_nN.size(); ++i) {
+    const Interval wide = interval_95(much.tensions_nN[i], 1), narrow = interval_95(little.tensions_nN[i], 1);
+    EXPECT_GT(wide.high - wide.low, narrow.high - narrow.low) << "tension " << i;
+    const double truth = scene.tensions_nN[static_cast<Eigen::Index>(i)];
+    n_covering += wide.low <= truth && truth <= wide.high ? 1 : 0;
+  }
+  // binomial, 0.95 of a dozen or more: 80 % is four standard deviations below
+  EXPECT_GE(n_covering, static_cast<int>(0.8 * static_cast<double>(much.tensions_nN.size())));
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
