@@ -14,6 +14,8 @@ namespace mbtfm::inverse {
 
 namespace {
 
+constexpr int kFewestForModelError = 3;  // two meshes tell of their spread as much as of nothing
+
 void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
   if (n_components >= n_tensions) return;
   throw InvalidData("displacement",
@@ -48,8 +50,13 @@ bool is_near_a_bound(const MeshFit& mesh) {
   return false;
 }
 
-void add_errors(MeshFit& mesh, double variance) {
-  mesh.covariance_nN2 = covariance_nN2(mesh.local, variance);
+void add_errors(MeshFit& mesh, const EnsembleFit& all) {
+  const double variance = all.variance;
+  mesh.covariance_nN2 = mesh.noise_covariance_nN2 = covariance_nN2(mesh.local, variance);
+  if (all.model_error) {  // A s² diag(noise share) Aᵀ, A = Cov Jᵀ / s²
+    const Eigen::MatrixXd A = mesh.covariance_nN2 * (all.data.compliance * mesh.force_derivatives).transpose();
+    mesh.noise_covariance_nN2 = A * all.model_error->noise_share.asDiagonal() * A.transpose() / variance;
+  }
   if (!is_near_a_bound(mesh)) return;
   for (int i = 0; i < static_cast<int>(mesh.local.g.size()); ++i) {
     mesh.intervals_95.push_back(profile_95(mesh.local, variance, i));
@@ -57,14 +64,14 @@ void add_errors(MeshFit& mesh, double variance) {
 }
 
 /// Draws shared out over the meshes in turn; replaces the profile.
-void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& networks, const ReducedData& data,
+void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& networks,
                    const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads) {
   const std::size_t n_meshes = all.meshes.size();
   std::vector<std::vector<double>> deviations(all.tensions_nN.size());
   for (std::size_t m = 0; m < n_meshes; ++m) {
     std::vector<std::uint64_t> draws;
     for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
-    const TensionProblem problem(networks[m], data, adhesion_ids);
+    const TensionProblem problem(networks[m], all.data, adhesion_ids);
     const Eigen::MatrixXd of_mesh =
         bootstrap_deviations_nN(problem, parameters, all.meshes[m].fit.trial, all.variance, draws, threads);
     for (std::size_t i = 0; i < deviations.size(); ++i) {
@@ -75,40 +82,45 @@ void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& n
   for (std::size_t i = 0; i < deviations.size(); ++i) {
     double sum = 0;
     for (const double d : deviations[i]) sum += d * d;
-    all.tensions_nN[i].noise = std::sqrt(sum / parameters.bootstrap);
-    all.tensions_nN[i].noise_95 = percentiles_95(deviations[i]);
+    all.tensions_nN[i].fitted = std::sqrt(sum / parameters.bootstrap);
+    all.tensions_nN[i].fitted_95 = percentiles_95(deviations[i]);
   }
 }
 
-/// Spread of one further mesh about the mean of these: s² (1 + 1/n).
-double spread_of(const std::vector<double>& values) {
+/// Standard error that the meshes add. Where the fit counts with their error the cell's own deviation is in its
+/// covariance, and the mean's is left: s² / n. Else that of one further mesh about the mean of these: s² (1 + 1/n).
+double spread_of(const std::vector<double>& values, bool is_cell_counted) {
   const double n = static_cast<double>(values.size());
   if (n < 2) return 0;
   double mean = 0, sum = 0;
   for (const double v : values) mean += v / n;
   for (const double v : values) sum += (v - mean) * (v - mean);
-  return std::sqrt(sum / (n - 1) * (1 + 1 / n));
+  return std::sqrt(sum / (n - 1) * (is_cell_counted ? 1 / n : 1 + 1 / n));
 }
 
-/// Mean, noise and spread of a quantity that is linear in the tensions about each mesh's solution.
-/// @param value_of  of a mesh; @param gradient_of  by tension
+/// Mean and errors of a quantity that is linear in the tensions about each mesh's solution.
+/// @param value_of  of a mesh; @param gradient_of  by tension; @param own_variance  of the model, beside the tensions
 template <class ValueOf, class GradientOf>
-Estimate estimate_of(const std::vector<MeshFit>& meshes, const ValueOf& value_of, const GradientOf& gradient_of) {
-  const auto n_meshes = static_cast<double>(meshes.size());
+Estimate estimate_of(const EnsembleFit& all, const ValueOf& value_of, const GradientOf& gradient_of,
+                     double own_variance = 0) {
+  const auto n_meshes = static_cast<double>(all.meshes.size());
   std::vector<double> values;
   Estimate estimate;
-  for (const MeshFit& mesh : meshes) {
+  double noise = 0, fitted = own_variance;
+  for (const MeshFit& mesh : all.meshes) {
     values.push_back(value_of(mesh));
     estimate.value += values.back() / n_meshes;
     const Eigen::VectorXd gradient = gradient_of(mesh);
-    estimate.noise += gradient.dot(mesh.covariance_nN2 * gradient) / n_meshes;
+    noise += gradient.dot(mesh.noise_covariance_nN2 * gradient) / n_meshes;
+    fitted += gradient.dot(mesh.covariance_nN2 * gradient) / n_meshes;
   }
-  estimate.noise = std::sqrt(std::max(0.0, estimate.noise));
-  estimate.spread = spread_of(values);
+  estimate.noise = std::sqrt(std::max(0.0, noise));
+  estimate.fitted = std::sqrt(std::max(0.0, fitted));
+  estimate.spread = spread_of(values, all.model_error.has_value());
   return estimate;
 }
 
-/// The beads' part of a tension's interval: the mean of the meshes'.
+/// The fitted part of a tension's interval: the mean of the meshes'.
 std::optional<Sides> mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
   const bool any = std::any_of(meshes.begin(), meshes.end(), [](const MeshFit& m) { return !m.intervals_95.empty(); });
   if (!any) return {};
@@ -149,17 +161,41 @@ void add_estimates(EnsembleFit& all) {
   }
   for (Eigen::Index i = 0; i < n_tensions; ++i) {
     all.tensions_nN.push_back(sum_of(all, {static_cast<int>(i)}));
-    all.tensions_nN.back().noise_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
+    all.tensions_nN.back().fitted_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
   }
   for (Eigen::Index row = 0; row < all.forces_nN.size(); row += 2) {
     const Eigen::Vector2d force = all.forces_nN.segment<2>(row);
     const Eigen::Vector2d along = force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
     all.force_magnitudes_nN.push_back(estimate_of(
-        all.meshes, [&](const MeshFit& mesh) { return along.dot(mesh.fit.trial.forces_nN.segment<2>(row)); },
+        all, [&](const MeshFit& mesh) { return along.dot(mesh.fit.trial.forces_nN.segment<2>(row)); },
         [&](const MeshFit& mesh) -> Eigen::VectorXd {
           return mesh.force_derivatives.middleRows<2>(row).transpose() * along;
-        }));
+        },
+        all.model_error ? all.model_error->force_variance_nN2[row] : 0.0));
   }
+}
+
+/// What each mesh makes of these tensions.
+std::vector<MeshForces> forces_at(const std::vector<network::CableNetwork>& networks, const ReducedData& data,
+                                  const std::vector<int>& adhesion_ids, const Trial& trial, int threads) {
+  std::vector<MeshForces> forces(networks.size());
+  parallel_for(static_cast<int>(networks.size()), threads, [&](int m) {
+    const auto i = static_cast<std::size_t>(m);
+    const TensionProblem problem(networks[i], data, adhesion_ids);
+    const Trial here = problem.evaluate(trial.tensions_nN, m == 0 ? &trial : nullptr);
+    forces[i] = {here.forces_nN, problem.force_derivatives(here)};
+  });
+  return forces;
+}
+
+/// Variance of a weighted component that is the beads' alone: what no forces at all could explain, where that is enough
+/// to tell.
+double noise_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
+                      const std::string& loss) {
+  const Eigen::Index n_unexplained = data.n_used - data.reduced.compliance.rows();
+  constexpr Eigen::Index kEnough = 50;  // known to 20 %
+  if (loss != "squares" || n_unexplained < kEnough) return misfit_variance(data, forces_nN, n_tensions, loss);
+  return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / static_cast<double>(n_unexplained));
 }
 
 }  // namespace
@@ -168,7 +204,7 @@ Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
   Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;
   return estimate_of(
-      fit.meshes, [&](const MeshFit& mesh) { return ones.dot(mesh.fit.trial.tensions_nN); },
+      fit, [&](const MeshFit& mesh) { return ones.dot(mesh.fit.trial.tensions_nN); },
       [&](const MeshFit&) { return ones; });
 }
 
@@ -200,33 +236,43 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
     all.meshes.front() = describe(TensionProblem(networks.front(), data.reduced, adhesion_ids), std::move(first));
     tell();
   }
+  all.data = data.reduced;
   const Eigen::VectorXd answer = all.meshes.front().fit.trial.tensions_nN;
-  parallel_for(n_meshes - 1, threads, [&](int m) {
-    const auto i = static_cast<std::size_t>(m) + 1;
-    const TensionProblem problem(networks[i], data.reduced, adhesion_ids, solved_misfit);
+  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
+  const bool has_model_error = parameters.model_error == "meshes" && n_meshes >= kFewestForModelError && !solved_misfit;
+  if (has_model_error) {
+    const double variance = noise_variance(data, all.meshes.front().fit.trial.forces_nN, n_tensions, parameters.loss);
+    all.model_error = model_error(
+        forces_at(networks, data.reduced, adhesion_ids, all.meshes.front().fit.trial, threads), data.reduced, variance);
+    all.data = all.model_error->data;
+  }
+  parallel_for(n_meshes, threads, [&](int m) {
+    if (m == 0 && !has_model_error) return;
+    const auto i = static_cast<std::size_t>(m);
+    const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit);
     all.meshes[i] = describe(problem, fit_tensions(problem, parameters, 1, answer));
     tell();
   });
   add_means(all);
-  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
                                static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
-  all.variance = misfit_variance(data, all.forces_nN, n_tensions, parameters.loss);
-  parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all.variance); });
+  all.variance = has_model_error ? all.model_error->noise_variance
+                                 : misfit_variance(data, all.forces_nN, n_tensions, parameters.loss);
+  parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   add_estimates(all);
-  if (parameters.bootstrap > 0) add_bootstrap(all, networks, data.reduced, adhesion_ids, parameters, threads);
+  if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;
 }
 
 Interval interval_95(const Estimate& estimate, int n_meshes) {
   const double normal = boost::math::quantile(boost::math::normal(), 0.975);
-  const auto half_width = [&](double noise) {
-    const double error = std::hypot(noise, estimate.spread);
+  const auto half_width = [&](double fitted) {
+    const double error = std::hypot(fitted, estimate.spread);
     if (n_meshes < 2 || estimate.spread <= 0) return normal * error;
     const double degrees = (n_meshes - 1) / std::pow(estimate.spread / error, 4);
     return boost::math::quantile(boost::math::students_t(std::min(degrees, 1e6)), 0.975) * error;
   };
-  const Sides sides = estimate.noise_95.value_or(Sides{normal * estimate.noise, normal * estimate.noise});
+  const Sides sides = estimate.fitted_95.value_or(Sides{normal * estimate.fitted, normal * estimate.fitted});
   return {.low = std::max(0.0, estimate.value - half_width(sides.below / normal)),
           .high = estimate.value + half_width(sides.above / normal)};
 }

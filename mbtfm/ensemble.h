@@ -3,11 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <vector>
 
 #include "mbtfm/intervals.h"
+#include "mbtfm/model_error.h"
 
 namespace mbtfm::inverse {
 
@@ -15,10 +17,12 @@ namespace mbtfm::inverse {
 struct Estimate {
   double value = 0;
   double noise = 0;   ///< from the beads
-  double spread = 0;  ///< between meshes, of one further mesh (the cell's own) about the mean; 0 for one mesh
-  std::optional<Sides> noise_95 =
-      {};  ///< where the beads' part of the 95 % interval is not 1.96 · noise to either side
-  double standard_error() const { return std::hypot(noise, spread); }
+  double fitted = 0;  ///< from the beads and the model error that the fit counts with; noise, where it counts with none
+  double spread = 0;  ///< between the fits of the meshes, beside that; 0 for one mesh
+  std::optional<Sides> fitted_95 = {};  ///< where the part of `fitted` in the 95 % interval is not 1.96 times it
+  double standard_error() const { return std::hypot(fitted, spread); }
+  /// The part of the standard error that another mesh would change.
+  double from_mesh() const { return std::sqrt(std::max(0.0, fitted * fitted - noise * noise) + spread * spread); }
 };
 
 /// What one mesh says.
@@ -26,26 +30,30 @@ struct MeshFit {
   TensionFit fit;
   Eigen::MatrixXd force_derivatives;  ///< dR/dt at the solution
   LocalMisfit local;
-  Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from the beads' noise
-  std::vector<Sides> intervals_95;                   ///< of the tensions, from the beads' noise
+  Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from all that the fit counts with
+  Eigen::MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
+  std::vector<Sides> intervals_95;                   ///< of the tensions, from all that the fit counts with
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
 };
 
 struct EnsembleFit {
   std::vector<int> fibre_ids;  ///< front() is 0, the actin network
   std::vector<Estimate> tensions_nN;
-  Eigen::MatrixXd covariance_nN2;             ///< of the tensions, from the beads' noise; mean over the meshes
+  Eigen::MatrixXd covariance_nN2;             ///< of the tensions, as the fit counts; mean over the meshes
   Eigen::VectorXd forces_nN;                  ///< by adhesion: fx, fy; mean over the meshes
   Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
   std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
   Eigen::VectorXd network_forces_nN;          ///< with every fibre at the network's tension: the network's part
   double chi_squared_per_degree = 0;          ///< of the mean over meshes: 1 where the model explains all but the noise
-  double variance = 0;                        ///< of a weighted component: see misfit_variance
+  double variance = 0;                        ///< of a component of `data`: see misfit_variance
+  ReducedData data;                           ///< as the fit weighs it
+  std::optional<ModelError> model_error;      ///< where the fit counts with one
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is
 };
 
-/// Fit on each network: the first one alone, the others in threads from its answer.
+/// Fit on the first network; at its answer, see how the networks differ (three of them or more); then fit on each, with
+/// that for the error of the model, in threads.
 /// @param data  its weights by bead are set where the loss is a robust one
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
 /// @param start_nN  tensions to start from (those of the frame before), or none
@@ -54,8 +62,8 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
                          const Progress& progress, const SolvedMisfit& solved_misfit = {},
                          const std::optional<Eigen::VectorXd>& start_nN = {});
 
-/// 95 % interval of a positive quantity: noise and spread combined to either side. Student's t with the degrees of
-/// freedom that both have together (Welch–Satterthwaite): many for the noise, meshes − 1 for the spread.
+/// 95 % interval of a positive quantity: both parts of the error combined to either side. Student's t with the degrees
+/// of freedom that they have together (Welch–Satterthwaite): many for the fitted one, meshes − 1 for the spread.
 struct Interval {
   double low = 0, high = 0;
 };

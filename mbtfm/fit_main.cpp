@@ -237,7 +237,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
-  const std::vector<MissingFibre> missing = missing_fibres(fit, data, inputs.cell.adhesions);
+  const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions);
   for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
   write_correlations(context.output("out", "correlations.csv"), fit);
   write_models(context.output("out", "models.csv"), models);

@@ -55,7 +55,7 @@ std::vector<Tension> tensions_of(const EnsembleFit& fit) {
                         .tension_nN = e.value,
                         .low_nN = interval.low,
                         .high_nN = interval.high,
-                        .identifiable = e.noise < scale});
+                        .identifiable = e.fitted < scale});
   }
   return tensions;
 }
@@ -101,7 +101,7 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
   const Imbalance balance = imbalance(fit);
   double mesh_part = 0, noise_part = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
-    mesh_part += std::pow(fit.tensions_nN[i].spread, 2);
+    mesh_part += std::pow(fit.tensions_nN[i].from_mesh(), 2);
     noise_part += std::pow(fit.tensions_nN[i].noise, 2);
   }
   s.more = {{"noise_source", noise.source},

@@ -154,11 +154,10 @@ std::vector<int> most_informed_fibre(const EnsembleFit& fit, const LinearData& d
   return ids;
 }
 
-std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const LinearData& data,
-                                         const std::vector<Adhesion>& adhesions) {
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions) {
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd& C = data.reduced.compliance;
-  const Eigen::VectorXd residual = data.reduced.target - C * fit.forces_nN;
+  const Eigen::MatrixXd& C = fit.data.compliance;
+  const Eigen::VectorXd residual = fit.data.target - C * fit.forces_nN;
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
   const Eigen::MatrixXd CJ = C * mesh.force_derivatives;
   const Eigen::MatrixXd cross_terms = CJ.transpose() * C;

@@ -55,8 +55,7 @@ struct MissingFibre {
 };
 /// The best ones, no adhesion twice. A gain is kept where chance would reach it in one cell of twenty, all pairs tried
 /// (Bonferroni).
-std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const LinearData& data,
-                                         const std::vector<Adhesion>& adhesions);
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions);
 
 void write_correlations(const Path& file, const EnsembleFit& fit);
 void write_models(const Path& file, const std::vector<ModelScore>& models);

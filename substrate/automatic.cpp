@@ -42,16 +42,17 @@ double half_space_bias(const Gel& gel, double radius_um) {
 }
 
 Choice choice_for(const Gel& gel, const SubstrateParameters& p, double scene_um) {
-  const int cells = cells_for(p.tolerance);
+  const int cells = cells_for(p.displacement_tolerance);
   const auto compared = [&](double bias) {
-    return brief(bias) + (bias <= p.tolerance ? ", within " : ", above ") + "the tolerance of " + brief(p.tolerance);
+    return brief(bias) + (bias <= p.displacement_tolerance ? ", within " : ", above ") + "the tolerance of " +
+           brief(p.displacement_tolerance);
   };
   if (!p.modulus_profile.empty()) return {"refined", "the modulus changes with depth", cells};
   if (p.side_distance_um) {
     const double sides = *p.side_distance_um / gel.thickness_um;
     const double bias = std::exp(-1.48 * sides);
     const std::string found = "sides at " + brief(sides) + " thicknesses change the field by " + compared(bias);
-    if (bias > p.tolerance) {
+    if (bias > p.displacement_tolerance) {
       const double elements = sides * cells;
       const bool is_smooth = elements >= 2;
       return {is_smooth ? "split" : "refined",
@@ -65,7 +66,7 @@ Choice choice_for(const Gel& gel, const SubstrateParameters& p, double scene_um)
   const double bias = half_space_bias(gel, scene_um);
   const std::string found =
       "the base, with a scene " + brief(ratio) + " thicknesses wide, changes the field by " + compared(bias);
-  return {bias <= p.tolerance ? "half-space" : "layer", found + "; the sides are far away", cells};
+  return {bias <= p.displacement_tolerance ? "half-space" : "layer", found + "; the sides are far away", cells};
 }
 
 class Automatic final : public Substrate {

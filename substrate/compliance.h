@@ -25,8 +25,9 @@ Ellipse ellipse_of(const Adhesion& adhesion);
 
 struct SubstrateParameters {
   std::string model = "split";  ///< exact near field, real sides and bottom, a second a cell
-  double tolerance = 0.02;      ///< a third of the beads' noise in good experiments; `split` and `layer` are far below
-  std::string modulus_profile;  ///< empty: youngs_modulus_kPa at every depth
+  double displacement_tolerance =
+      0.02;  ///< a third of the beads' noise in good experiments; `split` and `layer` are far below
+  std::string modulus_profile = {};  ///< empty: youngs_modulus_kPa at every depth
 
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
@@ -40,8 +41,8 @@ struct SubstrateParameters {
   int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
   double growth = 4;                      ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
 
-  std::optional<double> side_distance_um;  ///< a gel is centimetres wide: its sides are far away
-  std::string cache_folder;                ///< empty: factors stay in memory
+  std::optional<double> side_distance_um = {};  ///< a gel is centimetres wide: its sides are far away
+  std::string cache_folder = {};                ///< empty: factors stay in memory
 
   bool vertical = false;  ///< adhesions pull along the surface and beads are seen from above
   bool stress = false;    ///< of the gel's inside, where it is written

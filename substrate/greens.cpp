@@ -9,7 +9,7 @@ namespace mbtfm::substrate {
 void declare(ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
   list.add("model", p.model, "elastic model of the gel", {"half-space", "layer", "split", "refined", "auto"});
-  list.add("tolerance", p.tolerance, Range::between(0, 1),
+  list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
            "refined: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is refined "
            "until it is estimated to have; 0: the first mesh, no error estimated. auto: bias a model may have");
   list.add("modulus_profile", p.modulus_profile,

@@ -133,7 +133,7 @@ class Refined final : public Substrate {
     Fineness fineness = first_fineness(request.ellipses.size());
     Eigen::MatrixXd columns;
     std::vector<double> errors;
-    if (parameters_.tolerance == 0) {
+    if (parameters_.displacement_tolerance == 0) {
       columns = solve_on(fineness, request);
     } else {
       for (int& halvings : fineness.halvings) --halvings;
@@ -170,12 +170,13 @@ class Refined final : public Substrate {
         errors[j] = estimated_error(columns, finer, static_cast<Eigen::Index>(j));
       }
       columns.swap(finer);
-      if (mean(errors) <= parameters_.tolerance) return errors;
+      if (mean(errors) <= parameters_.displacement_tolerance) return errors;
     }
     throw NotSolved(Report{.iterations = kMostLevels,
                            .last_change = mean(errors),
                            .reason = "the substrate's error is still estimated as " + brief(mean(errors)) + " after " +
-                                     std::to_string(kMostLevels) + " refinements: ask for a larger tolerance"});
+                                     std::to_string(kMostLevels) +
+                                     " refinements: ask for a larger displacement_tolerance"});
   }
 
   /// As many of the largest errors as must fall by q = 2^(3/2) for the mean to reach the tolerance; all where none is
@@ -185,7 +186,7 @@ class Refined final : public Substrate {
     std::iota(order.begin(), order.end(), 0);
     if (std::isinf(errors[0])) return order;
     std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return errors[a] > errors[b]; });
-    double excess = (mean(errors) - kAim * parameters_.tolerance) * static_cast<double>(errors.size());
+    double excess = (mean(errors) - kAim * parameters_.displacement_tolerance) * static_cast<double>(errors.size());
     std::size_t n = 0;
     while (n < order.size() && excess > 0) excess -= (1 - 1 / kFall) * errors[order[n++]];
     order.resize(n);
@@ -199,7 +200,8 @@ class Refined final : public Substrate {
     } catch (NotSolved& error) {
       if (std::isfinite(mean(errors))) {
         error.report.reason += "; the mesh before it has an estimated error of " + brief(mean(errors)) +
-                               " (substrate.tolerance is " + brief(parameters_.tolerance) + ")";
+                               " (substrate.displacement_tolerance is " + brief(parameters_.displacement_tolerance) +
+                               ")";
       }
       throw;
     }

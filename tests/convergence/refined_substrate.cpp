@@ -16,7 +16,7 @@ Gel gel_of(double poisson_ratio, double thickness_um) {
 
 SubstrateParameters refined_to(double tolerance) {
   SubstrateParameters parameters = test::model_named("refined");
-  parameters.tolerance = tolerance;
+  parameters.displacement_tolerance = tolerance;
   return parameters;
 }
 

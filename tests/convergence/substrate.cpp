@@ -126,7 +126,7 @@ TEST(Refined, converges_to_the_layer_as_its_elements_halve) {
   const auto points = test::scattered_points(2000, 6);
   const Eigen::MatrixXd layer = compliance(gel, test::model_named("layer"), points, ellipse);
   SubstrateParameters parameters = test::model_named("refined");
-  parameters.tolerance = 0;
+  parameters.displacement_tolerance = 0;
   std::vector<double> errors;
   for (const double across : {1.0, 2.0, 4.0}) {
     parameters.elements_across_adhesion = across;
@@ -146,7 +146,7 @@ TEST(Refined, error_does_not_grow_as_the_gel_becomes_incompressible) {
   for (const char* element : {"q2-p1disc", "q1-p0"}) {
     SubstrateParameters parameters = test::model_named("refined");
     parameters.element = element;
-    parameters.tolerance = 0;
+    parameters.displacement_tolerance = 0;
     parameters.elements_across_adhesion = 2;
     std::vector<double> errors;
     for (const double nu : {0.3, 0.49, 0.4999}) {
@@ -197,7 +197,7 @@ TEST(Split, agrees_with_refined_elements_where_the_sides_are_near) {
   split.cells_per_thickness = 4;
   SubstrateParameters refined = test::model_named("refined");
   refined.side_distance_um = 10;
-  refined.tolerance = 0;
+  refined.displacement_tolerance = 0;
   refined.elements_across_adhesion = 6;
   const Eigen::MatrixXd by_split = compliance(gel, split, points, ellipse);
   const Eigen::MatrixXd layer = compliance(gel, test::model_named("layer"), points, ellipse);

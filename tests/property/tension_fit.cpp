@@ -230,7 +230,7 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
   test::add_ventral(cell, 5, 14);
   TensionScene whole = test::scene_of(cell, Eigen::Vector4d(0.06, 4, 5, 6), 3000, 0.05, 10);
   const EnsembleFit fit = fit_own_network(whole);
-  for (const MissingFibre& f : missing_fibres(fit, whole.data, cell.adhesions)) {
+  for (const MissingFibre& f : missing_fibres(fit, cell.adhesions)) {
     // one cell of twenty has a hint by chance; of a thousand, over 120 pairs, one goes beyond 4.3²
     EXPECT_LT(f.chi_squared_gain, 4.3 * 4.3) << f.start_adhesion_id << "-" << f.end_adhesion_id;
   }
@@ -248,7 +248,7 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
   TensionScene lacking = test::scene_of(cell, Eigen::Vector4d(0.06, 4, 5, 6), 3000, 0.05, 10);
   lacking.cables = network::CableNetwork(network);
   const EnsembleFit without = fit_own_network(lacking);
-  const std::vector<MissingFibre> missing = missing_fibres(without, lacking.data, cell.adhesions);
+  const std::vector<MissingFibre> missing = missing_fibres(without, cell.adhesions);
   ASSERT_FALSE(missing.empty());
   EXPECT_EQ(missing[0].start_adhesion_id, 3);
   EXPECT_EQ(missing[0].end_adhesion_id, 12);

@@ -150,7 +150,7 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
 
 TEST(Substrate, says_which_mesh_would_fit_the_memory) {
   SubstrateParameters parameters = test::model_named("refined");
-  parameters.tolerance = 0;
+  parameters.displacement_tolerance = 0;
   parameters.precision = "double";
   for (const auto& [limit_GB, fitting] : {std::pair{0.2, "elements; one of"}, std::pair{0.5, "unknowns would fit"}}) {
     parameters.memory_limit_GB = limit_GB;
@@ -217,7 +217,7 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
   const auto ellipses = test::scattered_ellipses(6, 25);
   SubstrateParameters parameters = test::model_named("auto");
   for (const double tolerance : {0.05, 0.01}) {
-    parameters.tolerance = tolerance;
+    parameters.displacement_tolerance = tolerance;
     // as thin as the half-space is taken
     Gel gel = kGel;
     gel.thickness_um = 40;
