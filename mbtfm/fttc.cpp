@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/parallel.h"
+#include "mbtfm/force_correction.h"
 
 namespace mbtfm::inverse {
 
@@ -58,41 +58,6 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
   });
 }
 
-TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
-                           double lambda) {
-  const Lattice &field = problem.field(), &box = problem.box();
-  const double area = field.spacing_um * field.spacing_um;
-  NodeField q = problem.transform().no_field();
-  for (std::size_t p = 0; p < owner.size(); ++p) {
-    if (owner[p] != force) continue;
-    const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
-               column = static_cast<Eigen::Index>(p) % field.n_columns;
-    q.x[column + box.n_columns * row] = area * direction.x;
-    q.y[column + box.n_columns * row] = area * direction.y;
-  }
-  TikhonovSolver solver(problem, problem.transform().forward(q), 1);
-  solver.solve(lambda, kScanTolerance);
-  return solver;
-}
-
-namespace {
-
-std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::vector<Patch>& patches,
-                                     const TractionInputs& inputs, const TractionParameters& parameters, double lambda,
-                                     double variance, int threads) {
-  const std::vector<int> owner = adhesion_of_patches(positions_of(patches), inputs.adhesions, parameters.grow_um);
-  std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
-  parallel_for(static_cast<int>(forces.size()), threads, [&](int f) {
-    AdhesionForce& force = forces[static_cast<std::size_t>(f)];
-    const TikhonovSolver probe = force_probe(problem, owner, f, direction_of(force.force_nN), lambda);
-    const double squared = probe.displaced_squared();
-    if (squared > 0) force.sigma_nN = std::sqrt(variance * squared);  // beyond the field nothing is known of a force
-  });
-  return forces;
-}
-
-}  // namespace
-
 LatticeOptions lattice_options(const TractionParameters& p, int threads) {
   return {.model = p.gel_model == "layer" ? GelModel::layer : GelModel::half_space,
           .spacing_um = p.spacing_um,
@@ -140,11 +105,22 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   const ReadOut read_out = parameters.read_out == "cells" ? ReadOut::cells : ReadOut::points;
   const WaveField waves = solver.solution();
   const NodeField displacements = problem.displaced(waves);
-  r.patches = patches_of(problem, tractions_kPa(problem, waves, read_out, parameters.gaussian_um), displacements);
+  const auto patches = [&](double gaussian_um) {
+    return patches_of(problem, tractions_kPa(problem, waves, read_out, gaussian_um), displacements);
+  };
+  r.patches = patches(0);
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
-  r.forces = forces_of(problem, r.patches, inputs, parameters, *r.lambda, r.scan->variance, threads);
+  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
+  correct_forces({.problem = problem,
+                  .displacements = displacements,
+                  .tikhonov_lambda = r.lambda,
+                  .lambda_by_gcv = r.scan->by_gcv,
+                  .variance = r.scan->variance},
+                 adhesion_of_patches(positions_of(r.patches), inputs.adhesions, parameters.grow_um), threads, r.forces);
+  // smooths the map alone: it would carry force over the adhesions' rims
+  if (parameters.gaussian_um > 0) r.patches = patches(parameters.gaussian_um);
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},
                {"lattice_rows", std::int64_t(problem.field().n_rows)}};

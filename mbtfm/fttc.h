@@ -16,13 +16,6 @@ enum class ReadOut {
   cells    ///< their mean over the cell around each node: sums of traction times area are forces
 };
 
-/// F = qᵀ t is a force: the sum over given nodes of the field of traction times area, along a direction. This solves
-/// (A + lambda²) s = q, A = G PᵀP G. The tractions of one lambda have the force sᵀ G Pᵀ u, so s tells its variance,
-/// sᵀ A s of one datum's: by the noise alone, what the smoothing takes away is not in it.
-/// @param owner  by node of the field: which force it belongs to, or -1. @param force  the one
-TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
-                           double lambda);
-
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 
 /// The nodes of the field, rows first. @param displacements  of the box
