@@ -2,6 +2,7 @@
 
 #include <cmath>
 
+#include "mbtfm/fttc.h"
 #include "pipeline/contract/parallel.h"
 
 namespace mbtfm::inverse {
@@ -30,45 +31,45 @@ WaveField sum_of_force(const LatticeProblem& problem, const std::vector<int>& ow
   return problem.transform().forward(q);
 }
 
-/// G Pᵀ (u − P G t): what the tractions have not explained.
-WaveField left_over(const LatticeProblem& problem, const NodeField& displacements) {
-  NodeField left = problem.transform().no_field();
-  problem.normal(displacements, left);
-  left.x = problem.spread_data().x - left.x;
-  left.y = problem.spread_data().y - left.y;
-  return problem.pulled_back(left);
-}
+double probe_lambda(const PenalisedTractions& tractions) { return kShare * tractions.lambda_by_gcv; }
 
 /// The variance of a corrected force over that of one datum. Where t = (A + lambda²)⁻¹ G Pᵀ u, the force answers to the
 /// data by v = s + m² w with (A + lambda²) w = s, and this is vᵀ A v, exactly; else by s, to first order.
-double variance_share(const PenalisedTractions& tractions, const TikhonovSolver& probe, double m) {
+double variance_share(const PenalisedTractions& tractions, const TikhonovSolver& probe) {
   if (!tractions.tikhonov_lambda) return probe.displaced_squared();
   TikhonovSolver second(tractions.problem, probe.solution(), 1);
   second.solve(*tractions.tikhonov_lambda, kTolerance);
-  const double lambda2 = std::pow(*tractions.tikhonov_lambda, 2), m2 = m * m;
+  const double lambda2 = std::pow(*tractions.tikhonov_lambda, 2), m2 = std::pow(probe_lambda(tractions), 2);
   const double s_A_w = probe.solution_squared() - lambda2 * second.right_hand_side_times_solution();
   return probe.displaced_squared() + 2 * m2 * s_A_w + m2 * m2 * second.displaced_squared();
 }
 
 }  // namespace
 
-void correct_forces(const PenalisedTractions& tractions, const std::vector<int>& owner, int threads,
-                    std::vector<AdhesionForce>& forces) {
+WaveField taken_by_penalty(const PenalisedTractions& tractions) {
   const LatticeProblem& problem = tractions.problem;
-  const double m = kShare * tractions.lambda_by_gcv;
-  const WaveField left = left_over(problem, tractions.displacements);
+  NodeField left = problem.transform().no_field();
+  problem.normal(tractions.displacements, left);
+  left.x = problem.spread_data().x - left.x;
+  left.y = problem.spread_data().y - left.y;
+  TikhonovSolver solver(problem, problem.pulled_back(left), problem.threads());
+  solver.solve(probe_lambda(tractions), kTolerance);
+  return solver.solution();
+}
+
+std::vector<AdhesionForce> forces_of(const PenalisedTractions& tractions, const std::vector<Vec2>& corrected_kPa,
+                                     const std::vector<Adhesion>& adhesions, double grow_um, int threads) {
+  const std::vector<Patch> patches = patches_of(tractions.problem, corrected_kPa, tractions.displacements);
+  const std::vector<int> owner = adhesion_of_patches(positions_of(patches), adhesions, grow_um);
+  std::vector<AdhesionForce> forces = forces_by_adhesion(patches, adhesions, grow_um);
   parallel_for(static_cast<int>(forces.size()), threads, [&](int f) {
     AdhesionForce& force = forces[static_cast<std::size_t>(f)];
-    const Vec2 along = direction_of(force.force_nN), across{-along.y, along.x};
-    for (const Vec2 direction : {along, across}) {
-      TikhonovSolver probe(problem, sum_of_force(problem, owner, f, direction), 1);
-      probe.solve(m, kTolerance);
-      force.force_nN += problem.transform().dot(probe.solution(), left) * direction;
-      if (direction == across) continue;
-      const double share = variance_share(tractions, probe, m);
-      if (share > 0) force.sigma_nN = std::sqrt(tractions.variance * share);  // beyond the field nothing is known
-    }
+    TikhonovSolver probe(tractions.problem, sum_of_force(tractions.problem, owner, f, direction_of(force.force_nN)), 1);
+    probe.solve(probe_lambda(tractions), kTolerance);
+    const double share = variance_share(tractions, probe);
+    if (share > 0) force.sigma_nN = std::sqrt(tractions.variance * share);  // beyond the field nothing is known
   });
+  return forces;
 }
 
 }  // namespace mbtfm::inverse

@@ -16,16 +16,18 @@ struct PenalisedTractions {
   double variance = 0;                    ///< of one datum
 };
 
-/// A force is F = qᵀ t: the sum over its nodes of traction times area. The penalty shortens tractions, and forces with
-/// them. With A = G PᵀP G and (A + m²) s = q
+/// The penalty shortens tractions, and forces with them: sums F = qᵀ t of traction times area over some nodes. With
+/// A = G PᵀP G these waves, added to t,
 ///
-///   F + sᵀ G Pᵀ (u − P G t)
+///   (A + m²)⁻¹ G Pᵀ (u − P G t)
 ///
-/// puts that right but for m² sᵀ (t − true), small in both factors (Zhang & Zhang, J. R. Stat. Soc. B 76 (2014) 217;
-/// Javanmard & Montanari, J. Mach. Learn. Res. 15 (2014) 2869). Sets the standard errors by the noise, too.
-/// @param owner   by node of the field: which force it belongs to, or -1
-/// @param forces  the sums F
-void correct_forces(const PenalisedTractions& tractions, const std::vector<int>& owner, int threads,
-                    std::vector<AdhesionForce>& forces);
+/// put F right but for m² sᵀ (t − true), (A + m²) s = q, small in both factors (Zhang & Zhang, J. R. Stat. Soc. B 76
+/// (2014) 217; Javanmard & Montanari, J. Mach. Learn. Res. 15 (2014) 2869). Too noisy for a map.
+WaveField taken_by_penalty(const PenalisedTractions& tractions);
+
+/// The forces so corrected, with their standard errors by the noise.
+/// @param corrected_kPa  at the nodes of the field, rows first
+std::vector<AdhesionForce> forces_of(const PenalisedTractions& tractions, const std::vector<Vec2>& corrected_kPa,
+                                     const std::vector<Adhesion>& adhesions, double grow_um, int threads);
 
 }  // namespace mbtfm::inverse

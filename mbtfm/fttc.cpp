@@ -82,6 +82,17 @@ std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<V
   return patches;
 }
 
+std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes) {
+  std::vector<Vec2> vectors;
+  for (int j = 0; j < problem.field().n_rows; ++j) {
+    for (int i = 0; i < problem.field().n_columns; ++i) {
+      const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
+      vectors.push_back({nodes.x[at], nodes.y[at]});
+    }
+  }
+  return vectors;
+}
+
 Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs) {
   Reconstruction r;
   r.remark = "no bead has moved: there is no traction";
@@ -105,22 +116,23 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   const ReadOut read_out = parameters.read_out == "cells" ? ReadOut::cells : ReadOut::points;
   const WaveField waves = solver.solution();
   const NodeField displacements = problem.displaced(waves);
-  const auto patches = [&](double gaussian_um) {
-    return patches_of(problem, tractions_kPa(problem, waves, read_out, gaussian_um), displacements);
-  };
-  r.patches = patches(0);
+  r.patches = patches_of(problem, tractions_kPa(problem, waves, read_out, parameters.gaussian_um), displacements);
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
-  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
-  correct_forces({.problem = problem,
-                  .displacements = displacements,
-                  .tikhonov_lambda = r.lambda,
-                  .lambda_by_gcv = r.scan->by_gcv,
-                  .variance = r.scan->variance},
-                 adhesion_of_patches(positions_of(r.patches), inputs.adhesions, parameters.grow_um), threads, r.forces);
-  // smooths the map alone: it would carry force over the adhesions' rims
-  if (parameters.gaussian_um > 0) r.patches = patches(parameters.gaussian_um);
+  if (!inputs.adhesions.empty()) {
+    const PenalisedTractions penalised{.problem = problem,
+                                       .displacements = displacements,
+                                       .tikhonov_lambda = r.lambda,
+                                       .lambda_by_gcv = r.scan->by_gcv,
+                                       .variance = r.scan->variance};
+    WaveField corrected = taken_by_penalty(penalised);
+    corrected.x += waves.x;
+    corrected.y += waves.y;
+    // without the Gaussian filter, which is for the map: it would carry force over the adhesions' rims
+    r.forces = forces_of(penalised, tractions_kPa(problem, corrected, read_out, 0), inputs.adhesions,
+                         parameters.grow_um, threads);
+  }
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},
                {"lattice_rows", std::int64_t(problem.field().n_rows)}};
@@ -147,15 +159,7 @@ std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& 
     read.x.segment(row, n_half) *= by_row[j] * by_column;
     read.y.segment(row, n_half) *= by_row[j] * by_column;
   }
-  const NodeField nodes = problem.transform().backward(std::move(read), problem.threads());
-  std::vector<Vec2> tractions;
-  for (int j = 0; j < problem.field().n_rows; ++j) {
-    for (int i = 0; i < problem.field().n_columns; ++i) {
-      const Eigen::Index at = i + static_cast<Eigen::Index>(box.n_columns) * j;
-      tractions.push_back({nodes.x[at], nodes.y[at]});
-    }
-  }
-  return tractions;
+  return on_field(problem, problem.transform().backward(std::move(read), problem.threads()));
 }
 
 }  // namespace mbtfm::inverse

@@ -22,6 +22,9 @@ LatticeOptions lattice_options(const TractionParameters& parameters, int threads
 std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
                               const NodeField& displacements);
 
+/// Vectors at the nodes of the field, rows first.
+std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes);
+
 /// Where all displacements are zero: no tractions, and a remark that says so.
 Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs);
 

@@ -139,23 +139,20 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
 
   Reconstruction r;
   const NodeField displacements = problem.displaced(problem.transform().forward(choice.tractions));
-  std::vector<Vec2> tractions;
-  int n_active = 0;
-  for (int j = 0; j < problem.field().n_rows; ++j) {
-    for (int i = 0; i < problem.field().n_columns; ++i) {
-      const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
-      tractions.push_back({choice.tractions.x[at], choice.tractions.y[at]});
-      if (norm(tractions.back()) > 0) ++n_active;
-    }
-  }
+  const std::vector<Vec2> tractions = on_field(problem, choice.tractions);
+  const auto n_active = std::count_if(tractions.begin(), tractions.end(), [](Vec2 t) { return norm(t) > 0; });
   r.patches = patches_of(problem, tractions, displacements);
-  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
-  correct_forces({.problem = problem,
-                  .displacements = displacements,
-                  .tikhonov_lambda = {},
-                  .lambda_by_gcv = scan.by_gcv,
-                  .variance = scan.variance},
-                 adhesion_of_patches(positions_of(r.patches), inputs.adhesions, parameters.grow_um), threads, r.forces);
+  if (!inputs.adhesions.empty()) {
+    const PenalisedTractions penalised{.problem = problem,
+                                       .displacements = displacements,
+                                       .tikhonov_lambda = {},
+                                       .lambda_by_gcv = scan.by_gcv,
+                                       .variance = scan.variance};
+    NodeField corrected = problem.transform().backward(taken_by_penalty(penalised));
+    corrected.x += choice.tractions.x;
+    corrected.y += choice.tractions.y;
+    r.forces = forces_of(penalised, on_field(problem, corrected), inputs.adhesions, parameters.grow_um, threads);
+  }
   r.relative_l2 = std::sqrt(choice.misfit / problem.data_squared());
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"penalty_um2_per_kPa", choice.weight},
