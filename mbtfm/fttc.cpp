@@ -129,8 +129,8 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
     WaveField corrected = taken_by_penalty(penalised);
     corrected.x += waves.x;
     corrected.y += waves.y;
-    // without the Gaussian filter, which is for the map: it would carry force over the adhesions' rims
-    r.forces = forces_of(penalised, tractions_kPa(problem, corrected, read_out, 0), inputs.adhesions,
+    // Neither the cells' means nor the Gaussian filter: both carry force over the adhesions' rims.
+    r.forces = forces_of(penalised, tractions_kPa(problem, corrected, ReadOut::points, 0), inputs.adhesions,
                          parameters.grow_um, threads);
   }
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},

@@ -140,7 +140,8 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
   Reconstruction r;
   const NodeField displacements = problem.displaced(problem.transform().forward(choice.tractions));
   const std::vector<Vec2> tractions = on_field(problem, choice.tractions);
-  const auto n_active = std::count_if(tractions.begin(), tractions.end(), [](Vec2 t) { return norm(t) > 0; });
+  const auto n_active =
+      std::count_if(tractions.begin(), tractions.end(), [](Vec2 traction) { return norm(traction) > 0; });
   r.patches = patches_of(problem, tractions, displacements);
   if (!inputs.adhesions.empty()) {
     const PenalisedTractions penalised{.problem = problem,
