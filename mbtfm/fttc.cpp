@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/parallel.h"
+#include "mbtfm/force_correction.h"
 
 namespace mbtfm::inverse {
 
@@ -58,41 +58,6 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
   });
 }
 
-TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
-                           double lambda) {
-  const Lattice &field = problem.field(), &box = problem.box();
-  const double area = field.spacing_um * field.spacing_um;
-  NodeField q = problem.transform().no_field();
-  for (std::size_t p = 0; p < owner.size(); ++p) {
-    if (owner[p] != force) continue;
-    const auto row = static_cast<Eigen::Index>(p) / field.n_columns,
-               column = static_cast<Eigen::Index>(p) % field.n_columns;
-    q.x[column + box.n_columns * row] = area * direction.x;
-    q.y[column + box.n_columns * row] = area * direction.y;
-  }
-  TikhonovSolver solver(problem, problem.transform().forward(q), 1);
-  solver.solve(lambda, kScanTolerance);
-  return solver;
-}
-
-namespace {
-
-std::vector<AdhesionForce> forces_of(const LatticeProblem& problem, const std::vector<Patch>& patches,
-                                     const TractionInputs& inputs, const TractionParameters& parameters, double lambda,
-                                     double variance, int threads) {
-  const std::vector<int> owner = adhesion_of_patches(positions_of(patches), inputs.adhesions, parameters.grow_um);
-  std::vector<AdhesionForce> forces = forces_by_adhesion(patches, inputs.adhesions, parameters.grow_um);
-  parallel_for(static_cast<int>(forces.size()), threads, [&](int f) {
-    AdhesionForce& force = forces[static_cast<std::size_t>(f)];
-    const TikhonovSolver probe = force_probe(problem, owner, f, direction_of(force.force_nN), lambda);
-    const double squared = probe.displaced_squared();
-    if (squared > 0) force.sigma_nN = std::sqrt(variance * squared);  // beyond the field nothing is known of a force
-  });
-  return forces;
-}
-
-}  // namespace
-
 LatticeOptions lattice_options(const TractionParameters& p, int threads) {
   return {.model = p.gel_model == "layer" ? GelModel::layer : GelModel::half_space,
           .spacing_um = p.spacing_um,
@@ -115,6 +80,17 @@ std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<V
     }
   }
   return patches;
+}
+
+std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes) {
+  std::vector<Vec2> vectors;
+  for (int j = 0; j < problem.field().n_rows; ++j) {
+    for (int i = 0; i < problem.field().n_columns; ++i) {
+      const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
+      vectors.push_back({nodes.x[at], nodes.y[at]});
+    }
+  }
+  return vectors;
 }
 
 Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs) {
@@ -144,7 +120,19 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
-  r.forces = forces_of(problem, r.patches, inputs, parameters, *r.lambda, r.scan->variance, threads);
+  if (!inputs.adhesions.empty()) {
+    const PenalisedTractions penalised{.problem = problem,
+                                       .displacements = displacements,
+                                       .tikhonov_lambda = r.lambda,
+                                       .lambda_by_gcv = r.scan->by_gcv,
+                                       .variance = r.scan->variance};
+    WaveField corrected = taken_by_penalty(penalised);
+    corrected.x += waves.x;
+    corrected.y += waves.y;
+    // Neither the cells' means nor the Gaussian filter: both carry force over the adhesions' rims.
+    r.forces = forces_of(penalised, tractions_kPa(problem, corrected, ReadOut::points, 0), inputs.adhesions,
+                         parameters.grow_um, threads);
+  }
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},
                {"lattice_rows", std::int64_t(problem.field().n_rows)}};
@@ -171,15 +159,7 @@ std::vector<Vec2> tractions_kPa(const LatticeProblem& problem, const WaveField& 
     read.x.segment(row, n_half) *= by_row[j] * by_column;
     read.y.segment(row, n_half) *= by_row[j] * by_column;
   }
-  const NodeField nodes = problem.transform().backward(std::move(read), problem.threads());
-  std::vector<Vec2> tractions;
-  for (int j = 0; j < problem.field().n_rows; ++j) {
-    for (int i = 0; i < problem.field().n_columns; ++i) {
-      const Eigen::Index at = i + static_cast<Eigen::Index>(box.n_columns) * j;
-      tractions.push_back({nodes.x[at], nodes.y[at]});
-    }
-  }
-  return tractions;
+  return on_field(problem, problem.transform().backward(std::move(read), problem.threads()));
 }
 
 }  // namespace mbtfm::inverse

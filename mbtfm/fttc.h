@@ -16,18 +16,14 @@ enum class ReadOut {
   cells    ///< their mean over the cell around each node: sums of traction times area are forces
 };
 
-/// F = qᵀ t is a force: the sum over given nodes of the field of traction times area, along a direction. This solves
-/// (A + lambda²) s = q, A = G PᵀP G. The tractions of one lambda have the force sᵀ G Pᵀ u, so s tells its variance,
-/// sᵀ A s of one datum's: by the noise alone, what the smoothing takes away is not in it.
-/// @param owner  by node of the field: which force it belongs to, or -1. @param force  the one
-TikhonovSolver force_probe(const LatticeProblem& problem, const std::vector<int>& owner, int force, Vec2 direction,
-                           double lambda);
-
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 
 /// The nodes of the field, rows first. @param displacements  of the box
 std::vector<Patch> patches_of(const LatticeProblem& problem, const std::vector<Vec2>& tractions_kPa,
                               const NodeField& displacements);
+
+/// Vectors at the nodes of the field, rows first.
+std::vector<Vec2> on_field(const LatticeProblem& problem, const NodeField& nodes);
 
 /// Where all displacements are zero: no tractions, and a remark that says so.
 Reconstruction reconstruction_of_nothing(const LatticeProblem& problem, const TractionInputs& inputs);

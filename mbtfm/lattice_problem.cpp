@@ -294,33 +294,78 @@ double product(const std::complex<double>& a, const std::complex<double>& b) {
 
 }  // namespace
 
-int TikhonovSolver::solve(double lambda, double tolerance) {
-  constexpr int kMost = 2000;  // an even field takes a few, a patchy one some tens
-  const SurfaceSpectrum& spectrum = problem_.spectrum();
-  const Eigen::ArrayXd &along = spectrum.along_um_per_kPa(), &across = spectrum.across_um_per_kPa();
+/// The sum of each wave's weight times both numbers that `body` returns.
+template <class Body>
+Eigen::Array2d TikhonovSolver::sum_over_waves(const Body& body) const {
   const Eigen::ArrayXd& weights = problem_.transform().weights();
+  return sum_over_parts(weights.size(), threads_, [&](Eigen::Index begin, Eigen::Index end) {
+    Eigen::Array2d sums = Eigen::Array2d::Zero();
+    for (Eigen::Index k = begin; k < end; ++k) sums += weights[k] * body(k);
+    return sums;
+  });
+}
+
+double TikhonovSolver::energy_of_residual(Eigen::Index k) const {
+  return by_along_[k] * squared(residual_.x[k]) + by_across_[k] * squared(residual_.y[k]);
+}
+
+/// The residual and the preconditioner for another lambda.
+TikhonovSolver::Start TikhonovSolver::restart(double lambda) {
   const double more = lambda * lambda - lambda2_;
   lambda2_ = lambda * lambda;
-  const Eigen::ArrayXd by_along = 1 / (along.square() + lambda2_), by_across = 1 / (across.square() + lambda2_);
-  const auto for_waves = [&](const auto& body) {  // the sum of weight times both numbers that it returns
-    return sum_over_parts(weights.size(), threads_, [&](Eigen::Index begin, Eigen::Index end) {
-      Eigen::Array2d sums = Eigen::Array2d::Zero();
-      for (Eigen::Index k = begin; k < end; ++k) sums += weights[k] * body(k);
-      return sums;
-    });
-  };
-  const auto energy_of_residual = [&](Eigen::Index k) {
-    return by_along[k] * squared(residual_.x[k]) + by_across[k] * squared(residual_.y[k]);
-  };
-
-  // b · t is the energy of the solution; what t lacks of it yet, the residual has
-  const Eigen::Array2d start = for_waves([&](Eigen::Index k) {
+  by_along_ = 1 / (problem_.spectrum().along_um_per_kPa().square() + lambda2_);
+  by_across_ = 1 / (problem_.spectrum().across_um_per_kPa().square() + lambda2_);
+  const Eigen::Array2d sums = sum_over_waves([&](Eigen::Index k) {
     residual_.x[k] -= more * t_.x[k];
     residual_.y[k] -= more * t_.y[k];
     return Eigen::Array2d(energy_of_residual(k), product(b_.x[k], t_.x[k]) + product(b_.y[k], t_.y[k]));
   });
-  double energy = start[0], ratio = 0;
-  const double enough = tolerance * tolerance * (std::abs(start[1]) + energy);
+  return {.residual_energy = sums[0], .solution_energy = sums[1]};
+}
+
+/// The next step: down the preconditioned residual, conjugate to the last by `ratio`. Leaves G PᵀP G step in work_.
+TikhonovSolver::StepSize TikhonovSolver::turn_step(double ratio) {
+  const SurfaceSpectrum& spectrum = problem_.spectrum();
+  const Eigen::ArrayXd &along = spectrum.along_um_per_kPa(), &across = spectrum.across_um_per_kPa();
+  const double step_squared = sum_over_waves([&](Eigen::Index k) {
+    std::complex<double>&x = step_.x[k], &y = step_.y[k];
+    x = by_along_[k] * residual_.x[k] + ratio * x;
+    y = by_across_[k] * residual_.y[k] + ratio * y;
+    work_.x[k] = along[k] * x;
+    work_.y[k] = across[k] * y;
+    spectrum.turn(k, work_.x[k], work_.y[k]);
+    return Eigen::Array2d(squared(x) + squared(y), 0);
+  })[0];
+  problem_.transform().backward(work_, nodes_, threads_);
+  problem_.normal(nodes_, normal_);
+  problem_.transform().forward(normal_, work_, threads_);
+  const double displaced_squared = sum_over_waves([&](Eigen::Index k) {
+    std::complex<double>&x = work_.x[k], &y = work_.y[k];
+    spectrum.turn(k, x, y);
+    x *= along[k];
+    y *= across[k];
+    return Eigen::Array2d(product(x, step_.x[k]) + product(y, step_.y[k]), 0);
+  })[0];
+  return {.squared = step_squared, .displaced_squared = displaced_squared};
+}
+
+/// Along the step. @returns the residual's energy there
+double TikhonovSolver::go(double length) {
+  return sum_over_waves([&](Eigen::Index k) {
+    t_.x[k] += length * step_.x[k];
+    t_.y[k] += length * step_.y[k];
+    residual_.x[k] -= length * (work_.x[k] + lambda2_ * step_.x[k]);
+    residual_.y[k] -= length * (work_.y[k] + lambda2_ * step_.y[k]);
+    return Eigen::Array2d(energy_of_residual(k), 0);
+  })[0];
+}
+
+int TikhonovSolver::solve(double lambda, double tolerance) {
+  constexpr int kMost = 2000;  // an even field takes a few, a patchy one some tens
+  const Start start = restart(lambda);
+  double energy = start.residual_energy, ratio = 0;
+  // b · t is the energy of the solution; what t lacks of it yet, the residual has
+  const double enough = tolerance * tolerance * (std::abs(start.solution_energy) + energy);
   int n = 0;
   for (; energy > enough; ++n) {
     if (n == kMost) {
@@ -330,33 +375,8 @@ int TikhonovSolver::solve(double lambda, double tolerance) {
                        .reason = "the tractions did not settle in " + std::to_string(n) +
                                  " steps: lambda is far too small for so uneven a field"});
     }
-    const double step_squared = for_waves([&](Eigen::Index k) {
-      std::complex<double>&x = step_.x[k], &y = step_.y[k];
-      x = by_along[k] * residual_.x[k] + ratio * x;
-      y = by_across[k] * residual_.y[k] + ratio * y;
-      work_.x[k] = along[k] * x;
-      work_.y[k] = across[k] * y;
-      spectrum.turn(k, work_.x[k], work_.y[k]);
-      return Eigen::Array2d(squared(x) + squared(y), 0);
-    })[0];
-    problem_.transform().backward(work_, nodes_, threads_);
-    problem_.normal(nodes_, normal_);
-    problem_.transform().forward(normal_, work_, threads_);
-    const double step_displaced = for_waves([&](Eigen::Index k) {
-      std::complex<double>&x = work_.x[k], &y = work_.y[k];
-      spectrum.turn(k, x, y);
-      x *= along[k];
-      y *= across[k];
-      return Eigen::Array2d(product(x, step_.x[k]) + product(y, step_.y[k]), 0);
-    })[0];
-    const double length = energy / (step_displaced + lambda2_ * step_squared);
-    const double next_energy = for_waves([&](Eigen::Index k) {
-      t_.x[k] += length * step_.x[k];
-      t_.y[k] += length * step_.y[k];
-      residual_.x[k] -= length * (work_.x[k] + lambda2_ * step_.x[k]);
-      residual_.y[k] -= length * (work_.y[k] + lambda2_ * step_.y[k]);
-      return Eigen::Array2d(energy_of_residual(k), 0);
-    })[0];
+    const StepSize step = turn_step(ratio);
+    const double next_energy = go(energy / (step.displaced_squared + lambda2_ * step.squared));
     ratio = next_energy / energy;
     energy = next_energy;
   }

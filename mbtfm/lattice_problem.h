@@ -91,10 +91,23 @@ class TikhonovSolver {
   double displaced_squared() const;               ///< |P G t|²
 
  private:
+  struct Start {
+    double residual_energy = 0, solution_energy = 0;
+  };
+  struct StepSize {
+    double squared = 0, displaced_squared = 0;
+  };
+  Start restart(double lambda);
+  StepSize turn_step(double ratio);
+  double go(double length);
+  template <class Body>
+  Eigen::Array2d sum_over_waves(const Body& body) const;
+  double energy_of_residual(Eigen::Index k) const;
   const LatticeProblem& problem_;
   int threads_;
   double lambda2_ = 0;
-  WaveField b_, t_, residual_;  ///< residual: b − (G PᵀP G + lambda²) t
+  Eigen::ArrayXd by_along_, by_across_;  ///< the preconditioner
+  WaveField b_, t_, residual_;           ///< residual: b − (G PᵀP G + lambda²) t
   WaveField step_, work_;
   NodeField nodes_, normal_;
 };

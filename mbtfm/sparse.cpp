@@ -3,9 +3,9 @@
 #include <cmath>
 #include <limits>
 
+#include "mbtfm/force_correction.h"
 #include "mbtfm/fttc.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/parallel.h"
 
 namespace mbtfm::inverse {
 
@@ -119,29 +119,6 @@ Choice choose_weight(const LatticeProblem& problem, double largest_kPa) {
   return *std::find_if(path.begin(), path.end(), [&](const Choice& c) { return c.criterion <= tolerance * least; });
 }
 
-/// The penalty shortens every traction, and forces with it. F + sᵀ G Pᵀ (u − P G t) with the probe s of the force puts
-/// that right but for lambda² sᵀ (t − true), small in both factors, and has the variance of sᵀ G Pᵀ u (Zhang & Zhang,
-/// J. R. Stat. Soc. B 76 (2014) 217; Javanmard & Montanari, J. Mach. Learn. Res. 15 (2014) 2869).
-void correct_forces(const LatticeProblem& problem, const NodeField& tractions, const std::vector<int>& owner,
-                    double lambda, double variance, int threads, std::vector<AdhesionForce>& forces) {
-  const NodeField displaced = problem.displaced(problem.transform().forward(tractions));
-  NodeField left = problem.transform().no_field();
-  problem.normal(displaced, left);
-  left.x = problem.spread_data().x - left.x;
-  left.y = problem.spread_data().y - left.y;
-  const WaveField pulled = problem.pulled_back(left);
-  parallel_for(static_cast<int>(forces.size()), threads, [&](int f) {
-    AdhesionForce& force = forces[static_cast<std::size_t>(f)];
-    const Vec2 along = direction_of(force.force_nN), across{-along.y, along.x};
-    for (const Vec2 direction : {along, across}) {
-      const TikhonovSolver probe = force_probe(problem, owner, f, direction, lambda);
-      force.force_nN += problem.transform().dot(probe.solution(), pulled) * direction;
-      const double squared = probe.displaced_squared();
-      if (direction == along && squared > 0) force.sigma_nN = std::sqrt(variance * squared);
-    }
-  });
-}
-
 }  // namespace
 
 Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
@@ -162,23 +139,21 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
 
   Reconstruction r;
   const NodeField displacements = problem.displaced(problem.transform().forward(choice.tractions));
-  std::vector<Vec2> tractions;
-  int n_active = 0;
-  for (int j = 0; j < problem.field().n_rows; ++j) {
-    for (int i = 0; i < problem.field().n_columns; ++i) {
-      const Eigen::Index at = i + static_cast<Eigen::Index>(problem.box().n_columns) * j;
-      tractions.push_back({choice.tractions.x[at], choice.tractions.y[at]});
-      if (norm(tractions.back()) > 0) ++n_active;
-    }
-  }
+  const std::vector<Vec2> tractions = on_field(problem, choice.tractions);
+  const auto n_active =
+      std::count_if(tractions.begin(), tractions.end(), [](Vec2 traction) { return norm(traction) > 0; });
   r.patches = patches_of(problem, tractions, displacements);
-  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
-  // Of cross-validation's lambda: the part not put right goes with its square. Measured at 2 to 10 % noise: at the
-  // whole it is seen beside the error, below a quarter the error grows for little.
-  constexpr double kShare = 0.25;
-  correct_forces(problem, choice.tractions,
-                 adhesion_of_patches(positions_of(r.patches), inputs.adhesions, parameters.grow_um),
-                 kShare * scan.by_gcv, scan.variance, threads, r.forces);
+  if (!inputs.adhesions.empty()) {
+    const PenalisedTractions penalised{.problem = problem,
+                                       .displacements = displacements,
+                                       .tikhonov_lambda = {},
+                                       .lambda_by_gcv = scan.by_gcv,
+                                       .variance = scan.variance};
+    NodeField corrected = problem.transform().backward(taken_by_penalty(penalised));
+    corrected.x += choice.tractions.x;
+    corrected.y += choice.tractions.y;
+    r.forces = forces_of(penalised, on_field(problem, corrected), inputs.adhesions, parameters.grow_um, threads);
+  }
   r.relative_l2 = std::sqrt(choice.misfit / problem.data_squared());
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"penalty_um2_per_kPa", choice.weight},

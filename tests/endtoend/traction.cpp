@@ -79,7 +79,8 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
 
 TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_force) {
   const test::TemporaryFolder folder;
-  for (const int strength : {1, 2, 3}) {
+  constexpr int kNotConverged = 4;  // its fit says a force that would turn the line, were it not left out
+  for (const int strength : {1, 2, 3, kNotConverged}) {
     test::EllipseScene scene = test::ellipse_scene(64, 0.03, static_cast<unsigned>(strength));
     for (Bead& b : scene.field) b.displacement_um = double(strength) * b.displacement_um;
     const fs::path cell = folder / ("cell_" + std::to_string(strength));
@@ -88,14 +89,15 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     write_displacement(cell / "2_track/displacement.csv", scene.field);
     write_outline(cell / "1_segment/outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
     FitSummary fit;
-    fit.total_force_nN = 89.8 * strength;
-    fit.converged = true;
+    fit.converged = strength != kNotConverged;
+    fit.total_force_nN = fit.converged ? 89.8 * strength : 1;
     write_fit_summary(cell / "4_fit/fit.json", fit);
   }
   const auto run = test::run_program("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
                                      (folder / "calibration.csv").string());
   ASSERT_EQ(run.code, 0) << run.output;
   EXPECT_NE(run.output.find("FTTC gives the forces of the fit at lambda E"), std::string::npos) << run.output;
+  EXPECT_NE(run.output.find("1 left out, whose fit has not converged"), std::string::npos) << run.output;
   const CsvTable table(folder / "calibration.csv");
   // forces in proportion, and the same noise: nearly one line at any lambda; the less smoothing the steeper
   for (int row = 1; row < table.n_rows(); ++row) {
@@ -103,6 +105,7 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     EXPECT_GT(table.number(row, "correlation"), 0.9);
   }
   EXPECT_EQ(CsvTable(folder / "calibration_cells.csv").n_rows(), 3 * table.n_rows());
+  EXPECT_EQ(read_text(folder / "calibration_cells.csv").find("cell_4"), std::string::npos);
   const std::string picture = read_text(folder / "calibration.svg");
   EXPECT_NE(picture.find("slope one at ℓ = "), std::string::npos);
 }
