@@ -93,7 +93,7 @@ class Builder {
       const BoundaryPlace place = boundary_.place(a.position_um);
       if (!place.is_inside && place.distance_um > kSnapReach * edge_) {
         throw InvalidData("adhesion " + std::to_string(a.adhesion_id),
-                          "a place inside the cell or within one edge length (" + shown(edge_) + ") of it",
+                          "a place inside the outline or within one edge length (" + shown(edge_) + ") of it",
                           "it " + shown(place.distance_um) + (place.is_in_hole ? " inside a hole" : " outside"));
       }
       if (!place.is_inside) frame_.snapped_adhesion_ids.push_back(a.adhesion_id);

@@ -46,8 +46,8 @@ TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
   Cell cell = test::round_cell(12, 12);
   test::add_ventral(cell, 1, 7);
   test::add_ventral(cell, 3, 9);
-  Fibre beside = cell.fibres[0];  // in the middle of the cell, with free ends
-  for (Vec2& p : beside.points_um) p = Vec2{30 + 0.4 * (p.x - 30), 30.1};
+  Fibre beside = cell.fibres[0];  // away from the others, with free ends
+  for (Vec2& p : beside.points_um) p = Vec2{30 + 0.4 * (p.x - 30), 36};
   beside.type = FibreType::arc;
   beside.start_adhesion_id = beside.end_adhesion_id = {};
   for (int i = 0; i < 2; ++i) {
