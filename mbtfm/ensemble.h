@@ -63,7 +63,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
                          const std::optional<Eigen::VectorXd>& start_nN = {});
 
 /// 95 % interval of a positive quantity: both parts of the error combined to either side. Student's t with the degrees
-/// of freedom that they have together (Welch–Satterthwaite): many for the fitted one, meshes − 1 for the spread.
+/// of freedom that they have together (Welch–Satterthwaite): many for the noise, meshes − 1 for what meshes tell.
 struct Interval {
   double low = 0, high = 0;
 };
