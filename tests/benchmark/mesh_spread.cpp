@@ -32,7 +32,7 @@ constexpr Formulation kFormulations[] = {{"thesis: link values, points", "equal"
                                          {"width, ellipses", "width", "ellipse", "jittered", true, 0},
                                          {"width, ellipses, regular", "width", "ellipse", "regular", true, 0},
                                          {"width, ellipses, Poisson disc", "width", "ellipse", "poisson", true, 0},
-                                         {"width, rims", "width", "rim", "jittered", true, 0.9}};
+                                         {"width, rims (dashed)", "width", "rim", "jittered", true, 0.9}};
 constexpr double kEdges_um[] = {3, 2, 1.5, 1, 0.7, 0.4};
 
 /// What one mesh gives.
