@@ -48,7 +48,7 @@ inline charts::Axis axis_of(const Panel& panel, bool is_x) {
   charts::Axis axis = charts::axis_over(is_x ? panel.x_label : panel.y_label, values,
                                         is_log ? charts::Scale::logarithmic : charts::Scale::linear);
   if (is_x) return axis;
-  const double room = panel.series.size() > 1 ? 0.09 * static_cast<double>(panel.series.size()) : 0;
+  const double room = panel.series.size() > 1 ? 0.13 * static_cast<double>(panel.series.size()) : 0;
   if (is_log) {
     axis.high *= std::pow(axis.high / axis.low, room);
   } else {
