@@ -175,6 +175,14 @@ void add_estimates(EnsembleFit& all) {
   }
 }
 
+TensionFit fit_first(const network::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
+                     const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
+                     const std::optional<Eigen::VectorXd>& start_nN) {
+  if (parameters.loss != "squares") return fit_reweighted(data, network, adhesion_ids, parameters, threads, start_nN);
+  const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit);
+  return fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
+}
+
 /// What each mesh makes of these tensions.
 std::vector<MeshForces> forces_at(const std::vector<network::CableNetwork>& networks, const ReducedData& data,
                                   const std::vector<int>& adhesion_ids, const Trial& trial, int threads) {
@@ -223,40 +231,31 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   int n_done = 0;
   const auto tell = [&] {
     const std::lock_guard lock(mutex);
-    if (progress) progress(double(++n_done) / n_meshes, "fitting tensions on " + std::to_string(n_meshes) + " meshes");
+    if (progress)
+      progress(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
   };
-  {
-    TensionFit first;
-    if (parameters.loss == "squares") {
-      const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, solved_misfit);
-      first = fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
-    } else {
-      first = fit_reweighted(data, networks.front(), adhesion_ids, parameters, threads, start_nN);
-    }
-    all.meshes.front() = describe(TensionProblem(networks.front(), data.reduced, adhesion_ids), std::move(first));
-    tell();
-  }
+  TensionFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start_nN);
+  tell();
   all.data = data.reduced;
-  const Eigen::VectorXd answer = all.meshes.front().fit.trial.tensions_nN;
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
-  const bool has_model_error = parameters.model_error == "meshes" && n_meshes >= kFewestForModelError && !solved_misfit;
-  if (has_model_error) {
-    const double variance = noise_variance(data, all.meshes.front().fit.trial.forces_nN, n_tensions, parameters.loss);
-    all.model_error = model_error(
-        forces_at(networks, data.reduced, adhesion_ids, all.meshes.front().fit.trial, threads), data.reduced, variance);
+  if (parameters.model_error == "meshes" && n_meshes >= kFewestForModelError && !solved_misfit) {
+    const double variance = noise_variance(data, first.trial.forces_nN, n_tensions, parameters.loss);
+    all.model_error =
+        model_error(forces_at(networks, data.reduced, adhesion_ids, first.trial, threads), data.reduced, variance);
     all.data = all.model_error->data;
   }
+  const Eigen::VectorXd answer = first.trial.tensions_nN;
   parallel_for(n_meshes, threads, [&](int m) {
-    if (m == 0 && !has_model_error) return;
     const auto i = static_cast<std::size_t>(m);
     const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit);
-    all.meshes[i] = describe(problem, fit_tensions(problem, parameters, 1, answer));
+    const bool is_done = m == 0 && !all.model_error;
+    all.meshes[i] = describe(problem, is_done ? std::move(first) : fit_tensions(problem, parameters, 1, answer));
     tell();
   });
   add_means(all);
   all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
                                static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
-  all.variance = has_model_error ? all.model_error->noise_variance
+  all.variance = all.model_error ? all.model_error->noise_variance
                                  : misfit_variance(data, all.forces_nN, n_tensions, parameters.loss);
   parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   add_estimates(all);
