@@ -54,9 +54,8 @@ void declare(ParameterList& list, SubstrateParameters& parameters);
 /// A solution inside the gel, on boxes.
 struct VolumeField {
   std::vector<std::array<double, 3>> points_um, displacement_um;
-  std::vector<int> box_corners;  ///< 8 points a box: the upper face round, then the lower one
-  std::vector<std::array<double, 6>>
-      stress_kPa;  ///< at the centre of each box: xx, yy, zz, xy, yz, xz; empty: not asked
+  std::vector<int> box_corners;                   ///< 8 points a box: the upper face round, then the lower one
+  std::vector<std::array<double, 6>> stress_kPa;  ///< mean over each box: xx, yy, zz, xy, yz, xz; empty: not asked
 };
 
 class Substrate {

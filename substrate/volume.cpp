@@ -6,49 +6,73 @@ namespace mbtfm::substrate {
 namespace {
 
 using Gradient = std::array<std::array<double, 3>, 3>;  ///< [i][j] = d u_i / d x_j
+using Part = std::array<int, 3>;                        ///< of a box cut at its nodes: half of each side, or all of it
 
-/// Of the shape functions' sum at the centre of a box, where its mean is for trilinear elements.
-Gradient gradient_at_centre(const BlockMesh& mesh, int cell, const std::vector<std::array<double, 3>>& u) {
+Part index_of(int k, int n) { return {k % n, k / n % n, k / (n * n)}; }
+
+/// At each node of a box.
+std::vector<Gradient> gradients(const BlockMesh& mesh, int cell, const std::vector<std::array<double, 3>>& u) {
   const int n = mesh.order + 1;
-  const auto value = shape_values(mesh.order, 0.5), slope = shape_slopes(mesh.order, 0.5);
-  Gradient gradient{};
+  const int stride[3] = {1, n, n * n};
+  std::vector<Gradient> at_node(mesh.nodes_per_cell());
   for (int k = 0; k < mesh.nodes_per_cell(); ++k) {
-    const int index[3] = {k % n, k / n % n, k / (n * n)};
+    const Part index = index_of(k, n);
     for (int j = 0; j < 3; ++j) {
-      double d = 1 / mesh.cells[cell].size_um[j];
-      for (int axis = 0; axis < 3; ++axis) d *= axis == j ? slope[index[axis]] : value[index[axis]];
-      for (int i = 0; i < 3; ++i) gradient[i][j] += d * u[mesh.nodes_of(cell)[k]][i];
+      const auto slope = shape_slopes(mesh.order, static_cast<double>(index[j]) / mesh.order);
+      for (int m = 0; m < n; ++m) {
+        const int node = mesh.nodes_of(cell)[k + (m - index[j]) * stride[j]];
+        for (int i = 0; i < 3; ++i) at_node[k][i][j] += slope[m] / mesh.cells[cell].size_um[j] * u[node][i];
+      }
     }
   }
-  return gradient;
+  return at_node;
 }
 
-/// Mean of div u over a box, from the displacement through its faces: what the element's pressure takes at its centre.
-double mean_divergence(const BlockMesh& mesh, int cell, const std::vector<std::array<double, 3>>& u) {
-  // Simpson's rule and the trapezoidal one: exact for quadratic and linear faces
-  const std::array<double, 3> weight =
-      mesh.order == 1 ? std::array{0.5, 0.5, 0.0} : std::array{1.0 / 6, 4.0 / 6, 1.0 / 6};
-  const int n = mesh.order + 1;
-  double sum = 0;
-  for (int k = 0; k < mesh.nodes_per_cell(); ++k) {
-    const int index[3] = {k % n, k / n % n, k / (n * n)};
-    for (int axis = 0; axis < 3; ++axis) {
-      if (index[axis] != 0 && index[axis] != mesh.order) continue;
-      const double across = weight[index[(axis + 1) % 3]] * weight[index[(axis + 2) % 3]];
-      sum += (index[axis] == 0 ? -1 : 1) * across * u[mesh.nodes_of(cell)[k]][axis] / mesh.cells[cell].size_um[axis];
+/// Mean of a linear or quadratic function over a part of [0, 1], from its values at the nodes.
+std::array<double, 3> mean_weights(int order, int part) {
+  if (order == 1) return {0.5, 0.5, 0};
+  return part == 0 ? std::array{5.0 / 12, 8.0 / 12, -1.0 / 12} : std::array{-1.0 / 12, 8.0 / 12, 5.0 / 12};
+}
+
+/// Means over a part of a box: they add up to those that the elements' balance of forces is made of.
+Gradient mean_gradient(int order, const std::vector<Gradient>& at_node, const Part& part) {
+  Gradient mean{};
+  for (int k = 0; k < static_cast<int>(at_node.size()); ++k) {
+    double weight = 1;
+    for (int j = 0; j < 3; ++j) weight *= mean_weights(order, part[j])[index_of(k, order + 1)[j]];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) mean[i][j] += weight * at_node[k][i][j];
     }
+  }
+  return mean;
+}
+
+/// The element's pressure, over -lambda, in the middle of a part: div u projected onto 1, x, y, z (or 1, for order 1).
+/// With t = x - 1/2 its slope is 12 (div u, t), by Simpson's rule, exact here; nodes lie at t = 0 and 1/2 to either
+/// side, the part's middle at 1/4: 12 / (2 · 4) = 3/2.
+double projected_divergence(int order, const std::vector<Gradient>& at_node, const Part& part) {
+  double sum = 0;
+  for (int k = 0; k < static_cast<int>(at_node.size()); ++k) {
+    const Part index = index_of(k, order + 1);
+    double whole = 1, linear = 1;
+    for (int j = 0; j < 3; ++j) {
+      whole *= 0.5 * (mean_weights(order, 0)[index[j]] + mean_weights(order, 1)[index[j]]);
+      if (order == 2) linear += 1.5 * (2 * part[j] - 1) * (index[j] - 1);
+    }
+    sum += whole * linear * (at_node[k][0][0] + at_node[k][1][1] + at_node[k][2][2]);
   }
   return sum;
 }
 
-std::array<double, 6> stress_kPa(const BlockMesh& mesh, int cell, const Material& material,
-                                 const std::vector<std::array<double, 3>>& u) {
-  const Box& box = mesh.cells[cell];
-  const double middle = box.low_um[2] + 0.5 * box.size_um[2];
-  const double mu = shear_modulus_kPa(material.gel) * relative_modulus(material, middle, middle + box.size_um[2]);
+/// Mean over a part of a box.
+std::array<double, 6> stress_kPa(const BlockMesh& mesh, int cell, const Part& part, const Material& material,
+                                 const std::vector<Gradient>& at_node) {
+  const double height = mesh.cells[cell].size_um[2] / mesh.order;
+  const double middle = mesh.cells[cell].low_um[2] + (part[2] + 0.5) * height;
+  const double mu = shear_modulus_kPa(material.gel) * relative_modulus(material, middle, middle + height);
   const double nu = material.gel.poisson_ratio;
-  const Gradient g = gradient_at_centre(mesh, cell, u);
-  const double even = 2 * mu * nu / (1 - 2 * nu) * mean_divergence(mesh, cell, u);
+  const Gradient g = mean_gradient(mesh.order, at_node, part);
+  const double even = 2 * mu * nu / (1 - 2 * nu) * projected_divergence(mesh.order, at_node, part);
   return {2 * mu * g[0][0] + even,  2 * mu * g[1][1] + even,  2 * mu * g[2][2] + even,
           mu * (g[0][1] + g[1][0]), mu * (g[1][2] + g[2][1]), mu * (g[0][2] + g[2][0])};
 }
@@ -60,20 +84,24 @@ VolumeField volume_field(const ElasticSystem& system, const Material& material, 
   const BlockMesh& mesh = system.mesh();
   const auto values = system.at_all_nodes(u);
   VolumeField field;
-  std::vector<int> point_of_node(values.size(), -1);  // corners alone
-  const int n = mesh.order + 1, e = mesh.order;
-  const int corners[8] = {0, e, e * n + e, e * n, e * n * n, e * n * n + e, e * n * n + e * n + e, e * n * n + e * n};
-  for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
-    for (const int corner : corners) {
-      const int node = mesh.nodes_of(static_cast<int>(cell))[corner];
-      if (point_of_node[node] < 0) {
-        point_of_node[node] = static_cast<int>(field.points_um.size());
-        field.points_um.push_back(mesh.position_um[node]);
-        field.displacement_um.push_back(values[node]);
+  std::vector<int> point_of_node(values.size(), -1);
+  const int n = mesh.order + 1;
+  const int corners[8] = {0, 1, n + 1, n, n * n, n * n + 1, n * n + n + 1, n * n + n};
+  for (int cell = 0; cell < static_cast<int>(mesh.cells.size()); ++cell) {
+    const std::vector<Gradient> at_node = with_stress ? gradients(mesh, cell, values) : std::vector<Gradient>();
+    for (int k = 0; k < mesh.order * mesh.order * mesh.order; ++k) {
+      const Part part = index_of(k, mesh.order);
+      for (const int corner : corners) {
+        const int node = mesh.nodes_of(cell)[part[0] + n * (part[1] + n * part[2]) + corner];
+        if (point_of_node[node] < 0) {
+          point_of_node[node] = static_cast<int>(field.points_um.size());
+          field.points_um.push_back(mesh.position_um[node]);
+          field.displacement_um.push_back(values[node]);
+        }
+        field.box_corners.push_back(point_of_node[node]);
       }
-      field.box_corners.push_back(point_of_node[node]);
+      if (with_stress) field.stress_kPa.push_back(stress_kPa(mesh, cell, part, material, at_node));
     }
-    if (with_stress) field.stress_kPa.push_back(stress_kPa(mesh, static_cast<int>(cell), material, values));
   }
   return field;
 }

@@ -5,7 +5,7 @@
 
 namespace mbtfm::substrate {
 
-/// @param with_stress  of each box at its centre, the pressure being the element's own
+/// @param with_stress  mean over each box
 VolumeField volume_field(const ElasticSystem& system, const Material& material, const NodalColumn& u, bool with_stress);
 
 }  // namespace mbtfm::substrate

@@ -235,6 +235,69 @@ TEST(Vertical, of_split_and_refined_agree) {
   }
 }
 
+/// Force (nN) that the stress carries across the horizontal cut in the middle of each of `n` slices of the gel: of the
+/// boxes it meets, stress times area.
+std::vector<Vec2> forces_across(const VolumeField& field, double thickness_um, int n) {
+  std::vector<Vec2> forces(n);
+  for (std::size_t box = 0; box < field.stress_kPa.size(); ++box) {
+    const auto& low = field.points_um[field.box_corners[8 * box]];
+    const auto& high = field.points_um[field.box_corners[8 * box + 6]];
+    const auto& s = field.stress_kPa[box];
+    for (int k = 0; k < n; ++k) {
+      const double depth = thickness_um * (k + 0.5) / n;
+      if (depth > low[2] && depth < high[2]) forces[k] += (high[0] - low[0]) * (high[1] - low[1]) * Vec2{s[5], s[4]};
+    }
+  }
+  return forces;
+}
+
+struct Imbalance {
+  double mean, rms;  // over all depths, as shares of the load
+};
+
+Imbalance imbalance(const char* element, double poisson_ratio, double growth) {
+  SubstrateParameters parameters = refined_to(0);
+  parameters.stress = true;
+  parameters.precision = "double";
+  parameters.element = element;
+  parameters.margin_thicknesses = 1;
+  parameters.elements_across_adhesion = 2 / growth;
+  parameters.growth = std::string(element) == "q1-p0" ? 8 * growth : growth;  // the same meshes
+  const Vec2 load = {2, 1};
+  const VolumeField field =
+      make_substrate(gel_of(poisson_ratio, 10), parameters, 2)->volume({{{0, 0}, 4, 2, 0.4}}, {load});
+  constexpr int kCuts = 128;  // none along a face of boxes, which halve the thickness some five times
+  Vec2 sum;
+  double squares = 0;
+  for (const Vec2 across : forces_across(field, 10, kCuts)) {
+    sum += 1.0 / kCuts * (load + across);
+    squares += dot(load + across, load + across) / kCuts;
+  }
+  return {norm(sum) / norm(load), std::sqrt(squares) / norm(load)};
+}
+
+TEST(Volume, carries_the_load_down_to_the_base) {
+  const double tiny = 1e-8;  // rounding times the condition: lambda / mu = 5000 by the gel's by the boxes' size squared
+  for (const char* element : {"q2-p1disc", "q1-p0"}) {
+    for (const double nu : {0.3, 0.4999}) {
+      SCOPED_TRACE(std::string(element) + " nu " + std::to_string(nu));
+      // the virtual displacement 1 - z/h belongs to all meshes: as a mean over depth the balance is exact on any; on
+      // one of equal boxes every layer's own belongs to it
+      EXPECT_LT(imbalance(element, nu, 2).rms, tiny);
+      // where large boxes lie beside small ones each stands for the whole of its height: to first order in their side,
+      // but for the block's edges on the base, where the stress is singular: at least to order 1/2
+      double before = imbalance(element, nu, 1).rms;
+      for (const double growth : {0.5, 0.25}) {
+        const Imbalance finer = imbalance(element, nu, growth);
+        EXPECT_LT(finer.mean, tiny);
+        EXPECT_LT(finer.rms, std::sqrt(0.5) * before);
+        before = finer.rms;
+        if (std::string(element) != "q1-p0") break;  // the next is large
+      }
+    }
+  }
+}
+
 TEST(Volume, holds_the_stress_of_the_half_space_where_the_base_is_far) {
   SubstrateParameters parameters = refined_to(0);
   parameters.stress = true;

@@ -1,5 +1,6 @@
 /// Hard cases of every model, and what none of them takes.
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include <algorithm>
 #include <fstream>
@@ -171,6 +172,28 @@ TEST(Substrate, takes_a_thousand_adhesions) {
   EXPECT_LT(test::mean_column_difference(compliance("split", kGel, points, ellipses), layer), 2e-3);
 }
 
+TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
+  const auto points = test::scattered_points(200, 60);
+  const auto ellipses = test::scattered_ellipses(1000, 60);
+  SubstrateParameters parameters = test::model_named("refined");
+  parameters.displacement_tolerance = 0;
+  rusage before{}, after{};
+  getrusage(RUSAGE_SELF, &before);
+  for (const double limit_GB : {0.5, 1.0}) {
+    parameters.memory_limit_GB = limit_GB;
+    try {
+      make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
+      FAIL();
+    } catch (const NotSolved& error) {
+      const std::string& reason = error.report.reason;
+      EXPECT_NE(reason.find("would fit the memory"), std::string::npos) << reason;
+      EXPECT_NE(reason.find("elements_across_adhesion"), std::string::npos) << reason;
+    }
+  }
+  getrusage(RUSAGE_SELF, &after);
+  EXPECT_LT(1e-6 * static_cast<double>(after.ru_maxrss - before.ru_maxrss), 1.0);  // the larger limit
+}
+
 TEST(Substrate, takes_adhesions_that_touch_a_side) {
   // the scene's rectangle is the block: the ellipse's tip touches the side
   SubstrateParameters parameters = test::model_named("refined");
@@ -249,7 +272,12 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
   }
   SubstrateParameters layer = test::model_named("layer");
   layer.vertical = true;
-  EXPECT_THROW(make_substrate(kGel, layer, 1), UsageError);
+  try {
+    make_substrate(kGel, layer, 1);
+    FAIL();
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("take half-space, split or refined"), std::string::npos) << error.what();
+  }
   EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
                UsageError);
 }
