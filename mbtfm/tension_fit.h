@@ -17,10 +17,10 @@ struct FitParameters {
   std::string loss = "squares";          ///< best where the noise is Gaussian, which tracking's is but for its flags
   std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
   std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
-  int n_meshes = 8;         ///< the spread between meshes is the largest error; its mean over eight is close to settled
+  int n_meshes = 8;  ///< the spread between meshes is the largest error; its mean over eight is close to settled
   std::string model_error = "meshes";  ///< what meshes disagree upon counts less: their spread is most of the error
-  double tolerance = 1e-6;  ///< relative change of the tensions at which the fit stops: far below any error bar
-  int max_steps = 100;      ///< of Gauss–Newton: every loop ends
+  double tolerance = 1e-6;      ///< relative change of the tensions at which the fit stops: far below any error bar
+  int max_steps = 100;          ///< of Gauss–Newton: every loop ends
   int max_evaluations = 5000;   ///< of the conjugate gradients
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
   int bootstrap = 0;            ///< draws; 0: intervals from the misfit's profile, which are as good and cost nothing

@@ -44,8 +44,8 @@ TEST(Fibres, take_images_of_few_pixels_and_narrow_ones) {
   }
 }
 
-/// The stated meaning of fibre_false_per_cell: where 0.5 lines a cell are expected, Poisson's chance of more than two is
-/// 1.4 %.
+/// The stated meaning of fibre_false_per_cell: where 0.5 lines a cell are expected, Poisson's chance of more than two
+/// is 1.4 %.
 TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
   for (const std::string quality : {"poor", "ordinary", "good"}) {
     SCOPED_TRACE(quality);
