@@ -196,14 +196,12 @@ std::vector<MeshForces> forces_at(const std::vector<network::CableNetwork>& netw
   return forces;
 }
 
-/// Variance of a weighted component that is the beads' alone: what no forces at all could explain, where that is enough
-/// to tell.
-double noise_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
-                      const std::string& loss) {
-  const Eigen::Index n_unexplained = data.n_used - data.reduced.compliance.rows();
+/// The beads' own variance, or the misfit's where the data are too few to tell it or the loss is a robust one.
+double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
+                                   const std::string& loss) {
   constexpr Eigen::Index kEnough = 50;  // known to 20 %
-  if (loss != "squares" || n_unexplained < kEnough) return misfit_variance(data, forces_nN, n_tensions, loss);
-  return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / static_cast<double>(n_unexplained));
+  const bool is_told = data.n_used - data.reduced.compliance.rows() >= kEnough;
+  return loss == "squares" && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
 }
 
 }  // namespace
@@ -239,7 +237,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   all.data = data.reduced;
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   if (parameters.model_error == "meshes" && n_meshes >= kFewestForModelError && !solved_misfit) {
-    const double variance = noise_variance(data, first.trial.forces_nN, n_tensions, parameters.loss);
+    const double variance = variance_beside_model_error(data, first.trial.forces_nN, n_tensions, parameters.loss);
     all.model_error =
         model_error(forces_at(networks, data.reduced, adhesion_ids, first.trial, threads), data.reduced, variance);
     all.data = all.model_error->data;

@@ -53,6 +53,11 @@ Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd&
   return data.weight_per_um.cwiseProduct(data.displacement_um - data.compliance_um_per_nN * forces_nN);
 }
 
+double noise_variance(const LinearData& data) {
+  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.compliance.rows()));
+  return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / n_free);
+}
+
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
   const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
   const double scale = is_used.cwiseProduct(data.displacement_um).norm();

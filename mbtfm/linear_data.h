@@ -38,6 +38,10 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight);
 /// u − G R, times W
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
+/// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
+/// below the stated errors'.
+double noise_variance(const LinearData& data);
+
 /// |u − G R| / |u| over the beads that are used
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN);
 

@@ -42,13 +42,6 @@ Trial best_uniform(const TensionProblem& problem) {
   return trial;
 }
 
-/// The variance of a weighted component that even the freest model, forces independent of each other, leaves.
-double noise_variance(const LinearData& data) {
-  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.compliance.rows()));
-  const double variance = data.reduced.floor_squared / n_free;
-  return std::max(data.has_errors ? 1.0 : 1e-300, variance);
-}
-
 /// Influence of each component of the reduced data, in standard errors of the tension: tensions × components.
 Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data) {
   const MeshFit& mesh = fit.meshes.front();
