@@ -1,8 +1,11 @@
 #include "pipeline/runner/batch_table.h"
 
 #include <algorithm>
+#include <array>
+#include <iomanip>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <sstream>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/json.h"
@@ -42,7 +45,7 @@ std::string last_summary(const fs::path& cell, const std::vector<std::string>& o
 
 void write_batch_table(const fs::path& file, const fs::path& folder, const std::vector<BatchCell>& cells,
                        const std::vector<std::string>& only) {
-  std::vector<std::string> header = {"cell", "exit_code", "seconds", "message"};
+  std::vector<std::string> header = {"cell", "exit_code", "seconds", "message", "failed_stage"};
   const std::size_t n_fixed = header.size();
   std::vector<std::map<std::string, std::string>> rows(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -63,11 +66,33 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
     csv.add(cells[i].cell.lexically_relative(folder).generic_string())
         .add(cells[i].exit_code)
         .add(cells[i].seconds)
-        .add(cells[i].message);
+        .add(cells[i].message)
+        .add(cells[i].failed_stage);
     for (std::size_t k = n_fixed; k < header.size(); ++k) csv.add(rows[i][header[k]]);
     csv.end_row();
   }
-  write_text(file, csv.str());
+  write_whole(file, csv.str());
+}
+
+std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& cells) {
+  std::vector<std::array<std::string, 4>> rows = {{"cell", "stage", "ended", "cause"}};
+  for (const BatchCell& cell : cells) {
+    if (cell.exit_code == 0) continue;
+    rows.push_back({cell.cell.lexically_relative(folder).generic_string(),
+                    cell.failed_stage.empty() ? "-" : cell.failed_stage, cell.how, cell.message});
+  }
+  if (rows.size() == 1) return {};
+  std::array<std::size_t, 4> widths{};
+  for (const auto& row : rows) {
+    for (std::size_t k = 0; k + 1 < row.size(); ++k) widths[k] = std::max(widths[k], row[k].size());
+  }
+  std::ostringstream text;
+  for (const auto& row : rows) {
+    for (std::size_t k = 0; k < row.size(); ++k)
+      text << (k == 0 ? "  " : "   ") << std::left << std::setw(static_cast<int>(widths[k])) << row[k];
+    text << '\n';
+  }
+  return text.str();
 }
 
 }  // namespace mbtfm::runner
