@@ -108,7 +108,7 @@ int batch(const CommandLine& line) {
   const auto n_failed =
       std::count_if(outcomes.begin(), outcomes.end(), [](const auto& cell) { return cell.exit_code != 0; });
   const fs::path table = line.folder / "batch.csv";
-  if (n_failed > 0) say("failed:\n" + runner::failure_table(line.folder, outcomes));
+  if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
   runner::write_batch_table(table, line.folder, outcomes, line.only);
   say(std::to_string(outcomes.size() - n_failed) + " cells done, " + std::to_string(n_failed) + " failed; " +
       table.string());
@@ -176,7 +176,7 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
       ->check(CLI::PositiveNumber);
-  command->add_option("--memory", line.memory_bytes, "refuse a stage more memory than this: 500MB, 4GB")
+  command->add_option("--memory", line.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
       ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
       ->check(CLI::PositiveNumber);
 }

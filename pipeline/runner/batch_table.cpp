@@ -89,8 +89,7 @@ std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& 
   std::ostringstream text;
   for (const auto& row : rows) {
     for (std::size_t k = 0; k < row.size(); ++k)
-      text << (k == 0 ? "  " : "   ") << std::left << std::setw(static_cast<int>(widths[k])) << row[k];
-    text << '\n';
+      text << (k == 0 ? "\n  " : "   ") << std::left << std::setw(static_cast<int>(widths[k])) << row[k];
   }
   return text.str();
 }

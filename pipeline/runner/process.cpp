@@ -14,8 +14,10 @@
 #include <cmath>
 #include <csignal>
 #include <cstring>
+#include <fstream>
 #include <sstream>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::runner {
@@ -38,15 +40,10 @@ extern "C" void note_interrupt(int) { was_interrupted = true; }
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// The child, between fork and exec: only async-signal-safe calls, as other threads of the parent may hold locks.
-[[noreturn]] void become(char* const* arguments, const ProcessLimits& limits, int output, pid_t parent) {
+[[noreturn]] void become(char* const* arguments, int output, pid_t parent) {
   setpgid(0, 0);
   prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (getppid() != parent) _exit(kCannotExecute);  // it died before that call
-  if (limits.memory_bytes) {
-    // The data segment is what a program allocates; its address space also holds libraries and what is only reserved.
-    const rlimit limit{.rlim_cur = *limits.memory_bytes, .rlim_max = *limits.memory_bytes};
-    setrlimit(RLIMIT_DATA, &limit);
-  }
   dup2(output, STDOUT_FILENO);
   dup2(output, STDERR_FILENO);
   execv(arguments[0], arguments);
@@ -56,7 +53,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
 /// A program that runs: its process group and what it prints.
 class Child {
  public:
-  Child(const std::vector<std::string>& command, const ProcessLimits& limits, const Sink& sink);
+  Child(const std::vector<std::string>& command, const Sink& sink);
   ~Child() { close(output_); }
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
@@ -64,6 +61,7 @@ class Child {
   /// Wait for output or a tick of the clock, and pass on what there is.
   void listen();
   bool has_ended() const;
+  std::uint64_t memory_bytes() const;  ///< that it holds
   void signal_group(int signal) const { kill(-pid_, signal); }
   /// End what is left of its group, and take its result. After has_ended only.
   ProcessResult result();
@@ -78,7 +76,7 @@ class Child {
   std::string tail_;
 };
 
-Child::Child(const std::vector<std::string>& command, const ProcessLimits& limits, const Sink& sink) : sink_(sink) {
+Child::Child(const std::vector<std::string>& command, const Sink& sink) : sink_(sink) {
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
@@ -90,7 +88,7 @@ Child::Child(const std::vector<std::string>& command, const ProcessLimits& limit
   output_ = ends[0];
   const pid_t parent = getpid();
   pid_ = fork();
-  if (pid_ == 0) become(arguments.data(), limits, ends[1], parent);
+  if (pid_ == 0) become(arguments.data(), ends[1], parent);
   const int fork_error = errno;
   close(ends[1]);
   if (pid_ < 0) {
@@ -123,6 +121,13 @@ void Child::listen() {
 bool Child::has_ended() const {
   siginfo_t info{};
   return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
+}
+
+std::uint64_t Child::memory_bytes() const {
+  std::ifstream statm("/proc/" + std::to_string(pid_) + "/statm");
+  std::uint64_t all_pages = 0, resident_pages = 0;
+  statm >> all_pages >> resident_pages;
+  return resident_pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
 }
 
 ProcessResult Child::result() {
@@ -167,9 +172,9 @@ void print_on(std::string_view text) {
 ProcessResult run_process(const std::vector<std::string>& command, const ProcessLimits& limits, const Sink& sink) {
   throw_if_interrupted();
   const auto start = Clock::now();
-  Child child(command, limits, sink);
+  Child child(command, sink);
   std::optional<Clock::time_point> asked_to_end;
-  bool is_timed_out = false;
+  auto exceeded = ProcessResult::Limit::none;
   while (!child.has_ended()) {
     child.listen();
     if (was_interrupted && !asked_to_end) {
@@ -177,22 +182,23 @@ ProcessResult run_process(const std::vector<std::string>& command, const Process
       child.signal_group(SIGTERM);
     }
     if (asked_to_end && seconds_since(*asked_to_end) > kGrace_s) child.signal_group(SIGKILL);
-    if (limits.seconds && seconds_since(start) > *limits.seconds) {
-      is_timed_out = true;
-      child.signal_group(SIGKILL);
-    }
+    if (limits.seconds && seconds_since(start) > *limits.seconds) exceeded = ProcessResult::Limit::seconds;
+    if (limits.memory_bytes && child.memory_bytes() > *limits.memory_bytes) exceeded = ProcessResult::Limit::memory;
+    if (exceeded != ProcessResult::Limit::none) child.signal_group(SIGKILL);
   }
   ProcessResult result = child.result();
   result.seconds = seconds_since(start);
-  result.is_timed_out = is_timed_out && result.signal;
+  if (result.signal) result.exceeded = exceeded;  // or else it ended by itself in the last moment
   throw_if_interrupted();
   return result;
 }
 
 std::string how_it_ended(const ProcessResult& result) {
   std::ostringstream text;
-  if (result.is_timed_out) {
-    text << "timed out after " << std::lround(result.seconds) << " s";
+  if (result.exceeded == ProcessResult::Limit::memory) {
+    text << "took too much memory (" << std::lround(result.peak_memory_MB) << " MB)";
+  } else if (result.exceeded == ProcessResult::Limit::seconds) {
+    text << "timed out after " << brief(result.seconds) << " s";
   } else if (result.signal) {
     text << "killed by signal " << *result.signal << " (" << strsignal(*result.signal) << ")";
   } else {
@@ -202,7 +208,7 @@ std::string how_it_ended(const ProcessResult& result) {
 }
 
 int exit_code_of(const ProcessResult& result) {
-  if (result.is_timed_out) return exit_code::kTimedOut;
+  if (result.exceeded == ProcessResult::Limit::seconds) return exit_code::kTimedOut;
   return result.signal ? 128 + *result.signal : result.exit_code;
 }
 

@@ -16,15 +16,18 @@ void watch_interrupts();
 /// @throws Interrupted where Ctrl-C was pressed
 void throw_if_interrupted();
 
+/// Beyond them it is killed. Memory is what it holds, looked at ten times a second. A limit of the system's
+/// (setrlimit) would refuse it more instead, which libraries do not bear: OpenBLAS asks again for ever.
 struct ProcessLimits {
-  std::optional<double> seconds;              ///< it is killed when they are over
-  std::optional<std::uint64_t> memory_bytes;  ///< of its data: more is refused, as on a machine that has no more
+  std::optional<double> seconds;
+  std::optional<std::uint64_t> memory_bytes;
 };
 
 struct ProcessResult {
   int exit_code = 0;          ///< of a program that ended by itself
   std::optional<int> signal;  ///< that ended it
-  bool is_timed_out = false;
+  enum class Limit { none, seconds, memory };
+  Limit exceeded = Limit::none;  ///< for which we killed it
   double seconds = 0;
   double peak_memory_MB = 0;
   std::string last_output;  ///< the end of what it printed
@@ -40,7 +43,8 @@ void print_on(std::string_view text);  ///< to our standard error
 ProcessResult run_process(const std::vector<std::string>& command, const ProcessLimits& limits = {},
                           const Sink& sink = print_on);
 
-/// One line that says how it ended: "exit code 3", "killed by signal 9 (Killed)", "timed out after 60 s".
+/// One line that says how it ended: "exit code 3", "killed by signal 9 (Killed)", "timed out after 60 s", "took too
+/// much memory (4100 MB)".
 std::string how_it_ended(const ProcessResult& result);
 /// As the shell counts: 128 + signal, and 124 (as of timeout(1)) for one that was timed out.
 int exit_code_of(const ProcessResult& result);

@@ -64,18 +64,8 @@ void remove_partial_files(const fs::path& folder) {
   for (const fs::path& file : partial) fs::remove(file);
 }
 
-StageFailure failure_of(const ProcessResult& result, const ProcessLimits& limits) {
-  StageFailure failure{
-      .exit_code = exit_code_of(result), .how = how_it_ended(result), .message = error_in(result.last_output)};
-  const bool is_by_memory =
-      !result.is_timed_out && (result.signal || failure.message.find("memory") != std::string::npos);
-  if (limits.memory_bytes && is_by_memory) {
-    std::ostringstream text;
-    text << std::setprecision(3) << " (it took " << result.peak_memory_MB << " MB; --memory allows "
-         << static_cast<double>(*limits.memory_bytes) * 1e-6 << " MB)";
-    failure.how += text.str();
-  }
-  return failure;
+StageFailure failure_of(const ProcessResult& result) {
+  return {.exit_code = exit_code_of(result), .how = how_it_ended(result), .message = error_in(result.last_output)};
 }
 
 /// Do a part of a stage's work; where that throws, the outcome tells of it, too.
@@ -213,7 +203,7 @@ void CellRun::start(const Stage& stage, const StageSurroundings& now, int thread
     // A stage that ends by itself has left its outputs as they were: so must be the record.
     if (!result.signal && had_record) write_whole(record_file, record_before);
     if (!result.signal && !had_record) forget_begun(record_file);
-    throw StageFailed(stage.name, failure_of(result, options_.limits));
+    throw StageFailed(stage.name, failure_of(result));
   }
   const Hashes outputs = hashes_.hash(stage.writes);
   for (const std::string& file : stage.writes) {
@@ -309,7 +299,7 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
   const ProcessResult check =
       run_process({executable_of(stage, options), "--check", "--config", toml_file.string()}, {}, sink);
   if (check.exit_code == 0 && !check.signal) return;
-  StageFailure failure = failure_of(check, {});
+  StageFailure failure = failure_of(check);
   failure.how = "does not accept cell.toml";
   throw StageFailed(stage.name, std::move(failure));
 }

@@ -97,7 +97,8 @@ std::string toml_of(const ordered_json& run, const fs::path& inputs, const fs::p
     add_values(values, text);
   }
   text += "\n[images]\n";
-  for (const auto& [key, file] : run.value("images", ordered_json::object()).items()) {
+  const ordered_json images = run.value("images", ordered_json::object());
+  for (const auto& [key, file] : images.items()) {
     const fs::path path = (inputs / file.get<std::string>()).lexically_normal();
     if (fs::exists(path)) text += key + " = " + ordered_json(fs::proximate(path, out).generic_string()).dump() + "\n";
   }
