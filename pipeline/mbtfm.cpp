@@ -33,7 +33,7 @@ struct CommandLine {
   fs::path stage_folder = runner::executable_folder();
   int threads = available_threads();
   int jobs = 1;
-  bool is_quiet = false, only_list = false, is_checked = false;
+  bool is_quiet = false, only_list = false, only_table = false, is_checked = false;
   std::vector<std::string> only, redo, patterns;
   fs::path template_toml, out, inputs;
   std::optional<double> timeout_s;
@@ -98,13 +98,15 @@ int batch(const CommandLine& line) {
     std::fputs(runner::list_cells(cells, run_options(line), line.threads).c_str(), stdout);
     return kDone;
   }
-  const auto outcomes = runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
-                                                  .arguments = arguments_of_cell(line),
-                                                  .jobs = line.jobs,
-                                                  .threads = line.threads,
-                                                  .run = run_options(line),
-                                                  .say = line.is_quiet ? nullptr : say,
-                                                  .show = line.is_quiet || !is_terminal() ? nullptr : show});
+  const auto outcomes = line.only_table
+                            ? runner::outcomes_so_far(cells, run_options(line), line.threads)
+                            : runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
+                                                        .arguments = arguments_of_cell(line),
+                                                        .jobs = line.jobs,
+                                                        .threads = line.threads,
+                                                        .run = run_options(line),
+                                                        .say = line.is_quiet ? nullptr : say,
+                                                        .show = line.is_quiet || !is_terminal() ? nullptr : show});
   const auto n_failed =
       std::count_if(outcomes.begin(), outcomes.end(), [](const auto& cell) { return cell.exit_code != 0; });
   const fs::path table = line.folder / "batch.csv";
@@ -199,6 +201,7 @@ int start(int argc, char** argv) {
       ->allow_extra_args(false);
   batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
   batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
+  batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
   CLI::App* verify_command =
       add_command(app, line, "verify", "hash all inputs and outputs anew: as run.json tells?", "CELL");
   CLI::App* repeat_command =

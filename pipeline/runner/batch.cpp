@@ -46,6 +46,13 @@ ProcessLimits limits_of_cell(const ProcessLimits& of_stage) {
   return {.seconds = static_cast<double>(stages().size()) * *of_stage.seconds + kMargin_s, .memory_bytes = {}};
 }
 
+void tell_of_failure(const std::optional<RecordedFailure>& failure, BatchCell& cell) {
+  if (!failure) return;
+  cell.failed_stage = failure->stage;
+  cell.how = failure->how;
+  if (!failure->message.empty()) cell.message = first_line(failure->message);
+}
+
 BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
   std::vector<std::string> command = {options.program.string(), "run", cell.string(), "--quiet"};
   command.insert(command.end(), options.arguments.begin(), options.arguments.end());
@@ -62,11 +69,7 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
     outcome.how = how_it_ended(result);
     outcome.message = first_line(error_in(result.last_output));
     if (time_of_record(cell) == record_before) return outcome;
-    if (const auto failure = recorded_failure(cell)) {
-      outcome.failed_stage = failure->stage;
-      outcome.how = failure->how;
-      if (!failure->message.empty()) outcome.message = first_line(failure->message);
-    }
+    tell_of_failure(recorded_failure(cell), outcome);
   } catch (const OutputError& error) {  // no log, no process: this cell's matter, not the batch's
     outcome.exit_code = exit_code::kOutput;
     outcome.how = "not started";
@@ -195,6 +198,19 @@ std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const Batch
   parallel_for(static_cast<int>(busy.size()), options.jobs, [&](int k) {
     outcomes[busy[k]] = run_when_free(cells[busy[k]], options);
     progress.ended(outcomes[busy[k]]);
+  });
+  return outcomes;
+}
+
+std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const RunOptions& options, int threads) {
+  std::vector<BatchCell> outcomes(cells.size());
+  parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
+    const Look look = look_at(cells[i], options);
+    outcomes[i] = look.outcome;
+    if (look.finding == Look::Finding::done) return;
+    outcomes[i].exit_code = exit_code::kFailed;
+    outcomes[i].how = look.finding == Look::Finding::busy ? "being run" : "not run";
+    tell_of_failure(recorded_failure(cells[i]), outcomes[i]);
   });
   return outcomes;
 }

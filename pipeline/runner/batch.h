@@ -38,6 +38,10 @@ struct BatchCell {
 /// @throws Interrupted
 std::vector<BatchCell> run_batch(const std::vector<std::filesystem::path>& cells, const BatchOptions& options);
 
+/// The same for the cells as they are: runs nothing. What is left undone counts as failed.
+std::vector<BatchCell> outcomes_so_far(const std::vector<std::filesystem::path>& cells, const RunOptions& options,
+                                       int threads);
+
 /// A table, as CSV, of each stage of each cell: cell, stage, state, why. Runs nothing. A cell that cannot be read has
 /// one row, state "unreadable".
 std::string list_cells(const std::vector<std::filesystem::path>& cells, const RunOptions& options, int threads);
