@@ -1,6 +1,7 @@
 #include "pipeline/runner/run_cell.h"
 
 #include <algorithm>
+#include <exception>
 #include <iomanip>
 #include <mutex>
 #include <sstream>
@@ -239,9 +240,18 @@ void CellRun::run_chains(CellOutcome& outcome) {
     return workers == 1 ? options_.threads
                         : (chain == 0 ? options_.threads - options_.threads / 2 : options_.threads / 2);
   };
+  // A chain that fails does not stop the other: what is done does not depend on the number of threads.
+  std::vector<std::exception_ptr> errors(chains.size());
   parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
-    for (const int i : chains[chain]) bring_up_to_date(all[i], threads_of(chain), outcome.stages[i]);
+    try {
+      for (const int i : chains[chain]) bring_up_to_date(all[i], threads_of(chain), outcome.stages[i]);
+    } catch (...) {
+      errors[chain] = std::current_exception();
+    }
   });
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
+  }
   bring_up_to_date(all.back(), options_.threads, outcome.stages.back());
 }
 

@@ -81,7 +81,7 @@ case $mode in
 esac
 
 compare() {
-  diff -r --exclude=record.json --exclude=run.json --exclude='*.log' --exclude=report.html --exclude='.*' \
+  diff -rq --exclude=record.json --exclude=run.json --exclude='*.log' --exclude=report.html --exclude='.*' \
     --exclude=batch.csv --exclude=statistics "$work/by_batch" "$work/study" || fail "results differ from those of mbtfm batch"
   n=$(find "$work/study" -name tensions.csv | wc -l)
   [ "$n" -eq $((n_cells - 1)) ] || fail "$n cells have tensions, expected $((n_cells - 1))"
