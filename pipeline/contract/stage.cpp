@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/blas.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/hash.h"
 #include "pipeline/contract/json.h"
@@ -270,6 +271,7 @@ int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<StageReport(StageContext&)>& body) {
   const std::string& stage = description.name;
   watch_signals();
+  keep_blas_to_one_thread();
   try {
     ParameterList list;
     declare_parameters(list);

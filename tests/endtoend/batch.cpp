@@ -140,6 +140,14 @@ TEST_F(Batches, killed_at_random_moments_resume_to_the_same_bytes) {
     EXPECT_FALSE(entry.path().filename().string().starts_with(".partial-")) << entry.path();
 }
 
+TEST_F(Batches, do_not_depend_on_the_libraries_own_threads) {
+  // As on a machine of other processors: Snakemake and many clusters set these.
+  const Outcome run = run_program("mbtfm run --quiet " + (study_ / "cell1").string(),
+                                  "export OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1; ");
+  ASSERT_EQ(run.code, 0) << run.output;
+  expect_nothing_half_written(study_, whole_, "with one thread of the BLAS");
+}
+
 TEST_F(Batches, two_in_one_folder_share_the_work) {
   const pid_t a = start_batch(study_), b = start_batch(study_);
   EXPECT_EQ(exit_code_of(a), 0);
