@@ -74,7 +74,7 @@ case $mode in
     start_slurm "$work/slurm"
     # this machine has the memory of one machine only, and its file system shows files at once
     run=(--profile "$project/pipeline/profiles/slurm" --restart-times 0 --latency-wait 5 --default-resources
-      --set-resources segment:mem_mb=300 track:mem_mb=300 network:mem_mb=100 fit:mem_mb=400
+      --set-resources segment:mem_mb=300 track:mem_mb=300 network:mem_mb=100 fit:mem_mb=400 stats:mem_mb=300
       --set-threads track=1 fit=1)
     ;;
   *) fail "unknown mode $mode: local or slurm" ;;
@@ -98,9 +98,9 @@ for study in study by_batch; do
   cp "$work/experiments/2/actin.tif" "$work/$study/day 1/cell02/actin.tif"
   sed -i 's/n_meshes = 1/n_meshes = 2/' "$work/$study/day 2/cell01/cell.toml"
 done
-"$bin/mbtfm" batch "$work/by_batch" --jobs 2 --threads 2 --quiet 2>/dev/null || fail "mbtfm batch: exit code $?"
+"$bin/mbtfm" batch "$work/by_batch" --jobs 2 --threads 2 --quiet 2>/dev/null || fail "mbtfm batch failed"
 : >"$work/snakemake.log"
-workflow "${run[@]}" || { tail -n 40 "$work/snakemake.log"; fail "snakemake: exit code $?"; }
+workflow "${run[@]}" || { tail -n 40 "$work/snakemake.log"; fail "snakemake failed"; }
 n_cells=$((n_cells + 1)) compare
 # segment, network and fit of the one, fit of the other, table, statistics, and `all`
 n_jobs=$(sed -n 's/^total *\([0-9]*\).*/\1/p' "$work/snakemake.log" | head -n 1)
@@ -108,7 +108,7 @@ n_jobs=$(sed -n 's/^total *\([0-9]*\).*/\1/p' "$work/snakemake.log" | head -n 1)
 
 echo "== nothing left to do"
 : >"$work/snakemake.log"
-workflow "${run[@]}" || fail "snakemake: exit code $?"
+workflow "${run[@]}" || fail "snakemake failed"
 grep -q 'Nothing to be done' "$work/snakemake.log" || fail "jobs, though all is up to date"
 for cell in "$work"/study/day*/cell*; do "$bin/mbtfm" verify "$cell" >/dev/null || fail "mbtfm verify $cell"; done
 echo "passed: $mode, $n_cells cells"
