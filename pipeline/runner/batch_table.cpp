@@ -5,6 +5,7 @@
 #include <iomanip>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 
 #include "pipeline/contract/csv.h"
@@ -47,6 +48,7 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
                        const std::vector<std::string>& only) {
   std::vector<std::string> header = {"cell", "exit_code", "seconds", "message", "failed_stage"};
   const std::size_t n_fixed = header.size();
+  std::set<std::string> columns;  // of the header
   std::vector<std::map<std::string, std::string>> rows(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].exit_code != 0) continue;  // what it has on disk may be of an earlier run
@@ -56,7 +58,7 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
       if (!record.is_object()) continue;
       for (const auto& [name, value] : record["figures"].items()) {
         const std::string column = stage.name + "." + name;
-        if (std::find(header.begin(), header.end(), column) == header.end()) header.push_back(column);
+        if (columns.insert(column).second) header.push_back(column);
         rows[i][column] = text_of(value);
       }
     }
