@@ -78,6 +78,9 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
   } catch (const StageFailed& error) {
     outcome.failure = error.failure;
     throw;
+  } catch (const OutputError& error) {
+    outcome.failure = {.exit_code = exit_code::kOutput, .how = "could not be written", .message = error.what()};
+    throw;
   } catch (const std::exception& error) {
     outcome.failure = {.exit_code = exit_code::kInput, .how = "not started", .message = error.what()};
     throw;
@@ -266,11 +269,11 @@ CellOutcome CellRun::run() {
     check_before_start(outcome);
     if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
     run_chains(outcome);
-  } catch (const std::exception& error) {
+  } catch (const std::exception&) {
     try {
       write_run_record(cell_, options_, outcome);
-    } catch (const OutputError&) {
-      // the disk is full: the error that is on its way says so
+    } catch (const std::exception&) {
+      // the disk is full, as a rule: the error that is on its way says so
     }
     throw;
   }
