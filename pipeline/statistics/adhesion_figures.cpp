@@ -17,6 +17,11 @@ std::string condition_colour(int condition) {
   return charts::kColours[static_cast<std::size_t>(condition) % std::size(charts::kColours)];
 }
 
+double end_below_keys(double largest, std::size_t n_keys) {
+  const double used = n_keys == 0 ? 0.05 : 0.07 + 0.077 * static_cast<double>(n_keys);
+  return largest > 0 ? largest / (1 - std::min(used, 0.7)) : 1;
+}
+
 int index_of(const std::vector<std::string>& list, const std::string& name) {
   const auto at = std::find(list.begin(), list.end(), name);
   MBTFM_ASSERT(at != list.end());
@@ -63,9 +68,8 @@ Chart histogram_chart(const std::string& title, const std::string& x_label, cons
     shares.push_back(shares_between(h.values, edges));
     largest = std::max(largest, *std::max_element(shares.back().begin(), shares.back().end()));
   }
-  const double room = 1.05 + 0.07 * static_cast<double>(n_keys);
   Chart chart(title, Axis{.label = x_label, .low = low, .high = high, .scale = scale},
-              Axis{.label = y_label, .low = 0, .high = largest > 0 ? room * largest : 1});
+              Axis{.label = y_label, .low = 0, .high = end_below_keys(largest, n_keys)});
   for (std::size_t h = 0; h < histograms.size(); ++h) {
     if (histograms[h].values.empty()) continue;
     std::vector<Vec2> steps = {{edges.front(), 0}};
@@ -127,19 +131,19 @@ Figure force_by_area(const Analysis& analysis) {
     x_end = std::max(x_end, b.mean_area_um2);
     y_end = std::max({y_end, b.mean_force_nN, b.interval_nN ? std::min(b.interval_nN->high, 2 * b.mean_force_nN) : 0});
   }
-  const double room = 1.05 + 0.14 * sample.n_conditions();
   Chart chart("Mean force of an adhesion by its area", Axis{.label = "area (µm²)", .low = 0, .high = 1.08 * x_end},
-              Axis{.label = "mean force (nN)", .low = 0, .high = y_end > 0 ? room * y_end : 1});
+              Axis{.label = "mean force (nN)", .low = 0, .high = end_below_keys(y_end, 2 * sample.conditions.size())});
   chart.put_key(Chart::KeySide::left);
   for (std::size_t c = 0; c < sample.conditions.size(); ++c) {
     for (const bool is_connected : {true, false}) {
       const std::string colour =
           condition_colour(sample.n_conditions() == 1 ? (is_connected ? 0 : 1) : static_cast<int>(c));
       std::vector<Vec2> line;
-      int n = 0;
+      int n = 0, n_cells = 0;
       for (const AreaBin& b : analysis.area_bins) {
         if (b.condition != sample.conditions[c] || b.is_connected != is_connected) continue;
         n += b.n_adhesions;
+        n_cells = std::max(n_cells, b.n_cells);
         line.push_back({b.mean_area_um2, b.mean_force_nN});
         if (b.interval_nN) chart.error_bar(b.mean_area_um2, b.interval_nN->low, b.interval_nN->high, colour);
         chart.dot(line.back(), 3.6,
@@ -148,8 +152,8 @@ Figure force_by_area(const Analysis& analysis) {
       }
       if (line.empty()) continue;
       chart.curve(line, "stroke:" + colour + ";stroke-width:1.4" + (is_connected ? "" : ";stroke-dasharray:5 3"));
-      chart.key(fmt::format("{}{}{}: {} adhesions", is_connected ? "" : "- - ", prefix_of(sample.conditions[c]),
-                            is_connected ? "connected" : "unconnected", n),
+      chart.key(fmt::format("{}{}{}: {} adhesions, {} cells", is_connected ? "" : "- - ",
+                            prefix_of(sample.conditions[c]), is_connected ? "connected" : "unconnected", n, n_cells),
                 colour);
     }
   }

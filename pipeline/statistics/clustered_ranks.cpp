@@ -109,8 +109,9 @@ TestResult clustered_rank_test(const std::vector<ClusteredValue>& values) {
   const Index q = ranks.sum.cols() - 1;  // the groups' sums add up to a constant: leave out the last
   const double n_cells = static_cast<double>(ranks.sum.rows()), degrees = n_cells - static_cast<double>(q);
   if (degrees < 1) throw InvalidData("the cells", "more than there are groups", std::to_string(ranks.sum.rows()));
+  const MatrixXd centred = ranks.deviation.rowwise() - ranks.deviation.colwise().mean();
   const VectorXd distance = (ranks.sum - ranks.expected).colwise().sum().head(q).transpose();
-  const MatrixXd spread = (ranks.deviation.transpose() * ranks.deviation).topLeftCorner(q, q);
+  const MatrixXd spread = (n_cells / (n_cells - 1) * centred.transpose() * centred).topLeftCorner(q, q);
   const Eigen::LDLT<MatrixXd> ldlt(spread);
   if (!(ldlt.vectorD().minCoeff() > 1e-12)) throw InvalidData("the groups", "values that scatter", "none that do");
   const double chi_squared = distance.dot(ldlt.solve(distance));

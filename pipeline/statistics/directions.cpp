@@ -106,11 +106,11 @@ std::string_view full_name_of(Relation relation) {
     case Relation::fibre_displacement:
       return "fibre and displacement";
     case Relation::model_measured:
-      return "displacement: model and measured";
+      return "displacement of the model and measured";
     case Relation::without_fibres_measured:
       break;
   }
-  return "displacement: model without fibres and measured";
+  return "displacement without fibres and measured";
 }
 
 double largest_angle_deg(Relation relation) { return relation == Relation::adhesion_fibre ? 90 : 180; }

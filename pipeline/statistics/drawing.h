@@ -13,6 +13,9 @@ std::string condition_colour(int condition);
 /// @throws InternalError where it is not there
 int index_of(const std::vector<std::string>& list, const std::string& name);
 
+/// The end of a y axis that leaves `largest` below the lines of the key: each takes 18 of the frame's 236 pixels.
+double end_below_keys(double largest, std::size_t n_keys);
+
 struct Histogram {
   std::string label;  ///< of the key; empty: none
   std::string colour;

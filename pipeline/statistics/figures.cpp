@@ -50,10 +50,13 @@ std::vector<std::string> kind_labels(const Sample& sample) {
     for (const Observation& o : sample.values) {
       if (o.kind == kind) own.push_back(o);
     }
-    labels.push_back(kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]) + "\n" + counts(own, sample.each));
+    labels.push_back(fmt::format("{}\n{} in {} cells", kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]),
+                                 own.size(), n_cells_of(own)));
   }
   return labels;
 }
+
+std::size_t n_keys_of(const Sample& sample) { return sample.n_conditions() > 1 ? sample.conditions.size() : 0; }
 
 void add_condition_keys(Chart& chart, const Sample& sample) {
   for (int c = 0; c < sample.n_conditions() && sample.n_conditions() > 1; ++c) {
@@ -72,9 +75,8 @@ void add_condition_keys(Chart& chart, const Sample& sample) {
 
 Figure tensions_by_type(const Study& study, const Analysis& analysis) {
   const Sample& sample = analysis.tensions.sample;
-  const double room = sample.n_conditions() > 1 ? 1.05 + 0.06 * sample.n_conditions() : 1.05;
   Chart chart("Tension by fibre type", charts::category_axis(kind_labels(sample)),
-              Axis{.label = "tension (nN)", .low = 0, .high = room * largest_of(sample)});
+              Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
   const std::vector<MeasuredFibre> fibres = measured_fibres(study);
   std::map<int, std::size_t> n_of;
   constexpr double kDots = 0.5;  // of a condition's column
@@ -144,7 +146,7 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                 .n_columns = 2};
   for (const double threshold : {parameters.weak_tension_nN, parameters.strong_tension_nN}) {
     Chart chart("Above " + readable(threshold) + " nN", charts::category_axis(kind_labels(sample)),
-                Axis{.label = "share of the fibres (%)", .low = 0, .high = 100});
+                Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
     for (const ShareAbove& s : analysis.shares) {
       if (s.threshold_nN != threshold) continue;
       const int condition = index_of(sample.conditions, s.condition), kind = index_of(sample.kinds, s.kind);
@@ -177,7 +179,7 @@ Figure forces_by_cell(const Study& study) {
   const double n = static_cast<double>(cells.size());
   Chart chart("Total force of each cell",
               Axis{.label = fmt::format("{} cells", cells.size()), .low = 0, .high = n, .categories = {""}},
-              Axis{.label = "force (nN)", .low = 0, .high = largest > 0 ? 1.15 * largest : 1});
+              Axis{.label = "force (nN)", .low = 0, .high = end_below_keys(largest, study.conditions.size() + 1)});
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const FitSummary& fit = cells[i]->fit;
     const double left = static_cast<double>(i) + 0.1, right = left + 0.8;
@@ -230,10 +232,9 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       for (const double x : c->x) x_end = std::max(x_end, x);
       for (const double y : c->y) y_end = std::max(y_end, y);
     }
-    const double room = 1.05 + 0.07 * static_cast<double>(panels[key].size());
     Chart chart(labels().at(key.second) + " by " + labels().at(key.first),
                 Axis{.label = labels().at(key.first), .low = 0, .high = 1.05 * x_end},
-                Axis{.label = labels().at(key.second), .low = 0, .high = y_end > 0 ? room * y_end : 1});
+                Axis{.label = labels().at(key.second), .low = 0, .high = end_below_keys(y_end, panels[key].size())});
     chart.put_key(Chart::KeySide::left);
     for (const Correlation* c : panels[key]) {
       const std::string colour = condition_colour(index_of(study.conditions, c->condition));
@@ -243,7 +244,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       chart.curve({{0, 0}, {x_end, c->line.slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
       std::string text = prefix_of(c->condition) + "slope " + readable(c->line.slope);
       if (c->line.slope_error) text += " ± " + readable(*c->line.slope_error);
-      if (c->line.correlation) text += fmt::format(", r = {:.2f}", *c->line.correlation);
+      if (c->line.correlation) text += ", r = " + readable(*c->line.correlation);
       chart.key(text + fmt::format(", n = {}", c->line.n), colour);
     }
     figure.charts.push_back(chart);
@@ -268,7 +269,7 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
 }
 
 std::string svg_of(const Figure& figure) {
-  // a line holds about 62 characters for each column of charts
+  // a line holds about 56 characters for each column of charts
   std::vector<std::string> lines(1);
   const std::size_t width =
       62 * static_cast<std::size_t>(std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())));

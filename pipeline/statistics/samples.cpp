@@ -64,7 +64,7 @@ Sample sample_tensions(const Study& study) {
 }
 
 Sample sample_adhesion_forces(const Study& study) {
-  Sample sample = empty_sample(study, "adhesion_force_nN", "force of an adhesion", "nN", "adhesions", kConnection);
+  Sample sample = empty_sample(study, "adhesion_force_nN", "force", "nN", "adhesions", kConnection);
   for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double) {
     add(sample, cell, i, f.connected ? 0 : 1, norm(f.force_nN), f.sigma_nN);
   });
@@ -72,7 +72,7 @@ Sample sample_adhesion_forces(const Study& study) {
 }
 
 Sample sample_adhesion_areas(const Study& study) {
-  Sample sample = empty_sample(study, "adhesion_area_um2", "area of an adhesion", "µm²", "adhesions", kConnection);
+  Sample sample = empty_sample(study, "adhesion_area_um2", "area", "µm²", "adhesions", kConnection);
   for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double area_um2) {
     add(sample, cell, i, f.connected ? 0 : 1, area_um2, 0.0);
   });

@@ -12,7 +12,8 @@ using charts::readable;
 std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
 
 std::string plural_of(const Sample& sample, const std::string& kind) {
-  return sample.each == "cells" ? "cells" : kind_for_people(kind) + " " + sample.each;
+  if (sample.each == "cells") return "cells";
+  return kind == "arc" ? "transverse arcs" : kind + " " + sample.each;
 }
 
 /// A sentence begins so, for people: "Control: ventral fibres".
@@ -98,11 +99,12 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
   for (const ShareAbove& s : analysis.shares) {
     if (s.threshold_nN != parameters.strong_tension_nN) continue;
     list.push_back(capitalised(
-        fmt::format("{}{:.0f} % of the {} fibres carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} fibres of {} "
+        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} fibres of {} "
                     "cells], {:.0f} % "
                     "without the blur of the measurement.",
-                    prefix_of(s.condition), 100 * s.share.value, kind_for_people(s.kind), readable(s.threshold_nN),
-                    100 * s.share.interval.low, 100 * s.share.interval.high, s.n, s.n_cells, 100 * s.without_error)));
+                    prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
+                    readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high, s.n, s.n_cells,
+                    100 * s.without_error)));
   }
   return list;
 }
@@ -117,7 +119,7 @@ std::vector<std::string> lines(const Analysis& analysis) {
                                                            : "fibre";
     std::string text = fmt::format("{}the total force is {} ± {} nN for each {} ({} cells", prefix_of(c.condition),
                                    readable(c.line.slope), readable(*c.line.slope_error), by, c.line.n);
-    if (c.line.correlation) text += fmt::format(", r = {:.2f}", *c.line.correlation);
+    if (c.line.correlation) text += ", r = " + readable(*c.line.correlation);
     list.push_back(capitalised(text + ")."));
   }
   return list;

@@ -148,7 +148,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   std::string tests;
   for (const Measure* m : analysis.measures()) {
     if (!m->comparisons.empty())
-      tests += report::folded("Tests of the " + m->sample.name, report::html_of(tests_table(*m)));
+      tests +=
+          report::folded("Tests of the " + m->sample.name + " of " + m->sample.each, report::html_of(tests_table(*m)));
   }
   body += report::section("Tests", tests + kHowToRead);
   body += report::section("Cells", report::html_of(cells_table(study)));
