@@ -125,7 +125,9 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
     }
     for (std::size_t k = 0; k < mass.size(); ++k) mass[k] = next[k] / static_cast<double>(values.size());
   }
-  return std::accumulate(mass.begin() + n_below, mass.end(), 0.0);
+  constexpr double kNothing = 1e-9;  // what EM leaves where it would end at zero
+  const double above = std::accumulate(mass.begin() + n_below, mass.end(), 0.0);
+  return above > kNothing ? above : 0;
 }
 
 }  // namespace mbtfm::statistics

@@ -204,12 +204,15 @@ const std::map<std::string, std::string>& labels() {
   static const std::map<std::string, std::string> list = {{"total_force_nN", "total force (nN)"},
                                                           {"fibre_force_nN", "force of the fibres (nN)"},
                                                           {"network_force_nN", "force of the network (nN)"},
-                                                          {"n_adhesions", "adhesions"},
+                                                          {"n_adhesions", "number of adhesions"},
                                                           {"adhesion_area_um2", "area of all adhesions (µm²)"},
                                                           {"cell_area_um2", "area of the cell (µm²)"},
-                                                          {"n_fibres", "fibres"}};
+                                                          {"n_fibres", "number of fibres"}};
   return list;
 }
+
+/// "force (nN)" without what stands in brackets.
+std::string without_unit(const std::string& label) { return label.substr(0, label.find(" (")); }
 
 Figure force_correlations(const Study& study, const Analysis& analysis) {
   Figure figure{.name = "force_correlations",
@@ -232,7 +235,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       for (const double x : c->x) x_end = std::max(x_end, x);
       for (const double y : c->y) y_end = std::max(y_end, y);
     }
-    Chart chart(labels().at(key.second) + " by " + labels().at(key.first),
+    Chart chart(without_unit(labels().at(key.second)) + " by " + without_unit(labels().at(key.first)),
                 Axis{.label = labels().at(key.first), .low = 0, .high = 1.05 * x_end},
                 Axis{.label = labels().at(key.second), .low = 0, .high = end_below_keys(y_end, panels[key].size())});
     chart.put_key(Chart::KeySide::left);
@@ -269,10 +272,10 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
 }
 
 std::string svg_of(const Figure& figure) {
-  // a line holds about 56 characters for each column of charts
+  // a line holds about 50 characters for each column of charts
   std::vector<std::string> lines(1);
   const std::size_t width =
-      62 * static_cast<std::size_t>(std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())));
+      50 * static_cast<std::size_t>(std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())));
   std::string word;
   for (const char c : figure.caption + " ") {
     if (c != ' ') {

@@ -132,7 +132,7 @@ std::vector<std::string> directions(const Analysis& analysis) {
                                    full_name_of(s.relation), s.mean_angle_deg);
     if (s.angle_interval_deg)
       text += fmt::format(" [95 % CI {:.0f}° to {:.0f}°]", s.angle_interval_deg->low, s.angle_interval_deg->high);
-    list.push_back(capitalised(text + fmt::format(", where chance would give {:.0f}° ({} of {} cells).",
+    list.push_back(capitalised(text + fmt::format(", where chance would give {:.0f}° ({} angles of {} cells).",
                                                   largest_angle_deg(s.relation) / 2, s.n, s.n_cells)));
   }
   return list;
@@ -144,20 +144,18 @@ void append(std::vector<std::string>& list, const std::vector<std::string>& more
 
 }  // namespace
 
-std::vector<std::string> sentences_of(const Analysis& analysis, const StudyParameters& parameters) {
-  std::vector<std::string> list = means(analysis.tensions);
-  append(list, differences(analysis.tensions));
-  append(list, shares(analysis, parameters));
-  append(list, means(analysis.adhesion_forces));
-  append(list, differences(analysis.adhesion_forces));
-  append(list, differences(analysis.adhesion_areas));
+std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters) {
+  std::vector<std::string> tensions = means(analysis.tensions), adhesions = means(analysis.adhesion_forces), cells;
+  append(tensions, differences(analysis.tensions));
+  append(tensions, shares(analysis, parameters));
+  append(adhesions, differences(analysis.adhesion_forces));
+  append(adhesions, differences(analysis.adhesion_areas));
   for (const Measure& m : analysis.cells) {
-    append(list, means(m));
-    append(list, differences(m));
+    append(cells, means(m));
+    append(cells, differences(m));
   }
-  append(list, lines(analysis));
-  append(list, directions(analysis));
-  return list;
+  append(cells, lines(analysis));
+  return {{"Tensions", tensions}, {"Adhesions", adhesions}, {"Cells", cells}, {"Directions", directions(analysis)}};
 }
 
 }  // namespace mbtfm::statistics

@@ -12,7 +12,7 @@
 namespace mbtfm::statistics {
 
 struct StudyParameters {
-  std::string condition_from;       ///< empty: all cells are of one condition
+  std::string condition_from{};     ///< empty: all cells are of one condition
   bool with_not_converged = false;  ///< a fit that did not converge is no measurement
   double weak_tension_nN = 1;       ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
   double strong_tension_nN = 5;     ///< a third of the ventral ones are above it

@@ -24,7 +24,11 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
 std::string svg_of(const Figure& figure);
 
 /// What was found, a sentence for each question, with interval, test and numbers of cells and fibres.
-std::vector<std::string> sentences_of(const Analysis& analysis, const StudyParameters& parameters);
+struct Findings {
+  std::string title;
+  std::vector<std::string> sentences;
+};
+std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters);
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
                        const StudyParameters& parameters);

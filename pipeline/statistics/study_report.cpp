@@ -2,14 +2,13 @@
 
 #include "pipeline/contract/version.h"
 #include "pipeline/report/page.h"
-#include "pipeline/report/svg.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-using report::html_escaped;
-using report::readable;
+using charts::html_escaped;
+using charts::readable;
 using report::Table;
 
 std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
@@ -21,7 +20,12 @@ std::string interval_text(const std::optional<Interval>& interval) {
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
 
 /// The one place where a figure enters the page.
-std::string embedded(const Figure& figure) { return report::figure(figure.title, svg_of(figure), figure.caption); }
+std::string embedded(const Figure& figure) {
+  std::string html = "<h3>" + html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
+  for (const charts::Chart& chart : figure.charts)
+    html += "<figure>" + charts::svg_file({chart}, 1, {}) + "</figure>\n";
+  return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
+}
 
 Table types_table(const Study& study, const Analysis& analysis) {
   Table table{{{"condition"},
@@ -140,7 +144,11 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   std::string body = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
                                  study.cells.size(), kVersion);
   body += report::section("In short", overview(study, analysis));
-  body += report::section("What was found", list_of(sentences_of(analysis, parameters)));
+  std::string found;
+  for (const Findings& f : findings_of(analysis, parameters)) {
+    if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
+  }
+  body += report::section("What was found", found);
   std::string pictures;
   for (const Figure& figure : figures) pictures += embedded(figure);
   body += report::section("Figures", pictures);

@@ -37,7 +37,7 @@ inline statistics::Study simulated_study(const StudySettings& s) {
                                .fit = {},
                                .directions = {}};
     cell.cell.fibres.clear();
-    cell.tensions.push_back({.fibre_id = 0, .tension_nN = 0.06});
+    cell.tensions.push_back({.fibre_id = 0, .tension_nN = 0.06, .low_nN = {}, .high_nN = {}});
     const double of_cell = s.cell_sd_nN * normal(random);
     for (const FibreType type : kFibreTypes) {
       const double of_type = s.type_in_cell_sd_nN * normal(random);
@@ -45,8 +45,12 @@ inline statistics::Study simulated_study(const StudySettings& s) {
       const int n = std::poisson_distribution<int>(s.fibres_by_type)(random);
       for (int k = 0; k < n; ++k) {
         const int id = static_cast<int>(cell.cell.fibres.size()) + 1;
-        cell.cell.fibres.push_back(
-            {.fibre_id = id, .type = type, .width_um = 0.6, .points_um = {{20, 20}, {30, 30.0 + id}}});
+        cell.cell.fibres.push_back({.fibre_id = id,
+                                    .type = type,
+                                    .width_um = 0.6,
+                                    .start_adhesion_id = {},
+                                    .end_adhesion_id = {},
+                                    .points_um = {{20, 20}, {30, 30.0 + id}}});
         const double error = s.error_nN * std::uniform_real_distribution<double>(0.5, 1.5)(random);
         const double t = s.offset_nN + mean + cell.condition * s.condition_effect_nN + of_cell + of_type +
                          s.fibre_sd_nN * normal(random) + error * normal(random);
