@@ -109,11 +109,6 @@ Axis axis_over(std::string label, const std::vector<double>& values, Scale scale
   return {axis.label, axis.low - room, axis.high + room, scale, {}};
 }
 
-Axis category_axis(std::vector<std::string> categories) {
-  const double n = static_cast<double>(categories.size());
-  return {.label = {}, .low = -0.5, .high = n - 0.5, .scale = Scale::linear, .categories = std::move(categories)};
-}
-
 Chart::Chart(std::string title, Axis x, Axis y) : title_(std::move(title)), x_(std::move(x)), y_(std::move(y)) {}
 
 Vec2 Chart::place(Vec2 value) const {
@@ -148,7 +143,7 @@ void Chart::dot(Vec2 value, double radius_px, const std::string& style, const st
                        at.x, at.y, radius_px, style, html_escaped(hover));
 }
 
-void Chart::box(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover) {
+void Chart::bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover) {
   const Vec2 a = place(corner), b = place(opposite);
   if (!is_finite(a) || !is_finite(b)) return;
   body_ += fmt::format(
@@ -156,14 +151,14 @@ void Chart::box(Vec2 corner, Vec2 opposite, const std::string& style, const std:
       std::min(a.x, b.x), std::min(a.y, b.y), std::abs(a.x - b.x), std::abs(a.y - b.y), style, html_escaped(hover));
 }
 
-void Chart::error_bar(double x, double low, double high, const std::string& colour) {
-  const Vec2 below = place({x, low}), above = place({x, high});
-  if (!is_finite(below) || !is_finite(above)) return;
+void Chart::error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover) {
+  const Vec2 a = place(from), b = place(to);
+  if (!is_finite(a) || !is_finite(b)) return;
   constexpr double kEnd_px = 4;  // half the width of the ends
   body_ += fmt::format(
       "<path d=\"M{0:.1f},{2:.1f}h{4}M{1:.1f},{2:.1f}V{3:.1f}M{0:.1f},{3:.1f}h{4}\" "
-      "style=\"fill:none;stroke:{5};stroke-width:1.6\"/>\n",
-      below.x - kEnd_px, below.x, below.y, above.y, 2 * kEnd_px, colour);
+      "style=\"fill:none;{5}\"><title>{6}</title></path>\n",
+      a.x - kEnd_px, a.x, a.y, b.y, 2 * kEnd_px, style, html_escaped(hover));
 }
 
 void Chart::upright(double x, const std::string& style) {
@@ -184,14 +179,8 @@ std::string Chart::str() const {
       fmt::format("<text x=\"{}\" y=\"18\" font-weight=\"600\">{}</text>\n", kLeft_px, html_escaped(title_));
   svg += fmt::format("<text x=\"{}\" y=\"37\" fill=\"{}\">{}</text>\n", kLeft_px, subtitle_colour_,
                      html_escaped(subtitle_));
-  for (std::size_t i = 0; i < x_.categories.size(); ++i) {
-    const double at = place({static_cast<double>(i), y_.low}).x;
-    const std::string& name = x_.categories[i];
-    const std::size_t end = std::min(name.find('\n'), name.size());
-    svg += text(at, bottom + 17, "middle", name.substr(0, end));
-    if (end < name.size()) svg += text(at, bottom + 34, "middle", name.substr(end + 1));
-  }
-  for (const double tick : x_.categories.empty() ? ticks_of(x_) : std::vector<double>()) {
+  for (const auto& [value, name] : x_.names) svg += text(place({value, y_.low}).x, bottom + 17, "middle", name);
+  for (const double tick : x_.names.empty() ? ticks_of(x_) : std::vector<double>()) {
     const double at = place({tick, y_.low}).x;
     svg += fmt::format("<path d=\"M{0:.1f},{1}V{2}\" stroke=\"#e3e5e8\"/>", at, kTop_px, bottom) +
            text(at, bottom + 17, "middle", readable(tick));

@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -26,10 +27,9 @@ struct Axis {
   std::string label;  ///< with the unit
   double low = 0, high = 1;
   Scale scale = Scale::linear;
-  std::vector<std::string> categories{};  ///< instead of ticks: one at 0, 1, 2, …; a line break begins its second line
+  /// Ticks with names, for groups in a row, in place of numbers.
+  std::vector<std::pair<double, std::string>> names = {};
 };
-/// Of categories side by side, half a place of room on both sides.
-Axis category_axis(std::vector<std::string> categories);
 /// That holds all finite values (positive ones if logarithmic) and some room on both sides.
 Axis axis_over(std::string label, const std::vector<double>& values, Scale scale);
 
@@ -44,10 +44,9 @@ class Chart {
   void second_x_axis(std::string label, double factor);
   void curve(const std::vector<Vec2>& points, const std::string& style);
   void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
-  /// A filled rectangle between two opposite corners: of a bar, of a histogram.
-  void box(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
-  /// An upright line from low to high with short ends.
-  void error_bar(double x, double low, double high, const std::string& colour);
+  void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
+  /// An upright error bar.
+  void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {});
   /// A line across the frame at x, or at y.
   void upright(double x, const std::string& style);
   void level(double y, const std::string& style);

@@ -145,7 +145,10 @@ Figure force_by_area(const Analysis& analysis) {
         n += b.n_adhesions;
         n_cells = std::max(n_cells, b.n_cells);
         line.push_back({b.mean_area_um2, b.mean_force_nN});
-        if (b.interval_nN) chart.error_bar(b.mean_area_um2, b.interval_nN->low, b.interval_nN->high, colour);
+        if (b.interval_nN) {
+          chart.error({b.mean_area_um2, b.interval_nN->low}, {b.mean_area_um2, b.interval_nN->high},
+                      "stroke:" + colour + ";stroke-width:1.6");
+        }
         chart.dot(line.back(), 3.6,
                   "fill:" + std::string(is_connected ? colour : "#fff") + ";stroke:" + colour + ";stroke-width:1.6",
                   fmt::format("{} adhesions of {} cells: {} nN", b.n_adhesions, b.n_cells, readable(b.mean_force_nN)));

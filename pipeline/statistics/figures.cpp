@@ -43,17 +43,25 @@ std::string colour_of(const Sample& sample, int condition, int kind) {
   return sample.n_conditions() == 1 ? report::colour_of(kFibreTypes[kind]) : condition_colour(condition);
 }
 
-std::vector<std::string> kind_labels(const Sample& sample) {
-  std::vector<std::string> labels;
+/// The kinds side by side.
+Axis kind_axis(const Sample& sample) {
+  Axis axis{.label = {}, .low = -0.5, .high = sample.n_kinds() - 0.5};
+  for (int kind = 0; kind < sample.n_kinds(); ++kind)
+    axis.names.emplace_back(kind, kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]));
+  return axis;
+}
+
+/// "n = 56, 48, 56 fibres of 8, 8, 8 cells", in the order of the kinds.
+std::string counts_by_kind(const Sample& sample) {
+  std::string n, cells;
   for (int kind = 0; kind < sample.n_kinds(); ++kind) {
     std::vector<Observation> own;
-    for (const Observation& o : sample.values) {
-      if (o.kind == kind) own.push_back(o);
-    }
-    labels.push_back(fmt::format("{}\n{} in {} cells", kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]),
-                                 own.size(), n_cells_of(own)));
+    std::copy_if(sample.values.begin(), sample.values.end(), std::back_inserter(own),
+                 [&](const Observation& o) { return o.kind == kind; });
+    n += (kind == 0 ? "" : ", ") + std::to_string(own.size());
+    cells += (kind == 0 ? "" : ", ") + std::to_string(n_cells_of(own));
   }
-  return labels;
+  return "n = " + n + " " + sample.each + " of " + cells + " cells";
 }
 
 std::size_t n_keys_of(const Sample& sample) { return sample.n_conditions() > 1 ? sample.conditions.size() : 0; }
@@ -75,8 +83,9 @@ void add_condition_keys(Chart& chart, const Sample& sample) {
 
 Figure tensions_by_type(const Study& study, const Analysis& analysis) {
   const Sample& sample = analysis.tensions.sample;
-  Chart chart("Tension by fibre type", charts::category_axis(kind_labels(sample)),
+  Chart chart("Tension by fibre type", kind_axis(sample),
               Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
+  chart.subtitle(counts_by_kind(sample), "#555");
   const std::vector<MeasuredFibre> fibres = measured_fibres(study);
   std::map<int, std::size_t> n_of;
   constexpr double kDots = 0.5;  // of a condition's column
@@ -94,7 +103,7 @@ Figure tensions_by_type(const Study& study, const Analysis& analysis) {
                 "stroke:#000;stroke-width:2.5");
     if (!s.model) continue;
     const double beside = x + 0.42 * width;
-    chart.error_bar(beside, s.model->low, s.model->high, "#000");
+    chart.error({beside, s.model->low}, {beside, s.model->high}, "stroke:#000;stroke-width:1.6");
     chart.dot({beside, s.model->estimate}, 3.4, "fill:#fff;stroke:#000;stroke-width:1.6",
               fmt::format("mean {} nN", readable(s.model->estimate)));
   }
@@ -145,14 +154,16 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                 .charts = {},
                 .n_columns = 2};
   for (const double threshold : {parameters.weak_tension_nN, parameters.strong_tension_nN}) {
-    Chart chart("Above " + readable(threshold) + " nN", charts::category_axis(kind_labels(sample)),
+    Chart chart("Above " + readable(threshold) + " nN", kind_axis(sample),
                 Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
+    chart.subtitle(counts_by_kind(sample), "#555");
     for (const ShareAbove& s : analysis.shares) {
       if (s.threshold_nN != threshold) continue;
       const int condition = index_of(sample.conditions, s.condition), kind = index_of(sample.kinds, s.kind);
       const double x = place_of(sample, condition, kind);
       const std::string colour = colour_of(sample, condition, kind);
-      chart.error_bar(x, 100 * s.share.interval.low, 100 * s.share.interval.high, colour);
+      chart.error({x, 100 * s.share.interval.low}, {x, 100 * s.share.interval.high},
+                  "stroke:" + colour + ";stroke-width:1.6");
       chart.dot({x, 100 * s.share.value}, 4, "fill:" + colour,
                 fmt::format("{}{}: {} % of {} fibres", prefix_of(s.condition), kind_for_people(s.kind),
                             readable(100 * s.share.value), s.n));
@@ -178,7 +189,7 @@ Figure forces_by_cell(const Study& study) {
   });
   const double n = static_cast<double>(cells.size());
   Chart chart("Total force of each cell",
-              Axis{.label = fmt::format("{} cells", cells.size()), .low = 0, .high = n, .categories = {""}},
+              Axis{.label = fmt::format("{} cells", cells.size()), .low = 0, .high = n, .names = {{n / 2, ""}}},
               Axis{.label = "force (nN)", .low = 0, .high = end_below_keys(largest, study.conditions.size() + 1)});
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const FitSummary& fit = cells[i]->fit;
@@ -186,8 +197,8 @@ Figure forces_by_cell(const Study& study) {
     const double network = std::clamp(fit.network_force_nN, 0.0, fit.total_force_nN);
     const std::string hover =
         fmt::format("{}: {} nN, of the network {} nN", cells[i]->name, readable(fit.total_force_nN), readable(network));
-    chart.box({left, network}, {right, fit.total_force_nN}, "fill:" + condition_colour(cells[i]->condition), hover);
-    chart.box({left, 0}, {right, network}, "fill:#c9ccd1", hover);
+    chart.bar({left, network}, {right, fit.total_force_nN}, "fill:" + condition_colour(cells[i]->condition), hover);
+    chart.bar({left, 0}, {right, network}, "fill:#c9ccd1", hover);
   }
   for (std::size_t c = 0; c < study.conditions.size(); ++c)
     chart.key(prefix_of(study.conditions[c]) + "fibres", condition_colour(static_cast<int>(c)));
