@@ -241,7 +241,7 @@ TEST(Bootstrap, percentiles_make_up_for_few_cells) {
   const Interval interval = *bootstrap_interval(even, 6);
   EXPECT_NEAR(interval.low, 0.002431803166498854,
               1e-12);  // Phi(t √(6/5)), t = −2.5706 the 2.5 % point of 5 degrees of freedom (SciPy)
-  EXPECT_NEAR(interval.high, 1 - 0.002431803166498854, 1e-12);
+  EXPECT_NEAR(interval.high, 1 - 0.002431803166498854, kExact);
   EXPECT_FALSE(bootstrap_interval(even, 1));
   even.resize(1100);  // a tenth of the draws without the group
   EXPECT_FALSE(bootstrap_interval(even, 6));
