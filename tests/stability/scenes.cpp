@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "pipeline/contract/errors.h"
+#include "tests/support/hard_case.h"
 #include "tests/support/random_scene.h"
 
 namespace mbtfm {
@@ -41,6 +42,9 @@ void expect_no_faults(std::uint64_t seed, const SceneOutcome& outcome) {
 }
 
 TEST(RandomScenes, are_answered_in_balance_with_intervals_that_hold_or_refused_with_a_reason) {
+  test::hard_case(
+      "whole experiments at random: gel, cell, tensions, beads, camera",
+      "balance, finite numbers, 95 % of errors within three stated standard errors, or a refusal with its reason");
   const int n = from_environment("MBTFM_SCENES", 20);
   const int first = from_environment("MBTFM_FIRST_SCENE", 1);
   int n_answered = 0, n_refused = 0, n_tensions = 0, n_within = 0;
@@ -54,8 +58,11 @@ TEST(RandomScenes, are_answered_in_balance_with_intervals_that_hold_or_refused_w
     n_tensions += outcome.n_tensions;
     n_within += outcome.n_within;
   }
-  std::printf("%d answered, %d refused; %d of %d tensions within three stated standard errors\n", n_answered,
-              n_refused, n_within, n_tensions);
+  const std::string summary = std::to_string(n_answered) + " answered, " + std::to_string(n_refused) + " refused; " +
+                              std::to_string(n_within) + " of " + std::to_string(n_tensions) +
+                              " tensions within three stated standard errors";
+  std::puts(summary.c_str());
+  test::came_out(summary);
   EXPECT_GE(n_within, 0.95 * n_tensions);
   EXPECT_LE(n_refused, 0.2 * n);
 }
