@@ -18,7 +18,7 @@ constexpr double kCertain = 0.7;
 struct Candidate {
   int spot = 0;
   Vec2 u;
-  double log_light = 0;
+  double light = 0;  ///< logarithm of how much likelier than any other bead's the spot's light is
   double odds = 0;
   double probability = 0.1;
 };
@@ -124,12 +124,12 @@ Leftover leftover(const Matching& all, int bead, const std::vector<char>& is_fre
     result.around.push_back({.bead = j, .weight = weight, .distance_px = distance});
   }
   const Vec2 centre = place + middle_step(result.around, all.tracks);
-  constexpr int kMost = 40;  // five times what a reach of two distances holds
+  constexpr int kMost = 40;  // three times what a reach of two distances holds
   for (const int b : scene.stressed.neighbours.within(centre, all.reach_px, kMost)) {
     if (!is_free[b]) continue;
     const double brighter = log_light(scene.stressed.beads[b]) - log_light(scene.relaxed->beads[bead]);
     result.candidates.push_back(
-        {.spot = b, .u = scene.stressed.positions[b] - place, .log_light = light.log_ratio(brighter)});
+        {.spot = b, .u = scene.stressed.positions[b] - place, .light = light.log_ratio(brighter)});
   }
   return result;
 }
@@ -183,7 +183,7 @@ void iterate(Matching& all) {
   for (Leftover& leftover : all.leftovers) {
     for (Candidate& c : leftover.candidates) {
       constexpr double kMost = 50;  // certain, and finite
-      c.odds = std::exp(std::min(kMost, log_chance + c.log_light + log_support(all, leftover, c)));
+      c.odds = std::exp(std::min(kMost, log_chance + c.light + log_support(all, leftover, c)));
       odds_of_spot[c.spot] += c.odds;
     }
   }
