@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 
-#include "pipeline/report/svg.h"
+#include "pipeline/charts/chart.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/statistics/rank_tests.h"
 #include "pipeline/statistics/study_files.h"
@@ -12,9 +12,9 @@
 namespace mbtfm::statistics {
 namespace {
 
-using report::html_escaped;
-using report::readable;
-using report::round_below;
+using charts::html_escaped;
+using charts::readable;
+using charts::round_below;
 
 constexpr double kWidth_px = 560, kHeight_px = 360, kLeft_px = 62, kTop_px = 16, kRight_px = 16, kBottom_px = 56;
 constexpr double kInkWidth_px = kWidth_px - kLeft_px - kRight_px, kInkHeight_px = kHeight_px - kTop_px - kBottom_px;

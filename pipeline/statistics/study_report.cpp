@@ -1,8 +1,8 @@
 #include <fmt/format.h>
 
 #include "pipeline/contract/version.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
-#include "pipeline/report/svg.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -103,9 +103,9 @@ std::string overview(const Study& study) {
 }  // namespace
 
 std::string study_html(const Study& study, const StudyParameters& parameters) {
-  std::string body = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
+  const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
                                  study.cells.size(), kVersion);
-  body += report::section("In short", overview(study));
+  std::string body = report::section("In short", overview(study));
   body += report::section(
       "Tension by fibre type",
       "<div class=\"grid\">\n" +
@@ -114,16 +114,16 @@ std::string study_html(const Study& study, const StudyParameters& parameters) {
                          "Sum of the force magnitudes over adhesions, the strongest cell first.") +
           report::figure("Force and area of adhesions", adhesion_forces_svg(study),
                          "Filled: a segmented fibre ends on the adhesion.") +
-          "</div>\n" + report::html_of(types_table(study, parameters)));
+          "</div>\n" + report::html_of(types_table(study, parameters), {"types.csv", types_csv(study, parameters)}));
   body += report::section(
       "Tests between types",
-      report::html_of(tests_table(study)) +
+      report::html_of(tests_table(study), {"tests.csv", tests_csv(study)}) +
           "<p class=\"sub\">Two-sided. The fibres of a cell are not independent: tests that count fibres overstate the "
           "evidence; those that count one median a cell and type do not. Effect size: rank-biserial correlation for "
           "pairs (positive: the first group is stronger), epsilon squared for all. Holm’s correction is over the "
           "pairs. Types with fewer than two values are left out.</p>\n");
-  body += report::section("Cells", report::html_of(cells_table(study)));
-  return report::page("Stress-fibre tensions – mbtfm", body);
+  body += report::section("Cells", report::html_of(cells_table(study), {"cells.csv", cells_csv(study)}));
+  return report::page("Stress-fibre tensions – mbtfm", head, body);
 }
 
 }  // namespace mbtfm::statistics
