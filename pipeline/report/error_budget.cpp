@@ -40,23 +40,24 @@ std::string share_text(const BudgetLine& line, const std::string& source, double
 /// A bar as long as the standard error, each source's piece by its share of the square.
 charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
   double longest = 0;
-  charts::Axis rows{.label = "", .low = static_cast<double>(lines.size()) + 0.6, .high = 0.4};
-  for (std::size_t i = 0; i < lines.size(); ++i) {
-    longest = std::max(longest, lines[i].total_nN);
-    rows.names.emplace_back(i + 1, name_of(lines[i]));
+  std::vector<std::string> names;
+  for (const BudgetLine& line : lines) {
+    longest = std::max(longest, line.total_nN);
+    names.push_back(name_of(line));
   }
   charts::Chart chart("Where the errors come from",
-                      {"standard error of the tension (nN)", 0, longest > 0 ? 1.03 * longest : 1}, rows);
+                      {"standard error of the tension (nN)", 0, longest > 0 ? 1.03 * longest : 1},
+                      charts::row_axis(std::move(names)));
   constexpr double kRow_px = 19;
-  chart.frame_height(kRow_px * (static_cast<double>(lines.size()) + 0.2));
+  chart.frame_height(kRow_px * static_cast<double>(lines.size()));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     double from_nN = 0;
     for (std::size_t k = 0; k < lines[i].parts_nN.size(); ++k) {
       const auto& [source, part_nN] = lines[i].parts_nN[k];
       if (!part_nN || !(*part_nN > 0) || !(lines[i].total_nN > 0)) continue;
       const double to_nN = from_nN + *part_nN * *part_nN / lines[i].total_nN;
-      const double row = static_cast<double>(i) + 1;
-      chart.bar({from_nN, row - 0.33}, {to_nN, row + 0.33}, std::string("fill:") + colour(k),
+      const double row = static_cast<double>(i);
+      chart.box({from_nN, row - 0.33}, {to_nN, row + 0.33}, std::string("fill:") + colour(k),
                 share_text(lines[i], source, *part_nN));
       from_nN = to_nN;
     }

@@ -18,6 +18,9 @@
 #include "pipeline/report/tension_table.h"
 
 namespace mbtfm::report {
+
+extern const std::string_view kParaviewScript;  // view_in_paraview.py, made into C++ by the build
+
 namespace {
 
 std::string findings_section(const CellResults& results, const Provenance& provenance) {
@@ -209,6 +212,9 @@ std::string report_html(const std::filesystem::path& cell) {
 }
 
 void update_report(const std::filesystem::path& cell) {
+  const std::filesystem::path script = cell / "view_in_paraview.py";
+  if (!std::filesystem::is_regular_file(script) || read_text(script) != kParaviewScript)
+    write_whole(script, std::string(kParaviewScript));
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
   if (std::filesystem::is_regular_file(file) && read_text(file).ends_with(signature)) return;
