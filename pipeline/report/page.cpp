@@ -42,10 +42,11 @@ std::string contents(const std::string& body) {
 }  // namespace
 
 std::string html_of(const Table& table) {
+  // no <button>: browsers leave these out of the titles that they repeat on each printed page
   std::string html = "<div class=\"scroll\"><table><thead><tr>";
   for (const Table::Column& column : table.columns) {
     html += std::string("<th") + (column.is_number ? " class=\"n\"" : "") +
-            "><button type=\"button\" title=\"click to sort\">" + html_escaped(column.title) + "</button></th>";
+            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + html_escaped(column.title) + "</span></th>";
   }
   html += "</tr></thead><tbody>\n";
   for (const auto& row : table.rows) {

@@ -1,8 +1,9 @@
 'use strict';
 // A click on a column's title sorts; a second click reverses. Numbers begin with the largest.
-document.querySelectorAll('th button').forEach(function (button) {
-  button.addEventListener('click', function () {
-    const th = button.parentNode, body = th.closest('table').tBodies[0], isNumber = th.classList.contains('n');
+document.querySelectorAll('th span').forEach(function (title) {
+  title.addEventListener('keydown', function (event) { if (event.key === 'Enter' || event.key === ' ') title.click(); });
+  title.addEventListener('click', function () {
+    const th = title.parentNode, body = th.closest('table').tBodies[0], isNumber = th.classList.contains('n');
     const first = isNumber ? 'descending' : 'ascending';
     const second = isNumber ? 'ascending' : 'descending';
     const order = th.getAttribute('aria-sort') === first ? second : first;
@@ -92,16 +93,21 @@ function draw(box) {
   };
   const whole = function () { x.show(0, 1); y.show(0, 1); update(); };
 
-  const fit = function () {
-    const width = Math.floor(box.clientWidth - pad.left - pad.right);
+  const fitTo = function (box_px) {
+    const width = Math.floor(box_px - pad.left - pad.right);
     if (width < 40 || width === view.width()) return;
     box.parentNode.style.setProperty('--frame', width / 362);
     view.width(width).run();
   };
+  const fit = function () { fitTo(box.clientWidth); };
   fit();
   view.run();
   update();
   new ResizeObserver(function () { requestAnimationFrame(fit); }).observe(box);
+
+  // half of an A4 page; the style sheet stretches it to what the column has
+  addEventListener('beforeprint', function () { fitTo(330); });
+  addEventListener('afterprint', fit);
 
   // the wheel alone scrolls the page
   box.addEventListener('wheel', function (event) {

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using test::run_program;
 using test::TemporaryFolder;
 
-/// A small cell that went through every stage, from images; one for all tests.
+/// A small cell that went through every stage, from images.
 const fs::path& cell() {
   static const TemporaryFolder folder;
   static const fs::path made = [] {
@@ -58,7 +58,7 @@ Extent extent_of(const std::string& file, const char* array) {
   return {range[0], range[1], values->GetNumberOfComponents()};
 }
 
-TEST(VtkFiles, hold_the_arrays_that_the_page_on_formats_names) {
+void expect_the_arrays_of_the_page_on_formats() {
   const std::map<std::string, std::set<std::string>> expected = {
       {"1_segment/cell.vtp", {"adhesion_id", "fibre_id", "fibre_type"}},
       {"2_track/displacement.vtp", {"displacement_um", "sigma_um", "is_good"}},
@@ -79,7 +79,7 @@ TEST(VtkFiles, hold_the_arrays_that_the_page_on_formats_names) {
   EXPECT_EQ(found.size(), expected.size());
 }
 
-TEST(VtkFiles, carry_the_unit_in_the_name_of_every_quantity) {
+void expect_the_unit_in_the_name_of_every_quantity() {
   // numbers without a unit
   const std::set<std::string> pure = {"adhesion_id", "fibre_id", "fibre_type",       "is_good",
                                       "share",       "state",    "informs_fibre_id", "weight"};
@@ -98,7 +98,7 @@ TEST(VtkFiles, carry_the_unit_in_the_name_of_every_quantity) {
   }
 }
 
-TEST(VtkFiles, agree_with_the_tables) {
+void expect_the_numbers_of_the_tables() {
   double largest_force_nN = 0, largest_displacement_um = 0;
   for (const AdhesionForce& f : read_adhesion_forces(cell() / "4_fit/adhesion_forces.csv"))
     largest_force_nN = std::max(largest_force_nN, norm(f.force_nN));
@@ -114,7 +114,7 @@ TEST(VtkFiles, agree_with_the_tables) {
   EXPECT_EQ(extent_of("4_fit/contracted.vtu", "fibre_id").high, largest_id);
 }
 
-TEST(VtkFiles, hold_values_that_are_finite_and_of_a_cells_size) {
+void expect_finite_values_of_a_cells_size() {
   struct Bound {
     const char *file, *array;
     int n_components;
@@ -134,6 +134,14 @@ TEST(VtkFiles, hold_values_that_are_finite_and_of_a_cells_size) {
     EXPECT_GE(extent.high, b.low) << b.file << " " << b.array;
     EXPECT_LE(extent.high, b.high) << b.file << " " << b.array;
   }
+}
+
+// one test: each would make the cell anew
+TEST(VtkFiles, hold_the_arrays_that_they_should_with_units_and_the_numbers_of_the_tables) {
+  expect_the_arrays_of_the_page_on_formats();
+  expect_the_unit_in_the_name_of_every_quantity();
+  expect_the_numbers_of_the_tables();
+  expect_finite_values_of_a_cells_size();
 }
 
 TEST(VtkFiles, paraview_shows_the_standard_view) {
