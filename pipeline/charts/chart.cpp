@@ -69,14 +69,10 @@ Axis axis_over(std::string label, const std::vector<double>& values, Scale scale
   return {axis.label, axis.low - room, axis.high + room, scale};
 }
 
-Axis category_axis(std::vector<std::string> categories) {
-  const double n = static_cast<double>(categories.size());
-  return {.label = {}, .low = -0.5, .high = n - 0.5, .scale = Scale::linear, .categories = std::move(categories)};
-}
-
-Axis row_axis(std::vector<std::string> categories) {
-  Axis axis = category_axis(std::move(categories));
-  std::swap(axis.low, axis.high);
+Axis row_axis(const std::vector<std::string>& names) {
+  const double n = static_cast<double>(names.size());
+  Axis axis{.label = {}, .low = n - 0.5, .high = -0.5};
+  for (std::size_t i = 0; i < names.size(); ++i) axis.names.emplace_back(i, names[i]);
   return axis;
 }
 
@@ -120,15 +116,11 @@ void Chart::pieces(const std::vector<std::pair<Vec2, Vec2>>& pieces, const std::
   marks_.push_back({.kind = Mark::Kind::pieces, .points = std::move(ends), .style = style, .hover = hover});
 }
 
-void Chart::box(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover) {
-  marks_.push_back({.kind = Mark::Kind::box, .points = {corner, opposite}, .style = style, .hover = hover});
+void Chart::bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover) {
+  marks_.push_back({.kind = Mark::Kind::bar, .points = {corner, opposite}, .style = style, .hover = hover});
 }
 
-void Chart::error_bar(double x, double low, double high, const std::string& colour) {
-  error_bar({x, low}, {x, high}, "stroke-width:1.6;stroke:" + colour);
-}
-
-void Chart::error_bar(Vec2 from, Vec2 to, const std::string& style, const std::string& hover) {
+void Chart::error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover) {
   marks_.push_back({.kind = Mark::Kind::error, .points = {from, to}, .style = style, .hover = hover});
 }
 

@@ -29,13 +29,11 @@ struct Axis {
   std::string label;         ///< with the unit
   double low = 0, high = 1;  ///< a linear axis may run downwards: low > high
   Scale scale = Scale::linear;
-  /// Instead of ticks: one at 0, 1, 2, …; a line break begins its second line.
-  std::vector<std::string> categories = {};
+  /// Ticks with names, for groups in a row, in place of numbers.
+  std::vector<std::pair<double, std::string>> names = {};
 };
-/// Of categories side by side, half a place of room on both sides.
-Axis category_axis(std::vector<std::string> categories);
-/// The same from the top down, for a y axis.
-Axis row_axis(std::vector<std::string> categories);
+/// Of rows with names from the top down, at 0, 1, 2, …, for a y axis.
+Axis row_axis(const std::vector<std::string>& names);
 /// That holds all finite values (positive ones if logarithmic) and some room on both sides.
 Axis axis_over(std::string label, const std::vector<double>& values, Scale scale);
 /// Where a value lies between the ends of its axis, 0 to 1; NaN where it has no place.
@@ -47,7 +45,7 @@ struct Mark {
     curve,    ///< through `points`
     polygon,  ///< with corners `points`
     pieces,   ///< of line, between each two of `points`
-    box,      ///< a rectangle between two opposite corners
+    bar,      ///< a rectangle between two opposite corners
     error,    ///< a line between two points with a stop at each end
     dot,
     diamond,
@@ -85,12 +83,10 @@ class Chart {
   /// Separate pieces of line, as one thing.
   void pieces(const std::vector<std::pair<Vec2, Vec2>>& pieces, const std::string& style,
               const std::string& hover = {});
-  /// A filled rectangle between two opposite corners: of a bar, of a histogram.
-  void box(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
-  /// An upright line from low to high with short ends.
-  void error_bar(double x, double low, double high, const std::string& colour);
-  /// A line along x or y with short ends.
-  void error_bar(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {});
+  /// A filled rectangle between two opposite corners.
+  void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
+  /// An error bar, along x or y.
+  void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {});
   void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
   void diamond(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
   void arrow(Vec2 from, Vec2 shift_px, const std::string& style);

@@ -28,12 +28,11 @@ std::vector<double> log_ticks(double low, double high) {
 
 /// value, text
 std::vector<std::pair<double, std::string>> ticks_of(const Axis& axis) {
-  std::vector<std::pair<double, std::string>> list;
-  for (const std::string& name : axis.categories) list.emplace_back(list.size(), name);
-  if (!list.empty()) return list;
+  if (!axis.names.empty()) return axis.names;
   const auto [low, high] = std::minmax(axis.low, axis.high);
   std::vector<double> values = axis.scale == Scale::logarithmic ? log_ticks(low, high) : std::vector<double>();
   if (values.size() < 3) values = ticks(low, high);  // within less than a decade a logarithm is hardly bent
+  std::vector<std::pair<double, std::string>> list;
   for (const double value : values) list.emplace_back(value, readable(value));
   return list;
 }
@@ -105,7 +104,7 @@ std::string svg_of(const Mark& mark, const Frame& frame) {
   const Vec2 at = frame.place(mark.points.front()), to = frame.place(mark.points.back());
   if (!is_finite(at) || !is_finite(to)) return {};
   switch (mark.kind) {
-    case Kind::box:
+    case Kind::bar:
       return element("rect", rectangle(at, to), mark);
     case Kind::error:
       return error_bar(mark, at, to);
@@ -142,11 +141,9 @@ std::string axes(const Frame& frame) {
   const double bottom = kTop_px + frame.height_px, right = kLeft_px + Chart::kFrameWidth_px;
   std::string svg;
   for (const auto& [value, name] : ticks_of(frame.x_axis)) {
-    const std::size_t end = std::min(name.find('\n'), name.size());
-    if (frame.x_axis.categories.empty())
+    if (frame.x_axis.names.empty())
       svg += fmt::format("<path d=\"M{0:.1f},{1}V{2}\" stroke=\"#e3e5e8\"/>", frame.x(value), kTop_px, bottom);
-    svg += text(frame.x(value), bottom + 17, "middle", name.substr(0, end));
-    if (end < name.size()) svg += text(frame.x(value), bottom + 34, "middle", name.substr(end + 1));
+    svg += text(frame.x(value), bottom + 17, "middle", name);
   }
   for (const auto& [value, name] : ticks_of(frame.y_axis)) {
     svg += fmt::format("<path d=\"M{0},{1:.1f}H{2}\" stroke=\"#e3e5e8\"/>", kLeft_px, frame.y(value), right) +

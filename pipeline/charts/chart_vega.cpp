@@ -89,7 +89,7 @@ std::string vega_kind(Kind kind) {
     case Kind::pieces:
     case Kind::arrow:
       return "path";
-    case Kind::box:
+    case Kind::bar:
       return "rect";
     case Kind::error:
     case Kind::upright:
@@ -150,7 +150,7 @@ ordered_json place_of(Kind kind) {
             {"scaleY", signal("y_step")}};
   }
   for (const char* axis : {"x", "y"}) place[axis] = {{"scale", axis}, {"field", axis}};
-  if (kind == Kind::box || kind == Kind::error || kind == Kind::picture) {
+  if (kind == Kind::bar || kind == Kind::error || kind == Kind::picture) {
     place["x2"] = {{"scale", "x"}, {"field", "x2"}};
     place["y2"] = {{"scale", "y"}, {"field", "y2"}};
   }
@@ -282,22 +282,26 @@ ordered_json axis_of(const std::string& scale, const char* orient, const Axis& a
                          {"labelColor", "#1a1d21"},
                          {"titleColor", "#1a1d21"},
                          {"labelOverlap", true}};
-  if (axis.categories.empty()) {
+  if (axis.names.empty()) {
     result["tickCount"] = signal(is_upright ? "max(3, height / 50)" : "max(3, width / 80)");
     return result;
   }
-  for (std::size_t i = 0; i < axis.categories.size(); ++i) result["values"].push_back(i);
+  ordered_json values = ordered_json::array(), names = ordered_json::array();
+  for (const auto& [value, name] : axis.names) {
+    values.push_back(value);
+    names.push_back(name);
+  }
+  result["values"] = values;
   if (!is_upright) result["grid"] = false;
   result["labelOverlap"] = false;
-  result["encode"]["labels"]["update"] = {{"text", signal(ordered_json(axis.categories).dump() + "[datum.value]")},
-                                          {"lineBreak", {{"value", "\n"}}}};
+  result["encode"]["labels"]["update"]["text"] = signal(names.dump() + "[indexof(" + values.dump() + ", datum.value)]");
   return result;
 }
 
 /// Room for the numbers or names of an upright axis and its title.
 double left_room_px(const Axis& axis) {
   std::size_t longest = 5;
-  for (const std::string& name : axis.categories) longest = std::max(longest, name.size());
+  for (const auto& [value, name] : axis.names) longest = std::max(longest, name.size());
   return kTextWidth_px * static_cast<double>(longest) + (axis.label.empty() ? 12 : 28);
 }
 
@@ -306,8 +310,6 @@ double left_room_px(const Axis& axis) {
 std::string Chart::vega() const {
   const Axes axes{x_, y_};
   constexpr double kTop_px = 10, kUpperAxis_px = 36, kRight_px = 16, kBottom_px = 44;
-  const bool has_two_lines = std::any_of(x_.categories.begin(), x_.categories.end(),
-                                         [](const std::string& name) { return name.find('\n') != name.npos; });
   ordered_json spec = {{"$schema", "vega/v5.json"},
                        {"description", title_},
                        {"autosize", "none"},
@@ -317,7 +319,7 @@ std::string Chart::vega() const {
                         {{"left", left_room_px(y_)},
                          {"right", kRight_px},
                          {"top", kTop_px + (second_factor_ > 0 ? kUpperAxis_px : 0)},
-                         {"bottom", kBottom_px + (has_two_lines ? kTextSize_px + 4 : 0)}}},
+                         {"bottom", kBottom_px}}},
                        {"signals", ordered_json::array()},
                        {"scales", {scale_of("x", x_, signal("xdom")), scale_of("y", y_, signal("ydom"))}},
                        {"axes", {axis_of("x", "bottom", x_), axis_of("y", "left", y_)}},

@@ -47,7 +47,7 @@ charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
   }
   charts::Chart chart("Where the errors come from",
                       {"standard error of the tension (nN)", 0, longest > 0 ? 1.03 * longest : 1},
-                      charts::row_axis(std::move(names)));
+                      charts::row_axis(names));
   constexpr double kRow_px = 19;
   chart.frame_height(kRow_px * static_cast<double>(lines.size()));
   for (std::size_t i = 0; i < lines.size(); ++i) {
@@ -57,7 +57,7 @@ charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
       if (!part_nN || !(*part_nN > 0) || !(lines[i].total_nN > 0)) continue;
       const double to_nN = from_nN + *part_nN * *part_nN / lines[i].total_nN;
       const double row = static_cast<double>(i);
-      chart.box({from_nN, row - 0.33}, {to_nN, row + 0.33}, std::string("fill:") + colour(k),
+      chart.bar({from_nN, row - 0.33}, {to_nN, row + 0.33}, std::string("fill:") + colour(k),
                 share_text(lines[i], source, *part_nN));
       from_nN = to_nN;
     }

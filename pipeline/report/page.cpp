@@ -46,7 +46,8 @@ std::string html_of(const Table& table) {
   std::string html = "<div class=\"scroll\"><table><thead><tr>";
   for (const Table::Column& column : table.columns) {
     html += std::string("<th") + (column.is_number ? " class=\"n\"" : "") +
-            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + html_escaped(column.title) + "</span></th>";
+            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + html_escaped(column.title) +
+            "</span></th>";
   }
   html += "</tr></thead><tbody>\n";
   for (const auto& row : table.rows) {

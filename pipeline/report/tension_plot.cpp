@@ -27,7 +27,7 @@ void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& re
   std::string hover = hover_of(*row.fibre, results);
   if (row.true_tension_nN) hover += "\ntruth " + readable(*row.true_tension_nN) + " nN";
   const Tension& t = row.tension;
-  if (t.low_nN && t.high_nN) chart.error_bar({*t.low_nN, y}, {*t.high_nN, y}, "stroke-width:2;stroke:" + colour, hover);
+  if (t.low_nN && t.high_nN) chart.error({*t.low_nN, y}, {*t.high_nN, y}, "stroke-width:2;stroke:" + colour, hover);
   chart.dot({t.tension_nN, y}, 4.5, "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff"),
             hover);
   if (row.true_tension_nN) {
@@ -103,7 +103,7 @@ Chart tension_plot(const CellResults& results) {
   for (const FibreRow& row : rows) names.push_back(fmt::format("{} {}", name_of(row.fibre->type), row.fibre->fibre_id));
   const double largest = largest_nN(rows);
   // from a little below zero: the mark of a tension of zero is seen whole
-  Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(std::move(names)));
+  Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(names));
   constexpr double kRow_px = 20;
   chart.frame_height(kRow_px * static_cast<double>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) draw_row(chart, rows[i], static_cast<double>(i), results);
