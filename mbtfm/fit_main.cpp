@@ -233,7 +233,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
-  const DisplacementField fitted = fitted_field(inputs, data, fit);
+  const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
@@ -251,6 +251,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
+  write_displacement(context.output("out", "displacement_without_fibres.csv"),
+                     field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(fit, data), weight_array(data)});
   context.progress(0.95, "surface of the gel");
