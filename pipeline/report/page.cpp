@@ -98,7 +98,8 @@ std::string figure(const charts::Chart& chart, const std::string& caption, const
     html += "</div>\n";
   }
   return html + "<div class=\"chart\"></div><script type=\"application/json\">" + inside_script(chart.vega()) +
-         "</script>\n" + legend + "<figcaption>" + html_escaped(caption) + "</figcaption></figure>\n";
+         "</script>\n" + legend + (caption.empty() ? "" : "<figcaption>" + html_escaped(caption) + "</figcaption>") +
+         "</figure>\n";
 }
 
 std::string figure(const std::string& title, const std::string& picture, const std::string& caption) {
