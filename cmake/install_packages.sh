@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Install the Debian packages that mbtfm builds with, those that lack only. As root or through sudo; says what lacks
-# where it can do neither.
+# where it can do neither. Arguments: further packages.
 set -euo pipefail
 
 packages=(
@@ -12,6 +12,7 @@ packages=(
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
   libjs-vega
   libgtest-dev libgmock-dev libbenchmark-dev
+  "$@"
 )
 
 missing=()

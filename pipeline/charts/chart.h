@@ -2,7 +2,6 @@
 /// pages.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
