@@ -95,7 +95,9 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
   if (line.is_quiet) arguments.emplace_back("--quiet");
   for (const std::string& argument : further) {
     // the one flag that people write with a dash
-    arguments.push_back(argument == "--condition-from" ? "--condition_from" : argument);
+    constexpr std::string_view kDashed = "--condition-from";
+    const bool is_dashed = argument.starts_with(kDashed);
+    arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
   }
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());

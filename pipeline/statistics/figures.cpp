@@ -256,9 +256,9 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
         chart.dot({c->x[i], c->y[i]}, 3.2, "fill:" + colour + ";fill-opacity:.7",
                   study.cells[static_cast<std::size_t>(c->cells[i])].name);
       chart.curve({{0, 0}, {x_end, c->line.slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
-      std::string text = prefix_of(c->condition) + "slope " + readable(c->line.slope);
-      if (c->line.slope_error) text += " ± " + readable(*c->line.slope_error);
-      if (c->line.correlation) text += ", r = " + readable(*c->line.correlation);
+      std::string text = prefix_of(c->condition) + readable(c->line.slope);
+      if (c->line.slope_error) text += fmt::format(" ± {:.2g}", *c->line.slope_error);
+      if (c->line.correlation) text += ", r = " + readable(std::round(100 * *c->line.correlation) / 100);
       chart.key(text + fmt::format(", n = {}", c->line.n), colour);
     }
     figure.charts.push_back(chart);

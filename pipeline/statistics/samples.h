@@ -30,7 +30,7 @@ Sample sample_adhesion_areas(const Study& study);
 /// Total, fibre and network force, surface tension of the network: one value a cell.
 std::vector<Sample> sample_cells(const Study& study);
 
-/// What a cell's force may depend on, and the force itself.
+/// What a cell's force may depend on.
 struct CellFigures {
   double n_adhesions = 0, n_fibres = 0, adhesion_area_um2 = 0, cell_area_um2 = 0;
 };

@@ -235,6 +235,18 @@ TEST(Bootstrap, the_interval_of_a_mean_is_students) {
   EXPECT_NEAR(interval.high, d.mean + half, 0.07 * half);
 }
 
+TEST(Bootstrap, percentiles_make_up_for_few_cells) {
+  std::vector<std::optional<double>> even;  // from 0 to 1: the value at a share is the share
+  for (int i = 0; i <= 1000; ++i) even.emplace_back(i / 1000.0);
+  const Interval interval = *bootstrap_interval(even, 6);
+  EXPECT_NEAR(interval.low, 0.002431803166498854,
+              1e-12);  // Phi(t √(6/5)), t = −2.5706 the 2.5 % point of 5 degrees of freedom (SciPy)
+  EXPECT_NEAR(interval.high, 1 - 0.002431803166498854, 1e-12);
+  EXPECT_FALSE(bootstrap_interval(even, 1));
+  even.resize(1100);  // a tenth of the draws without the group
+  EXPECT_FALSE(bootstrap_interval(even, 6));
+}
+
 TEST(Shares, fibres_that_agree_within_cells_count_as_cells) {
   // ten cells of ten fibres, all above or all below: as ten independent observations or fewer
   std::vector<CellCount> cells(10, {.n = 10, .n_with = 0});

@@ -59,7 +59,7 @@ double share_below(const std::vector<double>& values, double end) {
 charts::Chart chart_of(const PValues& p_values, const std::string& question, int n_cells) {
   charts::Chart chart(question + ", " + std::to_string(n_cells) + " cells, no difference",
                       {.label = "p", .low = 0, .high = 1},
-                      {.label = "share of the studies with a smaller p", .low = 0, .high = 1});
+                      {.label = "share of the studies with a smaller p", .low = 0, .high = 1.4});
   chart.curve({{0, 0}, {1, 1}}, "stroke:#999;stroke-dasharray:4 3");
   chart.put_key(charts::Chart::KeySide::right);
   int next = 0;
