@@ -102,11 +102,6 @@ std::string figure(const charts::Chart& chart, const std::string& caption, const
          "</figure>\n";
 }
 
-std::string figure(const std::string& title, const std::string& picture, const std::string& caption) {
-  return "<figure><h3>" + html_escaped(title) + "</h3>\n" + picture + "<figcaption>" + html_escaped(caption) +
-         "</figcaption></figure>\n";
-}
-
 std::string page(const std::string& title, const std::string& head, const std::string& body) {
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
          "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"

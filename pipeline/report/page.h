@@ -40,9 +40,6 @@ std::string folded(const std::string& title, const std::string& content);
 /// A chart that zooms and answers the mouse. @param legend  HTML below the frame
 std::string figure(const charts::Chart& chart, const std::string& caption, const std::string& legend = {});
 
-/// A drawing that is HTML already.
-std::string figure(const std::string& title, const std::string& picture, const std::string& caption);
-
 /// A whole page with its styles, scripts and Vega inside: it asks for nothing from anywhere. @param head  HTML before
 /// the table of contents
 std::string page(const std::string& title, const std::string& head, const std::string& body);
