@@ -113,7 +113,7 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"n_beads", std::int64_t(inputs.beads.size())},
             {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
             {"method", parameters.method},
-            {"loss", parameters.loss},
+            {"loss", fit.loss},
             {"reason", fit.report.reason}};
   return s;
 }
