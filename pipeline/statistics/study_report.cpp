@@ -1,5 +1,7 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "pipeline/contract/version.h"
 #include "pipeline/report/page.h"
 #include "pipeline/statistics/study_files.h"
@@ -22,8 +24,7 @@ bool has_conditions(const Study& study) { return study.conditions.size() > 1 || 
 /// The one place where a figure enters the page.
 std::string embedded(const Figure& figure) {
   std::string html = "<h3>" + html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
-  for (const charts::Chart& chart : figure.charts)
-    html += "<figure>" + charts::svg_file({chart}, 1, {}) + "</figure>\n";
+  for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
   return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
 }
 
@@ -141,9 +142,9 @@ constexpr const char* kHowToRead =
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
                        const StudyParameters& parameters) {
-  std::string body = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
-                                 study.cells.size(), kVersion);
-  body += report::section("In short", overview(study, analysis));
+  const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
+                                       study.cells.size(), kVersion);
+  std::string body = report::section("In short", overview(study, analysis));
   std::string found;
   for (const Findings& f : findings_of(analysis, parameters)) {
     if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
@@ -152,7 +153,12 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   std::string pictures;
   for (const Figure& figure : figures) pictures += embedded(figure);
   body += report::section("Figures", pictures);
-  body += report::section("Tension by fibre type", report::html_of(types_table(study, analysis)));
+  const auto files = tables_of(study, analysis);
+  const auto with_file = [&](const Table& table, const std::string& name) {
+    const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
+    return report::html_of(table, {file->first, file->second});
+  };
+  body += report::section("Tension by fibre type", with_file(types_table(study, analysis), "types.csv"));
   std::string tests;
   for (const Measure* m : analysis.measures()) {
     if (!m->comparisons.empty())
@@ -160,8 +166,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
           report::folded("Tests of the " + m->sample.name + " of " + m->sample.each, report::html_of(tests_table(*m)));
   }
   body += report::section("Tests", tests + kHowToRead);
-  body += report::section("Cells", report::html_of(cells_table(study)));
-  return report::page("Stress-fibre tensions – mbtfm", body);
+  body += report::section("Cells", with_file(cells_table(study), "cells.csv"));
+  return report::page("Stress-fibre tensions – mbtfm", head, body);
 }
 
 }  // namespace mbtfm::statistics
