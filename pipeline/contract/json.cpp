@@ -19,4 +19,13 @@ Value value_of(const nlohmann::ordered_json& json) {
   return json.get<std::string>();
 }
 
+nlohmann::ordered_json json_of(const Effect& e) {
+  nlohmann::ordered_json json = {{"name", e.name}, {"switch", e.setting}, {"on", e.is_on}};
+  if (e.number) json["number"] = *e.number;
+  if (e.threshold) json["threshold"] = *e.threshold;
+  json["why"] = e.why;
+  json["seconds"] = e.seconds;
+  return json;
+}
+
 }  // namespace mbtfm

@@ -211,9 +211,8 @@ std::string choice(const Gel& gel, const SubstrateParameters& parameters, const 
   const auto model = make_substrate(gel, parameters, 2);
   const Eigen::MatrixXd matrix = model->compliance_um_per_nN(points, ellipses);
   EXPECT_TRUE(matrix.allFinite());
-  const std::string why = model->effects().front().why;
-  EXPECT_GT(why.size(), 30u) << why;  // a reason with numbers
-  return why.substr(0, why.find(':'));
+  const std::string name = std::get<std::string>(model->figures().front().second);
+  return name;
 }
 
 TEST(Automatic, takes_the_cheapest_model_that_is_right) {
@@ -240,7 +239,7 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
   const auto ellipses = test::scattered_ellipses(6, 25);
   SubstrateParameters parameters = test::model_named("auto");
   for (const double tolerance : {0.05, 0.01}) {
-    parameters.displacement_tolerance = tolerance;
+    parameters.effects.effect_tolerance = tolerance;
     // as thin as the half-space is taken
     Gel gel = kGel;
     gel.thickness_um = 40;
@@ -271,12 +270,12 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
     EXPECT_THROW(make_substrate(kGel, parameters, 1), UsageError) << model;
   }
   SubstrateParameters layer = test::model_named("layer");
-  layer.vertical = true;
+  layer.effects.vertical_displacement = "on";
   try {
     make_substrate(kGel, layer, 1);
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("take half-space, split or refined"), std::string::npos) << error.what();
+    EXPECT_NE(std::string(error.what()).find("take another"), std::string::npos) << error.what();
   }
   EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
                UsageError);
