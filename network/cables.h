@@ -51,6 +51,7 @@ class CableNetwork {
   CableNetwork& operator=(CableNetwork&&) noexcept;
 
   const Network& network() const;
+  const CableParameters& parameters() const;
   /// Labels of the groups that have a tension: front() is 0, the actin network; then the fibres in rising order.
   const std::vector<int>& fibre_ids() const;
   /// Labels of the adhesions that hold vertices, in rising order.

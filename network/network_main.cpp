@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <string>
 
+#include "network/effects.h"
 #include "network/mesh.h"
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/files.h"
@@ -80,7 +81,7 @@ int main(int argc, char** argv) {
                  {"out", FileArgument::Kind::output, "network.vtu"}}},
       argc, argv, [](const NetworkStageParameters& parameters, StageContext& context) {
         Cell cell = read_cell(context.input("cell", kCellFiles));
-        const Effect fibres = take_fibres(cell, parameters.effects.stress_fibres);
+        const Effect fibres = network::take_fibres(cell, parameters.effects.stress_fibres);
         const network::GeneratedNetwork generated = network::generate_network(cell, parameters.network);
         write_network(context.output("out"), generated.network);
         StageReport report = report_of(generated);

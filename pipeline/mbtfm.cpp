@@ -27,7 +27,7 @@ struct CommandLine {
   fs::path stage_folder = runner::executable_folder();
   int threads = available_threads();
   int jobs = 1;
-  bool is_quiet = false;
+  bool is_quiet = false, explain = false;
   std::vector<std::string> only, redo, patterns;
   fs::path template_toml;
 };
@@ -40,6 +40,7 @@ int run(const CommandLine& line) {
                                    .is_quiet = line.is_quiet,
                                    .only = line.only,
                                    .redo = line.redo,
+                                   .explain = line.explain,
                                    .version = kVersion,
                                    .say = line.is_quiet ? nullptr : say};
   const runner::CellOutcome outcome = runner::run_cell(line.folder, options);
@@ -133,6 +134,7 @@ int start(int argc, char** argv) {
   app.require_subcommand(1);
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
   add_stage_options(run_command, line);
+  run_command->add_flag("--explain", line.explain, "fit anew and say what each effect that is off would change");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();

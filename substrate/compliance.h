@@ -27,7 +27,7 @@ Ellipse ellipse_of(const Adhesion& adhesion);
 struct SubstrateParameters {
   std::string model = "auto";            ///< how, not what: the cheapest that has the effects that are on
   double displacement_tolerance = 0.02;  ///< a third of the beads' noise in good experiments
-  std::string modulus_profile = {};  ///< empty: youngs_modulus_kPa at every depth
+  std::string modulus_profile = {};      ///< empty: youngs_modulus_kPa at every depth
 
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
@@ -44,7 +44,7 @@ struct SubstrateParameters {
   std::optional<double> side_distance_um = {};  ///< a gel is centimetres wide: its sides are far away
   std::string cache_folder = {};                ///< empty: factors stay in memory
 
-  bool stress = false;    ///< of the gel's inside, where it is written
+  bool stress = false;  ///< of the gel's inside, where it is written
 
   EffectSwitches effects = {};  ///< declared by those who have them
 

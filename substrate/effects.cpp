@@ -67,8 +67,9 @@ Effect decide_grading(const Gel& gel, const SubstrateParameters& p) {
 }
 
 Effect decide_thickness(const Gel& gel, const SubstrateParameters& p, double scene_um) {
-  return decided(kThickness, p.effects.finite_thickness, thickness_number(gel, scene_um), p.effects.effect_tolerance,
-                 "with a scene " + brief(scene_um / gel.thickness_um) + " thicknesses wide the base changes the field by");
+  return decided(
+      kThickness, p.effects.finite_thickness, thickness_number(gel, scene_um), p.effects.effect_tolerance,
+      "with a scene " + brief(scene_um / gel.thickness_um) + " thicknesses wide the base changes the field by");
 }
 
 Effect decide_vertical(const SubstrateParameters& p) {
@@ -99,7 +100,8 @@ GelEffects effects_of_model(const SubstrateParameters& p) {
   const bool has_base = p.model != "half-space", has_sides = p.model == "split" || p.model == "refined";
   const auto row = [&](const char* name, const char* key, const std::string& setting, bool can_on, bool can_off,
                        bool is_on, const std::string& why) {
-    require(setting != "on" || can_on, std::string(key) + " = on: the model '" + p.model + "' has none: take another, or auto");
+    require(setting != "on" || can_on,
+            std::string(key) + " = on: the model '" + p.model + "' has none: take another, or auto");
     require(setting != "off" || can_off, std::string(key) + " = off: the model '" + p.model + "' cannot leave it out");
     return decided(name, setting, is_on, why);
   };

@@ -1,5 +1,5 @@
-#include "substrate/greens_model.h"
 #include "substrate/effects.h"
+#include "substrate/greens_model.h"
 #include "substrate/layer.h"
 #include "substrate/models.h"
 

@@ -8,10 +8,10 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "substrate/effects.h"
 #include "substrate/elastic_system.h"
 #include "substrate/greens_model.h"
 #include "substrate/load_cases.h"
-#include "substrate/effects.h"
 #include "substrate/models.h"
 #include "substrate/refined_mesh.h"
 #include "substrate/volume.h"

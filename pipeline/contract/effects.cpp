@@ -57,9 +57,8 @@ void declare(ParameterList& list, EffectSwitches& values, const std::vector<std:
 Effect decided(const std::string& name, const std::string& setting, double number, double threshold,
                const std::string& found) {
   const bool is_above = number > threshold;
-  Effect effect = decided(
-      name, setting, is_above,
-      found + " " + brief(number) + (is_above ? ", above " : ", not above ") + brief(threshold));
+  Effect effect = decided(name, setting, is_above,
+                          found + " " + brief(number) + (is_above ? ", above " : ", not above ") + brief(threshold));
   effect.number = number;
   effect.threshold = threshold;
   return effect;
@@ -79,6 +78,7 @@ std::string line_of(const Effect& effect) {
   line += effect.setting == "auto" ? " (auto)" : " (as switched)";
   line += ": " + effect.why;
   if (effect.seconds > 0) line += "; " + brief(effect.seconds) + " s";
+  if (!effect.would_change.empty()) line += "; on, it " + effect.would_change;
   return line;
 }
 

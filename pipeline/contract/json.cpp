@@ -25,6 +25,8 @@ nlohmann::ordered_json json_of(const Effect& e) {
   if (e.threshold) json["threshold"] = *e.threshold;
   json["why"] = e.why;
   json["seconds"] = e.seconds;
+  if (e.change) json["change"] = *e.change;
+  if (!e.would_change.empty()) json["would_change"] = e.would_change;
   return json;
 }
 

@@ -17,8 +17,8 @@ namespace mbtfm {
 namespace {
 
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
-constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network", "cables",
-                                "effects", "substrate", "fit",    "stats",   "scenario", "traction"};
+constexpr std::array kTables = {"gel",     "images",    "segment", "track", "network",  "cables",
+                                "effects", "substrate", "fit",     "stats", "scenario", "traction"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 

@@ -28,7 +28,9 @@ struct Effect {
   std::optional<double> number;  ///< what leaving it out would cost, where that was asked; on above the threshold
   std::optional<double> threshold;
   std::string why;
-  double seconds = 0;  ///< spent on it, its own question included
+  double seconds = 0;                 ///< spent on it, its own question included
+  std::optional<double> change = {};  ///< of the tensions were it on, relative; where that was asked (--explain)
+  std::string would_change = {};      ///< the same in a sentence
 };
 
 using Value = std::variant<bool, std::int64_t, double, std::string>;

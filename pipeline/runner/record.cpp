@@ -103,6 +103,15 @@ std::string settings_of(const Stage& stage, const fs::path& toml_file) {
     const std::string table = value.is_table() ? std::string(key.str()) : std::string();
     if (std::find(stage.tables.begin(), stage.tables.end(), table) != stage.tables.end()) relevant.insert(key, value);
   }
+  toml::table effects;
+  if (const toml::table* all = whole["effects"].as_table()) {
+    for (const auto& [key, value] : *all) {
+      const std::string name(key.str());
+      if (std::find(stage.effects.begin(), stage.effects.end(), name) != stage.effects.end())
+        effects.insert(key, value);
+    }
+  }
+  if (!effects.empty()) relevant.insert("effects", effects);
   std::ostringstream text;
   text << toml::json_formatter(relevant);
   return json::parse(text.str()).dump();

@@ -41,6 +41,7 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
   add("threads", std::to_string(threads));
   add("record", (cell / stage.folder / "record.json").string());
   if (options.is_quiet) command.push_back("--quiet");
+  if (options.explain && stage.name == "fit") command.push_back("--explain");
   return command;
 }
 
@@ -68,7 +69,8 @@ StageStatus CellRun::status(const Stage& stage) const {
   if (!is_asked(stage, options_.only)) {
     return {StageState::not_asked, "left out by --only"};
   }
-  if (contains_name(options_.redo, stage.name)) return {StageState::must_run, "asked for"};
+  const bool is_explained = options_.explain && stage.name == "fit";
+  if (is_explained || contains_name(options_.redo, stage.name)) return {StageState::must_run, "asked for"};
   return status_of(stage, read_record(cell_ / stage.folder / "record.json"),
                    surroundings_of(stage, cell_, images_, options_.version));
 }
