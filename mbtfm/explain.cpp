@@ -64,25 +64,41 @@ Change change_by_data(const std::string& effect, const EnsembleFit& fit, const L
           mean_step_nN(meshes, weighed_as(fit, with.reduced)) - mean_step_nN(meshes, weighed_as(fit, without.reduced))};
 }
 
-Change change_by_networks(const std::string& effect, const EnsembleFit& fit,
+Change change_by_networks(const std::string& effect, const EnsembleFit& fit, const LinearData& data,
                           const std::vector<network::CableNetwork>& with, const std::vector<int>& adhesion_ids,
                           int threads) {
   constexpr int kSteps = 2;  // the first makes most of it, the second what the forces' bend leaves
-  std::vector<Eigen::VectorXd> changes(with.size());
-  parallel_for(static_cast<int>(with.size()), threads, [&](int m) {
+  const auto n = static_cast<int>(with.size());
+  const auto trial_at = [&](int m, const Eigen::VectorXd& tensions_nN, const Trial& nearby) {
+    return TensionProblem(with[static_cast<std::size_t>(m)], data.reduced, adhesion_ids).evaluate(tensions_nN, &nearby);
+  };
+  const auto derivatives = [&](int m, const Trial& trial) {
+    return TensionProblem(with[static_cast<std::size_t>(m)], data.reduced, adhesion_ids).force_derivatives(trial);
+  };
+  std::vector<Trial> trials(with.size());
+  std::vector<MeshForces> common(with.size());
+  const Trial& first = fit.meshes.front().fit.trial;
+  parallel_for(n, threads, [&](int m) {
     const auto i = static_cast<std::size_t>(m);
-    const TensionProblem problem(with[i], fit.data, adhesion_ids);
     const Trial& start = fit.meshes[i].fit.trial;
-    Trial trial = problem.evaluate(start.tensions_nN, &start);
-    for (int step = 0; step < kSteps; ++step) {
-      const Expansion at{trial.tensions_nN, trial.forces_nN, problem.force_derivatives(trial)};
-      const Eigen::VectorXd next = (trial.tensions_nN + step_nN(at, fit.data)).cwiseMax(0.0);
-      trial = problem.evaluate(next, &trial);
-    }
-    changes[i] = trial.tensions_nN - start.tensions_nN;
+    trials[i] = trial_at(m, start.tensions_nN, start);
+    if (!fit.model_error) return;
+    const Trial here = trial_at(m, first.tensions_nN, trials[i]);
+    common[i] = {here.forces_nN, derivatives(m, here)};
   });
-  Eigen::VectorXd sum = Eigen::VectorXd::Zero(changes.front().size());
-  for (const Eigen::VectorXd& change : changes) sum += change / static_cast<double>(changes.size());
+  const ReducedData weighed =
+      fit.model_error ? model_error(common, data.reduced, fit.model_error->noise_variance).data : data.reduced;
+  parallel_for(n, threads, [&](int m) {
+    Trial& trial = trials[static_cast<std::size_t>(m)];
+    for (int step = 0; step < kSteps; ++step) {
+      const Expansion at{trial.tensions_nN, trial.forces_nN, derivatives(m, trial)};
+      trial = trial_at(m, (trial.tensions_nN + step_nN(at, weighed)).cwiseMax(0.0), trial);
+    }
+  });
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(first.tensions_nN.size());
+  for (std::size_t i = 0; i < with.size(); ++i) {
+    sum += (trials[i].tensions_nN - fit.meshes[i].fit.trial.tensions_nN) / static_cast<double>(n);
+  }
   return {effect, sum};
 }
 

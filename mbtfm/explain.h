@@ -20,8 +20,8 @@ struct Change {
 Change change_by_data(const std::string& effect, const EnsembleFit& fit, const LinearData& without,
                       const LinearData& with);
 
-/// With networks that carry other forces at the same tensions.
-Change change_by_networks(const std::string& effect, const EnsembleFit& fit,
+/// With networks that carry other forces at the same tensions, and differ otherwise from each other.
+Change change_by_networks(const std::string& effect, const EnsembleFit& fit, const LinearData& data,
                           const std::vector<network::CableNetwork>& with, const std::vector<int>& adhesion_ids,
                           int threads);
 

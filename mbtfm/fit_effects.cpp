@@ -48,7 +48,7 @@ std::optional<Change> with_grading(const Effect& e, const FittedCell& c) {
 std::optional<Change> with_elasticity(const Effect& e, const FittedCell& c, int threads) {
   std::vector<network::CableNetwork> networks;
   for (const network::CableNetwork& n : c.networks) networks.emplace_back(n.network(), c.parameters.cables);
-  return change_by_networks(e.name, c.fit, networks, adhesion_ids_of(c.inputs.cell), threads);
+  return change_by_networks(e.name, c.fit, c.data, networks, adhesion_ids_of(c.inputs.cell), threads);
 }
 
 std::optional<Change> with_loss(const Effect& e, const FittedCell& c) {

@@ -247,7 +247,7 @@ Tracking RelaxedBeads::track_as(const std::string& drift, const Image& stressed,
   const GlobalMotion& drift = far.drift;
   const Vec2 centre = drift.centre + drift.shift;
   result.drift_um = pixel_size_um * ((turn ? turn->of(centre) : centre) - drift.centre);
-  result.turn_rad = turn ? drift.turn_rad + turn->angle_rad : far.turn_rad;
+  result.turn_rad = rotation.is_on ? drift.turn_rad + (turn ? turn->angle_rad : 0) : far.turn_rad;
   result.growth = drift.growth;
   return result;
 }
