@@ -92,8 +92,8 @@ std::string in_words(const std::string& name) {
 
 std::vector<Change> explain(std::vector<Effect>& effects, const FittedCell& cell, int threads) {
   effects.push_back(
-      {.name = kTurnLeft,
-       .why = "mbtfm-track takes turns off the displacement; this is what it left, or was told to leave"});
+      decided(kTurnLeft, "auto", false,
+              "mbtfm-track takes turns off the displacement; this is what it left, or was told to leave"));
   std::vector<Change> changes;
   for (Effect& effect : effects) {
     if (effect.is_on) continue;

@@ -141,6 +141,36 @@ Tracking tracking_of(const Scene& scene, const std::vector<Track>& tracks, const
   return result;
 }
 
+struct DriftOfAll {
+  FarField far;
+  Effect rotation;
+};
+
+/// What the whole image did, with a turn or without. @param turn  by which it was turned back before, if any
+DriftOfAll drift_of_all(const Scene& scene, const Measured& measured, const TrackParameters& parameters,
+                        const std::string& kind, const std::optional<Turn>& turn) {
+  const auto far_as = [&](Drift what) {
+    return far_field_of(scene, measured.tracks, measured.pooling, parameters, what);
+  };
+  const Drift first = kind == "auto" ? Drift::translation : drift_kind(kind);
+  DriftOfAll result{far_as(first), decided(kRotation, first == Drift::translation ? "off" : "on", true, "as asked")};
+  require_no_turn(result.far, first);
+  if (kind == "auto") {
+    const Stopwatch watch;
+    const FarField turned = far_as(Drift::rotation);
+    const double largest_px = largest_displacement_px(measured.tracks, measured.pooling, result.far, scene);
+    result.rotation = decide_rotation(turned, largest_px, scene.relaxed->image.plane, parameters.effect_tolerance);
+    if (result.rotation.is_on) result.far = turned;
+    result.rotation.seconds = watch.seconds();
+  } else if (parameters.drift == "auto") {
+    const double all_rad = turn->angle_rad + result.far.drift.turn_rad;
+    result.rotation = decided(kRotation, "auto", true,
+                              "unturned, the images do not fit together; turned by " +
+                                  brief(all_rad * 180 / std::numbers::pi) + " degrees they do");
+  }
+  return result;
+}
+
 }  // namespace
 
 void declare(ParameterList& list, TrackParameters& p) {
@@ -193,7 +223,7 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   }
 }
 
-Tracking RelaxedBeads::track_as(const std::string& drift, const Image& stressed, double pixel_size_um,
+Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, double pixel_size_um,
                                 const Progress& progress) const {
   const auto tell = [&](double fraction, const char* what) {
     if (progress) progress(fraction, what);
@@ -207,7 +237,7 @@ Tracking RelaxedBeads::track_as(const std::string& drift, const Image& stressed,
   require_numbers(stressed, "stressed");
   tell(0, "finding beads");
   std::optional<Turn> turn;
-  if (drift != "auto" && drift_kind(drift) != Drift::translation) {
+  if (kind != "auto" && drift_kind(kind) != Drift::translation) {
     const Plane light = without_background(stressed, background_sigma(side_->bead_sigma));
     turn = turn_between(plane, light, side_->bead_sigma, threads_);
     if (!turn) require_common_beads(0, static_cast<int>(side_->beads.size()));
@@ -226,22 +256,7 @@ Tracking RelaxedBeads::track_as(const std::string& drift, const Image& stressed,
   const Measured measured = measured_beads(scene, std::move(followed), turn, parameters_);
   const std::vector<Track>& tracks = measured.tracks;
   const Pooling& pooling = measured.pooling;
-  const auto far_field_as = [&](Drift kind) { return far_field_of(scene, tracks, pooling, parameters_, kind); };
-  const Stopwatch watch;
-  FarField far = far_field_as(drift == "auto" ? Drift::translation : drift_kind(drift));
-  require_no_turn(far, drift == "auto" ? Drift::translation : drift_kind(drift));
-  Effect rotation = decided(kRotation, drift == "translation" ? "off" : "on", true, "as asked");
-  if (drift == "auto") {
-    const FarField turned = far_field_as(Drift::rotation);
-    rotation = decide_rotation(turned, largest_displacement_px(tracks, pooling, far, scene), plane,
-                               parameters_.effect_tolerance);
-    if (rotation.is_on) far = turned;
-    rotation.seconds = watch.seconds();
-  } else if (parameters_.drift == "auto") {
-    rotation = decided(kRotation, "auto", true,
-                       "unturned, the images do not fit together; turned by " +
-                           brief((turn->angle_rad + far.drift.turn_rad) * 180 / std::numbers::pi) + " degrees they do");
-  }
+  const auto [far, rotation] = drift_of_all(scene, measured, parameters_, kind, turn);
   Tracking result = tracking_of(scene, tracks, pooling, far, pixel_size_um);
   result.rotation = rotation;
   const GlobalMotion& drift = far.drift;

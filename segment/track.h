@@ -87,7 +87,7 @@ class RelaxedBeads {
   Tracking track(const Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
 
  private:
-  Tracking track_as(const std::string& drift, const Image& stressed, double pixel_size_um,
+  Tracking track_as(const std::string& kind, const Image& stressed, double pixel_size_um,
                     const Progress& progress) const;
   std::shared_ptr<const Side> side_;
   TrackParameters parameters_;

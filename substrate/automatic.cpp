@@ -29,8 +29,7 @@ std::string model_for(const Gel& gel, const SubstrateParameters& p, const GelEff
     const double elements = *p.side_distance_um / gel.thickness_um * p.cells_per_thickness;
     return elements >= 2 ? "split" : "refined";
   }
-  if (!effects.thickness.is_on) return "half-space";
-  return effects.vertical.is_on ? "split" : "layer";
+  return effects.thickness.is_on ? "layer" : "half-space";
 }
 
 class Automatic final : public Substrate {

@@ -115,8 +115,8 @@ GelEffects effects_of_model(const SubstrateParameters& p) {
       row(kThickness, "finite_thickness", p.effects.finite_thickness, has_base, !has_base, has_base, as_model),
       row(kSides, "finite_sides", p.effects.finite_sides, has_sides, true, has_sides && p.side_distance_um, as_model),
       row(kGrading, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
-      row(kVertical, "vertical_displacement", p.effects.vertical_displacement, p.model != "layer", true,
-          asks_for_vertical(p), asks_for_vertical(p) ? "asked for" : "not asked for")};
+      row(kVertical, "vertical_displacement", p.effects.vertical_displacement, true, true, asks_for_vertical(p),
+          asks_for_vertical(p) ? "asked for" : "not asked for")};
 }
 
 SubstrateParameters without_what_is_off(SubstrateParameters p, const GelEffects& effects) {

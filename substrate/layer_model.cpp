@@ -1,6 +1,7 @@
 #include "substrate/effects.h"
 #include "substrate/greens_model.h"
 #include "substrate/layer.h"
+#include "substrate/layer_vertical.h"
 #include "substrate/models.h"
 
 namespace mbtfm::substrate {
@@ -16,6 +17,14 @@ class LayerModel final : public Substrate {
     return compliance_by_columns(points_um, ellipses, threads_,
                                  [this](const Ellipse& ellipse) { return LayerEllipse(layer_, ellipse); });
   }
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN) const override {
+    check_points(points_um);
+    check(ellipses);
+    check_forces(ellipses, forces_nN);
+    return LayerVertical(layer_.gel()).vertical_um(points_um, ellipses, forces_nN, threads_);
+  }
+  bool has_vertical() const override { return asks_for_vertical(parameters_); }
   std::vector<Effect> effects() const override { return effects_of_model(parameters_).list(); }
   Figures figures() const override {
     return {{"substrate_model", "layer"}, {"substrate_thickness_um", layer_.gel().thickness_um}};

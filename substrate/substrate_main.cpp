@@ -131,15 +131,10 @@ void write_result(StageContext& context, const substrate::Substrate& model, cons
   }
 }
 
-/// Of a surface in space all three components are asked for, where the model has them.
-bool shows_all_components(const StageContext& context, const substrate::SubstrateParameters& p) {
-  return !context.has_input("points") && p.model != "layer";
-}
-
 StageReport run(const Parameters& given, StageContext& context) {
   Parameters parameters = given;
   std::string& vertical = parameters.substrate.effects.vertical_displacement;
-  if (vertical == "auto" && shows_all_components(context, parameters.substrate)) vertical = "on";
+  if (vertical == "auto" && !context.has_input("points")) vertical = "on";  // a surface in space has three components
   const auto model = substrate::make_substrate(parameters.gel, parameters.substrate, context.threads);
   const Load load = read_load(context);
   context.progress(0.1, "solving for the substrate");

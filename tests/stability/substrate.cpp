@@ -331,14 +331,6 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
     parameters.modulus_profile = "0:8, 4:8, 4:16";
     EXPECT_THROW(make_substrate(kGel, parameters, 1), UsageError) << model;
   }
-  SubstrateParameters layer = test::model_named("layer");
-  layer.effects.vertical_displacement = "on";
-  try {
-    make_substrate(kGel, layer, 1);
-    FAIL();
-  } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("take another"), std::string::npos) << error.what();
-  }
   EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
                UsageError);
 }
