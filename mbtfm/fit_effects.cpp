@@ -81,11 +81,11 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   return {};
 }
 
-/// Of those that change no tension, or of whose size nothing is known.
+/// Of those that change no tension, or of which nothing is known.
 std::string in_words(const std::string& name) {
   if (name == "vertical displacement") return "would change no tension: nothing along the surface depends on it";
   if (name == "time coupling") return "would change no tension but by the fit's tolerance: only where the fit begins";
-  return "would change what cannot be told: there is no datum of it";
+  return "would change nothing that can be told: there is no datum of it";
 }
 
 }  // namespace
