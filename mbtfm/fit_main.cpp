@@ -208,7 +208,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitInputs inputs = read_inputs(context);
   const Cell cell = inputs.cell;
   Effect fibres = network::take_fibres(inputs.cell, p.effects.stress_fibres);
-  check_fibres(inputs, fibres, context.input("network"));
+  check_fibres(inputs, fibres, context.inputs_.at("network"));
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
   LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));

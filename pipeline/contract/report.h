@@ -25,8 +25,8 @@ struct Effect {
   std::string name;
   std::string setting = "auto";  ///< its switch: auto, on, off
   bool is_on = false;
-  std::optional<double> number;  ///< what leaving it out would cost, where that was asked; on above the threshold
-  std::optional<double> threshold;
+  std::optional<double> number = {};  ///< what leaving it out would cost, where that was asked; on above the threshold
+  std::optional<double> threshold = {};
   std::string why;
   double seconds = 0;                 ///< spent on it, its own question included
   std::optional<double> change = {};  ///< of the tensions were it on, relative; where that was asked (--explain)

@@ -1,5 +1,5 @@
 /// effects_cost [REPEATS]: what an effect costs that is off, against a path that does not know of it. Each is run in a
-/// process of its own, in turn; median seconds and peak memory.
+/// process of its own, in turn; median seconds of the processor and peak memory.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -13,7 +13,6 @@
 
 #include "mbtfm/effects.h"
 #include "network/effects.h"
-#include "pipeline/contract/effects.h"
 #include "segment/track.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/substrate_scene.h"
@@ -27,24 +26,17 @@ struct Cost {
 };
 
 Cost cost_of(const std::function<void()>& work) {
-  int ends[2];
-  if (pipe(ends) != 0) std::exit(1);
   const pid_t child = fork();
   if (child == 0) {
-    const Stopwatch watch;
     work();
-    const double seconds = watch.seconds();
-    _exit(write(ends[1], &seconds, sizeof seconds) == sizeof seconds ? 0 : 1);
+    _exit(0);
   }
-  Cost cost;
   int status = 0;
   rusage usage{};
-  if (read(ends[0], &cost.seconds, sizeof cost.seconds) != sizeof cost.seconds) std::exit(1);
   wait4(child, &status, 0, &usage);
-  close(ends[0]);
-  close(ends[1]);
-  cost.peak_MB = static_cast<double>(usage.ru_maxrss) / 1024;
-  return cost;
+  if (status != 0) std::exit(1);
+  const auto seconds = [](timeval t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return {seconds(usage.ru_utime) + seconds(usage.ru_stime), static_cast<double>(usage.ru_maxrss) / 1024};
 }
 
 double median(std::vector<double> values) {
