@@ -265,7 +265,7 @@ Interval interval_95(const Estimate& estimate, int n_meshes) {
   const double normal = boost::math::quantile(boost::math::normal(), 0.975);
   const auto half_width = [&](double fitted) {
     const double error = std::hypot(fitted, estimate.spread);
-    if (n_meshes < 2 || estimate.from_mesh() <= 0) return normal * error;
+    if (n_meshes < 2 || error == 0 || estimate.from_mesh() <= 0) return normal * error;
     const double degrees = (n_meshes - 1) / std::pow(std::min(1.0, estimate.from_mesh() / error), 4);
     return boost::math::quantile(boost::math::students_t(std::min(degrees, 1e6)), 0.975) * error;
   };
