@@ -212,8 +212,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
   LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));
-  const Effect loss = decide_robust_loss(data, p.fit, p.effects.robust_loss);
-  p.fit.loss = loss.is_on ? p.fit.robust_kind : "squares";
+  p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
   const Effect coupling = decide_time_coupling(context.has_input("start"), p.effects.time_coupling);
@@ -237,7 +236,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
-  const DisplacementField fitted = fitted_field(inputs, data, fit);
+  const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
@@ -255,6 +254,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
+  write_displacement(context.output("out", "displacement_without_fibres.csv"),
+                     field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(fit, data), weight_array(data)});
   context.progress(0.95, "surface of the gel");
@@ -270,7 +271,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      .effects = {}};
   report.effects = substrate->effects();
   report.effects.insert(report.effects.begin(), fibres);
-  report.effects.insert(report.effects.end(), {elasticity, loss, coupling});
+  report.effects.insert(report.effects.end(),
+                        {elasticity, robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
   if (p.explain) {
     context.progress(0.97, "explaining what is off");
     const std::vector<Change> changes =

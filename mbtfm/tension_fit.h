@@ -14,7 +14,7 @@ namespace mbtfm::inverse {
 struct FitParameters {
   std::string method = "gauss-newton";   ///< converges in about ten steps; the others are kept for comparison
   std::string gradients = "exact";       ///< finite-difference: as in the thesis, one equilibrium a tension and side
-  std::string loss = "squares";          ///< or, where the effect robust loss is on, robust_kind
+  std::string loss = "auto";             ///< as the switch robust_loss says: auto, squares, or robust_kind
   std::string robust_kind = "huber";     ///< one minimum, and 95 % efficient where the noise is Gaussian after all
   std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
   std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces

@@ -94,7 +94,12 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
                                         "--threads",
                                         std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
-  arguments.insert(arguments.end(), further.begin(), further.end());
+  for (const std::string& argument : further) {
+    // the one flag that people write with a dash
+    constexpr std::string_view kDashed = "--condition-from";
+    const bool is_dashed = argument.starts_with(kDashed);
+    arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
+  }
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);

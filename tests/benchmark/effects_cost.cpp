@@ -11,7 +11,6 @@
 #include <string>
 #include <vector>
 
-#include "mbtfm/effects.h"
 #include "network/effects.h"
 #include "segment/track.h"
 #include "tests/support/bead_pair.h"
@@ -83,19 +82,17 @@ void compare_fit(int n) {
   Eigen::VectorXd tensions = Eigen::VectorXd::Constant(9, 3);
   tensions[0] = 0.06;
   const test::TensionScene scene = test::scene_of(cell, tensions, 5000, 0.05, 1);
-  const auto fit = [&] {
+  const auto fit = [&](const std::string& loss) {
     test::TensionScene copy = test::scene_of(cell, tensions, 10, 0.05, 1);
     copy.beads = scene.beads;
     copy.data = scene.data;
     copy.adhesion_ids = scene.adhesion_ids;
-    test::fit_own_network(copy);
+    inverse::FitParameters parameters;
+    parameters.loss = loss;
+    test::fit_own_network(copy, parameters);
   };
   compare(
-      "robust loss", n,
-      [&] {
-        if (!inverse::decide_robust_loss(scene.data, {}, "auto").is_on) fit();
-      },
-      fit);
+      "robust loss", n, [&] { fit("auto"); }, [&] { fit("squares"); });
   const std::vector<double> given(tensions.data(), tensions.data() + tensions.size());
   const auto contract = [&](double stiffness) {
     const network::CableNetwork cables(scene.cables.network(), {.axial_stiffness_nN = stiffness});

@@ -105,22 +105,13 @@ TEST(EffectsOfTheFit, elasticity_that_is_off_is_that_of_very_soft_cables) {
 
 TEST(EffectsOfTheFit, a_robust_loss_where_beads_stray) {
   TensionScene s = scene(0.05);
-  const FitParameters parameters;
-  EXPECT_FALSE(decide_robust_loss(s.data, parameters, "auto").is_on);
+  const auto on = networks(1);
+  EXPECT_FALSE(robust_loss_effect("auto", fitted(on, s.data, s, loss_of_switch("auto", "huber")).loss).is_on);
   for (std::size_t i = 0; i < s.beads.size(); i += 33) s.beads[i].displacement_um += Vec2{8 * s.beads[i].sigma_um, 0};
   s.data = reduce(s.beads, s.compliance_um_per_nN);
-  const Effect effect = decide_robust_loss(s.data, parameters, "auto");
-  EXPECT_TRUE(effect.is_on) << effect.why;
-  EXPECT_NEAR(tails_of(s.data, "huber").share, 1.0 / 33, 0.01);
-}
-
-TEST(EffectsOfTheFit, a_robust_loss_is_seldom_called_for_by_gaussian_noise) {
-  int n_on = 0;
-  for (unsigned seed = 1; seed <= 20; ++seed) {
-    TensionScene s = scene(0.05, seed);
-    n_on += decide_robust_loss(s.data, {}, "auto").is_on ? 1 : 0;
-  }
-  EXPECT_EQ(n_on, 0);
+  EXPECT_TRUE(robust_loss_effect("auto", fitted(on, s.data, s, loss_of_switch("auto", "huber")).loss).is_on);
+  EXPECT_FALSE(robust_loss_effect("off", fitted(on, s.data, s, loss_of_switch("off", "huber")).loss).is_on);
+  EXPECT_EQ(loss_of_switch("on", "tukey"), "tukey");
 }
 
 TEST(EffectsOfTheFit, time_coupling_where_there_is_a_frame_before) {
