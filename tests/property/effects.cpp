@@ -75,7 +75,7 @@ Network held_lattice(int side) {
       network.vertices_um.push_back({1.5 * (i + 0.5 * j), 1.5 * std::sqrt(0.75) * j});
       const bool is_border = i == 0 || j == 0 || i == side - 1 || j == side - 1;
       network.adhesion_id.push_back(is_border ? ++adhesion_id : 0);
-      for (const auto [di, dj] : {std::pair{-1, 0}, std::pair{0, -1}, std::pair{1, -1}}) {
+      for (const auto& [di, dj] : {std::pair{-1, 0}, std::pair{0, -1}, std::pair{1, -1}}) {
         if (i + di < 0 || i + di >= side || j + dj < 0) continue;
         network.links.push_back({.vertex_a = index(i + di, j + dj), .vertex_b = index(i, j), .rest_length_um = 1.5});
       }
