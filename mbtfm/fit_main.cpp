@@ -6,8 +6,10 @@
 #include <mutex>
 
 #include "mbtfm/cross_validation.h"
-#include "mbtfm/fit_results.h"
+#include "mbtfm/effects.h"
+#include "mbtfm/fit_effects.h"
 #include "mbtfm/model_checks.h"
+#include "network/effects.h"
 #include "network/mesh.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -23,22 +25,6 @@ namespace {
 // Chi squared per degree of freedom. Cells that follow the model, fitted on other networks, were found at 0.99 to 1.16.
 constexpr double kPoorFit = 1.3;
 
-struct FitStageParameters {
-  Gel gel;
-  network::NetworkParameters network;
-  network::CableParameters cables;
-  substrate::SubstrateParameters substrate;
-  FitParameters fit;
-};
-
-void declare(ParameterList& list, FitStageParameters& p) {
-  declare(list, p.gel);
-  declare(list, p.network);
-  declare(list, p.cables);
-  declare(list, p.substrate);
-  declare(list, p.fit);
-}
-
 FitInputs read_inputs(StageContext& context) {
   FitInputs inputs{.cell = read_cell(context.input("cell", kCellFiles)),
                    .network = read_network(context.input("network")),
@@ -53,22 +39,8 @@ FitInputs read_inputs(StageContext& context) {
   return inputs;
 }
 
-std::vector<int> adhesion_ids_of(const Cell& cell) {
-  std::vector<int> ids;
-  for (const Adhesion& a : cell.adhesions) ids.push_back(a.adhesion_id);
-  return ids;
-}
-
-std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  return ellipses;
-}
-
 Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const FitInputs& inputs) {
-  std::vector<Vec2> points;
-  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
-  return substrate.compliance_um_per_nN(points, ellipses_of(inputs.cell));
+  return substrate.compliance_um_per_nN(points_of(inputs.beads), ellipses_of(inputs.cell));
 }
 
 std::vector<bool> beads_in_region(const FitInputs& inputs, const FitParameters& p) {
@@ -83,23 +55,21 @@ std::vector<bool> beads_in_region(const FitInputs& inputs, const FitParameters& 
 /// The thesis' way: the displacements of each trial are solved for. One at a time, as the solver has threads of its
 /// own.
 SolvedMisfit solved_misfit(const substrate::Substrate& substrate, const FitInputs& inputs, const LinearData& data) {
-  std::vector<Vec2> points;
-  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
   const auto one_at_a_time = std::make_shared<std::mutex>();
-  return
-      [&substrate, &data, points, ellipses = ellipses_of(inputs.cell), one_at_a_time](const Eigen::VectorXd& forces) {
-        std::vector<Vec2> forces_nN;
-        for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
-        const std::lock_guard lock(*one_at_a_time);
-        const std::vector<Vec2> u = substrate.displacements_um(points, ellipses, forces_nN);
-        double sum = 0;
-        for (std::size_t i = 0; i < u.size(); ++i) {
-          const auto row = 2 * static_cast<Eigen::Index>(i);
-          const Vec2 misfit_um = u[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
-          sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
-        }
-        return sum;
-      };
+  return [&substrate, &data, points = points_of(inputs.beads), ellipses = ellipses_of(inputs.cell),
+          one_at_a_time](const Eigen::VectorXd& forces) {
+    std::vector<Vec2> forces_nN;
+    for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
+    const std::lock_guard lock(*one_at_a_time);
+    const std::vector<Vec2> u = substrate.displacements_um(points, ellipses, forces_nN);
+    double sum = 0;
+    for (std::size_t i = 0; i < u.size(); ++i) {
+      const auto row = 2 * static_cast<Eigen::Index>(i);
+      const Vec2 misfit_um = u[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
+      sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
+    }
+    return sum;
+  };
 }
 
 /// The given network first, then further ones over the same cell from other seeds.
@@ -123,18 +93,33 @@ void write_surface(const Path& file, const substrate::Substrate& substrate, cons
   substrate::write_substrate_vtu(file, substrate, ellipses_of(cell), forces_nN);
 }
 
-std::vector<Effect> effects_of(const substrate::Substrate& substrate, const FitInputs& inputs, const FitParameters& p) {
-  std::vector<Effect> effects = substrate.effects();
-  const std::string n_fibres = std::to_string(inputs.cell.fibres.size());
-  effects.push_back({.name = "stress fibres in the network",
-                     .is_on = !inputs.cell.fibres.empty(),
-                     .why = n_fibres + " fibres were segmented"});
-  effects.push_back({.name = "mesh ensemble",
-                     .is_on = p.n_meshes > 1,
-                     .why = p.n_meshes > 1
-                                ? std::to_string(p.n_meshes) + " meshes: their spread is part of the error bars"
-                                : "one mesh: the error bars hold the bead noise only"});
-  return effects;
+/// The network must be that of the cell as it is taken, with fibres or without.
+void check_fibres(const FitInputs& inputs, const Effect& fibres, const Path& file) {
+  const auto has_fibre = [](const Link& link) { return link.fibre_id != 0; };
+  if (fibres.is_on || std::ranges::none_of(inputs.network.links, has_fibre)) return;
+  throw InputError(file.string(), "a network without stress fibres, as effects.stress_fibres says", "fibres",
+                   "span it anew: mbtfm-network with the same cell.toml");
+}
+
+/// The same networks of other cables.
+std::vector<network::CableNetwork> of_cables(const std::vector<network::CableNetwork>& networks,
+                                             network::CableParameters cables, double axial_stiffness_nN) {
+  cables.axial_stiffness_nN = axial_stiffness_nN;
+  std::vector<network::CableNetwork> result;
+  for (const network::CableNetwork& n : networks) result.emplace_back(n.network(), cables);
+  return result;
+}
+
+/// The tensions found may stretch cables that those of the start did not. @returns whether elasticity was switched on
+bool was_left_out_wrongly(Effect& elasticity, const network::CableNetwork& network, const Trial& answer,
+                          const FitStageParameters& p) {
+  if (elasticity.is_on || elasticity.setting != "auto") return false;
+  const double share = network::stretch_share(network.network(), answer.equilibrium, p.cables.axial_stiffness_nN);
+  if (share <= p.effects.effect_tolerance) return false;
+  elasticity.is_on = true;
+  elasticity.number = share;
+  elasticity.why += "; but at the tensions found without it " + brief(share) + ", above: fitted again";
+  return true;
 }
 
 /// "3 + 7: 5.2 ± 0.1 nN; …"
@@ -181,8 +166,7 @@ PointArray weight_array(const LinearData& data) {
 }
 
 /// The tensions of the frame before, by the network's groups; fibres that are new since then at the others' mean.
-std::optional<Eigen::VectorXd> start_of(StageContext& context, const std::vector<int>& fibre_ids) {
-  if (!context.has_input("start")) return std::nullopt;
+Eigen::VectorXd start_of(StageContext& context, const std::vector<int>& fibre_ids) {
   std::map<int, double> known;
   double sum = 0;
   for (const Tension& t : read_tensions(context.input("start"))) {
@@ -217,19 +201,38 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
   return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
 }
 
-StageReport fit(const FitStageParameters& p, StageContext& context) {
+StageReport fit(const FitStageParameters& given, StageContext& context) {
+  FitStageParameters p = given;
+  p.substrate.effects = p.effects;
   context.progress(0, "reading");
-  const FitInputs inputs = read_inputs(context);
+  FitInputs inputs = read_inputs(context);
+  const Cell cell = inputs.cell;
+  Effect fibres = network::take_fibres(inputs.cell, p.effects.stress_fibres);
+  check_fibres(inputs, fibres, context.inputs_.at("network"));
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
   LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));
+  p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
-  const std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
-  const EnsembleFit fit = fit_ensemble(
-      networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
-      [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
-      p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{},
-      start_of(context, networks.front().fibre_ids()));
+  std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
+  const Effect coupling = decide_time_coupling(context.has_input("start"), p.effects.time_coupling);
+  const Eigen::VectorXd start =
+      coupling.is_on ? start_of(context, networks.front().fibre_ids())
+                     : uniform_start_nN(TensionProblem(networks.front(), data.reduced, adhesion_ids_of(inputs.cell)));
+  Effect elasticity =
+      network::decide_elasticity(networks.front(), {start.data(), start.data() + start.size()}, p.effects);
+  if (!elasticity.is_on) networks = of_cables(networks, p.cables, 0);
+  const auto fit_all = [&] {
+    return fit_ensemble(
+        networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
+        [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
+        p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{}, start);
+  };
+  EnsembleFit fit = fit_all();
+  if (was_left_out_wrongly(elasticity, networks.front(), fit.meshes.front().fit.trial, p)) {
+    networks = of_cables(networks, p.cables, p.cables.axial_stiffness_nN);
+    fit = fit_all();
+  }
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
@@ -265,7 +268,17 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
                      .summary = std::to_string(tensions.size() - 1) + " fibre tensions, total force " +
                                 brief(summary.total_force_nN) + " nN, relative L2 " + brief(summary.relative_l2),
                      .figures = summary.more,
-                     .effects = effects_of(*substrate, inputs, p.fit)};
+                     .effects = {}};
+  report.effects = substrate->effects();
+  report.effects.insert(report.effects.begin(), fibres);
+  report.effects.insert(report.effects.end(),
+                        {elasticity, robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
+  if (p.explain) {
+    context.progress(0.97, "explaining what is off");
+    const std::vector<Change> changes =
+        explain(report.effects, {p, cell, inputs, networks, data, fit}, context.threads);
+    write_changes(context.output("out", "effects_left_out.csv"), changes, fit);
+  }
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";

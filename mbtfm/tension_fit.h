@@ -14,7 +14,8 @@ namespace mbtfm::inverse {
 struct FitParameters {
   std::string method = "gauss-newton";   ///< converges in about ten steps; the others are kept for comparison
   std::string gradients = "exact";       ///< finite-difference: as in the thesis, one equilibrium a tension and side
-  std::string loss = "auto";             ///< squares are best where noise is Gaussian, which a few bad beads are not
+  std::string loss = "auto";             ///< as the switch robust_loss says: auto, squares, or robust_kind
+  std::string robust_kind = "huber";     ///< one minimum, and 95 % efficient where the noise is Gaussian after all
   std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
   std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
   int n_meshes = 8;  ///< the spread between meshes is the largest error; its mean over eight is close to settled

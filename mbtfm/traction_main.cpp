@@ -1,6 +1,7 @@
 /// mbtfm-traction: the standard traction reconstructions, beside the model-based one.
 #include "mbtfm/traction.h"
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/stage.h"
 
@@ -56,10 +57,8 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   }
   report.figures = summary_of(r, sums);
   const bool is_layer = p.traction.gel_model == "layer";
-  report.effects = {{.name = "finite thickness",
-                     .is_on = is_layer,
-                     .why = is_layer ? "layer on a rigid base" : "half-space, as gel_model asks",
-                     .seconds = 0}};
+  report.effects = {decided("finite thickness", is_layer ? "on" : "off", is_layer,
+                            is_layer ? "layer on a rigid base" : "half-space, as gel_model asks")};
   return report;
 }
 

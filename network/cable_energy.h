@@ -19,7 +19,7 @@ struct Cable {
   int vertex_b = 0;
   double rest_length_um = 0;
   double tension_nN = 0;           ///< share · t of its group
-  double stiffness_nN_per_um = 0;  ///< k = share · EA / l0, beyond the rest length
+  double stiffness_nN_per_um = 0;  ///< k = share · EA / l0, beyond the rest length; 0: it does not resist
 };
 
 struct Rounding {
@@ -46,6 +46,7 @@ inline Pull pull(const Cable& cable, Vec2 span_um, const Rounding& rounding) {
   const double length = std::sqrt(dot(span_um, span_um) + rounding.eps_um * rounding.eps_um);
   // The rest length is smoothed like the length, so that the stretch begins at d = l0 exactly.
   const double e = length - smoothed_um(cable.rest_length_um, rounding.eps_um);
+  if (k == 0) return {length, e, 0, cable.tension_nN, 0};
   if (rounding.mu_fJ > 0) {
     const double root = std::sqrt(e * e + 4 * rounding.mu_fJ / k);
     const double sum = e > 0 ? e + root : 4 * rounding.mu_fJ / k / (root - e);  // e + root without cancellation
@@ -59,6 +60,7 @@ inline Pull pull(const Cable& cable, Vec2 span_um, const Rounding& rounding) {
 }
 
 inline double energy_fJ(const Cable& cable, const Pull& pull, const Rounding& rounding) {
+  if (cable.stiffness_nN_per_um == 0) return cable.tension_nN * pull.length_um;
   const double q = pull.stretch_force_nN;
   // The integral of q over e; (log q: of the barrier, up to a constant).
   const double barrier = rounding.mu_fJ > 0 ? rounding.mu_fJ * std::log(q) : 0;

@@ -130,6 +130,7 @@ CableNetwork::CableNetwork(CableNetwork&&) noexcept = default;
 CableNetwork& CableNetwork::operator=(CableNetwork&&) noexcept = default;
 
 const Network& CableNetwork::network() const { return impl_->network; }
+const CableParameters& CableNetwork::parameters() const { return impl_->parameters; }
 const std::vector<int>& CableNetwork::fibre_ids() const { return impl_->fibre_ids; }
 const std::vector<int>& CableNetwork::adhesion_ids() const { return impl_->adhesion_ids; }
 const std::vector<int>& CableNetwork::held_vertices() const { return impl_->held_vertices; }

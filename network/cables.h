@@ -22,7 +22,8 @@ namespace mbtfm::network {
 struct CableParameters {
   static constexpr int kNewtonSteps = 500;           ///< ordinary cells take 20 to 30, EA / t of 1e6 some 70
   static constexpr int kConjugateSteps = 1'000'000;  ///< ordinary cells take 7 000 to 200 000
-  double axial_stiffness_nN = 50;       ///< EA: force at 100 % strain beyond the rest length (thesis 3.2.3)
+  /// EA: force at 100 % strain beyond the rest length (thesis 3.2.3); 0: cables are never longer than they like
+  double axial_stiffness_nN = 50;
   double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can tell
   double force_tolerance = 1e-9;        ///< largest net force on a free vertex, relative to the largest tension
   std::optional<int> max_iterations{};  ///< or kNewtonSteps, kConjugateSteps
@@ -50,6 +51,7 @@ class CableNetwork {
   CableNetwork& operator=(CableNetwork&&) noexcept;
 
   const Network& network() const;
+  const CableParameters& parameters() const;
   /// Labels of the groups that have a tension: front() is 0, the actin network; then the fibres in rising order.
   const std::vector<int>& fibre_ids() const;
   /// Labels of the adhesions that hold vertices, in rising order.

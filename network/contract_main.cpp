@@ -3,6 +3,7 @@
 #include <string>
 
 #include "network/cables.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
 
@@ -26,6 +27,16 @@ std::vector<double> tensions_by_group(const std::vector<int>& fibre_ids, const s
     throw InputError(file.string(), "a row for each fibre of the network", "none for fibre_id " + missing,
                      "fibre_id 0 is the actin network");
   return result;
+}
+
+struct ContractParameters {
+  network::CableParameters cables;
+  EffectSwitches effects;
+};
+
+void declare(ParameterList& list, ContractParameters& p) {
+  declare(list, p.cables);
+  declare(list, p.effects, {"cable_elasticity"});
 }
 
 StageReport report_of(const network::CableNetwork& cables, const network::Equilibrium& equilibrium,
@@ -58,16 +69,20 @@ StageReport report_of(const network::CableNetwork& cables, const network::Equili
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using Kind = FileArgument::Kind;
-  return run_stage<network::CableParameters>(
+  return run_stage<ContractParameters>(
       {.name = "contract",
        .purpose = "contract a cable network with given tensions",
        .files = {{"network", Kind::input, "network.vtu"},
                  {"tensions", Kind::input, "tensions.csv: fibre_id, tension_nN; fibre_id 0 is the actin network"},
                  {"out", Kind::output, "the contracted network (.vtu), with the force each cable carries"},
                  {"reactions", Kind::output, "force on the substrate at each held vertex (.csv)"}}},
-      argc, argv, [](const network::CableParameters& parameters, StageContext& context) {
+      argc, argv, [](const ContractParameters& parameters, StageContext& context) {
         const Path tensions_file = context.input("tensions");
-        const network::CableNetwork cables(read_network(context.input("network")), parameters);
+        network::CableParameters cable_parameters = parameters.cables;
+        Effect elasticity = decided("elasticity of cables", parameters.effects.cable_elasticity, true,
+                                    "one contraction: to ask for it would cost as much as to have it");
+        if (!elasticity.is_on) cable_parameters.axial_stiffness_nN = 0;
+        const network::CableNetwork cables(read_network(context.input("network")), cable_parameters);
         const auto tensions = tensions_by_group(cables.fibre_ids(), read_tensions(tensions_file), tensions_file);
         const network::Equilibrium equilibrium = cables.equilibrium(tensions);
         const std::vector<Vec2> by_vertex = cables.reactions_nN(tensions, equilibrium);
@@ -81,6 +96,8 @@ int main(int argc, char** argv) {
         write_contracted_network(context.output("out"), cables.network(), equilibrium.positions_um,
                                  equilibrium.link_force_nN, equilibrium.link_states);
         write_reactions(context.output("reactions"), vertices, forces);
-        return report_of(cables, equilibrium, cables.adhesion_forces_nN(tensions, equilibrium));
+        StageReport report = report_of(cables, equilibrium, cables.adhesion_forces_nN(tensions, equilibrium));
+        report.effects = {elasticity};
+        return report;
       });
 }

@@ -49,6 +49,7 @@ struct Dual {
 
 /// Derivative of q along the curve through the present q, which need not lie on the one of mu.
 double stiffness_along(const Cable& cable, const Dual& dual, double stretch_um) {
+  if (cable.stiffness_nN_per_um == 0) return 0;
   const double rise = dual.stretch_force_nN / cable.stiffness_nN_per_um;
   const double gap = std::max(0.0, rise - stretch_um);
   return rise + gap > 0 ? dual.stretch_force_nN / (rise + gap) : cable.stiffness_nN_per_um;
@@ -59,6 +60,7 @@ Dual advanced(const Cable& cable, const Dual& dual, const Pull& pull, Vec2 span,
               double mu) {
   const Vec2 n = (1 / pull.length_um) * span;
   const Vec2 turn = n - dual.direction + (1 / pull.length_um) * (change - dot(n, change) * dual.direction);
+  if (cable.stiffness_nN_per_um == 0) return {unit_or_less(dual.direction + length * turn), 0};
   const double q = dual.stretch_force_nN, rise = q / cable.stiffness_nN_per_um;
   const double denominator = 2 * rise - pull.stretch_um;
   const double growth = q * dot(n, change) - (q * (rise - pull.stretch_um) - mu);

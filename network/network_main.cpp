@@ -1,7 +1,9 @@
 #include <algorithm>
 #include <string>
 
+#include "network/effects.h"
 #include "network/mesh.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
 
@@ -16,6 +18,16 @@ std::string listed(const std::vector<int>& ids) {
   std::string list;
   for (const int id : ids) list += (list.empty() ? "" : " ") + std::to_string(id);
   return list;
+}
+
+struct NetworkStageParameters {
+  network::NetworkParameters network;
+  EffectSwitches effects;
+};
+
+void declare(ParameterList& list, NetworkStageParameters& p) {
+  declare(list, p.network);
+  declare(list, p.effects, {"stress_fibres"});
 }
 
 StageReport report_of(const network::GeneratedNetwork& generated) {
@@ -61,16 +73,19 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
 
 int main(int argc, char** argv) {
   using namespace mbtfm;
-  return run_stage<network::NetworkParameters>(
+  return run_stage<NetworkStageParameters>(
       {.name = "network",
        .purpose = "span a contractile cable network over a segmented cell",
        .files = {{"cell", FileArgument::Kind::input,
                   "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
                  {"out", FileArgument::Kind::output, "network.vtu"}}},
-      argc, argv, [](const network::NetworkParameters& parameters, StageContext& context) {
-        const Cell cell = read_cell(context.input("cell", kCellFiles));
-        const network::GeneratedNetwork generated = network::generate_network(cell, parameters);
+      argc, argv, [](const NetworkStageParameters& parameters, StageContext& context) {
+        Cell cell = read_cell(context.input("cell", kCellFiles));
+        const Effect fibres = network::take_fibres(cell, parameters.effects.stress_fibres);
+        const network::GeneratedNetwork generated = network::generate_network(cell, parameters.network);
         write_network(context.output("out"), generated.network);
-        return report_of(generated);
+        StageReport report = report_of(generated);
+        report.effects = {fibres};
+        return report;
       });
 }

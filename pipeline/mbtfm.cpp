@@ -33,7 +33,7 @@ struct CommandLine {
   fs::path stage_folder = runner::executable_folder();
   int threads = available_threads();
   int jobs = 1;
-  bool is_quiet = false, only_list = false, only_table = false, is_checked = false;
+  bool is_quiet = false, only_list = false, only_table = false, is_checked = false, explain = false;
   std::vector<std::string> only, redo, patterns;
   fs::path template_toml, out, inputs;
   std::optional<double> timeout_s;
@@ -55,6 +55,7 @@ runner::RunOptions run_options(const CommandLine& line) {
           .is_checked = line.is_checked,
           .only = line.only,
           .redo = line.redo,
+          .explain = line.explain,
           .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
           .version = kVersion,
           .say = line.is_quiet ? nullptr : say,
@@ -196,6 +197,7 @@ int start(int argc, char** argv) {
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
+  run_command->add_flag("--explain", line.explain, "fit anew and say what each effect that is off would change");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();

@@ -118,6 +118,12 @@ void fit_frame(FarField& result, const std::vector<Vec2>& positions, const std::
   result.drift = global_motion(solution, n_global, result.drift.centre, scale);
   const cv::Mat rest = u - design * solution;
   result.rms = cv::norm(rest) / std::sqrt(n_rows);
+  if (kind != Drift::translation) {
+    cv::Mat unit = cv::Mat::zeros(n, 1, CV_64F), column;
+    unit.at<double>(2) = 1;
+    cv::solve(normal, unit, column, cv::DECOMP_CHOLESKY);
+    result.turn_sigma_rad = result.rms * std::sqrt(column.at<double>(2)) / scale;
+  }
   std::vector<double> sizes;
   for (int k = 0; k < n_rows; ++k) sizes.push_back(std::abs(rest.at<double>(k)));
   result.noise = quantile(std::move(sizes), 0.5) / 0.6745;

@@ -23,11 +23,12 @@ struct GlobalMotion {
 };
 
 struct FarField {
-  GlobalMotion drift;      ///< px
-  double rms = 0;          ///< px, of a component about drift and the cell's tail
-  double noise = 0;        ///< px, the same from the median, which outliers do not move
-  double turn_rad = 0;     ///< of the frame as a whole, whether taken for drift or not
-  bool is_turned = false;  ///< by more than a pixel, and that is most of what it does besides its shift
+  GlobalMotion drift;         ///< px
+  double rms = 0;             ///< px, of a component about drift and the cell's tail
+  double noise = 0;           ///< px, the same from the median, which outliers do not move
+  double turn_sigma_rad = 0;  ///< standard error of drift.turn_rad, where the frame is at rest and may be turned
+  double turn_rad = 0;        ///< of the frame as a whole, whether taken for drift or not
+  bool is_turned = false;     ///< by more than a pixel, and that is most of what it does besides its shift
   int n_beads = 0;
   bool is_at_rest = false;  ///< the frame is quieter than the rest; otherwise the drift is that of all beads
 };

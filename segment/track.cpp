@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
 #include "segment/alignment.h"
 #include "segment/beads.h"
@@ -46,12 +47,12 @@ void require_numbers(const Image& image, const char* which) {
 /// A turn that is taken for displacement is a wrong field, however well its beads were found.
 void require_no_turn(const FarField& far, Drift kind) {
   if (kind != Drift::translation || !far.is_turned) return;
-  throw InvalidData("the stressed image", "a far field that is shifted at most (drift = translation)",
+  throw InvalidData("the stressed image", "a far field that is shifted at most (effects.drift_rotation = off)",
                     "one turned by " + brief(far.turn_rad * 180 / std::numbers::pi) + " degrees");
 }
 
 FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, const Pooling& pooling,
-                      const TrackParameters& parameters) {
+                      const TrackParameters& parameters, Drift kind) {
   std::vector<Vec2> positions, displacements;
   double squares = 0;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -63,8 +64,32 @@ FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, cons
   const Plane& plane = scene.relaxed->image.plane;
   const double noise = std::sqrt(squares / std::max<double>(1, static_cast<double>(positions.size())));
   return far_field(positions, displacements, plane.width, plane.height,
-                   parameters.far_field_share * std::min(plane.width, plane.height), drift_kind(parameters.drift),
-                   noise);
+                   parameters.far_field_share * std::min(plane.width, plane.height), kind, noise);
+}
+
+constexpr const char* kRotation = "drift rotation";
+
+/// About the drift; a hundredth of the beads may move further, as outliers do.
+double largest_displacement_px(const std::vector<Track>& tracks, const Pooling& pooling, const FarField& far,
+                               const Scene& scene) {
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (!tracks[k].is_good()) continue;
+    lengths.push_back(norm(pooling.beads[k].u - far.drift.at(scene.position(static_cast<int>(k)))));
+  }
+  return lengths.empty() ? 0 : quantile(std::move(lengths), 0.99);
+}
+
+/// Drift rotation: where the turn, found together with the cell's own tail, displaces the border by more than the
+/// tolerance, of the largest displacement, and by more than three of its standard errors.
+Effect decide_rotation(const FarField& turned, double largest_px, const Plane& plane, double tolerance) {
+  if (!turned.is_at_rest) return decided(kRotation, "auto", false, "no place is at rest that would show a turn");
+  const double arm_px = 0.5 * std::min(plane.width, plane.height), unit_px = std::max(largest_px, 1e-9);
+  const double threshold = std::max(tolerance, 3 * turned.turn_sigma_rad * arm_px / unit_px);
+  return decided(kRotation, "auto", std::abs(turned.drift.turn_rad) * arm_px / unit_px, threshold,
+                 "a turn of " + brief(turned.drift.turn_rad * 180 / std::numbers::pi) + " +- " +
+                     brief(turned.turn_sigma_rad * 180 / std::numbers::pi) +
+                     " degrees displaces the border, over the largest displacement, by");
 }
 
 /// The beads that left the stressed image when it was turned.
@@ -118,6 +143,36 @@ Tracking tracking_of(const Scene& scene, const std::vector<Track>& tracks, const
   return result;
 }
 
+struct DriftOfAll {
+  FarField far;
+  Effect rotation;
+};
+
+/// What the whole image did, with a turn or without. @param turn  by which it was turned back before, if any
+DriftOfAll drift_of_all(const Scene& scene, const Measured& measured, const TrackParameters& parameters,
+                        const std::string& kind, const std::optional<Turn>& turn) {
+  const auto far_as = [&](Drift what) {
+    return far_field_of(scene, measured.tracks, measured.pooling, parameters, what);
+  };
+  const Drift first = kind == "auto" ? Drift::translation : drift_kind(kind);
+  DriftOfAll result{far_as(first), decided(kRotation, first == Drift::translation ? "off" : "on", true, "as asked")};
+  require_no_turn(result.far, first);
+  if (kind == "auto") {
+    const Stopwatch watch;
+    const FarField turned = far_as(Drift::rotation);
+    const double largest_px = largest_displacement_px(measured.tracks, measured.pooling, result.far, scene);
+    result.rotation = decide_rotation(turned, largest_px, scene.relaxed->image.plane, parameters.effect_tolerance);
+    if (result.rotation.is_on) result.far = turned;
+    result.rotation.seconds = watch.seconds();
+  } else if (parameters.drift == "auto") {
+    const double all_rad = turn->angle_rad + result.far.drift.turn_rad;
+    result.rotation = decided(kRotation, "auto", true,
+                              "unturned, the images do not fit together; turned by " +
+                                  brief(all_rad * 180 / std::numbers::pi) + " degrees they do");
+  }
+  return result;
+}
+
 }  // namespace
 
 void declare(ParameterList& list, TrackParameters& p) {
@@ -134,10 +189,8 @@ void declare(ParameterList& list, TrackParameters& p) {
            "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::not_negative(),
            "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
-  list.add("drift", p.drift,
-           "what may have moved the whole image between the two, found far from the cell and taken off; turns of up to "
-           "30 degrees, growth of a few per cent",
-           {"translation", "rotation", "similarity"});
+  list.add("drift_growth", p.drift_growth,
+           "take growth of the whole image by a few per cent for drift, too, beside a turn: a gel that swells");
   list.add(
       "far_field_share", p.far_field_share, Range::between(0.01, 0.5),
       "width of the frame along the border that is taken for far from the cell, for the drift (share of the side)");
@@ -164,6 +217,16 @@ RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& paramete
 }
 
 Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const Progress& progress) const {
+  if (parameters_.drift != "auto") return track_as(parameters_.drift, stressed, pixel_size_um, progress);
+  try {
+    return track_as("auto", stressed, pixel_size_um, progress);
+  } catch (const InvalidData&) {  // turned so far that its beads are not met with again, or the border shows it?
+    return track_as("rotation", stressed, pixel_size_um, progress);
+  }
+}
+
+Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, double pixel_size_um,
+                                const Progress& progress) const {
   const auto tell = [&](double fraction, const char* what) {
     if (progress) progress(fraction, what);
   };
@@ -176,7 +239,7 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   require_numbers(stressed, "stressed");
   tell(0, "finding beads");
   std::optional<Turn> turn;
-  if (drift_kind(parameters_.drift) != Drift::translation) {
+  if (kind != "auto" && drift_kind(kind) != Drift::translation) {
     const Plane light = without_background(stressed, background_sigma(side_->bead_sigma));
     turn = turn_between(plane, light, side_->bead_sigma, threads_);
     if (!turn) require_common_beads(0, static_cast<int>(side_->beads.size()));
@@ -195,13 +258,13 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   const Measured measured = measured_beads(scene, std::move(followed), turn, parameters_);
   const std::vector<Track>& tracks = measured.tracks;
   const Pooling& pooling = measured.pooling;
-  const FarField far = far_field_of(scene, tracks, pooling, parameters_);
-  require_no_turn(far, drift_kind(parameters_.drift));
+  const auto [far, rotation] = drift_of_all(scene, measured, parameters_, kind, turn);
   Tracking result = tracking_of(scene, tracks, pooling, far, pixel_size_um);
+  result.rotation = rotation;
   const GlobalMotion& drift = far.drift;
   const Vec2 centre = drift.centre + drift.shift;
   result.drift_um = pixel_size_um * ((turn ? turn->of(centre) : centre) - drift.centre);
-  result.turn_rad = turn ? drift.turn_rad + turn->angle_rad : far.turn_rad;
+  result.turn_rad = rotation.is_on ? drift.turn_rad + (turn ? turn->angle_rad : 0) : far.turn_rad;
   result.growth = drift.growth;
   return result;
 }

@@ -19,10 +19,13 @@ struct TrackParameters {
   int stressed_last = 0;               ///< of a time series the last time or page; 0: a single image
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
-  std::string drift = "translation";   ///< a stage drifts; a dish put back on it is turned, too
-  double far_field_share = 0.12;       ///< of the image's side: the frame that is taken for far from the cell
-  double least_similarity = 0.6;       ///< correlation of a bead's neighbourhoods below which it is no match
-  double outlier_threshold = 4;        ///< in robust sd: 4 rejects one good bead in 16 000
+  /// translation, rotation, similarity, or auto: a stage drifts; a dish put back on it is turned, too
+  std::string drift = "translation";
+  bool drift_growth = false;       ///< a gel that swells between the images
+  double effect_tolerance = 0.01;  ///< auto: turns that displace the border by less, of the largest displacement, stay
+  double far_field_share = 0.12;   ///< of the image's side: the frame that is taken for far from the cell
+  double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
+  double outlier_threshold = 4;    ///< in robust sd: 4 rejects one good bead in 16 000
   // a displacement field from elsewhere
   std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
   std::string sigma_column = "sigma_um";  ///< need not be there
@@ -54,6 +57,7 @@ struct Tracking {
   bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is that of all beads
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   int n_good = 0;
+  Effect rotation{};         ///< whether a turn was taken off, and why
   int n_beads_stressed = 0;  ///< found in the stressed image
 };
 
@@ -84,6 +88,8 @@ class RelaxedBeads {
   Tracking track(const Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
 
  private:
+  Tracking track_as(const std::string& kind, const Image& stressed, double pixel_size_um,
+                    const Progress& progress) const;
   std::shared_ptr<const Side> side_;
   TrackParameters parameters_;
   int threads_;

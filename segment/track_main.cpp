@@ -6,6 +6,7 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
@@ -94,6 +95,7 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
                         {"noise_um", tracking.noise_um},
                         {"scatter_um", tracking.scatter_um}};
   report.figures.insert(report.figures.end(), more.begin(), more.end());
+  report.effects = {tracking.rotation};
   return report;
 }
 
@@ -148,7 +150,7 @@ auto with_names(const std::string& names, const Body& body) {
   } catch (const InvalidData& error) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
                      "are these the bead channels of one place, in focus? Check the planes, detection_snr, and where "
-                     "one may be turned against the other, drift = rotation");
+                     "one may be turned against the other, effects.drift_rotation");
   }
 }
 
@@ -245,7 +247,34 @@ StageReport track(const TrackParameters& parameters, StageContext& context) {
   return report_of(tracking, pixel_size_um);
 }
 
-StageReport run(const TrackParameters& parameters, StageContext& context) {
+struct TrackStageParameters {
+  TrackParameters track;
+  EffectSwitches effects;
+};
+
+void declare(ParameterList& list, TrackStageParameters& p) {
+  declare(list, p.track);
+  declare(list, p.effects, {"drift_rotation", "effect_tolerance"});
+}
+
+/// What may have moved the image, as the switches say.
+TrackParameters switched(const TrackStageParameters& given) {
+  TrackParameters parameters = given.track;
+  const std::string& rotation = given.effects.drift_rotation;
+  if (parameters.drift_growth && rotation == "off") {
+    throw UsageError(
+        "track.drift_growth: expected effects.drift_rotation on or auto, found off: growth is found with a turn");
+  }
+  parameters.drift = parameters.drift_growth ? "similarity"
+                     : rotation == "auto"    ? "auto"
+                     : rotation == "on"      ? "rotation"
+                                             : "translation";
+  parameters.effect_tolerance = given.effects.effect_tolerance;
+  return parameters;
+}
+
+StageReport run(const TrackStageParameters& given, StageContext& context) {
+  const TrackParameters parameters = switched(given);
   cv::setNumThreads(context.threads);
   const bool has_images = context.has_input("stressed") || context.has_input("relaxed");
   if (context.has_input("displacement")) {
@@ -270,7 +299,7 @@ StageReport run(const TrackParameters& parameters, StageContext& context) {
 int main(int argc, char** argv) {
   using mbtfm::FileArgument;
   using Kind = FileArgument::Kind;
-  return mbtfm::run_stage<mbtfm::segment::TrackParameters>(
+  return mbtfm::run_stage<mbtfm::segment::TrackStageParameters>(
       {.name = "track",
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
        .files = {{"stressed", Kind::optional_input,

@@ -1,13 +1,6 @@
-/// The cheapest model that is right for a scene to the wanted error.
+/// The cheapest model that computes the effects which the switches and the scene call for.
 ///
-/// Each model leaves something out. What that costs, as a share of the field, follows from dimensionless numbers:
-///
-/// - `half-space` leaves out the base. Its correction s_0/(2 pi mu h) is largest, and even, near the force (theory,
-///   section 2), while the field falls as 1/r. Over a disc of radius R around a force, R >> a, the correction's share
-///   of the field's L2 norm is at most 2 s_0 / sqrt((2-nu)² + nu²) · R/h (the field's norm, as sqrt(2 ln(R/a)), being
-///   taken as that at R = e^(1/2) a: an upper bound for a scene larger than its adhesions).
-/// - `layer` leaves out the sides. Its field falls as exp(-0.739 r/h) or faster, to a side at distance d and back:
-///   exp(-1.48 d/h).
+/// - `half-space` has neither base nor sides, `layer` has the base.
 /// - `split` takes even gels whose sides are no nearer than two elements of its grid, which is what quadratic elements
 ///   need to follow the half-space field there; its grid leaves 0.1 % with 2 elements over the thickness, falling as
 ///   their cube.
@@ -16,77 +9,62 @@
 #include <cmath>
 #include <mutex>
 
-#include "pipeline/contract/csv.h"
-#include "substrate/layer.h"
+#include "pipeline/contract/effects.h"
+#include "substrate/effects.h"
 #include "substrate/models.h"
 #include "substrate/scene.h"
 
 namespace mbtfm::substrate {
 namespace {
 
-struct Choice {
-  std::string model, why;
-  int cells_per_thickness;
-};
-
 /// Cells of the grid of `split` over the thickness that leave no more than the tolerance: 0.1 % with 2.
 int cells_for(double tolerance) {
   constexpr double kErrorOfTwo = 1e-3;
-  return tolerance == 0 ? 4 : std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kErrorOfTwo / tolerance))));
+  return std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kErrorOfTwo / tolerance))));
 }
 
-double half_space_bias(const Gel& gel, double radius_um) {
-  const double nu = gel.poisson_ratio;
-  const double s = std::abs(LayerTable(nu).correction(0).s);
-  return 2 * s / std::hypot(2 - nu, nu) * radius_um / gel.thickness_um;
-}
-
-Choice choice_for(const Gel& gel, const SubstrateParameters& p, double scene_um) {
-  const int cells = cells_for(p.displacement_tolerance);
-  const auto compared = [&](double bias) {
-    return brief(bias) + (bias <= p.displacement_tolerance ? ", within " : ", above ") + "the tolerance of " +
-           brief(p.displacement_tolerance);
-  };
-  if (!p.modulus_profile.empty()) return {"refined", "the modulus changes with depth", cells};
-  if (p.side_distance_um) {
-    const double sides = *p.side_distance_um / gel.thickness_um;
-    const double bias = std::exp(-1.48 * sides);
-    const std::string found = "sides at " + brief(sides) + " thicknesses change the field by " + compared(bias);
-    if (bias > p.displacement_tolerance) {
-      const double elements = sides * cells;
-      const bool is_smooth = elements >= 2;
-      return {is_smooth ? "split" : "refined",
-              found + "; that is " + brief(elements) + " elements of the grid of split, " +
-                  (is_smooth ? "enough" : "fewer than the 2 it needs"),
-              cells};
-    }
+std::string model_for(const Gel& gel, const SubstrateParameters& p, const GelEffects& effects) {
+  if (effects.grading.is_on) return "refined";
+  if (effects.sides.is_on) {
+    const double elements = *p.side_distance_um / gel.thickness_um * p.cells_per_thickness;
+    return elements >= 2 ? "split" : "refined";
   }
-  if (p.vertical) return {"split", "the vertical displacement is asked for, on a base", cells};
-  const double ratio = scene_um / gel.thickness_um;
-  const double bias = half_space_bias(gel, scene_um);
-  const std::string found =
-      "the base, with a scene " + brief(ratio) + " thicknesses wide, changes the field by " + compared(bias);
-  return {bias <= p.displacement_tolerance ? "half-space" : "layer", found + "; the sides are far away", cells};
+  return effects.thickness.is_on ? "layer" : "half-space";
 }
 
 class Automatic final : public Substrate {
+  template <class Ask>
+  auto timed(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses, const Ask& ask) const {
+    const Stopwatch watch;
+    auto answer = ask(model_of(points_um, ellipses));
+    const std::lock_guard lock(mutex_);
+    seconds_ += watch.seconds();
+    return answer;
+  }
+
  public:
   Automatic(const Gel& gel, const SubstrateParameters& parameters, int threads)
-      : gel_(gel), parameters_(parameters), threads_(threads) {}
+      : gel_(gel), parameters_(parameters), threads_(threads) {
+    parameters_.cells_per_thickness =
+        std::max(parameters_.cells_per_thickness, cells_for(parameters_.effects.effect_tolerance));
+    decide(gel_, parameters_, 0);  // refuses what the switches get wrong before any file is read
+  }
 
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<Ellipse>& ellipses) const override {
-    return model_for(points_um, ellipses).compliance_um_per_nN(points_um, ellipses);
+    return timed(points_um, ellipses, [&](const Substrate& m) { return m.compliance_um_per_nN(points_um, ellipses); });
   }
   std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                      const std::vector<Vec2>& forces_nN) const override {
-    return model_for(points_um, ellipses).displacements_um(points_um, ellipses, forces_nN);
+    return timed(points_um, ellipses,
+                 [&](const Substrate& m) { return m.displacements_um(points_um, ellipses, forces_nN); });
   }
   std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                   const std::vector<Vec2>& forces_nN) const override {
-    return model_for(points_um, ellipses).vertical_um(points_um, ellipses, forces_nN);
+    return timed(points_um, ellipses,
+                 [&](const Substrate& m) { return m.vertical_um(points_um, ellipses, forces_nN); });
   }
-  bool has_vertical() const override { return parameters_.vertical; }
+  bool has_vertical() const override { return asks_for_vertical(parameters_); }
   VolumeField volume(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) const override {
     SubstrateParameters parameters = parameters_;
     parameters.model = "refined";  // the one that has an inside
@@ -94,10 +72,14 @@ class Automatic final : public Substrate {
   }
   std::vector<Effect> effects() const override {
     const std::lock_guard lock(mutex_);
-    std::vector<Effect> effects = model_ ? model_->effects() : std::vector<Effect>();
-    const std::string why = model_ ? choice_.model + ": " + choice_.why + "; the surface is taken as flat" : "no scene";
-    effects.insert(effects.begin(), {.name = "choice of the substrate's model", .is_on = true, .why = why});
-    return effects;
+    GelEffects effects = model_ ? effects_ : decide(gel_, parameters_, 0);
+    // the model's time stands at the effect that called for it
+    for (Effect* e : {&effects.grading, &effects.sides, &effects.vertical, &effects.thickness}) {
+      if (!e->is_on) continue;
+      e->seconds = seconds_;
+      break;
+    }
+    return effects.list();
   }
   Figures figures() const override {
     const std::lock_guard lock(mutex_);
@@ -106,7 +88,7 @@ class Automatic final : public Substrate {
 
  private:
   /// The first scene decides: later ones of the same gel are answered by the same model.
-  const Substrate& model_for(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const {
+  const Substrate& model_of(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const {
     const std::lock_guard lock(mutex_);
     if (model_) return *model_;
     double scene_um = 0;
@@ -116,10 +98,12 @@ class Automatic final : public Substrate {
       const Extent extent = extent_of(points_um, ellipses);
       scene_um = norm(extent.high_um - extent.low_um);
     }
-    choice_ = choice_for(gel_, parameters_, scene_um);
-    SubstrateParameters parameters = parameters_;
-    parameters.model = choice_.model;
-    parameters.cells_per_thickness = std::max(parameters.cells_per_thickness, choice_.cells_per_thickness);
+    effects_ = decide(gel_, parameters_, scene_um);
+    SubstrateParameters parameters = without_what_is_off(parameters_, effects_);
+    parameters.model = model_for(gel_, parameters, effects_);
+    EffectSwitches decided;  // as the model has them: the switches are obeyed by now
+    decided.vertical_displacement = effects_.vertical.is_on ? "on" : "off";
+    parameters.effects = decided;
     model_ = make_substrate(gel_, parameters, threads_);
     return *model_;
   }
@@ -128,8 +112,9 @@ class Automatic final : public Substrate {
   SubstrateParameters parameters_;
   int threads_;
   mutable std::mutex mutex_;  // guards the choice
-  mutable Choice choice_;
+  mutable GelEffects effects_;
   mutable std::unique_ptr<Substrate> model_;
+  mutable double seconds_ = 0;
 };
 
 }  // namespace

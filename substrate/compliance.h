@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/parameters.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/types.h"
@@ -24,10 +25,9 @@ struct Ellipse {
 Ellipse ellipse_of(const Adhesion& adhesion);
 
 struct SubstrateParameters {
-  std::string model = "split";  ///< exact near field, real sides and bottom, a second a cell
-  double displacement_tolerance =
-      0.02;  ///< a third of the beads' noise in good experiments; `split` and `layer` are far below
-  std::string modulus_profile = {};  ///< empty: youngs_modulus_kPa at every depth
+  std::string model = "auto";            ///< how, not what: the cheapest that has the effects that are on
+  double displacement_tolerance = 0.02;  ///< a third of the beads' noise in good experiments
+  std::string modulus_profile = {};      ///< empty: youngs_modulus_kPa at every depth
 
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
@@ -44,8 +44,9 @@ struct SubstrateParameters {
   std::optional<double> side_distance_um = {};  ///< a gel is centimetres wide: its sides are far away
   std::string cache_folder = {};                ///< empty: factors stay in memory
 
-  bool vertical = false;  ///< adhesions pull along the surface and beads are seen from above
-  bool stress = false;    ///< of the gel's inside, where it is written
+  bool stress = false;  ///< of the gel's inside, where it is written
+
+  EffectSwitches effects = {};  ///< declared by those who have them
 
   double memory_limit_GB = 0;  ///< of split and refined; 0: four fifths of what the machine has
 };

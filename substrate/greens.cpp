@@ -2,18 +2,20 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "substrate/effects.h"
 #include "substrate/models.h"
 
 namespace mbtfm::substrate {
 
 void declare(ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
-  list.add("model", p.model, "elastic model of the gel", {"half-space", "layer", "split", "refined", "auto"});
+  list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on",
+           {"half-space", "layer", "split", "refined", "auto"});
   list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
            "refined: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is refined "
-           "until it is estimated to have; 0: the first mesh, no error estimated. auto: bias a model may have");
+           "until it is estimated to have; 0: the first mesh, no error estimated");
   list.add("modulus_profile", p.modulus_profile,
-           "refined: depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
+           "depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
            "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
   list.add(
       "margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
@@ -32,10 +34,9 @@ void declare(ParameterList& list, SubstrateParameters& p) {
   list.add("growth", p.growth, Range::between(0.1, 10),
            "refined: largest side of an element over its distance to the nearest adhesion");
   list.add("side_distance_um", p.side_distance_um, Range::positive(),
-           "split, refined, auto: from the adhesions and beads to the gel's own sides (um); unset: they are far away");
+           "from the adhesions and beads to the gel's own sides (um); unset: they are far away");
   list.add("cache_folder", p.cache_folder,
            "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
-  list.add("vertical", p.vertical, "write the displacement into the gel, too (half-space, split, refined)");
   list.add("stress", p.stress, "write the stress inside the gel, too (refined)");
   list.add("memory_limit_GB", p.memory_limit_GB, Range::not_negative(),
            "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
@@ -76,7 +77,10 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
   check(gel);
   std::string names;
   for (const Model& model : table) {
-    if (model.name == parameters.model) return model.make(gel, parameters, threads);
+    if (model.name == parameters.model) {
+      if (model.name == "auto") return model.make(gel, parameters, threads);  // decides by the scene
+      return model.make(gel, without_what_is_off(parameters, effects_of_model(parameters)), threads);
+    }
     names += (names.empty() ? "" : ", ") + model.name;
   }
   throw UsageError("substrate.model: expected one of " + names + ", found '" + parameters.model + "'");
@@ -88,29 +92,19 @@ std::unique_ptr<Substrate> make_greens(const Gel& gel, const SubstrateParameters
 
 std::vector<double> Substrate::vertical_um(const std::vector<Vec2>&, const std::vector<Ellipse>&,
                                            const std::vector<Vec2>&) const {
-  throw UsageError("substrate.vertical: the model has no vertical displacement: take half-space, split or refined");
+  throw UsageError("effects.vertical_displacement: the model has no displacement: take half-space, split or refined");
 }
 
 VolumeField Substrate::volume(const std::vector<Ellipse>&, const std::vector<Vec2>&) const {
   throw UsageError("the model knows the gel's surface alone: take the model refined");
 }
 
-Effect vertical_effect(const SubstrateParameters& parameters) {
-  return {.name = "vertical displacement",
-          .is_on = parameters.vertical,
-          .why = parameters.vertical
-                     ? "asked for (substrate.vertical)"
-                     : "adhesions pull along the surface and beads are seen from above; it does not couple back"};
+bool asks_for_vertical(const SubstrateParameters& parameters) {
+  return parameters.effects.vertical_displacement == "on";
 }
 
 double margin_um(const Gel& gel, const SubstrateParameters& parameters) {
   return parameters.side_distance_um.value_or(parameters.margin_thicknesses * gel.thickness_um);
-}
-
-void check_uniform(const SubstrateParameters& parameters) {
-  if (parameters.modulus_profile.empty()) return;
-  throw UsageError("substrate.modulus_profile: the model '" + parameters.model +
-                   "' holds for one modulus at every depth: take the model refined");
 }
 
 }  // namespace mbtfm::substrate

@@ -1,3 +1,4 @@
+#include "substrate/effects.h"
 #include "substrate/greens_model.h"
 #include "substrate/models.h"
 
@@ -21,14 +22,8 @@ class HalfSpace final : public Substrate {
     check_forces(ellipses, forces_nN);
     return half_space_vertical_um(gel_, points_um, ellipses, forces_nN, threads_);
   }
-  bool has_vertical() const override { return parameters_.vertical; }
-  std::vector<Effect> effects() const override {
-    return {{.name = "finite thickness",
-             .is_on = false,
-             .why = "half-space: valid where the gel is far thicker than the cell is wide"},
-            {.name = "finite sides", .is_on = false, .why = "half-space: the gel reaches far beyond the cell"},
-            vertical_effect(parameters_)};
-  }
+  bool has_vertical() const override { return asks_for_vertical(parameters_); }
+  std::vector<Effect> effects() const override { return effects_of_model(parameters_).list(); }
   Figures figures() const override { return {{"substrate_model", "half-space"}}; }
 
  private:
@@ -40,7 +35,6 @@ class HalfSpace final : public Substrate {
 }  // namespace
 
 std::unique_ptr<Substrate> make_half_space(const Gel& gel, const SubstrateParameters& parameters, int threads) {
-  check_uniform(parameters);
   return std::make_unique<HalfSpace>(gel, parameters, threads);
 }
 

@@ -137,6 +137,8 @@ LayerTable::LayerTable(double poisson_ratio) : poisson_ratio_(poisson_ratio) {
   }
 }
 
+LayerTable::Value layer_correction_at_force(double poisson_ratio) { return integrate(transform(poisson_ratio), 0); }
+
 LayerTable::Value LayerTable::correction(double r) const {
   // beyond the reach: what cancels the half-space's
   if (r >= kReach) return {-(2 - poisson_ratio_) / (2 * r), -poisson_ratio_ / (2 * r)};

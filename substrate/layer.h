@@ -39,6 +39,9 @@ class LayerTable {
   std::vector<Piece> pieces_;  ///< polynomials in t in [-1, 1] over 1/8 of a thickness each
 };
 
+/// The same at r = 0, without the table.
+LayerTable::Value layer_correction_at_force(double poisson_ratio);
+
 /// The layer with its table: displacements of its surface.
 class Layer {
  public:

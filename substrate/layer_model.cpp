@@ -1,6 +1,7 @@
-#include "pipeline/contract/errors.h"
+#include "substrate/effects.h"
 #include "substrate/greens_model.h"
 #include "substrate/layer.h"
+#include "substrate/layer_vertical.h"
 #include "substrate/models.h"
 
 namespace mbtfm::substrate {
@@ -16,11 +17,15 @@ class LayerModel final : public Substrate {
     return compliance_by_columns(points_um, ellipses, threads_,
                                  [this](const Ellipse& ellipse) { return LayerEllipse(layer_, ellipse); });
   }
-  std::vector<Effect> effects() const override {
-    return {{.name = "finite thickness", .is_on = true, .why = "layer on a rigid base, to 1e-6 of the field"},
-            {.name = "finite sides", .is_on = false, .why = "layer: a gel is centimetres wide, a cell 0.1 mm"},
-            vertical_effect(parameters_)};
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN) const override {
+    check_points(points_um);
+    check(ellipses);
+    check_forces(ellipses, forces_nN);
+    return LayerVertical(layer_.gel()).vertical_um(points_um, ellipses, forces_nN, threads_);
   }
+  bool has_vertical() const override { return asks_for_vertical(parameters_); }
+  std::vector<Effect> effects() const override { return effects_of_model(parameters_).list(); }
   Figures figures() const override {
     return {{"substrate_model", "layer"}, {"substrate_thickness_um", layer_.gel().thickness_um}};
   }
@@ -34,10 +39,6 @@ class LayerModel final : public Substrate {
 }  // namespace
 
 std::unique_ptr<Substrate> make_layer(const Gel& gel, const SubstrateParameters& parameters, int threads) {
-  check_uniform(parameters);
-  if (parameters.vertical) {
-    throw UsageError("substrate.vertical: the model 'layer' has none: take half-space, split or refined");
-  }
   return std::make_unique<LayerModel>(gel, parameters, threads);
 }
 

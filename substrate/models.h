@@ -26,13 +26,10 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
 /// @throws InvalidData where a force is not finite or their number is not that of the ellipses
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
 
-/// Of the displacement along z.
-Effect vertical_effect(const SubstrateParameters& parameters);
+/// Whether the displacement along z is wanted, too.
+bool asks_for_vertical(const SubstrateParameters& parameters);
 
 /// From the scene to the block's sides: the gel's own, or so far that they do not matter.
 double margin_um(const Gel& gel, const SubstrateParameters& parameters);
-
-/// @throws UsageError where the modulus changes with depth, which only `refined` takes
-void check_uniform(const SubstrateParameters& parameters);
 
 }  // namespace mbtfm::substrate

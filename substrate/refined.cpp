@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "substrate/effects.h"
 #include "substrate/elastic_system.h"
 #include "substrate/greens_model.h"
 #include "substrate/load_cases.h"
@@ -78,7 +79,7 @@ class Refined final : public Substrate {
     for (std::size_t i = 0; i < vertical.size(); ++i) vertical[i] = field(3 * static_cast<Eigen::Index>(i) + 2, 0);
     return vertical;
   }
-  bool has_vertical() const override { return parameters_.vertical; }
+  bool has_vertical() const override { return asks_for_vertical(parameters_); }
 
   /// On the first mesh: pictures need no more.
   VolumeField volume(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) const override {
@@ -96,17 +97,7 @@ class Refined final : public Substrate {
     return field;
   }
 
-  std::vector<Effect> effects() const override {
-    return {{.name = "finite thickness", .is_on = true, .why = "refined: elements down to the rigid base"},
-            {.name = "finite sides",
-             .is_on = true,
-             .why = "refined: free sides " + brief(margin_um(material_.gel, parameters_)) +
-                    " um beyond adhesions and beads"},
-            {.name = "modulus by depth",
-             .is_on = !material_.profile.empty(),
-             .why = material_.profile.empty() ? "one modulus for the gel" : parameters_.modulus_profile},
-            vertical_effect(parameters_)};
-  }
+  std::vector<Effect> effects() const override { return effects_of_model(parameters_).list(); }
 
   Figures figures() const override {
     const std::lock_guard lock(mutex_);

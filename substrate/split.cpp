@@ -9,7 +9,7 @@
 #include <memory>
 #include <mutex>
 
-#include "pipeline/contract/csv.h"
+#include "substrate/effects.h"
 #include "substrate/greens_model.h"
 #include "substrate/load_cases.h"
 #include "substrate/models.h"
@@ -86,16 +86,9 @@ class Split final : public Substrate {
         points_um, ellipses, [&all](int) { return all; }, {2}, field);
     return {field.data(), field.data() + field.size()};
   }
-  bool has_vertical() const override { return parameters_.vertical; }
+  bool has_vertical() const override { return asks_for_vertical(parameters_); }
 
-  std::vector<Effect> effects() const override {
-    return {{.name = "finite thickness", .is_on = true, .why = "split: finite element correction for the rigid base"},
-            {.name = "finite sides",
-             .is_on = true,
-             .why = "split: free sides " + brief(margin_um(gel_, parameters_)) + " um beyond adhesions and beads, " +
-                    (parameters_.side_distance_um ? "where the gel ends" : "at least; real ones are further away")},
-            vertical_effect(parameters_)};
-  }
+  std::vector<Effect> effects() const override { return effects_of_model(parameters_).list(); }
 
   Figures figures() const override {
     const std::lock_guard lock(mutex_);
@@ -196,7 +189,6 @@ class Split final : public Substrate {
 }  // namespace
 
 std::unique_ptr<Substrate> make_split(const Gel& gel, const SubstrateParameters& parameters, int threads) {
-  check_uniform(parameters);
   return std::make_unique<Split>(gel, parameters, threads);
 }
 

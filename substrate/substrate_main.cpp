@@ -20,6 +20,8 @@ struct Parameters {
 void declare(ParameterList& list, Parameters& p) {
   declare(list, p.gel);
   declare(list, p.substrate);
+  declare(list, p.substrate.effects,
+          {"finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement", "effect_tolerance"});
 }
 
 struct Load {
@@ -129,7 +131,10 @@ void write_result(StageContext& context, const substrate::Substrate& model, cons
   }
 }
 
-StageReport run(const Parameters& parameters, StageContext& context) {
+StageReport run(const Parameters& given, StageContext& context) {
+  Parameters parameters = given;
+  std::string& vertical = parameters.substrate.effects.vertical_displacement;
+  if (vertical == "auto" && !context.has_input("points")) vertical = "on";  // a surface in space has three components
   const auto model = substrate::make_substrate(parameters.gel, parameters.substrate, context.threads);
   const Load load = read_load(context);
   context.progress(0.1, "solving for the substrate");
@@ -139,6 +144,11 @@ StageReport run(const Parameters& parameters, StageContext& context) {
   report.figures.emplace_back("n_loads", static_cast<std::int64_t>(load.ellipses.size()));
   for (const auto& figure : model->figures()) report.figures.push_back(figure);
   report.effects = model->effects();
+  for (Effect& e : report.effects) {
+    if (e.name != "vertical displacement" || given.substrate.effects.vertical_displacement != "auto") continue;
+    e.setting = "auto";
+    if (e.is_on) e.why = "a surface in space is written";
+  }
   return report;
 }
 

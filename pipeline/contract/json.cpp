@@ -19,4 +19,15 @@ Value value_of(const nlohmann::ordered_json& json) {
   return json.get<std::string>();
 }
 
+nlohmann::ordered_json json_of(const Effect& e) {
+  nlohmann::ordered_json json = {{"name", e.name}, {"switch", e.setting}, {"on", e.is_on}};
+  if (e.number) json["number"] = *e.number;
+  if (e.threshold) json["threshold"] = *e.threshold;
+  json["why"] = e.why;
+  json["seconds"] = e.seconds;
+  if (e.change) json["change"] = *e.change;
+  if (!e.would_change.empty()) json["would_change"] = e.would_change;
+  return json;
+}
+
 }  // namespace mbtfm

@@ -1,4 +1,4 @@
-/// Figures as JSON. Inside pipeline/ only.
+/// Figures and effects as JSON. Inside pipeline/ only.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -9,6 +9,7 @@ namespace mbtfm {
 
 nlohmann::ordered_json json_of(const Value& value);
 nlohmann::ordered_json json_of(const Figures& figures);
+nlohmann::ordered_json json_of(const Effect& effect);
 /// @throws nlohmann::json::exception where it is not a boolean, number or string
 Value value_of(const nlohmann::ordered_json& json);
 

@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm {
@@ -16,8 +17,8 @@ namespace mbtfm {
 namespace {
 
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
-constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network", "cables",
-                                "substrate", "fit",    "stats",   "scenario", "traction"};
+constexpr std::array kTables = {"gel",     "images",    "segment", "track", "network",  "cables",
+                                "effects", "substrate", "fit",     "stats", "scenario", "traction"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
@@ -215,9 +216,11 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
       if (keys_of.contains(key_name)) {
         for (const auto& [inner_key, inner] : *table) {
           if (set(key_name, inner_key.str(), inner)) continue;
+          const std::vector<std::string> others = key_name == "effects" ? effect_keys() : std::vector<std::string>();
+          if (std::ranges::find(others, std::string(inner_key.str())) != others.end()) continue;  // another stage's
           throw InputError(place(name, inner), "a known key of [" + key_name + "]",
                            "'" + std::string(inner_key.str()) + "'",
-                           unknown_key_hint(keys_of[key_name], inner_key.str()));
+                           unknown_key_hint(others.empty() ? keys_of[key_name] : others, inner_key.str()));
         }
       } else if (std::find(kTables.begin(), kTables.end(), key_name) == kTables.end()) {
         throw InputError(place(name, node), "a known table", "[" + key_name + "]",

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -19,12 +20,17 @@ struct Report {
   std::string reason;  ///< one sentence; where not converged: the likely cause and the numbers that tell
 };
 
-/// An effect of the physics that a scene may or may not call for.
+/// An effect of the physics that a scene may or may not call for: what became of it in this run (see effects.h).
 struct Effect {
   std::string name;
+  std::string setting = "auto";  ///< its switch: auto, on, off
   bool is_on = false;
+  std::optional<double> number = {};  ///< what leaving it out would cost, where that was asked; on above the threshold
+  std::optional<double> threshold = {};
   std::string why;
-  double seconds = 0;  ///< spent on it
+  double seconds = 0;                 ///< spent on it, its own question included
+  std::optional<double> change = {};  ///< of the tensions were it on, relative; where that was asked (--explain)
+  std::string would_change = {};      ///< the same in a sentence
 };
 
 using Value = std::variant<bool, std::int64_t, double, std::string>;

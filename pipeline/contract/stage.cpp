@@ -12,6 +12,7 @@
 
 #include "pipeline/contract/blas.h"
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/hash.h"
 #include "pipeline/contract/json.h"
 #include "pipeline/contract/parallel.h"
@@ -157,9 +158,7 @@ void write_record(const fs::path& file, const StageDescription& description, con
     outputs.push_back({.at = pending.temporary, .name = pending.destination});
   }
   nlohmann::ordered_json effects = nlohmann::ordered_json::array();
-  for (const Effect& e : report.effects) {
-    effects.push_back({{"name", e.name}, {"on", e.is_on}, {"why", e.why}, {"seconds", e.seconds}});
-  }
+  for (const Effect& e : report.effects) effects.push_back(json_of(e));
   const nlohmann::ordered_json record = {{"stage", description.name},
                                          {"version", kVersion},
                                          {"parameters", parameters_of(list)},
@@ -216,7 +215,10 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
       std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", description.name.c_str(), report.summary.c_str());
       return kNotSolved;
     }
-    if (!line.is_quiet) std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
+    if (!line.is_quiet) {
+      std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
+      for (const Effect& e : report.effects) std::fprintf(stderr, "  %s\n", line_of(e).c_str());
+    }
     return kDone;
   } catch (...) {
     discard(context);

@@ -101,6 +101,13 @@ Settings read_settings(const fs::path& toml_file) {
       const std::string table = value.is_table() ? std::string(key.str()) : std::string();
       if (std::find(stage.tables.begin(), stage.tables.end(), table) != stage.tables.end()) relevant.insert(key, value);
     }
+    toml::table effects;
+    if (const toml::table* all = whole["effects"].as_table()) {
+      for (const auto& [key, value] : *all) {
+        if (std::ranges::find(stage.effects, key.str()) != stage.effects.end()) effects.insert(key, value);
+      }
+    }
+    if (!effects.empty()) relevant.insert("effects", effects);
     std::ostringstream text;
     text << toml::json_formatter(relevant);
     settings[stage.name] = json::parse(text.str()).dump();

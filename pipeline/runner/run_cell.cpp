@@ -42,6 +42,7 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
   add("threads", std::to_string(threads));
   add("record", (cell / stage.folder / "record.json").string());
   if (options.is_quiet) command.push_back("--quiet");
+  if (options.explain && stage.name == "fit") command.push_back("--explain");
   return command;
 }
 
@@ -130,8 +131,10 @@ CellRun::Present CellRun::present(const Stage& stage) {
   now.surroundings = surroundings_of(
       stage, {.cell = cell_, .images = images_, .settings = settings_, .hashes = hashes_, .version = options_.version},
       now.record);
-  now.status = contains_name(options_.redo, stage.name) ? StageStatus{StageState::must_run, "asked for"}
-                                                        : status_of(stage, now.record, now.surroundings);
+  const bool is_explained = options_.explain && stage.name == "fit";
+  now.status = is_explained || contains_name(options_.redo, stage.name)
+                   ? StageStatus{StageState::must_run, "asked for"}
+                   : status_of(stage, now.record, now.surroundings);
   return now;
 }
 

@@ -18,6 +18,7 @@ struct RunOptions {
   bool is_checked = false;        ///< every stage is known to accept its parameters
   std::vector<std::string> only;  ///< names of stages; empty: all
   std::vector<std::string> redo;  ///< stages to run even if up to date or changed by hand
+  bool explain = false;           ///< let the fit estimate what the effects that are off would change
   ProcessLimits limits;           ///< of each stage
   std::string version;
   std::function<void(const std::string&)> say;  ///< one line for each stage

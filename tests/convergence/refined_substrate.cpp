@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "substrate/layer.h"
+#include "substrate/layer_vertical.h"
 #include "tests/support/layered_gel.h"
 #include "tests/support/substrate_scene.h"
 
@@ -215,6 +216,43 @@ TEST(Vertical, of_the_half_space_is_the_average_of_the_point_force) {
   const Vec2 step = {1e-9 * std::cos(0.7), 1e-9 * std::sin(0.7)};
   const auto near = model->vertical_um({rim - step, rim + step}, {ellipse}, {{2, -1}});
   EXPECT_NEAR(near[0], near[1], 1e-4 * std::abs(near[0]));
+}
+
+/// The layer's own transforms against the finite elements' correction on a wide block.
+TEST(Vertical, of_layer_and_split_agree) {
+  const SquareScene scene;
+  const std::vector<Vec2> forces = {{1, 2}, {-3, 0.5}};
+  for (const double nu : {0.3, 0.49}) {
+    const Gel gel = gel_of(nu, 15);
+    SubstrateParameters fine = test::model_named("split");
+    fine.cells_per_thickness = 4;
+    const auto by_split = make_substrate(gel, fine, 2);
+    const auto split = by_split->vertical_um(scene.points, scene.ellipses, forces);
+    const auto along = by_split->displacements_um(scene.points, scene.ellipses, forces);
+    const auto layer =
+        make_substrate(gel, test::model_named("layer"), 2)->vertical_um(scene.points, scene.ellipses, forces);
+    double difference = 0, size = 0, vertical = 0;
+    for (std::size_t i = 0; i < split.size(); ++i) {
+      difference += (split[i] - layer[i]) * (split[i] - layer[i]);
+      size += split[i] * split[i] + dot(along[i], along[i]);
+      vertical += layer[i] * layer[i];
+    }
+    EXPECT_LT(std::sqrt(difference / size), 1e-3) << nu;  // the sides, at four thicknesses, change that much
+    EXPECT_GT(std::sqrt(vertical / size), 1e-2) << nu;    // it is worth comparing
+  }
+}
+
+TEST(Vertical, of_a_thick_layer_is_that_of_the_half_space) {
+  for (const double nu : {0.0, 0.3, 0.4999}) {
+    EXPECT_NEAR(layer_vertical_factor(nu, 30), 0.5 * (1 - 2 * nu), 1e-12);
+    EXPECT_NEAR(layer_vertical_factor(nu, 0.01), 0, 1e-4);  // long waves shear the layer: as (kh)²
+  }
+  const std::vector<Vec2> points = {{1, 0.5}, {3, -2}};
+  const std::vector<Ellipse> ellipses = {{{0, 0}, 1, 0.5, 0.3}};
+  const Gel thick = gel_of(0.3, 1e5);
+  const auto layer = make_substrate(thick, test::model_named("layer"), 1)->vertical_um(points, ellipses, {{1, 2}});
+  const auto half = make_substrate(thick, test::model_named("half-space"), 1)->vertical_um(points, ellipses, {{1, 2}});
+  for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(layer[i], half[i], 1e-6 * std::abs(half[i]));
 }
 
 TEST(Vertical, of_split_and_refined_agree) {

@@ -70,7 +70,7 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
 }
 
 TEST_F(SubstrateProgram, writes_the_vertical_part_where_asked_for) {
-  ASSERT_EQ(run(forces() + "--model split --vertical --points " + file("points.csv") + " --out " + file("u.csv")).code,
+  ASSERT_EQ(run(forces() + "--model split --vertical_displacement on --points " + file("points.csv") + " --out " + file("u.csv")).code,
             0);
   const CsvTable table{fs::path(file("u.csv"))};
   // a point ahead of the force is pressed into the gel, and one above it keeps still but for its other component
@@ -108,7 +108,10 @@ TEST_F(SubstrateProgram, writes_a_surface_that_vtk_opens) {
   ASSERT_GT(n_cells, 160 * 160);  // the adhesion's rectangle alone
   for (vtkIdType cell = 0; cell < n_cells; ++cell) ASSERT_EQ(grid->GetCellType(cell), VTK_QUAD);
   EXPECT_GT(largest(grid->GetPointData(), "displacement_um", n_points, 3, 0), 0);
-  EXPECT_EQ(largest(grid->GetPointData(), "displacement_um", n_points, 3, 2), 0);
+  // a surface in space has three components, but where the third is switched off
+  EXPECT_GT(largest(grid->GetPointData(), "displacement_um", n_points, 3, 2), 0);
+  ASSERT_EQ(run(forces() + "--model layer --vertical_displacement off --out " + file("flat.vtu")).code, 0);
+  EXPECT_EQ(largest(opened(file("flat.vtu"))->GetPointData(), "displacement_um", n_points, 3, 2), 0);
   // 3 and 1 nN over pi um²
   EXPECT_NEAR(largest(grid->GetCellData(), "traction_kPa", n_cells, 3, 0), 3 / std::numbers::pi, 1e-9);
   EXPECT_NEAR(largest(grid->GetCellData(), "traction_kPa", n_cells, 3, 1), 1 / std::numbers::pi, 1e-9);

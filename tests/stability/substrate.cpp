@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
+#include "substrate/effects.h"
 #include "substrate/gel_vtu.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/substrate_scene.h"
@@ -235,9 +236,8 @@ std::string choice(const Gel& gel, const SubstrateParameters& parameters, const 
   const auto model = make_substrate(gel, parameters, 2);
   const Eigen::MatrixXd matrix = model->compliance_um_per_nN(points, ellipses);
   EXPECT_TRUE(matrix.allFinite());
-  const std::string why = model->effects().front().why;
-  EXPECT_GT(why.size(), 30u) << why;  // a reason with numbers
-  return why.substr(0, why.find(':'));
+  const std::string name = std::get<std::string>(model->figures().front().second);
+  return name;
 }
 
 TEST(Automatic, takes_the_cheapest_model_that_is_right) {
@@ -267,7 +267,7 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
   const auto ellipses = test::scattered_ellipses(6, 25);
   SubstrateParameters parameters = test::model_named("auto");
   for (const double tolerance : {0.05, 0.01}) {
-    parameters.displacement_tolerance = tolerance;
+    parameters.effects.effect_tolerance = tolerance;
     // as thin as the half-space is taken
     Gel gel = kGel;
     gel.thickness_um = 40;
@@ -286,6 +286,67 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
   }
 }
 
+GelEffects effects_for(double thickness_um, const SubstrateParameters& parameters) {
+  Gel gel = kGel;
+  gel.thickness_um = thickness_um;
+  return decide(gel, parameters, 50);
+}
+
+TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_that_does_not) {
+  SubstrateParameters p;
+  EXPECT_TRUE(effects_for(60, p).thickness.is_on);
+  EXPECT_FALSE(effects_for(20000, p).thickness.is_on);
+  p.side_distance_um = 100;
+  EXPECT_TRUE(effects_for(60, p).sides.is_on);  // exp(-2.5)
+  EXPECT_FALSE(effects_for(20, p).sides.is_on);
+  EXPECT_FALSE(effects_for(60, {}).sides.is_on);
+  p.modulus_profile = "0:8.4, 20:8.4, 20:8.8";
+  EXPECT_TRUE(effects_for(60, p).grading.is_on);
+  EXPECT_FALSE(effects_for(15, p).grading.is_on);  // thinner than where it begins
+  p.modulus_profile = "0:8.4, 20:8.45";
+  EXPECT_FALSE(effects_for(60, p).grading.is_on);
+  EXPECT_FALSE(effects_for(60, p).vertical.is_on);
+  p.effects.vertical_displacement = "on";
+  EXPECT_TRUE(effects_for(60, p).vertical.is_on);
+}
+
+TEST(Automatic, obeys_its_switches) {
+  const auto points = test::scattered_points(100, 10);
+  const std::vector<Ellipse> ellipses = {{{1, 2}, 1, 0.5, 0.3}};
+  SubstrateParameters p;
+  p.side_distance_um = 30;
+  p.modulus_profile = "0:8.4, 5:8.4, 5:20";
+  p.effects.depth_graded_gel = "off";
+  EXPECT_EQ(choice(kGel, p, points, ellipses), "split");
+  p.effects.finite_sides = "off";
+  EXPECT_EQ(choice(kGel, p, points, ellipses), "layer");
+  p.effects.finite_thickness = "off";
+  EXPECT_EQ(choice(kGel, p, points, ellipses), "half-space");
+}
+
+TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) {
+  const auto refused = [](const std::string& model, std::string EffectSwitches::*member, const std::string& setting,
+                          std::optional<double> side_distance_um = {}) {
+    SubstrateParameters p = test::model_named(model);
+    p.effects.*member = setting;
+    p.side_distance_um = side_distance_um;
+    try {
+      make_substrate(kGel, p, 1);
+    } catch (const UsageError& error) {
+      return std::string(error.what()).find("effects.") != std::string::npos;
+    }
+    return false;
+  };
+  using S = EffectSwitches;
+  EXPECT_TRUE(refused("auto", &S::finite_sides, "on"));
+  EXPECT_TRUE(refused("auto", &S::depth_graded_gel, "on"));
+  EXPECT_TRUE(refused("auto", &S::finite_thickness, "off", 5));  // sides so near are on, and have a base
+  EXPECT_TRUE(refused("half-space", &S::finite_thickness, "on"));
+  EXPECT_TRUE(refused("layer", &S::finite_thickness, "off"));
+  EXPECT_TRUE(refused("layer", &S::finite_sides, "on", 30));
+  EXPECT_FALSE(refused("auto", &S::finite_sides, "on", 30));
+}
+
 TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
   test::hard_case("malformed modulus profiles", "an error for each");
   SubstrateParameters parameters = test::model_named("refined");
@@ -297,14 +358,6 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
     parameters.model = model;
     parameters.modulus_profile = "0:8, 4:8, 4:16";
     EXPECT_THROW(make_substrate(kGel, parameters, 1), UsageError) << model;
-  }
-  SubstrateParameters layer = test::model_named("layer");
-  layer.vertical = true;
-  try {
-    make_substrate(kGel, layer, 1);
-    FAIL();
-  } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("take half-space, split or refined"), std::string::npos) << error.what();
   }
   EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
                UsageError);

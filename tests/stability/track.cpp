@@ -139,7 +139,7 @@ TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_gi
   EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed).substr(0, refused.size()), refused);
   EXPECT_NE(what_is_wrong(one.relaxed, one.stressed), "nothing");
   const auto little = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .turn_rad = 0.02, .seed = 1});
-  EXPECT_NE(what_is_wrong(little.relaxed, little.stressed).find("(drift = translation), found one turned by 1.1"),
+  EXPECT_NE(what_is_wrong(little.relaxed, little.stressed).find("(effects.drift_rotation = off), found one turned by 1.1"),
             std::string::npos);
   for (const char* drift : {"rotation", "similarity"}) {
     TrackParameters parameters;

@@ -1,0 +1,24 @@
+#include "mbtfm/effects.h"
+
+namespace mbtfm::inverse {
+
+std::string loss_of_switch(const std::string& setting, const std::string& robust_kind) {
+  if (setting == "auto") return "auto";
+  return setting == "on" ? robust_kind : "squares";
+}
+
+Effect robust_loss_effect(const std::string& setting, const std::string& used_loss) {
+  const bool is_robust = used_loss != "squares";
+  return decided("robust loss", setting, is_robust,
+                 is_robust
+                     ? used_loss + ": the first fit leaves a residual that Gaussian noise has in one case of twenty"
+                     : "the first fit leaves no residual that is too large for Gaussian noise");
+}
+
+Effect decide_time_coupling(bool has_frame_before, const std::string& setting) {
+  Effect effect = decided("time coupling", setting, has_frame_before ? 1 : 0, 0, "number of frames before this one:");
+  effect.is_on = effect.is_on && has_frame_before;
+  return effect;
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,40 @@
+/// The effects of mbtfm-fit as a whole: the gel's, the network's and the fit's own.
+#pragma once
+
+#include "mbtfm/explain.h"
+#include "mbtfm/fit_results.h"
+#include "network/mesh.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::inverse {
+
+struct FitStageParameters {
+  Gel gel;
+  network::NetworkParameters network;
+  network::CableParameters cables;
+  substrate::SubstrateParameters substrate;
+  FitParameters fit;
+  EffectSwitches effects;
+  bool explain = false;  ///< some seconds; what is off is off because it does not matter
+};
+void declare(ParameterList& list, FitStageParameters& parameters);
+
+/// A fit with all that went into it.
+struct FittedCell {
+  const FitStageParameters& parameters;
+  const Cell& cell;  ///< with its fibres, whether in the network or not
+  const FitInputs& inputs;
+  const std::vector<network::CableNetwork>& networks;
+  const LinearData& data;
+  const EnsembleFit& fit;
+};
+
+std::vector<int> adhesion_ids_of(const Cell& cell);
+std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
+std::vector<Vec2> points_of(const DisplacementField& beads);
+
+/// Say of each effect that is off what it would change, where anything tells: its `change` and `would_change`.
+/// @return the changes by tension
+std::vector<Change> explain(std::vector<Effect>& effects, const FittedCell& cell, int threads);
+
+}  // namespace mbtfm::inverse

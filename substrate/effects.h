@@ -1,0 +1,37 @@
+/// Which of the gel's effects a scene calls for, and which a model takes into account.
+#pragma once
+
+#include <vector>
+
+#include "substrate/compliance.h"
+
+namespace mbtfm::substrate {
+
+/// In this order: finite thickness, finite sides, depth-graded gel, vertical displacement.
+struct GelEffects {
+  Effect thickness, sides, grading, vertical;
+  std::vector<Effect> list() const { return {thickness, sides, grading, vertical}; }
+};
+
+/// By the switches and, where these are `auto`, by what each would change of the field (theory.md, section 2):
+///
+/// - finite thickness: the layer's correction s_0/(2 pi mu h) is largest, and even, near the force, while the field
+///   falls as 1/r. Over a disc of radius R around a force, R >> a, its share of the field's L2 norm is at most
+///   2 s_0 / sqrt((2-nu)² + nu²) · R/h (the field's norm, as sqrt(2 ln(R/a)), being taken as that at R = e^(1/2) a: an
+///   upper bound for a scene larger than its adhesions).
+/// - finite sides at a distance d: the layer's field falls as exp(-0.739 r/h) or faster, to a side and back
+///   exp(-1.48 d/h).
+/// - depth-graded gel: stiffer everywhere is less compliant, so the true compliance lies between those of the softest
+///   and the stiffest depth: it differs from the even gel's by E/E_min - 1 or 1 - E/E_max at most.
+/// - vertical displacement: it does not act back on the displacement along the surface: on only where it is asked for.
+/// @param scene_um  diagonal of the rectangle around all adhesions and points
+/// @throws UsageError where a switch is on that the gel has no datum for, or the switches contradict each other
+GelEffects decide(const Gel& gel, const SubstrateParameters& parameters, double scene_um);
+
+/// What the named model takes into account. @throws UsageError where a switch asks for something else
+GelEffects effects_of_model(const SubstrateParameters& parameters);
+
+/// Parameters without the data of effects that are off: sides far away, an even modulus.
+SubstrateParameters without_what_is_off(SubstrateParameters parameters, const GelEffects& effects);
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,125 @@
+/// effects_cost [REPEATS]: what an effect costs that is off, against a path that does not know of it. Each is run in a
+/// process of its own, in turn; median seconds of the processor and peak memory.
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "network/effects.h"
+#include "segment/track.h"
+#include "tests/support/bead_pair.h"
+#include "tests/support/substrate_scene.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm {
+namespace {
+
+struct Cost {
+  double seconds = 0, peak_MB = 0;
+};
+
+Cost cost_of(const std::function<void()>& work) {
+  const pid_t child = fork();
+  if (child == 0) {
+    work();
+    _exit(0);
+  }
+  int status = 0;
+  rusage usage{};
+  wait4(child, &status, 0, &usage);
+  if (status != 0) std::exit(1);
+  const auto seconds = [](timeval t) { return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec); };
+  return {seconds(usage.ru_utime) + seconds(usage.ru_stime), static_cast<double>(usage.ru_maxrss) / 1024};
+}
+
+double median(std::vector<double> values) {
+  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2), values.end());
+  return values[values.size() / 2];
+}
+
+void compare(const std::string& effect, int n, const std::function<void()>& off, const std::function<void()>& without) {
+  std::vector<double> seconds[2], memory[2];
+  for (int i = 0; i < n; ++i) {
+    for (int k = 0; k < 2; ++k) {
+      const Cost cost = cost_of(k == 0 ? off : without);
+      seconds[k].push_back(cost.seconds);
+      memory[k].push_back(cost.peak_MB);
+    }
+  }
+  std::printf("| %s | %.3f | %.3f | %.1f | %.1f |\n", effect.c_str(), median(seconds[0]), median(seconds[1]),
+              median(memory[0]), median(memory[1]));
+  std::fflush(stdout);
+}
+
+/// 170 adhesions, 10 000 beads, on a gel so thick that all effects of the gel are off.
+void compare_gel(int n) {
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 50000};
+  const auto points = test::scattered_points(10000, 50);
+  const auto ellipses = test::scattered_ellipses(170, 30);
+  const auto run = [&](const std::string& model) {
+    substrate::make_substrate(gel, test::model_named(model), 1)->compliance_um_per_nN(points, ellipses);
+  };
+  compare(
+      "finite thickness, sides, grading, vertical", n, [&] { run("auto"); }, [&] { run("half-space"); });
+  Gel thin = gel;
+  thin.thickness_um = 60;
+  const auto run_on = [&](const std::string& model) {
+    substrate::make_substrate(thin, test::model_named(model), 1)->compliance_um_per_nN(points, ellipses);
+  };
+  compare(
+      "finite sides, grading, vertical", n, [&] { run_on("auto"); }, [&] { run_on("layer"); });
+}
+
+void compare_fit(int n) {
+  Cell cell = test::round_cell(25, 40);
+  for (int k = 1; k <= 8; ++k) test::add_ventral(cell, k, k + 17);
+  Eigen::VectorXd tensions = Eigen::VectorXd::Constant(9, 3);
+  tensions[0] = 0.06;
+  const test::TensionScene scene = test::scene_of(cell, tensions, 5000, 0.05, 1);
+  const auto fit = [&](const std::string& loss) {
+    test::TensionScene copy = test::scene_of(cell, tensions, 10, 0.05, 1);
+    copy.beads = scene.beads;
+    copy.data = scene.data;
+    copy.adhesion_ids = scene.adhesion_ids;
+    inverse::FitParameters parameters;
+    parameters.loss = loss;
+    test::fit_own_network(copy, parameters);
+  };
+  compare(
+      "robust loss", n, [&] { fit("auto"); }, [&] { fit("squares"); });
+  const std::vector<double> given(tensions.data(), tensions.data() + tensions.size());
+  const auto contract = [&](double stiffness) {
+    const network::CableNetwork cables(scene.cables.network(), {.axial_stiffness_nN = stiffness});
+    for (int k = 0; k < 10; ++k) cables.equilibrium(given);
+  };
+  compare(
+      "elasticity of cables (against on)", n, [&] { contract(0); }, [&] { contract(50); });
+}
+
+void compare_tracking(int n) {
+  const auto pair = test::draw_bead_pair(test::ring_of_adhesions(512, 6), {.width = 512, .n_beads = 5200});
+  const auto track = [&](const std::string& drift) {
+    segment::TrackParameters parameters;
+    parameters.drift = drift;
+    segment::track_beads(pair.relaxed, pair.stressed, 0.1, parameters, 1);
+  };
+  compare(
+      "drift rotation", n, [&] { track("auto"); }, [&] { track("translation"); });
+}
+
+}  // namespace
+}  // namespace mbtfm
+
+int main(int argc, char** argv) {
+  const int n = argc > 1 ? std::atoi(argv[1]) : 5;
+  std::printf("| off | seconds | without | MB | without |\n|---|---|---|---|---|\n");
+  mbtfm::compare_gel(n);
+  mbtfm::compare_fit(n);
+  mbtfm::compare_tracking(n);
+}

@@ -1,0 +1,38 @@
+/// Whether the tracker takes a turn off is decided by the pictures.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "segment/track.h"
+#include "tests/support/bead_pair.h"
+
+namespace mbtfm::segment {
+namespace {
+
+const std::vector<test::Peak> kCell = test::ring_of_adhesions(384, 6);
+
+Tracking tracked(double turn_rad, std::uint64_t seed) {
+  const auto pair = test::draw_bead_pair(
+      kCell, {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = {2, -1}, .seed = seed});
+  TrackParameters parameters;
+  parameters.drift = "auto";
+  return track_beads(pair.relaxed, pair.stressed, 0.1, parameters, 2);
+}
+
+TEST(DriftRotation, is_taken_off_where_the_border_is_turned) {
+  for (const double turn_rad : {-0.002, 0.17}) {
+    const Tracking tracking = tracked(turn_rad, 3);
+    EXPECT_TRUE(tracking.rotation.is_on) << turn_rad << ": " << tracking.rotation.why;
+    EXPECT_NEAR(tracking.turn_rad, turn_rad, 2e-4);
+  }
+}
+
+TEST(DriftRotation, is_left_where_nothing_is_turned) {
+  for (const std::uint64_t seed : {1, 2}) {
+    const Tracking tracking = tracked(0, seed);
+    EXPECT_FALSE(tracking.rotation.is_on) << seed << ": " << tracking.rotation.why;
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment

@@ -1,0 +1,166 @@
+/// Which effects a scene calls for, each with a scene that does and one that does not; and what is said of those left
+/// out, against a fit that has them.
+#include "mbtfm/effects.h"
+
+#include <gtest/gtest.h>
+
+#include "mbtfm/explain.h"
+#include "network/effects.h"
+#include "pipeline/contract/errors.h"
+#include "substrate/effects.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::TensionScene;
+
+Cell cell_of_three_fibres() {
+  Cell cell = test::round_cell(14, 12);
+  test::add_ventral(cell, 1, 6);
+  test::add_ventral(cell, 3, 9);
+  test::add_ventral(cell, 4, 11);
+  return cell;
+}
+
+TensionScene scene(double noise, unsigned seed = 1) {
+  return test::scene_of(cell_of_three_fibres(), Eigen::Vector4d(0.06, 3, 5, 2), 1500, noise, seed);
+}
+
+std::vector<network::CableNetwork> networks(int n, network::CableParameters cables = {}) {
+  std::vector<network::CableNetwork> result;
+  for (int m = 0; m < n; ++m) {
+    network::NetworkParameters parameters;
+    parameters.seed = 10 + static_cast<std::uint64_t>(m);
+    result.emplace_back(network::generate_network(cell_of_three_fibres(), parameters).network, cables);
+  }
+  return result;
+}
+
+EnsembleFit fitted(const std::vector<network::CableNetwork>& on, LinearData data, const TensionScene& s,
+                   const std::string& loss = "squares") {
+  FitParameters parameters;
+  parameters.n_meshes = static_cast<int>(on.size());
+  parameters.loss = loss;
+  return fit_ensemble(on, data, s.adhesion_ids, parameters, 2, {});
+}
+
+/// The change that was stated against the one that a fit with the effect makes.
+void expect_as_stated(const Change& stated, const EnsembleFit& without, const EnsembleFit& with) {
+  const Eigen::VectorXd made = test::values_of(with) - test::values_of(without);
+  EXPECT_GT(made.norm(), 0);
+  EXPECT_LE(made.norm(), 2 * stated.by_tension_nN.norm())
+      << made.transpose() << " | " << stated.by_tension_nN.transpose();
+  EXPECT_GE(made.norm(), 0.5 * stated.by_tension_nN.norm());
+  EXPECT_LE((made - stated.by_tension_nN).norm(), 0.5 * made.norm());
+}
+
+TEST(EffectsOfTheFit, stress_fibres_where_the_cell_has_any) {
+  Cell with = cell_of_three_fibres(), without = test::round_cell(14, 12), left_out = with;
+  EXPECT_TRUE(network::take_fibres(with, "auto").is_on);
+  EXPECT_EQ(with.fibres.size(), 3u);
+  EXPECT_FALSE(network::take_fibres(without, "auto").is_on);
+  EXPECT_FALSE(network::take_fibres(left_out, "off").is_on);
+  EXPECT_TRUE(left_out.fibres.empty());
+  EXPECT_THROW(network::take_fibres(without, "on"), InvalidData);
+}
+
+/// A triangular lattice whose border is held all round: pulling alike, its cables stay as they are.
+Network held_lattice(int side) {
+  Network network;
+  const auto index = [&](int i, int j) { return j * side + i; };
+  int adhesion_id = 0;
+  for (int j = 0; j < side; ++j) {
+    for (int i = 0; i < side; ++i) {
+      network.vertices_um.push_back({1.5 * (i + 0.5 * j), 1.5 * std::sqrt(0.75) * j});
+      const bool is_border = i == 0 || j == 0 || i == side - 1 || j == side - 1;
+      network.adhesion_id.push_back(is_border ? ++adhesion_id : 0);
+      for (const auto& [di, dj] : {std::pair{-1, 0}, std::pair{0, -1}, std::pair{1, -1}}) {
+        if (i + di < 0 || i + di >= side || j + dj < 0) continue;
+        network.links.push_back({.vertex_a = index(i + di, j + dj), .vertex_b = index(i, j), .rest_length_um = 1.5});
+      }
+    }
+  }
+  return network;
+}
+
+TEST(EffectsOfTheFit, elasticity_where_cables_would_be_longer_than_at_rest) {
+  EXPECT_FALSE(network::decide_elasticity(network::CableNetwork(held_lattice(7)), {0.06}, {}).is_on);
+  const auto cell = networks(1);
+  EXPECT_TRUE(network::decide_elasticity(cell.front(), {0.06, 0.06, 0.06, 0.06}, {}).is_on);
+}
+
+TEST(EffectsOfTheFit, elasticity_that_is_off_is_that_of_very_soft_cables) {
+  const auto off = networks(1, {.axial_stiffness_nN = 0}), soft = networks(1, {.axial_stiffness_nN = 1e-7});
+  const std::vector<double> tensions = {0.06, 3, 5, 2};
+  const auto a = off[0].equilibrium(tensions), b = soft[0].equilibrium(tensions);
+  ASSERT_TRUE(a.report.converged) << a.report.reason;
+  const Eigen::VectorXd fa = off[0].adhesion_forces_nN(tensions, a), fb = soft[0].adhesion_forces_nN(tensions, b);
+  EXPECT_LE((fa - fb).norm(), 1e-5 * fb.norm());  // EA is 2e-6 of the network's tension, over strains of up to some
+  const Eigen::MatrixXd da = off[0].adhesion_force_derivatives(tensions, a);
+  EXPECT_TRUE(da.allFinite());
+  // without elasticity forces are linear in the tensions (Euler: R = dR/dt t)
+  EXPECT_LE((da * Eigen::Vector4d(0.06, 3, 5, 2) - fa).norm(), 1e-5 * fa.norm());
+}
+
+TEST(EffectsOfTheFit, a_robust_loss_where_beads_stray) {
+  TensionScene s = scene(0.05);
+  const auto on = networks(1);
+  EXPECT_FALSE(robust_loss_effect("auto", fitted(on, s.data, s, loss_of_switch("auto", "huber")).loss).is_on);
+  for (std::size_t i = 0; i < s.beads.size(); i += 33) s.beads[i].displacement_um += Vec2{8 * s.beads[i].sigma_um, 0};
+  s.data = reduce(s.beads, s.compliance_um_per_nN);
+  EXPECT_TRUE(robust_loss_effect("auto", fitted(on, s.data, s, loss_of_switch("auto", "huber")).loss).is_on);
+  EXPECT_FALSE(robust_loss_effect("off", fitted(on, s.data, s, loss_of_switch("off", "huber")).loss).is_on);
+  EXPECT_EQ(loss_of_switch("on", "tukey"), "tukey");
+}
+
+TEST(EffectsOfTheFit, time_coupling_where_there_is_a_frame_before) {
+  EXPECT_TRUE(decide_time_coupling(true, "auto").is_on);
+  EXPECT_FALSE(decide_time_coupling(true, "off").is_on);
+  EXPECT_FALSE(decide_time_coupling(false, "auto").is_on);
+  EXPECT_FALSE(decide_time_coupling(false, "on").is_on) << "a series has a first frame";
+}
+
+TEST(Explained, the_gels_thickness_changes_the_tensions_as_stated) {
+  const TensionScene s = scene(0.03);
+  const auto on = networks(3);
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};  // as test::scene_of
+  const LinearData half_space = reduce(
+      s.beads, substrate::make_greens(gel, {.model = "half-space"}, 2)->compliance_um_per_nN(s.points_um, s.ellipses));
+  const EnsembleFit without = fitted(on, half_space, s), with = fitted(on, s.data, s);
+  const Change change = change_by_data("finite thickness", without, half_space, s.data);
+  expect_as_stated(change, without, with);
+  EXPECT_NE(sentence(change, without).find("would change the tensions by"), std::string::npos);
+}
+
+TEST(Explained, elasticity_changes_the_tensions_as_stated) {
+  const TensionScene s = scene(0.03);
+  const auto off = networks(3, {.axial_stiffness_nN = 0}), on = networks(3);
+  const EnsembleFit without = fitted(off, s.data, s), with = fitted(on, s.data, s);
+  expect_as_stated(change_by_networks("elasticity", without, s.data, on, s.adhesion_ids, 2), without, with);
+}
+
+TEST(Explained, a_robust_loss_changes_the_tensions_as_stated) {
+  TensionScene s = scene(0.03);
+  for (std::size_t i = 0; i < s.beads.size(); i += 20) s.beads[i].displacement_um += Vec2{0, 15 * s.beads[i].sigma_um};
+  s.data = reduce(s.beads, s.compliance_um_per_nN);
+  const auto on = networks(3);
+  const EnsembleFit without = fitted(on, s.data, s), with = fitted(on, s.data, s, "huber");
+  expect_as_stated(change_by_loss("robust loss", without, s.data, "huber"), without, with);
+}
+
+TEST(Explained, a_turn_left_in_the_field_changes_the_tensions_as_stated) {
+  TensionScene s = scene(0.03);
+  const auto on = networks(3);
+  const EnsembleFit with = fitted(on, s.data, s);
+  for (Bead& bead : s.beads) {
+    const Vec2 d = bead.position_um - Vec2{30, 30};
+    bead.displacement_um += 0.004 * Vec2{-d.y, d.x};  // a quarter of a degree
+  }
+  const LinearData turned = reduce(s.beads, s.compliance_um_per_nN);
+  const EnsembleFit without = fitted(on, turned, s);
+  expect_as_stated(change_by_turn("turn", without, turned, s.points_um), without, with);
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse

@@ -1,0 +1,74 @@
+/// The switches of the effects: how they are read, decided, recorded, and whose result depends on which.
+#include "pipeline/contract/effects.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/runner/record.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm {
+namespace {
+
+EffectSwitches read(std::string_view toml, const std::vector<std::string>& names) {
+  EffectSwitches switches;
+  ParameterList list;
+  declare(list, switches, names);
+  read_toml(list, toml, "cell.toml");
+  return switches;
+}
+
+TEST(Effects, a_stage_reads_its_own_switches_and_leaves_the_others_to_their_stages) {
+  const std::string toml = "[effects]\nfinite_sides = 'off'\ndrift_rotation = 'on'\neffect_tolerance = 0.05\n";
+  const EffectSwitches fit = read(toml, {"finite_sides", "effect_tolerance"});
+  EXPECT_EQ(fit.finite_sides, "off");
+  EXPECT_EQ(fit.drift_rotation, "auto");
+  EXPECT_EQ(fit.effect_tolerance, 0.05);
+  EXPECT_EQ(read(toml, {"drift_rotation"}).drift_rotation, "on");
+}
+
+TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
+  try {
+    read("[effects]\nfinite_side = 'on'\n", {"drift_rotation"});
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(error.hint.find("'finite_sides'"), std::string::npos) << error.hint;
+  }
+  EXPECT_THROW(read("[effects]\nfinite_sides = 'yes'\n", {"finite_sides"}), InputError);
+}
+
+TEST(Effects, auto_follows_the_number_and_a_switch_overrules_it) {
+  for (const double number : {0.02, 0.01, 0.0}) {
+    EXPECT_EQ(decided("sides", "auto", number, 0.01, "they change").is_on, number > 0.01);
+    EXPECT_TRUE(decided("sides", "on", number, 0.01, "they change").is_on);
+    EXPECT_FALSE(decided("sides", "off", number, 0.01, "they change").is_on);
+  }
+  EXPECT_EQ(line_of(decided("sides", "auto", 0.02, 0.01, "they change the field by")),
+            "sides: on (auto): they change the field by 0.02, above 0.01");
+}
+
+TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {
+  const test::TemporaryFolder folder;
+  const auto settings = [&](const std::string& toml) {
+    write_text(folder / "cell.toml", toml);
+    std::vector<std::string> all;
+    for (const runner::Stage& stage : runner::stages()) all.push_back(runner::settings_of(stage, folder / "cell.toml"));
+    return all;
+  };
+  const auto changed = [&](const std::string& toml) {
+    const auto before = settings("[gel]\nyoungs_modulus_kPa = 8\n");
+    const auto after = settings("[gel]\nyoungs_modulus_kPa = 8\n" + toml);
+    std::string names;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      if (before[i] != after[i]) names += runner::stages()[i].name + " ";
+    }
+    return names;
+  };
+  EXPECT_EQ(changed("[effects]\ndrift_rotation = 'off'\n"), "track ");
+  EXPECT_EQ(changed("[effects]\nstress_fibres = 'off'\n"), "network fit ");
+  EXPECT_EQ(changed("[effects]\nrobust_loss = 'off'\n"), "fit ");
+}
+
+}  // namespace
+}  // namespace mbtfm
