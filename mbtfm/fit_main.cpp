@@ -165,9 +165,9 @@ Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models
           {"n_missing_fibres_hinted", std::int64_t(missing.size())}};
 }
 
-PointArray most_informed_array(const EnsembleFit& fit, const LinearData& data) {
+PointArray most_informed_array(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
   PointArray array{.name = "informs_fibre_id", .scalars = {}, .vectors = {}};
-  for (const int id : most_informed_fibre(fit, data)) array.scalars.push_back(id);
+  for (const int id : most_informed_fibre(fit, influence)) array.scalars.push_back(id);
   return array;
 }
 
@@ -236,7 +236,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   const DisplacementField fitted = fitted_field(inputs, data, fit);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
-  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
+  const Eigen::MatrixXd influence = influence_of(fit, data);
+  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence);
   const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions);
   for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
   write_correlations(context.output("out", "correlations.csv"), fit);
@@ -252,7 +253,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
-                         {most_informed_array(fit, data), weight_array(data)});
+                         {most_informed_array(fit, influence), weight_array(data)});
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
   context.progress(1, "done");

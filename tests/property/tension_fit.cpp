@@ -208,7 +208,7 @@ TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
   const TensionScene scene = tension_scene("case_21", 2000, 0.05, 9);
   TensionScene same = tension_scene("case_21", 2000, 0.05, 9);
   const EnsembleFit fit = fit_own_network(same);
-  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, same.data);
+  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence_of(fit, same.data));
   // without the fibre its links are plain network
   const int removed = 3;
   Network network = scene.cables.network();
