@@ -17,12 +17,6 @@ using test::tension_scene;
 using test::TensionScene;
 using test::values_of;
 
-double total_force_nN(const Eigen::VectorXd& forces_nN) {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) sum += forces_nN.segment<2>(i).norm();
-  return sum;
-}
-
 TEST(TensionFit, errors_reach_the_Cramer_Rao_limit_and_intervals_cover) {
   constexpr int kRepeats = 60;
   for (const double noise : {0.03, 0.25}) {
@@ -62,8 +56,8 @@ TEST(TensionFit, total_and_network_force_are_unbiased_at_a_quarter_of_noise) {
   for (unsigned repeat = 0; repeat < kRepeats; ++repeat) {
     measure(scene, 0.25, 300 + repeat);
     const EnsembleFit fit = fit_own_network(scene);
-    const double a = total_force_nN(fit.forces_nN) / total_force_nN(scene.forces_nN) - 1;
-    const double b = total_force_nN(fit.network_forces_nN) / total_force_nN(equal.forces_nN) - 1;
+    const double a = fit.total_force_nN.value / total_nN(scene.forces_nN) - 1;
+    const double b = fit.network_force_nN.value / total_nN(equal.forces_nN) - 1;
     total += a / kRepeats;
     total_squared += a * a / kRepeats;
     network += b / kRepeats;
