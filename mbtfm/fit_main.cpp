@@ -2,12 +2,12 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
-#include <mutex>
 
 #include "mbtfm/cross_validation.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/model_checks.h"
+#include "mbtfm/series.h"
+#include "mbtfm/solved_misfit.h"
 #include "network/mesh.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -65,41 +65,23 @@ std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
   return ellipses;
 }
 
-Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const FitInputs& inputs) {
+std::vector<Vec2> points_of(const DisplacementField& beads) {
   std::vector<Vec2> points;
-  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
-  return substrate.compliance_um_per_nN(points, ellipses_of(inputs.cell));
+  for (const Bead& b : beads) points.push_back(b.position_um);
+  return points;
 }
 
-std::vector<bool> beads_in_region(const FitInputs& inputs, const FitParameters& p) {
+Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const DisplacementField& beads, const Cell& cell) {
+  return substrate.compliance_um_per_nN(points_of(beads), ellipses_of(cell));
+}
+
+std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& cell, const FitParameters& p) {
   std::vector<bool> is_used;
-  for (const Bead& b : inputs.beads) {
-    is_used.push_back(!p.region_um || contains(inputs.cell.outline_um, b.position_um) ||
-                      distance_to_boundary_um(inputs.cell.outline_um, b.position_um) <= *p.region_um);
+  for (const Bead& b : beads) {
+    is_used.push_back(!p.region_um || contains(cell.outline_um, b.position_um) ||
+                      distance_to_boundary_um(cell.outline_um, b.position_um) <= *p.region_um);
   }
   return is_used;
-}
-
-/// The thesis' way: the displacements of each trial are solved for. One at a time, as the solver has threads of its
-/// own.
-SolvedMisfit solved_misfit(const substrate::Substrate& substrate, const FitInputs& inputs, const LinearData& data) {
-  std::vector<Vec2> points;
-  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
-  const auto one_at_a_time = std::make_shared<std::mutex>();
-  return
-      [&substrate, &data, points, ellipses = ellipses_of(inputs.cell), one_at_a_time](const Eigen::VectorXd& forces) {
-        std::vector<Vec2> forces_nN;
-        for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
-        const std::lock_guard lock(*one_at_a_time);
-        const std::vector<Vec2> u = substrate.displacements_um(points, ellipses, forces_nN);
-        double sum = 0;
-        for (std::size_t i = 0; i < u.size(); ++i) {
-          const auto row = 2 * static_cast<Eigen::Index>(i);
-          const Vec2 misfit_um = u[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
-          sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
-        }
-        return sum;
-      };
 }
 
 /// The given network first, then further ones over the same cell from other seeds.
@@ -217,18 +199,55 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
   return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
 }
 
+/// Registers the files that it reads.
+std::vector<SeriesFrame> read_series_of(StageContext& context) {
+  if (!context.has_input("frames")) return {};
+  std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
+  std::vector<std::string> names;
+  for (const SeriesFrame& frame : frames) {
+    if (frame.refused.empty()) names.push_back(file_of_frame(frame.frame));
+  }
+  context.input("frames", names);
+  return frames;
+}
+
+/// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
+std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::Substrate& substrate, const Cell& cell,
+                       const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
+                       const FitParameters& p, StageContext& context) {
+  const DisplacementField& beads =
+      std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
+  Eigen::VectorXd start(static_cast<Eigen::Index>(first.tensions_nN.size()));
+  for (Eigen::Index i = 0; i < start.size(); ++i) start[i] = first.tensions_nN[static_cast<std::size_t>(i)].value;
+  const std::vector<FrameFit> fits = fit_series(
+      frames, networks, compliance_of(substrate, beads, cell), beads_in_region(beads, cell, p), adhesion_ids_of(cell),
+      p, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); }, start);
+  write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
+  write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
+  write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
+  const auto n_refused = std::count_if(fits.begin(), fits.end(), [](const FrameFit& f) { return !f.refused.empty(); });
+  return "; " + std::to_string(fits.size()) + " frames" +
+         (n_refused > 0 ? ", " + std::to_string(n_refused) + " of them without a fit (see frames.csv)" : "");
+}
+
 StageReport fit(const FitStageParameters& p, StageContext& context) {
   context.progress(0, "reading");
   const FitInputs inputs = read_inputs(context);
+  const std::vector<SeriesFrame> series = read_series_of(context);
+  if (!series.empty() && p.fit.substrate == "per-evaluation")
+    throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));
+  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs.beads, inputs.cell),
+                           beads_in_region(inputs.beads, inputs.cell, p.fit));
   context.progress(0.3, "spanning networks");
   const std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
   const EnsembleFit fit = fit_ensemble(
       networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
-      [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
-      p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{},
+      [&](double f, std::string_view what) { context.progress(0.4 + (series.empty() ? 0.5 : 0.2) * f, what); },
+      p.fit.substrate == "per-evaluation"
+          ? solved_misfit(*substrate, points_of(inputs.beads), ellipses_of(inputs.cell), data)
+          : SolvedMisfit{},
       start_of(context, networks.front().fibre_ids()));
 
   const std::vector<Tension> tensions = tensions_of(fit);
@@ -254,6 +273,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(fit, influence), weight_array(data)});
+  const std::string of_series =
+      series.empty() ? "" : fit_frames(series, *substrate, inputs.cell, networks, fit, p.fit, context);
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
   context.progress(1, "done");
@@ -265,6 +286,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
                                 brief(summary.total_force_nN) + " nN, relative L2 " + brief(summary.relative_l2),
                      .figures = summary.more,
                      .effects = effects_of(*substrate, inputs, p.fit)};
+  report.summary += of_series;
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
@@ -292,6 +314,8 @@ int main(int argc, char** argv) {
                  {"network", FileArgument::Kind::input, "network.vtu"},
                  {"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
                  {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
+                 {"frames", FileArgument::Kind::optional_input,
+                  "folder with frames.csv and displacement_0001.csv ... of a time series, each of which is fitted"},
                  {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
       argc, argv, fit);
 }
