@@ -28,9 +28,9 @@ std::vector<SeriesFrame> read_series(const Path& folder);
 struct FrameFit {
   int frame = 0;
   std::string refused;  ///< why it has no fit
-  std::vector<Tension> tensions;
-  std::vector<double> sigmas_nN;  ///< standard errors of the tensions
-  Estimate total_force_nN, network_force_nN;
+  std::vector<Tension> tensions = {};
+  std::vector<double> sigmas_nN = {};  ///< standard errors of the tensions
+  Estimate total_force_nN = {}, network_force_nN = {};
   double relative_l2 = 0, chi_squared_per_degree = 0;
   bool converged = false;
 };
