@@ -349,6 +349,7 @@ Network relabelled(Network network, const std::vector<int>& removed) {
 // Fig. 3.7: fibres too many and too few, on the same mesh.
 void segmentation(const Arguments& a) {
   std::printf("cell,case,relative_l2,expected_l2,change_of_others_nN,largest_extra_nN\n");
+  std::map<std::string, test::Series> misfits, changes;  // over the cells
   for (int c = 1; c <= a.n_cells; ++c) {
     Cell cell = drawn_cell(static_cast<std::uint64_t>(c));
     const std::size_t n_true = cell.fibres.size();
@@ -396,8 +397,24 @@ void segmentation(const Arguments& a) {
         measured += dot(b.displacement_um, b.displacement_um), expected += 2 * b.sigma_um * b.sigma_um;
       std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, relative_l2(scene.data, fit.forces_nN),
                   std::sqrt(expected / measured), std::sqrt(change / m), largest);
+      for (auto [series, value] :
+           {std::pair{&misfits, relative_l2(scene.data, fit.forces_nN) / std::sqrt(expected / measured)},
+            std::pair{&changes, std::sqrt(change / m)}}) {
+        (*series)[name].name = name;
+        (*series)[name].x.push_back(c);
+        (*series)[name].y.push_back(value);
+      }
     }
   }
+  const auto values_of = [](const std::map<std::string, test::Series>& map) {
+    std::vector<test::Series> list;
+    for (const auto& [name, series] : map) list.push_back(series);
+    return list;
+  };
+  save(
+      a, "segmentation",
+      {{.title = "misfit", .x_label = "cell", .y_label = "relative L2 over the noise's", .series = values_of(misfits)},
+       {.title = "the other tensions", .x_label = "cell", .y_label = "rms change (nN)", .series = values_of(changes)}});
 }
 
 // Fig. 3.10: directions of the model's forces against those found without it.
