@@ -8,6 +8,7 @@ packages=(
   libopencv-dev libvtk9-dev libeigen3-dev libdeal.ii-dev libboost-dev libboost-thread-dev libcgal-dev
   libsuitesparse-dev libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
   libtiff-dev libpng-dev libzip-dev libexpat1-dev libssl-dev
+  librsvg2-dev pkg-config fonts-dejavu-core
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
   libgtest-dev libgmock-dev libbenchmark-dev
 )

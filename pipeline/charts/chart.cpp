@@ -103,10 +103,10 @@ Axis axis_over(std::string label, const std::vector<double>& values, Scale scale
   if (scale == Scale::logarithmic) {
     if (is_first) axis.low = axis.high = 1;
     const double room = std::max(std::pow(axis.high / axis.low, kRoom), 1.1);
-    return {axis.label, axis.low / room, axis.high * room, scale};
+    return {axis.label, axis.low / room, axis.high * room, scale, {}};
   }
   const double room = axis.high > axis.low ? kRoom * (axis.high - axis.low) : std::max(std::abs(axis.high), 1.0);
-  return {axis.label, axis.low - room, axis.high + room, scale};
+  return {axis.label, axis.low - room, axis.high + room, scale, {}};
 }
 
 Chart::Chart(std::string title, Axis x, Axis y) : title_(std::move(title)), x_(std::move(x)), y_(std::move(y)) {}
@@ -143,6 +143,24 @@ void Chart::dot(Vec2 value, double radius_px, const std::string& style, const st
                        at.x, at.y, radius_px, style, html_escaped(hover));
 }
 
+void Chart::bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover) {
+  const Vec2 a = place(corner), b = place(opposite);
+  if (!is_finite(a) || !is_finite(b)) return;
+  body_ += fmt::format(
+      "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" style=\"{}\"><title>{}</title></rect>\n",
+      std::min(a.x, b.x), std::min(a.y, b.y), std::abs(a.x - b.x), std::abs(a.y - b.y), style, html_escaped(hover));
+}
+
+void Chart::error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover) {
+  const Vec2 a = place(from), b = place(to);
+  if (!is_finite(a) || !is_finite(b)) return;
+  constexpr double kEnd_px = 4;  // half the width of the ends
+  body_ += fmt::format(
+      "<path d=\"M{0:.1f},{2:.1f}h{4}M{1:.1f},{2:.1f}V{3:.1f}M{0:.1f},{3:.1f}h{4}\" "
+      "style=\"fill:none;{5}\"><title>{6}</title></path>\n",
+      a.x - kEnd_px, a.x, a.y, b.y, 2 * kEnd_px, style, html_escaped(hover));
+}
+
 void Chart::upright(double x, const std::string& style) {
   const double at = kLeft_px + kInkWidth_px * std::clamp(share(x_, x), -10.0, 10.0);
   body_ += fmt::format("<path d=\"M{:.1f},{}v{}\" style=\"{}\"/>\n", at, kTop_px, kInkHeight_px, style);
@@ -161,7 +179,8 @@ std::string Chart::str() const {
       fmt::format("<text x=\"{}\" y=\"18\" font-weight=\"600\">{}</text>\n", kLeft_px, html_escaped(title_));
   svg += fmt::format("<text x=\"{}\" y=\"37\" fill=\"{}\">{}</text>\n", kLeft_px, subtitle_colour_,
                      html_escaped(subtitle_));
-  for (const double tick : ticks_of(x_)) {
+  for (const auto& [value, name] : x_.names) svg += text(place({value, y_.low}).x, bottom + 17, "middle", name);
+  for (const double tick : x_.names.empty() ? ticks_of(x_) : std::vector<double>()) {
     const double at = place({tick, y_.low}).x;
     svg += fmt::format("<path d=\"M{0:.1f},{1}V{2}\" stroke=\"#e3e5e8\"/>", at, kTop_px, bottom) +
            text(at, bottom + 17, "middle", readable(tick));
@@ -172,7 +191,7 @@ std::string Chart::str() const {
            text(kLeft_px - 6, at + 5, "end", readable(tick));
   }
   if (second_factor_ > 0) {
-    const Axis second{second_label_, second_factor_ * x_.low, second_factor_ * x_.high, x_.scale};
+    const Axis second{second_label_, second_factor_ * x_.low, second_factor_ * x_.high, x_.scale, {}};
     for (const double tick : ticks_of(second)) {
       const double at = kLeft_px + kInkWidth_px * share(second, tick);
       svg += fmt::format("<path d=\"M{0:.1f},{1}v-4\" stroke=\"#444\"/>", at, kTop_px) +

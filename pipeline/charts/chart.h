@@ -3,6 +3,7 @@
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -26,6 +27,8 @@ struct Axis {
   std::string label;  ///< with the unit
   double low = 0, high = 1;
   Scale scale = Scale::linear;
+  /// Ticks with names, for groups in a row, in place of numbers.
+  std::vector<std::pair<double, std::string>> names = {};
 };
 /// That holds all finite values (positive ones if logarithmic) and some room on both sides.
 Axis axis_over(std::string label, const std::vector<double>& values, Scale scale);
@@ -41,6 +44,9 @@ class Chart {
   void second_x_axis(std::string label, double factor);
   void curve(const std::vector<Vec2>& points, const std::string& style);
   void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
+  void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
+  /// An upright error bar.
+  void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {});
   /// A line across the frame at x, or at y.
   void upright(double x, const std::string& style);
   void level(double y, const std::string& style);

@@ -36,7 +36,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"zip", {"segment"}},
     {"expat", {"segment"}},
     {"CGAL/", {"network"}},
-    {"Eigen/", {"network", "substrate", "mbtfm", "samples"}},
+    {"Eigen/", {"network", "substrate", "mbtfm", "samples", "pipeline"}},
     {"fftw3", {"mbtfm"}},
     {"deal.II/", {"substrate"}},
     {"cholmod", {"substrate"}},
@@ -50,6 +50,8 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"fmt/", {"pipeline", "pipeline/charts", "pipeline/contract"}},
     {"toml++/", {"pipeline", "pipeline/contract"}},
     {"openssl/", {"pipeline/contract"}},
+    {"librsvg/", {"pipeline"}},
+    {"cairo/", {"pipeline"}},
 };
 
 struct Include {
