@@ -13,7 +13,8 @@ std::string loss_of_switch(const std::string& setting, const std::string& robust
 /// Robust loss, once the fit has used this one.
 Effect robust_loss_effect(const std::string& setting, const std::string& used_loss);
 
-/// Time coupling: where there is a frame before. A series' first frame has none, and starts afresh, whatever the switch.
+/// Time coupling: where there is a frame before. A series' first frame has none, and starts afresh, whatever the
+/// switch.
 Effect decide_time_coupling(bool has_frame_before, const std::string& setting);
 
 }  // namespace mbtfm::inverse

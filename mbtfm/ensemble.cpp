@@ -57,6 +57,7 @@ void add_errors(MeshFit& mesh, const EnsembleFit& all) {
     const Eigen::MatrixXd A = mesh.covariance_nN2 * (all.data.compliance * mesh.force_derivatives).transpose();
     mesh.noise_covariance_nN2 = A * all.model_error->noise_share.asDiagonal() * A.transpose() / variance;
   }
+  mesh.past_bounds_nN = past_bounds_nN(mesh.local, variance);
   if (!is_near_a_bound(mesh)) return;
   for (int i = 0; i < static_cast<int>(mesh.local.g.size()); ++i) {
     mesh.intervals_95.push_back(profile_95(mesh.local, variance, i));
@@ -135,6 +136,48 @@ std::optional<Sides> mean_sides(const std::vector<MeshFit>& meshes, std::size_t 
   return mean;
 }
 
+/// The change of each force along its own direction, for the sum of the magnitudes.
+Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(forces_nN.size());
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+    const double size = forces_nN.segment<2>(row).norm();
+    if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
+  }
+  return along;
+}
+
+/// Errors by way of the forces' directions in the mean over meshes.
+Estimate total_force_of(const EnsembleFit& all) {
+  const Eigen::VectorXd along = directions_of(all.forces_nN);
+  double own_variance = 0;  // of each force along itself, none alike: see model_error()
+  for (Eigen::Index row = 0; all.model_error && row < along.size(); row += 2)
+    own_variance += all.model_error->force_variance_nN2[row];
+  return estimate_of(
+      all,
+      [&](const MeshFit& mesh) {
+        return along.dot(mesh.fit.trial.forces_nN + mesh.force_derivatives * mesh.past_bounds_nN) -
+               magnitude_bias_nN(all.forces_nN, mesh.force_derivatives, mesh.covariance_nN2);
+      },
+      [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, own_variance);
+}
+
+/// Proportional to the network's tension.
+Estimate network_force_of(const EnsembleFit& all) {
+  const Eigen::VectorXd along = directions_of(all.network_forces_nN);
+  const auto per_tension = [&](const MeshFit& mesh) {
+    const double tension = mesh.local.tensions_nN[0];
+    return tension > 0 ? along.dot(mesh.network_forces_nN) / tension : 0;
+  };
+  return estimate_of(
+      all,
+      [&](const MeshFit& mesh) {
+        return per_tension(mesh) * std::max(0.0, mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0]);
+      },
+      [&](const MeshFit& mesh) -> Eigen::VectorXd {
+        return per_tension(mesh) * Eigen::VectorXd::Unit(mesh.local.g.size(), 0);
+      });
+}
+
 void add_means(EnsembleFit& all) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
   const MeshFit& first = all.meshes.front();
@@ -173,6 +216,8 @@ void add_estimates(EnsembleFit& all) {
         },
         all.model_error ? all.model_error->force_variance_nN2[row] : 0.0));
   }
+  all.total_force_nN = total_force_of(all);
+  all.network_force_nN = network_force_of(all);
 }
 
 struct FirstFit {
@@ -212,6 +257,12 @@ double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd
 }
 
 }  // namespace
+
+double total_nN(const Eigen::VectorXd& forces_nN) {
+  double sum = 0;
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
+  return sum;
+}
 
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
   Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));

@@ -33,6 +33,7 @@ struct MeshFit {
   LocalMisfit local;
   Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from all that the fit counts with
   Eigen::MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
+  Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
   std::vector<Sides> intervals_95;                   ///< of the tensions, from all that the fit counts with
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
 };
@@ -45,11 +46,13 @@ struct EnsembleFit {
   Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
   std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
   Eigen::VectorXd network_forces_nN;          ///< with every fibre at the network's tension: the network's part
-  double chi_squared_per_degree = 0;          ///< of the mean over meshes: 1 where the model explains all but the noise
-  double variance = 0;                        ///< of a component of `data`: see misfit_variance
-  ReducedData data;                           ///< as the fit weighs it
-  std::string loss;                           ///< that the first fit called for
-  std::optional<ModelError> model_error;      ///< where the fit counts with one
+  /// Sums of the magnitudes of both, less what noise and the bounds t >= 0 add to them on average.
+  Estimate total_force_nN, network_force_nN;
+  double chi_squared_per_degree = 0;      ///< of the mean over meshes: 1 where the model explains all but the noise
+  double variance = 0;                    ///< of a component of `data`: see misfit_variance
+  ReducedData data;                       ///< as the fit weighs it
+  std::string loss;                       ///< that the first fit called for
+  std::optional<ModelError> model_error;  ///< where the fit counts with one
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is
 };
@@ -70,6 +73,9 @@ struct Interval {
   double low = 0, high = 0;
 };
 Interval interval_95(const Estimate& estimate, int n_meshes);
+
+/// Sum of the magnitudes of forces (fx, fy by adhesion).
+double total_nN(const Eigen::VectorXd& forces_nN);
 
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);

@@ -2,13 +2,13 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
-#include <memory>
-#include <mutex>
 
 #include "mbtfm/cross_validation.h"
 #include "mbtfm/effects.h"
 #include "mbtfm/fit_effects.h"
 #include "mbtfm/model_checks.h"
+#include "mbtfm/series.h"
+#include "mbtfm/solved_misfit.h"
 #include "network/effects.h"
 #include "network/mesh.h"
 #include "pipeline/contract/csv.h"
@@ -39,37 +39,17 @@ FitInputs read_inputs(StageContext& context) {
   return inputs;
 }
 
-Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const FitInputs& inputs) {
-  return substrate.compliance_um_per_nN(points_of(inputs.beads), ellipses_of(inputs.cell));
+Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const DisplacementField& beads, const Cell& cell) {
+  return substrate.compliance_um_per_nN(points_of(beads), ellipses_of(cell));
 }
 
-std::vector<bool> beads_in_region(const FitInputs& inputs, const FitParameters& p) {
+std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& cell, const FitParameters& p) {
   std::vector<bool> is_used;
-  for (const Bead& b : inputs.beads) {
-    is_used.push_back(!p.region_um || contains(inputs.cell.outline_um, b.position_um) ||
-                      distance_to_boundary_um(inputs.cell.outline_um, b.position_um) <= *p.region_um);
+  for (const Bead& b : beads) {
+    is_used.push_back(!p.region_um || contains(cell.outline_um, b.position_um) ||
+                      distance_to_boundary_um(cell.outline_um, b.position_um) <= *p.region_um);
   }
   return is_used;
-}
-
-/// The thesis' way: the displacements of each trial are solved for. One at a time, as the solver has threads of its
-/// own.
-SolvedMisfit solved_misfit(const substrate::Substrate& substrate, const FitInputs& inputs, const LinearData& data) {
-  const auto one_at_a_time = std::make_shared<std::mutex>();
-  return [&substrate, &data, points = points_of(inputs.beads), ellipses = ellipses_of(inputs.cell),
-          one_at_a_time](const Eigen::VectorXd& forces) {
-    std::vector<Vec2> forces_nN;
-    for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
-    const std::lock_guard lock(*one_at_a_time);
-    const std::vector<Vec2> u = substrate.displacements_um(points, ellipses, forces_nN);
-    double sum = 0;
-    for (std::size_t i = 0; i < u.size(); ++i) {
-      const auto row = 2 * static_cast<Eigen::Index>(i);
-      const Vec2 misfit_um = u[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
-      sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
-    }
-    return sum;
-  };
 }
 
 /// The given network first, then further ones over the same cell from other seeds.
@@ -150,9 +130,9 @@ Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models
           {"n_missing_fibres_hinted", std::int64_t(missing.size())}};
 }
 
-PointArray most_informed_array(const EnsembleFit& fit, const LinearData& data) {
+PointArray most_informed_array(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
   PointArray array{.name = "informs_fibre_id", .scalars = {}, .vectors = {}};
-  for (const int id : most_informed_fibre(fit, data)) array.scalars.push_back(id);
+  for (const int id : most_informed_fibre(fit, influence)) array.scalars.push_back(id);
   return array;
 }
 
@@ -201,32 +181,73 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
   return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
 }
 
+/// Registers the files that it reads.
+std::vector<SeriesFrame> read_series_of(StageContext& context) {
+  if (!context.has_input("frames")) return {};
+  std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
+  std::vector<std::string> names;
+  for (const SeriesFrame& frame : frames) {
+    if (frame.refused.empty()) names.push_back(file_of_frame(frame.frame));
+  }
+  context.input("frames", names);
+  return frames;
+}
+
+/// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
+std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::Substrate& substrate, const Cell& cell,
+                       const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
+                       const FitParameters& p, bool is_coupled, StageContext& context) {
+  const DisplacementField& beads =
+      std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
+  Eigen::VectorXd start(static_cast<Eigen::Index>(first.tensions_nN.size()));
+  for (Eigen::Index i = 0; i < start.size(); ++i) start[i] = first.tensions_nN[static_cast<std::size_t>(i)].value;
+  const std::vector<FrameFit> fits = fit_series(
+      frames, networks, compliance_of(substrate, beads, cell), beads_in_region(beads, cell, p), adhesion_ids_of(cell),
+      p, is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
+      start);
+  write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
+  write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
+  write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
+  const auto n_refused = std::count_if(fits.begin(), fits.end(), [](const FrameFit& f) { return !f.refused.empty(); });
+  return "; " + std::to_string(fits.size()) + " frames" +
+         (n_refused > 0 ? ", " + std::to_string(n_refused) + " of them without a fit (see frames.csv)" : "");
+}
+
 StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitStageParameters p = given;
   p.substrate.effects = p.effects;
   context.progress(0, "reading");
   FitInputs inputs = read_inputs(context);
   const Cell cell = inputs.cell;
+  const std::vector<SeriesFrame> series = read_series_of(context);
+  if (!series.empty() && p.fit.substrate == "per-evaluation")
+    throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   Effect fibres = network::take_fibres(inputs.cell, p.effects.stress_fibres);
   check_fibres(inputs, fibres, context.inputs_.at("network"));
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs), beads_in_region(inputs, p.fit));
+  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs.beads, inputs.cell),
+                           beads_in_region(inputs.beads, inputs.cell, p.fit));
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
-  const Effect coupling = decide_time_coupling(context.has_input("start"), p.effects.time_coupling);
+  const Effect coupling =
+      decide_time_coupling(context.has_input("start") || series.size() > 1, p.effects.time_coupling);
   const Eigen::VectorXd start =
-      coupling.is_on ? start_of(context, networks.front().fibre_ids())
-                     : uniform_start_nN(TensionProblem(networks.front(), data.reduced, adhesion_ids_of(inputs.cell)));
+      coupling.is_on && context.has_input("start")
+          ? start_of(context, networks.front().fibre_ids())
+          : uniform_start_nN(TensionProblem(networks.front(), data.reduced, adhesion_ids_of(inputs.cell)));
   Effect elasticity =
       network::decide_elasticity(networks.front(), {start.data(), start.data() + start.size()}, p.effects);
   if (!elasticity.is_on) networks = of_cables(networks, p.cables, 0);
   const auto fit_all = [&] {
     return fit_ensemble(
         networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
-        [&](double f, std::string_view what) { context.progress(0.4 + 0.5 * f, what); },
-        p.fit.substrate == "per-evaluation" ? solved_misfit(*substrate, inputs, data) : SolvedMisfit{}, start);
+        [&](double f, std::string_view what) { context.progress(0.4 + (series.empty() ? 0.5 : 0.2) * f, what); },
+        p.fit.substrate == "per-evaluation"
+            ? solved_misfit(*substrate, points_of(inputs.beads), ellipses_of(inputs.cell), data)
+            : SolvedMisfit{},
+        start);
   };
   EnsembleFit fit = fit_all();
   if (was_left_out_wrongly(elasticity, networks.front(), fit.meshes.front().fit.trial, p)) {
@@ -239,7 +260,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
-  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
+  const Eigen::MatrixXd influence = influence_of(fit, data);
+  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence);
   const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions);
   for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
   write_correlations(context.output("out", "correlations.csv"), fit);
@@ -257,7 +279,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_displacement(context.output("out", "displacement_without_fibres.csv"),
                      field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
-                         {most_informed_array(fit, data), weight_array(data)});
+                         {most_informed_array(fit, influence), weight_array(data)});
+  const std::string of_series =
+      series.empty() ? "" : fit_frames(series, *substrate, inputs.cell, networks, fit, p.fit, coupling.is_on, context);
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
   context.progress(1, "done");
@@ -279,6 +303,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
         explain(report.effects, {p, cell, inputs, networks, data, fit}, context.threads);
     write_changes(context.output("out", "effects_left_out.csv"), changes, fit);
   }
+  report.summary += of_series;
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
@@ -306,6 +331,8 @@ int main(int argc, char** argv) {
                  {"network", FileArgument::Kind::input, "network.vtu"},
                  {"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
                  {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
+                 {"frames", FileArgument::Kind::optional_input,
+                  "folder with frames.csv and displacement_0001.csv ... of a time series, each of which is fitted"},
                  {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
       argc, argv, fit);
 }

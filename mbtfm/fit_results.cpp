@@ -10,12 +10,6 @@ namespace mbtfm::inverse {
 
 namespace {
 
-double sum_of_magnitudes(const Eigen::VectorXd& forces_nN) {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) sum += forces_nN.segment<2>(i).norm();
-  return sum;
-}
-
 /// |sum of forces| and |sum of torques| over the sums of their magnitudes: rounding only.
 struct Imbalance {
   double force = 0, torque = 0;
@@ -25,7 +19,7 @@ Imbalance imbalance(const EnsembleFit& fit) {
   Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
   for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
   constexpr double kTiny = 1e-300;  // a cell without any force is balanced
-  return {.force = net_nN.norm() / std::max(sum_of_magnitudes(fit.forces_nN), kTiny),
+  return {.force = net_nN.norm() / std::max(total_nN(fit.forces_nN), kTiny),
           .torque = std::abs(fit.torques_nN_um.sum()) / std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
 }
 
@@ -90,8 +84,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
   s.noise_um = noise.sigma_um;
   s.expected_relative_l2 =
       measured_um > 0 ? noise.sigma_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
-  s.total_force_nN = sum_of_magnitudes(fit.forces_nN);
-  s.network_force_nN = sum_of_magnitudes(fit.network_forces_nN);
+  s.total_force_nN = fit.total_force_nN.value;
+  s.network_force_nN = fit.network_force_nN.value;
   s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
   s.network_surface_tension_nN_per_um =
       surface_tension_nN_per_um(networks.front().network(), inputs.cell.outline_um, fit.tensions_nN[0].value);
@@ -106,6 +100,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
   }
   s.more = {{"noise_source", noise.source},
             {"chi_squared_per_degree", fit.chi_squared_per_degree},
+            {"total_force_sigma_nN", fit.total_force_nN.standard_error()},
+            {"network_force_sigma_nN", fit.network_force_nN.standard_error()},
             {"net_force_over_total", balance.force},
             {"net_torque_over_total", balance.torque},
             {"tension_error_from_noise_nN", std::sqrt(noise_part)},

@@ -1,6 +1,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -26,8 +27,10 @@ constexpr double kLargestDrop = 0.7;
 // Of the largest tension: below this a fibre may go to zero.
 constexpr double kLetGo = 0.01;
 
-// Of the variance of one component, in 2 Phi: 0.001 is a thirtieth of a standard error.
-constexpr double kNegligible = 1e-3;
+// Of the variance of one component, in 2 Phi: 0.01 is a tenth of a standard error, along one direction of them all.
+constexpr double kNegligible = 1e-2;
+// A refused step is damped by no less: at a smaller part of the diagonal the next one would be the same again.
+constexpr double kFirstRefusal = 0.3;
 
 /// What no bead could tell, in Phi.
 double negligible(const TensionProblem& problem, double objective) {
@@ -62,72 +65,93 @@ std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::Ve
   }
 }
 
+struct Step {
+  Eigen::VectorXd change_nN;
+  double predicted = 0;  ///< by how much it lowers Phi, if forces are linear in the tensions
+};
+
+Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, double damping) {
+  const Eigen::MatrixXd H = jacobian.transpose() * jacobian;
+  const Eigen::VectorXd gradient = jacobian.transpose() * trial.residual;
+  // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
+  // damps its steps, but moves no minimum.
+  const Eigen::VectorXd weak = Eigen::VectorXd::Constant(H.rows(), 1e-6 * middle_of(H.diagonal()) + 1e-300);
+  const Eigen::VectorXd scale = H.diagonal();
+  const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale + weak).asDiagonal());
+  const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, lowest_step(trial.tensions_nN));
+  return {.change_nN = step, .predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step))};
+}
+
+/// Whether a descent may end before its time.
+using Enough = std::function<bool(const Trial&)>;
+
 /// Levenberg–Marquardt from fit.trial.
-void descend(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit) {
+void descend(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit,
+             const Enough& is_enough = {}) {
   fit.report = {};
   double gain_of_late = 0;
   double damping = 1e-3;  // relative to the diagonal; small, as forces are nearly linear in the tensions
+  const auto has_ended = [&](const char* reason) {
+    fit.report.converged = true;
+    fit.report.reason = reason;
+  };
   Eigen::MatrixXd jacobian = problem.jacobian(fit.trial);
   for (int i = 0; i < parameters.max_steps; ++i) {
+    if (is_enough && is_enough(fit.trial)) return has_ended("nothing else is to be found there");
     fit.report.iterations = i + 1;
     fit.history.push_back({.n_evaluations = fit.n_evaluations, .objective = fit.trial.objective});
-    Eigen::MatrixXd H = jacobian.transpose() * jacobian;
-    const Eigen::VectorXd gradient = jacobian.transpose() * fit.trial.residual;
-    // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
-    // damps its steps, but moves no minimum.
-    const Eigen::VectorXd weak = Eigen::VectorXd::Constant(H.rows(), 1e-6 * middle_of(H.diagonal()) + 1e-300);
-    const Eigen::VectorXd scale = H.diagonal();
-    const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale + weak).asDiagonal());
-    const double largest = fit.trial.tensions_nN.maxCoeff();
-    const Eigen::VectorXd low = lowest_step(fit.trial.tensions_nN);
-    const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, low);
-    fit.report.last_change = step.cwiseAbs().maxCoeff() / std::max(largest, std::numeric_limits<double>::min());
+    const auto [step, predicted] = damped_step(fit.trial, jacobian, damping);
+    const double largest = std::max(fit.trial.tensions_nN.maxCoeff(), std::numeric_limits<double>::min());
+    fit.report.last_change = step.cwiseAbs().maxCoeff() / largest;
+    if (predicted <= 1e-15 * fit.trial.objective || step.cwiseAbs().maxCoeff() == 0)
+      return has_ended("no step lowers the misfit any further");
 
-    const double predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step));
-    if (predicted <= 1e-15 * fit.trial.objective || step.cwiseAbs().maxCoeff() == 0) {
-      fit.report.converged = true;
-      fit.report.reason = "no step lowers the misfit any further";
-      break;
-    }
-    const Eigen::VectorXd moved = (fit.trial.tensions_nN + step).cwiseMax(0.0);
-    const std::optional<Trial> next = try_evaluate(problem, moved, fit);
+    const std::optional<Trial> next = try_evaluate(problem, (fit.trial.tensions_nN + step).cwiseMax(0.0), fit);
     const double gain = next ? (fit.trial.objective - next->objective) / predicted : -1;
     if (gain > 0) fit.trial = *next;
     // A step that is short because it is damped says nothing of convergence.
-    if (fit.report.last_change < parameters.tolerance && damping <= 1e-2) {
-      fit.report.converged = true;
-      fit.report.reason = "the tensions change by less than the tolerance";
-      break;
-    }
-    if (gain > 0) jacobian = problem.jacobian(fit.trial);
+    if (fit.report.last_change < parameters.tolerance && damping <= 1e-2)
+      return has_ended("the tensions change by less than the tolerance");
     // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
     gain_of_late = 0.5 * gain_of_late + std::max(0.0, gain) * predicted;
-    if (i >= 5 && gain > 0 && gain_of_late < negligible(problem, fit.trial.objective)) {
-      fit.report.converged = true;
-      fit.report.reason = "the last steps lower the misfit by less than any bead could tell";
-      break;
-    }
+    if (i >= 5 && gain > 0 && gain_of_late < negligible(problem, fit.trial.objective))
+      return has_ended("the last steps lower the misfit by less than any bead could tell");
+    if (gain > 0) jacobian = problem.jacobian(fit.trial);
     if (gain > 0.75) damping = std::max(1e-12, damping / 10);
-    if (gain < 0.25) damping = std::max(10 * damping, gain > 0 ? 0.0 : 1e-2);
+    if (gain < 0.25) damping = std::max(10 * damping, gain > 0 ? 0.0 : kFirstRefusal);
   }
-  if (!fit.report.converged) {
-    fit.report.reason = "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +
-                        std::to_string(fit.report.iterations) + " steps";
-  }
+  fit.report.reason = "the tensions still change by " + brief(fit.report.last_change) + " of the largest after " +
+                      std::to_string(fit.report.iterations) + " steps";
+}
+
+/// Whether tension i is as good as zero.
+bool is_slack(const Eigen::VectorXd& tensions_nN, Eigen::Index i) {
+  return tensions_nN[i] <= kLetGo * tensions_nN.maxCoeff();
+}
+
+/// Whether a trial has come back to where the minimum was: the same fibres slack, and no further than a standard error.
+Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
+  const double whole = 2 * minimum.objective + problem.data().floor_squared;
+  const double variance = whole / static_cast<double>(std::max<Eigen::Index>(1, problem.data().n_components));
+  return [jacobian = problem.jacobian(minimum), at = minimum.tensions_nN, variance](const Trial& trial) {
+    for (Eigen::Index i = 1; i < at.size(); ++i) {
+      if (is_slack(trial.tensions_nN, i) != is_slack(at, i)) return false;
+    }
+    return (jacobian * (trial.tensions_nN - at)).squaredNorm() < variance;
+  };
 }
 
 /// Tensions that came out as good as zero, set to the median of the others; none where there are none.
 std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions_nN) {
-  const double limit = kLetGo * tensions_nN.maxCoeff();
   std::vector<double> taut;
   for (Eigen::Index i = 1; i < tensions_nN.size(); ++i) {
-    if (tensions_nN[i] > limit) taut.push_back(tensions_nN[i]);
+    if (!is_slack(tensions_nN, i)) taut.push_back(tensions_nN[i]);
   }
   if (taut.empty() || taut.size() + 1 == static_cast<std::size_t>(tensions_nN.size())) return std::nullopt;
   std::nth_element(taut.begin(), taut.begin() + static_cast<std::ptrdiff_t>(taut.size() / 2), taut.end());
   Eigen::VectorXd raised = tensions_nN;
   for (Eigen::Index i = 1; i < raised.size(); ++i) {
-    if (raised[i] <= limit) raised[i] = taut[taut.size() / 2];
+    if (is_slack(tensions_nN, i)) raised[i] = taut[taut.size() / 2];
   }
   return raised;
 }
@@ -197,7 +221,7 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     const std::optional<Trial> start = try_evaluate(problem, *raised, other);
     if (!start) break;
     other.trial = *start;
-    descend(problem, parameters, other);
+    descend(problem, parameters, other, is_back_at(problem, fit.trial));
     fit.n_evaluations = other.n_evaluations;
     if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
     fit = std::move(other);

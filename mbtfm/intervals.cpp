@@ -15,6 +15,9 @@ namespace {
 constexpr double kNormal95 = 1.959963984540054;  // two-sided 95 % of a normal variable
 // A tension is held at zero where chance would press it there this hard once in forty.
 constexpr double kHeldBeyond = kNormal95;
+// What chance presses against zero is to be counted in full where a bias is taken off: this leaves out a hundredth of
+// it.
+constexpr double kPressedByMoreThanChance = 3;
 
 /// H⁻¹; eigenvalues lost in rounding count as its limit.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
@@ -25,6 +28,18 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
       eigen.eigenvalues().unaryExpr([&](double v) { return 1 / std::sqrt(std::max(v, smallest)); });
   const Eigen::MatrixXd half = scale.asDiagonal() * eigen.eigenvectors() * roots.asDiagonal();
   return half * half.transpose();
+}
+
+/// Those that the data do not press against zero by more than so many standard errors.
+std::vector<int> free_tensions(const LocalMisfit& local, const Eigen::MatrixXd& covariance_nN2, double variance,
+                               double limit) {
+  std::vector<int> free;
+  for (int i = 0; i < static_cast<int>(local.g.size()); ++i) {
+    // g_i has the variance (variance²/covariance_ii) where t_i is truly zero
+    const bool is_held = local.tensions_nN[i] <= 0 && local.g[i] * std::sqrt(covariance_nN2(i, i)) > limit * variance;
+    if (!is_held) free.push_back(i);
+  }
+  return free;
 }
 
 /// Least rise of 2 Phi where tension i changes by `shift` and the others follow as they may.
@@ -74,16 +89,38 @@ LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
 
 Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance) {
   const Eigen::MatrixXd all = variance * inverse_of(local.H);
-  std::vector<int> free;
-  for (int i = 0; i < static_cast<int>(local.g.size()); ++i) {
-    // g_i has the variance (variance²/all_ii) where t_i is truly zero
-    const bool is_held = local.tensions_nN[i] <= 0 && local.g[i] * std::sqrt(all(i, i)) > kHeldBeyond * variance;
-    if (!is_held) free.push_back(i);
-  }
+  const std::vector<int> free = free_tensions(local, all, variance, kHeldBeyond);
   if (free.size() == static_cast<std::size_t>(local.g.size())) return all;
   Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(all.rows(), all.cols());
   if (!free.empty()) covariance(free, free) = variance * inverse_of(local.H(free, free));
   return covariance;
+}
+
+Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
+  Eigen::VectorXd past = Eigen::VectorXd::Zero(local.g.size());
+  const std::vector<int> free =
+      free_tensions(local, variance * inverse_of(local.H), variance, kPressedByMoreThanChance);
+  if (free.empty()) return past;
+  Eigen::VectorXd pressed = Eigen::VectorXd::Zero(local.g.size());  // a free tension's gradient is a last step's rest
+  for (Eigen::Index i = 0; i < pressed.size(); ++i)
+    if (local.tensions_nN[i] <= 0) pressed[i] = std::max(0.0, local.g[i]);
+  past(free) = -inverse_of(local.H(free, free)) * pressed(free);
+  return past;
+}
+
+double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd& derivatives,
+                         const Eigen::MatrixXd& covariance_nN2) {
+  double bias = 0;
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+    const Eigen::Vector2d force = forces_nN.segment<2>(row);
+    const double size = force.norm();
+    if (size <= 0) continue;
+    const Eigen::Vector2d across(-force.y() / size, force.x() / size);
+    const Eigen::VectorXd gradient = derivatives.middleRows<2>(row).transpose() * across;
+    // No more than the force itself: where the error is as large as the force the second order says nothing.
+    bias += std::min(size, gradient.dot(covariance_nN2 * gradient) / (2 * size));
+  }
+  return bias;
 }
 
 Sides profile_95(const LocalMisfit& local, double variance, int i) {

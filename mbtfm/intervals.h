@@ -21,6 +21,19 @@ LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian);
 /// variance and give none to the others. A direction of which no bead tells anything gets a huge variance.
 Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance);
 
+/// From the solution to where the misfit would be least without the bounds. Estimates that end at a bound are biased
+/// towards the inside, and those of other tensions with them; sums over many tensions are not where each is counted
+/// from there (without bounds least squares are unbiased). Tensions that more than
+/// chance presses against zero (three standard errors) stay there.
+Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance);
+
+/// By how much noise makes the sum of the forces' magnitudes too large, to second order: an error across a force F
+/// lengthens it by its square over 2 F.
+/// @param forces_nN  by adhesion: fx, fy
+/// @param derivatives  of the forces, by tension
+double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd& derivatives,
+                         const Eigen::MatrixXd& covariance_nN2);
+
 /// Distance to either end of an interval.
 struct Sides {
   double below = 0, above = 0;

@@ -43,19 +43,6 @@ Trial best_uniform(const TensionProblem& problem) {
   return trial;
 }
 
-/// Influence of each component of the reduced data, in standard errors of the tension: tensions × components.
-Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data) {
-  const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd J = data.weight_per_um.asDiagonal() * (data.compliance_um_per_nN * mesh.force_derivatives);
-  Eigen::MatrixXd influence = mesh.covariance_nN2 * J.transpose();
-  for (Eigen::Index i = 0; i < influence.rows(); ++i) {
-    influence.row(i) /= std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
-    for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b)
-      influence.row(i).segment<2>(2 * b) *= data.bead_weight[b];
-  }
-  return influence;
-}
-
 }  // namespace
 
 Eigen::MatrixXd correlation_of(const EnsembleFit& fit) {
@@ -87,6 +74,23 @@ std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
   return groups;
 }
 
+Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data) {
+  // With the reduced data y = C⁺ᵀ (W G)ᵀ W u and the fit's own coordinates M y, M C = C', the tensions change by
+  // H⁻¹ (C' D)ᵀ M dy = H⁻¹ (C' D)ᵀ C' (CᵀC)⁺ (W G)ᵀ W du, D = dR/dt. Rows of C are orthogonal.
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd &C = data.reduced.compliance, &weighed = fit.data.compliance;
+  const Eigen::VectorXd per_row = C.rowwise().squaredNorm().cwiseAbs2().cwiseInverse();
+  const Eigen::MatrixXd by_force = mesh.covariance_nN2 / fit.variance * (weighed * mesh.force_derivatives).transpose() *
+                                   weighed * C.transpose() * per_row.asDiagonal() * C;
+  Eigen::MatrixXd influence = by_force * data.compliance_um_per_nN.transpose() * data.weight_per_um.asDiagonal();
+  for (Eigen::Index i = 0; i < influence.rows(); ++i) {
+    influence.row(i) /= std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
+    for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b)
+      influence.row(i).segment<2>(2 * b) *= data.bead_weight[b];
+  }
+  return influence;
+}
+
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
                                        const network::CableNetwork& first_network,
                                        const std::vector<int>& adhesion_ids) {
@@ -109,8 +113,7 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
   return models;
 }
 
-std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const LinearData& data) {
-  const Eigen::MatrixXd influence = influence_of(fit, data);
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
   std::vector<FibreLeftOut> fibres;
   for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.fibre_ids.size()); ++i) {
     FibreLeftOut left{.fibre_id = fit.fibre_ids[static_cast<std::size_t>(i)],
@@ -138,8 +141,7 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Lin
   return fibres;
 }
 
-std::vector<int> most_informed_fibre(const EnsembleFit& fit, const LinearData& data) {
-  const Eigen::MatrixXd influence = influence_of(fit, data);
+std::vector<int> most_informed_fibre(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
   std::vector<int> ids;
   for (Eigen::Index b = 0; b < influence.cols(); b += 2) {
     Eigen::Index strongest = 0;

@@ -35,6 +35,10 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
                                        const network::CableNetwork& first_network,
                                        const std::vector<int>& adhesion_ids);
 
+/// By how many of its standard errors each tension changes (on the first mesh) where a bead's displacement component
+/// changes by one of its own: tensions × components, as the fit weighs beads and meshes.
+Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data);
+
 /// What becomes of the fit where a fibre is taken for plain network, the other tensions following.
 struct FibreLeftOut {
   int fibre_id = 0;
@@ -42,11 +46,12 @@ struct FibreLeftOut {
   double aic_rise = 0;           ///< less 2 for the parameter saved: positive where the beads call for the fibre
   double n_informing_beads = 0;  ///< over which the estimate is spread: (sum q)² / sum q², q the squared influence
 };
-std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const LinearData& data);
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Eigen::MatrixXd& influence);
 
 /// By bead: the fibre whose tension a displacement there moves most, in standard errors of that tension; 0: the
 /// network.
-std::vector<int> most_informed_fibre(const EnsembleFit& fit, const LinearData& data);
+/// @param influence  see influence_of
+std::vector<int> most_informed_fibre(const EnsembleFit& fit, const Eigen::MatrixXd& influence);
 
 /// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
 struct MissingFibre {

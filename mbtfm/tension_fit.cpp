@@ -27,6 +27,7 @@ void declare(ParameterList& list, FitParameters& p) {
            "equilibria solved by a conjugate gradient method at most");
   list.add("far_distance_um", p.far_distance_um, Range::not_negative(),
            "beads this far outside the outline tell the noise level (um)");
+  list.add("frame_interval_s", p.frame_interval_s, Range::positive(), "time between the frames of a series (s)");
   list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
            "parametric bootstrap draws for the intervals; 0: from the misfit's profile");
   list.add("cross_validation", p.cross_validation, Range::between(0, 1000000),

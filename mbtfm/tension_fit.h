@@ -24,8 +24,9 @@ struct FitParameters {
   int max_steps = 100;          ///< of Gauss–Newton: every loop ends
   int max_evaluations = 5000;   ///< of the conjugate gradients
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
-  int bootstrap = 0;            ///< draws; 0: intervals from the misfit's profile, which are as good and cost nothing
-  int cross_validation = 0;     ///< draws; 0: not asked for, as it takes an equilibrium each
+  std::optional<double> frame_interval_s = {};  ///< of a time series; unset: tracks go by frame
+  int bootstrap = 0;         ///< draws; 0: intervals from the misfit's profile, which are as good and cost nothing
+  int cross_validation = 0;  ///< draws; 0: not asked for, as it takes an equilibrium each
 };
 void declare(ParameterList& list, FitParameters& parameters);
 

@@ -67,8 +67,10 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
   const double largest = trial.tensions_nN.maxCoeff();
   Eigen::VectorXd gradient(n_tensions());
   parallel_for(n_tensions(), threads, [&](int i) {
-    // half the digits of a double go into the step, which stays on the allowed side of zero
-    const double step = 1e-6 * std::max(trial.tensions_nN[i], 1e-3 * std::max(largest, 1e-12));
+    // A third of the digits of a double go into the step, which stays on the allowed side of zero. It must be far above
+    // the 1e-7 of the largest tension that a zero one stands for: below, nothing changes, and who is at zero stays
+    // there.
+    const double step = 1e-5 * std::max(largest, 1e-12);
     Eigen::VectorXd above = trial.tensions_nN, below = trial.tensions_nN;
     above[i] += step;
     below[i] = std::max(0.0, below[i] - step);

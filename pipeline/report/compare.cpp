@@ -94,7 +94,7 @@ Comparison compare_with_truth(const fs::path& cell) {
     comparison.fibres.push_back(std::move(missed));
   }
   add_figures(comparison);
-  comparison.total_force_nN = sum_of_magnitudes(read_adhesion_forces(cell / "4_fit/adhesion_forces.csv"));
+  comparison.total_force_nN = read_fit_summary(cell / "4_fit/fit.json").total_force_nN;
   if (fs::is_regular_file(cell / "truth/adhesion_forces.csv")) {
     comparison.true_total_force_nN = sum_of_magnitudes(read_adhesion_forces(cell / "truth/adhesion_forces.csv"));
   }

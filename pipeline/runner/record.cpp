@@ -133,6 +133,9 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   std::vector<std::string> names = files_of(images_of(stage, images), cell, images);
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
+  for (const PathArgument& argument : stage.arguments) {
+    if (!argument.where.empty() && fs::is_regular_file(cell / argument.where)) names.push_back(argument.where);
+  }
   return names;
 }
 

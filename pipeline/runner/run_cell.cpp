@@ -36,7 +36,10 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
   for (const ImageInput& image : stage.optional_images) {
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
   }
-  for (const PathArgument& argument : stage.arguments) add(argument.flag, (cell / argument.path).string());
+  for (const PathArgument& argument : stage.arguments) {
+    if (argument.where.empty() || fs::is_regular_file(cell / argument.where))
+      add(argument.flag, (cell / argument.path).string());
+  }
   add("config", (cell / "cell.toml").string());
   add(stage.output.flag, (cell / stage.output.path).string());
   add("threads", std::to_string(threads));

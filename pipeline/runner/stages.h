@@ -16,6 +16,7 @@ struct ImageInput {
 struct PathArgument {
   std::string flag;
   std::string path;
+  std::string where = {};  ///< a file: the argument is given only where it is there; empty: always
 };
 
 struct Stage {

@@ -49,8 +49,22 @@ TEST(TensionFit, the_exact_gradient_agrees_with_finite_differences) {
   const Trial trial = problem.evaluate(0.7 * scene.tensions_nN);
   const Eigen::VectorXd exact = problem.gradient(trial);
   const Eigen::VectorXd differences = problem.finite_difference_gradient(trial, 2);
-  // Central differences at 1e-6 of a tension: equilibria good to 1e-9 leave 1e-3 of a small component.
+  // Central differences at 1e-5 of the largest tension: equilibria good to 1e-9 leave 1e-3 of a small component.
   EXPECT_LE((exact - differences).norm(), 1e-3 * exact.norm());
+}
+
+TEST(TensionFit, finite_differences_see_a_slack_fibre_begin_to_pull) {
+  const TensionScene scene = tension_scene("case_21", 1000, 0, 4);
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  Eigen::VectorXd tensions = scene.tensions_nN;
+  Eigen::Index strongest = 0;
+  tensions.maxCoeff(&strongest);
+  tensions[strongest] = 0;
+  const Trial trial = problem.evaluate(tensions);
+  const double exact = problem.gradient(trial)[strongest];
+  ASSERT_LT(exact, 0) << "the beads want it to pull";
+  // A zero tension stands for 1e-7 of the largest, a hundredth of the step.
+  EXPECT_NEAR(problem.finite_difference_gradient(trial, 2)[strongest], exact, 0.05 * std::abs(exact));
 }
 
 TEST(TensionFit, blockwise_conjugate_gradients_find_the_noise_free_tensions) {

@@ -2,6 +2,7 @@
 /// descent, noise, beside-fttc, segmentation, directions, types, meshes, speed. A table (CSV) on stdout; charts (SVG)
 /// into the folder.
 #include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
@@ -11,6 +12,7 @@
 #include "mbtfm/cross_validation.h"
 #include "mbtfm/traction.h"
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/parallel.h"
 #include "samples/experiment.h"
 #include "tests/support/chart.h"
 #include "tests/support/tension_scene.h"
@@ -29,12 +31,6 @@ struct Arguments {
 };
 
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
-
-double total_nN(const Eigen::VectorXd& forces_nN) {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) sum += forces_nN.segment<2>(i).norm();
-  return sum;
-}
 
 void save(const Arguments& a, const std::string& name, const std::vector<test::Panel>& panels) {
   write_text(a.folder / (name + ".svg"), test::chart(panels));
@@ -93,6 +89,25 @@ struct Repeats {
   }
 };
 
+double condition_of(const Eigen::MatrixXd& H) {
+  const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(H).eigenvalues();
+  return values.maxCoeff() / values.minCoeff();
+}
+
+/// What conjugate gradients have to cope with: the condition number of d²Phi/dt² at the solution.
+void print_conditions(const TensionProblem& problem, const Eigen::VectorXd& solution_nN) {
+  const Eigen::MatrixXd J = problem.jacobian(problem.evaluate(solution_nN));
+  const Eigen::MatrixXd H = J.transpose() * J;
+  const Eigen::Index n_fibres = H.rows() - 1;
+  const Eigen::VectorXd scale = H.diagonal().cwiseSqrt().cwiseInverse();
+  std::printf("network_over_median_fibre,condition,of_fibres_alone,all_scaled_to_equal_weight\n");
+  Eigen::VectorXd fibres = H.diagonal().tail(n_fibres);
+  std::sort(fibres.begin(), fibres.end());
+  std::printf("%.3g,%.3g,%.3g,%.3g\n", H(0, 0) / fibres[n_fibres / 2], condition_of(H),
+              condition_of(H.bottomRightCorner(n_fibres, n_fibres)),
+              condition_of(scale.asDiagonal() * H * scale.asDiagonal()));
+}
+
 // Fig. 3.4: the misfit over the equilibria solved, without noise.
 void descent(const Arguments& a) {
   const TensionScene scene = thesis_scene(1, 2000, 0);
@@ -125,70 +140,119 @@ void descent(const Arguments& a) {
   // thesis: from all tensions at the network's
   const Eigen::VectorXd start = Eigen::VectorXd::Constant(n, 0.06);
   for (const std::string method : {"plain-cg", "blockwise-cg"}) {
-    parameters.method = method;
-    add(method, fit_tensions(problem, parameters, 2, start));
+    for (const std::string gradients : {"exact", "finite-difference"}) {
+      parameters.method = method;
+      parameters.gradients = gradients;
+      add(method + (gradients == "exact" ? "" : ", finite differences"), fit_tensions(problem, parameters, 2, start));
+    }
   }
+  parameters.gradients = "exact";
   add("network fixed", fit_conjugate_gradients(problem, parameters, 2, start, {{.tensions = fibres, .n_steps = 10}}));
   add("gauss-newton", fit_gauss_newton(problem, parameters, start));
   save(a, "descent", {panel});
+  print_conditions(problem, scene.tensions_nN);
+}
+
+/// Sum of the forces' components along the directions of others.
+double total_along(const Eigen::VectorXd& directions, const Eigen::VectorXd& forces_nN) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) {
+    const double size = directions.segment<2>(i).norm();
+    if (size > 0) sum += directions.segment<2>(i).dot(forces_nN.segment<2>(i)) / size;
+  }
+  return sum;
+}
+
+/// Sums over the repeats of one level of noise.
+struct NoiseRow {
+  double l2 = 0, total = 0, network = 0, plain_total = 0, plain_network = 0, deviation = 0, implied = 0, squares = 0;
+  int n_repeats = 0, n = 0, n_deviations = 0, n_intervals = 0, n_covered = 0;
+  int n_weak = 0, n_weak_covered = 0;  // true tensions below two standard errors: near the bound
+};
+
+void add_forces(NoiseRow& row, const TensionScene& scene, const Trial& trial, const Eigen::MatrixXd& derivatives,
+                const LocalMisfit& local) {
+  const double true_total = total_nN(scene.forces_nN), true_network = scene.tensions_nN[0];
+  const Eigen::VectorXd past = past_bounds_nN(local, 1);
+  const double unbounded = total_along(trial.forces_nN, trial.forces_nN + derivatives * past);
+  row.plain_total += total_nN(trial.forces_nN) / true_total;
+  row.total += (unbounded - magnitude_bias_nN(trial.forces_nN, derivatives, covariance_nN2(local, 1))) / true_total;
+  // forces of a network without fibres go with its tension
+  row.plain_network += trial.tensions_nN[0] / true_network;
+  row.network += std::max(0.0, trial.tensions_nN[0] + past[0]) / true_network;
+}
+
+/// @param limit_nN  Cramér–Rao, by tension
+void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::VectorXd& limit_nN,
+                  const LocalMisfit& local) {
+  for (Eigen::Index i = 0; i < limit_nN.size(); ++i) {
+    const double t = true_nN[i], error = local.tensions_nN[i] - t;
+    const Sides sides = profile_95(local, 1, static_cast<int>(i));
+    const int is_covered = -sides.above <= error && error <= sides.below ? 1 : 0;
+    row.n_covered += is_covered;
+    ++row.n_intervals;
+    row.n_weak_covered += t < 2 * limit_nN[i] ? is_covered : 0;
+    row.n_weak += t < 2 * limit_nN[i] ? 1 : 0;
+    if (i > 0)
+      row.deviation += std::abs(error) / t, row.implied += std::sqrt(2 / kPi) * limit_nN[i] / t, ++row.n_deviations;
+    if (t < 3 * limit_nN[i]) continue;  // the bound makes those better than the limit
+    row.squares += std::pow(error / limit_nN[i], 2);
+    ++row.n;
+  }
+}
+
+void add_repeats(NoiseRow& row, const TensionScene& scene, const Repeats& repeats, double sigma_um, int n_repeats,
+                 std::uint64_t first_seed) {
+  const ReducedData exact = repeats.draw(sigma_um, 0);
+  const TensionProblem truth(scene.cables, exact, scene.adhesion_ids);
+  const Trial at_truth = truth.evaluate(scene.tensions_nN);
+  const Eigen::VectorXd limit =
+      covariance_nN2(local_misfit(at_truth, truth.jacobian(at_truth)), 1).diagonal().cwiseSqrt();
+  std::vector<Trial> trials(static_cast<std::size_t>(n_repeats));
+  std::vector<Eigen::MatrixXd> derivatives(trials.size());
+  parallel_for(n_repeats, 2, [&](int r) {
+    const ReducedData data = repeats.draw(sigma_um, first_seed + static_cast<std::uint64_t>(r));
+    const TensionProblem problem(scene.cables, data, scene.adhesion_ids);
+    const auto i = static_cast<std::size_t>(r);
+    trials[i] = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
+    derivatives[i] = problem.force_derivatives(trials[i]);
+  });
+  for (std::size_t i = 0; i < trials.size(); ++i) {
+    const ReducedData data = repeats.draw(sigma_um, first_seed + i);
+    const LocalMisfit local = local_misfit(trials[i], data.compliance * derivatives[i]);
+    row.l2 += repeats.relative_l2(trials[i], data, sigma_um);
+    ++row.n_repeats;
+    add_forces(row, scene, trials[i], derivatives[i], local);
+    add_tensions(row, scene.tensions_nN, limit, local);
+  }
 }
 
 // Fig. 3.6, and how large errors are and are said to be.
 void noise(const Arguments& a) {
-  struct Row {
-    double l2 = 0, total = 0, network = 0, deviation = 0, implied = 0, squares = 0;
-    int n = 0, n_deviations = 0, n_bounded = 0, n_covered = 0;
-  };
   const std::vector<double> levels = {0.01, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25};
-  std::vector<Row> rows(levels.size());
+  std::vector<NoiseRow> rows(levels.size());
   for (int c = 0; c < a.n_cells; ++c) {
     TensionScene scene = thesis_scene(static_cast<std::uint64_t>(c) + 1, 10000, 0);
     const Repeats repeats(scene);
-    for (std::size_t l = 0; l < levels.size(); ++l) {
-      const double sigma_um = levels[l] * scene.largest_um;
-      Row& row = rows[l];
-      const ReducedData exact = repeats.draw(sigma_um, 0);
-      const TensionProblem truth(scene.cables, exact, scene.adhesion_ids);
-      const Trial at_truth = truth.evaluate(scene.tensions_nN);
-      const Eigen::VectorXd limit =
-          covariance_nN2(local_misfit(at_truth, truth.jacobian(at_truth)), 1).diagonal().cwiseSqrt();
-      const Eigen::VectorXd equal = Eigen::VectorXd::Constant(limit.size(), scene.tensions_nN[0]);
-      const double network = total_nN(truth.evaluate(equal).forces_nN);
-      for (int r = 0; r < a.n_repeats; ++r) {
-        const ReducedData data = repeats.draw(sigma_um, 1000 * static_cast<std::uint64_t>(c) + r + 1);
-        const TensionProblem problem(scene.cables, data, scene.adhesion_ids);
-        const Trial trial = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
-        const LocalMisfit local = local_misfit(trial, problem.jacobian(trial));
-        const double share = 1.0 / (a.n_repeats * a.n_cells);
-        row.l2 += share * repeats.relative_l2(trial, data, sigma_um);
-        row.total += share * total_nN(trial.forces_nN) / total_nN(scene.forces_nN);
-        const Eigen::VectorXd fitted = Eigen::VectorXd::Constant(limit.size(), trial.tensions_nN[0]);
-        row.network += share * total_nN(problem.evaluate(fitted, &trial).forces_nN) / network;
-        for (Eigen::Index i = 0; i < limit.size(); ++i) {
-          const double t = scene.tensions_nN[i], error = trial.tensions_nN[i] - t;
-          const Sides sides = profile_95(local, 1, static_cast<int>(i));
-          row.n_covered += -sides.above <= error && error <= sides.below ? 1 : 0;
-          ++row.n_bounded;
-          if (i > 0)
-            row.deviation += std::abs(error) / t, row.implied += std::sqrt(2 / kPi) * limit[i] / t, ++row.n_deviations;
-          if (t < 3 * limit[i]) continue;  // the bound makes those better than the limit
-          row.squares += std::pow(error / limit[i], 2);
-          ++row.n;
-        }
-      }
-    }
+    for (std::size_t l = 0; l < levels.size(); ++l)
+      add_repeats(rows[l], scene, repeats, levels[l] * scene.largest_um, a.n_repeats,
+                  1000 * static_cast<std::uint64_t>(c) + 1);
   }
   test::Series l2{.name = "L2", .x = levels, .y = {}}, total{.name = "total", .x = levels, .y = {}},
       network{.name = "network", .x = levels, .y = {}}, deviation{.name = "found", .x = levels, .y = {}},
       implied{.name = "Cramér–Rao", .x = levels, .y = {}};
   std::printf(
-      "noise,relative_l2,total_force,network_force,mean_relative_deviation,implied_by_limit,rms_over_limit,coverage\n");
+      "noise,relative_l2,total_force,network_force,uncorrected_total,uncorrected_network,mean_relative_deviation,"
+      "implied_by_limit,rms_over_limit,coverage,near_zero,coverage_near_zero\n");
   for (std::size_t l = 0; l < levels.size(); ++l) {
-    const Row& r = rows[l];
-    l2.y.push_back(r.l2), total.y.push_back(r.total), network.y.push_back(r.network);
+    const NoiseRow& r = rows[l];
+    const double n = r.n_repeats;
+    l2.y.push_back(r.l2 / n), total.y.push_back(r.total / n), network.y.push_back(r.network / n);
     deviation.y.push_back(r.deviation / r.n_deviations), implied.y.push_back(r.implied / r.n_deviations);
-    std::printf("%g,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f\n", levels[l], r.l2, r.total, r.network, deviation.y.back(),
-                implied.y.back(), std::sqrt(r.squares / std::max(1, r.n)), double(r.n_covered) / r.n_bounded);
+    std::printf("%g,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f,%d,%.4f\n", levels[l], r.l2 / n, r.total / n,
+                r.network / n, r.plain_total / n, r.plain_network / n, deviation.y.back(), implied.y.back(),
+                std::sqrt(r.squares / std::max(1, r.n)), double(r.n_covered) / r.n_intervals, r.n_weak,
+                double(r.n_weak_covered) / std::max(1, r.n_weak));
   }
   save(a, "noise",
        {{.title = "misfit", .x_label = "noise / largest displacement", .y_label = "relative L2", .series = {l2}},
@@ -285,6 +349,7 @@ Network relabelled(Network network, const std::vector<int>& removed) {
 // Fig. 3.7: fibres too many and too few, on the same mesh.
 void segmentation(const Arguments& a) {
   std::printf("cell,case,relative_l2,expected_l2,change_of_others_nN,largest_extra_nN\n");
+  std::map<std::string, test::Series> misfits, changes;  // over the cells
   for (int c = 1; c <= a.n_cells; ++c) {
     Cell cell = drawn_cell(static_cast<std::uint64_t>(c));
     const std::size_t n_true = cell.fibres.size();
@@ -332,8 +397,24 @@ void segmentation(const Arguments& a) {
         measured += dot(b.displacement_um, b.displacement_um), expected += 2 * b.sigma_um * b.sigma_um;
       std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, relative_l2(scene.data, fit.forces_nN),
                   std::sqrt(expected / measured), std::sqrt(change / m), largest);
+      for (auto [series, value] :
+           {std::pair{&misfits, relative_l2(scene.data, fit.forces_nN) / std::sqrt(expected / measured)},
+            std::pair{&changes, std::sqrt(change / m)}}) {
+        (*series)[name].name = name;
+        (*series)[name].x.push_back(c);
+        (*series)[name].y.push_back(value);
+      }
     }
   }
+  const auto values_of = [](const std::map<std::string, test::Series>& map) {
+    std::vector<test::Series> list;
+    for (const auto& [name, series] : map) list.push_back(series);
+    return list;
+  };
+  save(
+      a, "segmentation",
+      {{.title = "misfit", .x_label = "cell", .y_label = "relative L2 over the noise's", .series = values_of(misfits)},
+       {.title = "the other tensions", .x_label = "cell", .y_label = "rms change (nN)", .series = values_of(changes)}});
 }
 
 // Fig. 3.10: directions of the model's forces against those found without it.

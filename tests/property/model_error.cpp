@@ -9,6 +9,7 @@
 #include <numbers>
 #include <random>
 
+#include "mbtfm/model_checks.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -137,6 +138,30 @@ TEST(ModelError, brings_the_tensions_of_a_cell_with_another_network_nearer) {
   }
   EXPECT_LT(with, without);
   EXPECT_LT(z_squared / n, 2);
+}
+
+TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_error) {
+  Cell cell = test::round_cell(12, 12);
+  for (int i = 1; i <= 3; ++i) test::add_ventral(cell, i, i + 6);
+  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 2, 5, 4), 800, 0.05, 3);
+  std::vector<network::CableNetwork> networks;
+  for (std::uint64_t seed = 11; seed <= 14; ++seed) {
+    network::NetworkParameters p;
+    p.seed = seed;
+    networks.emplace_back(network::generate_network(cell, p).network);
+  }
+  FitParameters parameters;
+  parameters.n_meshes = 4;
+  parameters.loss = "squares";  // with one that weighs beads down their noise counts for less than it is
+  const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
+  ASSERT_TRUE(fit.model_error.has_value());
+  const Eigen::MatrixXd influence = influence_of(fit, scene.data);
+  const MeshFit& mesh = fit.meshes.front();
+  for (Eigen::Index i = 0; i < influence.rows(); ++i) {
+    const double part = mesh.noise_covariance_nN2(i, i) / mesh.covariance_nN2(i, i);
+    EXPECT_LT(part, 0.999) << "the meshes must differ for this to tell anything";
+    EXPECT_NEAR(fit.variance * influence.row(i).squaredNorm(), part, 1e-6);
+  }
 }
 
 }  // namespace

@@ -17,12 +17,6 @@ using test::tension_scene;
 using test::TensionScene;
 using test::values_of;
 
-double total_force_nN(const Eigen::VectorXd& forces_nN) {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) sum += forces_nN.segment<2>(i).norm();
-  return sum;
-}
-
 TEST(TensionFit, errors_reach_the_Cramer_Rao_limit_and_intervals_cover) {
   constexpr int kRepeats = 60;
   for (const double noise : {0.03, 0.25}) {
@@ -62,8 +56,8 @@ TEST(TensionFit, total_and_network_force_are_unbiased_at_a_quarter_of_noise) {
   for (unsigned repeat = 0; repeat < kRepeats; ++repeat) {
     measure(scene, 0.25, 300 + repeat);
     const EnsembleFit fit = fit_own_network(scene);
-    const double a = total_force_nN(fit.forces_nN) / total_force_nN(scene.forces_nN) - 1;
-    const double b = total_force_nN(fit.network_forces_nN) / total_force_nN(equal.forces_nN) - 1;
+    const double a = fit.total_force_nN.value / total_nN(scene.forces_nN) - 1;
+    const double b = fit.network_force_nN.value / total_nN(equal.forces_nN) - 1;
     total += a / kRepeats;
     total_squared += a * a / kRepeats;
     network += b / kRepeats;
@@ -264,7 +258,7 @@ TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
   FitParameters parameters;
   parameters.loss = "squares";  // both misfits with the same weights
   const EnsembleFit fit = fit_own_network(same, parameters);
-  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, same.data);
+  const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence_of(fit, same.data));
   // without the fibre its links are plain network
   const int removed = 3;
   Network network = scene.cables.network();

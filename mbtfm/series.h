@@ -1,0 +1,57 @@
+/// The fit of a time series: one cell, its networks and the gel's compliance, and displacements frame by frame. Each
+/// frame is a fit of its own, with its own errors, that starts from the tensions of the frame before.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/ensemble.h"
+#include "pipeline/contract/files.h"
+
+namespace mbtfm::inverse {
+
+/// Displacements of one frame; of the same beads in all frames, some of them flagged.
+struct SeriesFrame {
+  int frame = 0;
+  std::string refused;      ///< why it has no displacements
+  DisplacementField beads;  ///< empty where refused
+};
+
+std::string file_of_frame(int frame);
+
+/// frames.csv and displacement_0001.csv … of mbtfm-track.
+/// @throws InputError where a frame has other beads than the first
+std::vector<SeriesFrame> read_series(const Path& folder);
+
+/// What came of a frame.
+struct FrameFit {
+  int frame = 0;
+  std::string refused;  ///< why it has no fit
+  std::vector<Tension> tensions = {};
+  std::vector<double> sigmas_nN = {};  ///< standard errors of the tensions
+  Estimate total_force_nN = {}, network_force_nN = {};
+  double relative_l2 = 0, chi_squared_per_degree = 0;
+  bool converged = false;
+};
+
+/// @param compliance_um_per_nN  of all beads
+/// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
+/// @param is_coupled  each frame starts from the tensions of the one before; else all from start_nN
+/// @param start_nN  for the first frame
+std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
+                                 const std::vector<network::CableNetwork>& networks,
+                                 const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
+                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
+                                 int threads, const Progress& progress, const Eigen::VectorXd& start_nN);
+
+/// By frame and fibre. @param interval_s  between frames, if known
+void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
+                  std::optional<double> interval_s);
+/// By frame: forces, misfit.
+void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::optional<double> interval_s);
+/// Tensions and forces over time as SVG, with 95 % intervals.
+std::string series_picture(const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
+                           std::optional<double> interval_s);
+
+}  // namespace mbtfm::inverse

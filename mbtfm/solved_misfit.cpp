@@ -1,0 +1,27 @@
+#include "mbtfm/solved_misfit.h"
+
+#include <cmath>
+#include <memory>
+#include <mutex>
+
+namespace mbtfm::inverse {
+
+SolvedMisfit solved_misfit(const substrate::Substrate& substrate, std::vector<Vec2> points_um,
+                           std::vector<substrate::Ellipse> ellipses, const LinearData& data) {
+  return [&substrate, &data, points_um = std::move(points_um), ellipses = std::move(ellipses),
+          one_at_a_time = std::make_shared<std::mutex>()](const Eigen::VectorXd& forces) {
+    std::vector<Vec2> forces_nN;
+    for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
+    const std::lock_guard lock(*one_at_a_time);
+    const std::vector<Vec2> u_um = substrate.displacements_um(points_um, ellipses, forces_nN);
+    double sum = 0;
+    for (std::size_t i = 0; i < u_um.size(); ++i) {
+      const auto row = 2 * static_cast<Eigen::Index>(i);
+      const Vec2 misfit_um = u_um[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
+      sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
+    }
+    return sum;
+  };
+}
+
+}  // namespace mbtfm::inverse

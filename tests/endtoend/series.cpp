@@ -1,0 +1,63 @@
+/// A cell followed over time, through the programs.
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/files.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Outcome;
+using test::run_program;
+
+/// The cell pulls twice as hard in the second frame; the third could not be tracked.
+void write_frames(const fs::path& track) {
+  DisplacementField field = read_displacement(track / "displacement.csv");
+  write_displacement(track / "displacement_0001.csv", field);
+  for (Bead& bead : field) bead.displacement_um = 2 * bead.displacement_um;
+  write_displacement(track / "displacement_0002.csv", field);
+  write_text(track / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n3,c.tif,out of focus\n");
+}
+
+TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
+  const test::TemporaryFolder folder;
+  const fs::path cell = folder / "cell";
+  const Outcome made = run_program(
+      "mbtfm-simulate --scenario two-adhesions --seed 1 --noise 0.05 --beads 800 --quiet --out " + cell.string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  write_frames(cell / "2_track");
+  std::string toml = read_text(cell / "cell.toml");
+  write_text(cell / "cell.toml", toml + "\n[fit]\nframe_interval_s = 30\n");
+  const Outcome run = run_program("mbtfm run " + cell.string());
+  ASSERT_EQ(run.code, 0) << run.output;
+
+  const auto single = read_tensions(cell / "4_fit/tensions.csv");
+  const CsvTable tracks(cell / "4_fit/tracks.csv");
+  ASSERT_EQ(tracks.n_rows(), 2 * static_cast<int>(single.size()));
+  const auto n = static_cast<int>(single.size());
+  for (int i = 0; i < n; ++i) {
+    const double first = tracks.number(i, "tension_nN"), second = tracks.number(n + i, "tension_nN");
+    const double sigma = tracks.number(n + i, "sigma_nN");
+    // fitted twice, from different starts: the same to less than any bead could tell
+    EXPECT_NEAR(first, single[static_cast<std::size_t>(i)].tension_nN, 0.2 * tracks.number(i, "sigma_nN"));
+    // twice the displacement is twice the tension while no cable is stretched
+    EXPECT_NEAR(second, 2 * first, 4 * sigma);
+    EXPECT_EQ(tracks.number(n + i, "time_s"), 30);
+  }
+  const CsvTable frames(cell / "4_fit/frames.csv");
+  ASSERT_EQ(frames.n_rows(), 3);
+  EXPECT_EQ(frames.text(2, "refused"), "out of focus");
+  EXPECT_NEAR(frames.number(1, "total_force_nN"), 2 * frames.number(0, "total_force_nN"),
+              4 * frames.number(1, "total_force_sigma_nN"));
+  EXPECT_TRUE(fs::exists(cell / "4_fit/tracks.svg"));
+
+  write_text(cell / "2_track/frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
+  const Outcome again = run_program("mbtfm run " + cell.string());
+  EXPECT_EQ(again.code, 0) << again.output;
+  EXPECT_EQ(CsvTable(cell / "4_fit/frames.csv").n_rows(), 2);
+}
+
+}  // namespace
+}  // namespace mbtfm

@@ -1,0 +1,119 @@
+/// A time series: every frame is a fit of its own on one cell, and follows what the tensions do.
+#include "mbtfm/series.h"
+
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+constexpr double kNoise = 0.05;
+
+/// Each tension swells and ebbs by half, one after the other.
+Eigen::VectorXd tensions_at(const Eigen::VectorXd& base_nN, int frame) {
+  Eigen::VectorXd tensions = base_nN;
+  for (Eigen::Index i = 0; i < tensions.size(); ++i)
+    tensions[i] *= 1 + 0.5 * std::sin(0.8 * frame + static_cast<double>(i));
+  return tensions;
+}
+
+struct Series {
+  test::TensionScene scene;
+  std::vector<Eigen::VectorXd> true_nN;
+  std::vector<double> true_total_nN;
+  std::vector<SeriesFrame> frames;
+};
+
+Series make_series(int n_frames) {
+  Series series{
+      .scene = test::tension_scene("case_21", 1500, kNoise, 1), .true_nN = {}, .true_total_nN = {}, .frames = {}};
+  const Eigen::VectorXd base_nN = series.scene.tensions_nN;
+  for (int f = 1; f <= n_frames; ++f) {
+    series.true_nN.push_back(tensions_at(base_nN, f));
+    contract(series.scene, series.true_nN.back());
+    measure(series.scene, kNoise, static_cast<unsigned>(f));
+    series.true_total_nN.push_back(total_nN(series.scene.forces_nN));
+    series.frames.push_back({.frame = f, .refused = {}, .beads = series.scene.beads});
+  }
+  return series;
+}
+
+std::vector<FrameFit> fit(const Series& series) {
+  std::vector<network::CableNetwork> networks;
+  networks.emplace_back(series.scene.cables.network());
+  FitParameters parameters;
+  parameters.n_meshes = 1;
+  return fit_series(series.frames, networks, series.scene.compliance_um_per_nN, {}, series.scene.adhesion_ids,
+                    parameters, true, 2, {}, Eigen::VectorXd::Ones(series.scene.tensions_nN.size()));
+}
+
+TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
+  const Series series = make_series(12);
+  const std::vector<FrameFit> fits = fit(series);
+  ASSERT_EQ(fits.size(), series.frames.size());
+  double squares = 0, total_squares = 0;
+  int n = 0;
+  for (std::size_t f = 0; f < fits.size(); ++f) {
+    ASSERT_TRUE(fits[f].refused.empty()) << fits[f].refused;
+    for (std::size_t i = 0; i < fits[f].tensions.size(); ++i) {
+      const double truth = series.true_nN[f][static_cast<Eigen::Index>(i)];
+      if (truth < 3 * fits[f].sigmas_nN[i]) continue;  // the bound t >= 0 makes those better than stated
+      squares += std::pow((fits[f].tensions[i].tension_nN - truth) / fits[f].sigmas_nN[i], 2);
+      ++n;
+    }
+    const Estimate& total = fits[f].total_force_nN;
+    total_squares += std::pow((total.value - series.true_total_nN[f]) / total.standard_error(), 2);
+  }
+  ASSERT_GE(n, 40);
+  // The root mean of n squares of normal variables deviates by 1/sqrt(2n): four of those.
+  EXPECT_NEAR(std::sqrt(squares / n), 1, 4 / std::sqrt(2.0 * n));
+  const double n_frames = static_cast<double>(fits.size());
+  EXPECT_NEAR(std::sqrt(total_squares / n_frames), 1, 4 / std::sqrt(2 * n_frames));
+}
+
+TEST(Series, a_frame_without_displacements_or_with_too_few_beads_does_not_stop_the_others) {
+  Series series = make_series(4);
+  series.frames[1] = {.frame = 2, .refused = "out of focus", .beads = {}};
+  for (std::size_t i = 2; i < series.frames[2].beads.size(); ++i) series.frames[2].beads[i].flag = "lost";
+  const std::vector<FrameFit> fits = fit(series);
+  EXPECT_EQ(fits[1].refused, "out of focus");
+  EXPECT_NE(fits[2].refused.find("at least"), std::string::npos) << fits[2].refused;
+  EXPECT_TRUE(fits[0].converged);
+  EXPECT_TRUE(fits[3].converged);
+}
+
+TEST(Series, flagged_beads_do_not_count) {
+  Series series = make_series(1);
+  const std::vector<FrameFit> before = fit(series);
+  for (std::size_t i = 0; i < series.frames[0].beads.size(); i += 10) series.frames[0].beads[i].flag = "ambiguous";
+  const std::vector<FrameFit> without = fit(series);
+  for (std::size_t i = 0; i < series.frames[0].beads.size(); i += 10)
+    series.frames[0].beads[i].displacement_um = {100, 100};
+  const std::vector<FrameFit> wrong = fit(series);
+  for (std::size_t i = 0; i < before[0].tensions.size(); ++i) {
+    EXPECT_NE(before[0].tensions[i].tension_nN, without[0].tensions[i].tension_nN);
+    EXPECT_EQ(wrong[0].tensions[i].tension_nN, without[0].tensions[i].tension_nN);
+  }
+}
+
+TEST(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
+  const test::TemporaryFolder folder;
+  Series series = make_series(2);
+  write_text(folder / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
+  write_displacement(folder / "displacement_0001.csv", series.frames[0].beads);
+  series.frames[1].beads[7].position_um.x += 1;
+  write_displacement(folder / "displacement_0002.csv", series.frames[1].beads);
+  try {
+    read_series(folder / "");
+    FAIL() << "beads of another place were taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("displacement_0002.csv: bead 8"), std::string::npos) << error.what();
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
