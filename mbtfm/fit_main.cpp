@@ -1,11 +1,13 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <map>
 #include <memory>
 #include <mutex>
 
 #include "mbtfm/cross_validation.h"
+#include "mbtfm/error_budget.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/model_checks.h"
 #include "network/mesh.h"
@@ -16,6 +18,7 @@
 #include "pipeline/contract/stage.h"
 #include "substrate/compliance.h"
 #include "substrate/gel_vtu.h"
+#include "substrate/stated_error.h"
 
 namespace mbtfm::inverse {
 namespace {
@@ -29,6 +32,7 @@ struct FitStageParameters {
   network::CableParameters cables;
   substrate::SubstrateParameters substrate;
   FitParameters fit;
+  SegmentationErrors segmentation;
 };
 
 void declare(ParameterList& list, FitStageParameters& p) {
@@ -37,6 +41,7 @@ void declare(ParameterList& list, FitStageParameters& p) {
   declare(list, p.cables);
   declare(list, p.substrate);
   declare(list, p.fit);
+  declare(list, p.segmentation);
 }
 
 FitInputs read_inputs(StageContext& context) {
@@ -150,6 +155,24 @@ std::string names_of_groups(const EnsembleFit& fit) {
   return text;
 }
 
+ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
+                      const std::vector<network::CableNetwork>& networks, const FitInputs& inputs,
+                      const substrate::Substrate& substrate, const FitStageParameters& p, int threads) {
+  const Figures figures = substrate.figures();
+  const bool lacks_base = std::find(figures.begin(), figures.end(),
+                                    Figures::value_type{"substrate_model", std::string("half-space")}) != figures.end();
+  return error_budget({.fit = fit,
+                       .data = data,
+                       .networks = networks,
+                       .cell = inputs.cell,
+                       .beads = inputs.beads,
+                       .gel = p.gel,
+                       .substrate_error = substrate::stated_error(p.substrate, figures),
+                       .lacks_base = lacks_base,
+                       .segmentation = p.segmentation},
+                      threads);
+}
+
 /// The checks of the model in a few figures.
 Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models,
                    const std::vector<FibreLeftOut>& left_out, const std::vector<MissingFibre>& missing) {
@@ -235,6 +258,9 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const DisplacementField fitted = fitted_field(inputs, data, fit);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  const auto budget_start = std::chrono::steady_clock::now();
+  summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
+  const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, data);
   const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions);
@@ -247,7 +273,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   if (drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *drawn);
   write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
   write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
-  write_fit_summary(context.output("out", "fit.json"), summary);
+  write_fit_summary(context.output("out", "fit.json"), summary, inputs.cell.fibres);
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
@@ -264,6 +290,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
                                 brief(summary.total_force_nN) + " nN, relative L2 " + brief(summary.relative_l2),
                      .figures = summary.more,
                      .effects = effects_of(*substrate, inputs, p.fit)};
+  report.figures.emplace_back("error_budget_s", budget_s);
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";

@@ -20,6 +20,7 @@
 #include "substrate/layer.h"
 #include "substrate/models.h"
 #include "substrate/scene.h"
+#include "substrate/stated_error.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -29,10 +30,10 @@ struct Choice {
   int cells_per_thickness;
 };
 
-/// Cells of the grid of `split` over the thickness that leave no more than the tolerance: 0.1 % with 2.
+/// Cells of the grid of `split` over the thickness that leave no more than the tolerance.
 int cells_for(double tolerance) {
-  constexpr double kErrorOfTwo = 1e-3;
-  return tolerance == 0 ? 4 : std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kErrorOfTwo / tolerance))));
+  return tolerance == 0 ? 4
+                        : std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kSplitErrorOfTwoCells / tolerance))));
 }
 
 double half_space_bias(const Gel& gel, double radius_um) {
