@@ -122,10 +122,10 @@ std::vector<network::CableNetwork> span_ensemble(const FitInputs& inputs, const 
 }
 
 void write_surface(const Path& file, const substrate::Substrate& substrate, const Cell& cell,
-                   const std::vector<AdhesionForce>& forces) {
+                   const std::vector<AdhesionForce>& forces, int n_lines) {
   std::vector<Vec2> forces_nN;
   for (const AdhesionForce& f : forces) forces_nN.push_back(f.force_nN);
-  substrate::write_substrate_vtu(file, substrate, ellipses_of(cell), forces_nN);
+  substrate::write_substrate_vtu(file, substrate, ellipses_of(cell), forces_nN, n_lines);
 }
 
 std::vector<Effect> effects_of(const substrate::Substrate& substrate, const FitInputs& inputs, const FitParameters& p) {
@@ -280,7 +280,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(fit, data), weight_array(data)});
   context.progress(0.95, "surface of the gel");
-  write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
+  write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces, p.fit.surface_lines);
   context.progress(1, "done");
 
   const auto n_unidentifiable =

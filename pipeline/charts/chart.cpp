@@ -143,6 +143,15 @@ void Chart::dot(Vec2 value, double radius_px, const std::string& style, const st
                        at.x, at.y, radius_px, style, html_escaped(hover));
 }
 
+void Chart::label(Vec2 value, const std::string& content, const std::string& colour) {
+  const Vec2 at = place(value);
+  if (!is_finite(at)) return;
+  body_ += fmt::format(
+      "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"11\" fill=\"{}\" style=\"stroke:#fff;stroke-width:3;"
+      "stroke-linejoin:round;paint-order:stroke\">{}</text>\n",
+      at.x + 7, at.y + 4, colour, html_escaped(content));
+}
+
 void Chart::upright(double x, const std::string& style) {
   const double at = kLeft_px + kInkWidth_px * std::clamp(share(x_, x), -10.0, 10.0);
   body_ += fmt::format("<path d=\"M{:.1f},{}v{}\" style=\"{}\"/>\n", at, kTop_px, kInkHeight_px, style);

@@ -41,6 +41,8 @@ class Chart {
   void second_x_axis(std::string label, double factor);
   void curve(const std::vector<Vec2>& points, const std::string& style);
   void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
+  /// A word beside a point.
+  void label(Vec2 at, const std::string& text, const std::string& colour);
   /// A line across the frame at x, or at y.
   void upright(double x, const std::string& style);
   void level(double y, const std::string& style);

@@ -16,6 +16,7 @@ struct ProcessResult {
   int exit_code = 0;          ///< of a program that ended by itself
   std::optional<int> signal;  ///< that ended it
   double seconds = 0;
+  double cpu_seconds = 0;  ///< of all its threads
   double peak_memory_MB = 0;
 };
 

@@ -90,7 +90,7 @@ void complete_record(const fs::path& record_file, const StageRecord& record, dou
   write_whole(record_file, whole.dump(1) + "\n");
 }
 
-std::string settings_of(const Stage& stage, const fs::path& toml_file) {
+std::string settings_of(const Stage& stage, const fs::path& toml_file, const std::vector<Setting>& beneath) {
   toml::table whole;
   try {
     whole = toml::parse(read_text(toml_file), toml_file.string());
@@ -105,7 +105,12 @@ std::string settings_of(const Stage& stage, const fs::path& toml_file) {
   }
   std::ostringstream text;
   text << toml::json_formatter(relevant);
-  return json::parse(text.str()).dump();
+  json settings = json::parse(text.str());
+  for (const Setting& setting : beneath) {
+    if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
+    settings[setting.table][setting.key] = setting.value;
+  }
+  return settings.dump();
 }
 
 namespace {
@@ -146,7 +151,7 @@ std::string name_of(StageState state) {
 }
 
 StageSurroundings surroundings_of(const Stage& stage, const fs::path& cell, const ImageNames& images,
-                                  const std::string& version) {
+                                  const std::vector<Setting>& beneath, const std::string& version) {
   std::vector<std::string> outputs = stage.writes;
   if (const auto record = read_record(cell / stage.folder / "record.json")) {
     for (const auto& [name, hash] : record->outputs) {
@@ -154,7 +159,7 @@ StageSurroundings surroundings_of(const Stage& stage, const fs::path& cell, cons
     }
   }
   return {.version = version,
-          .settings = settings_of(stage, cell / "cell.toml"),
+          .settings = settings_of(stage, cell / "cell.toml", beneath),
           .inputs = hash_files(cell, inputs_of(stage, cell, images)),
           .outputs = hash_files(cell, outputs),
           .has_images = !files_of(images_of(stage, images), cell, images).empty()};

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/runner/images.h"
+#include "pipeline/runner/settings.h"
 #include "pipeline/runner/stages.h"
 
 namespace mbtfm::runner {
@@ -40,7 +41,9 @@ void complete_record(const std::filesystem::path& record_file, const StageRecord
                      double peak_memory_MB);
 
 /// The tables of cell.toml that `stage` depends on, as JSON with sorted keys. @throws InputError
-std::string settings_of(const Stage& stage, const std::filesystem::path& toml_file);
+/// @param beneath  values that stand in place of defaults
+std::string settings_of(const Stage& stage, const std::filesystem::path& toml_file,
+                        const std::vector<Setting>& beneath = {});
 
 /// Paths, relative to the cell folder, of the files that a stage reads: its images as far as they are there, and the
 /// files of earlier stages.
@@ -66,7 +69,7 @@ struct StageSurroundings {
   bool has_images = true;  ///< one at least of those that it must have
 };
 StageSurroundings surroundings_of(const Stage& stage, const std::filesystem::path& cell, const ImageNames& images,
-                                  const std::string& version);
+                                  const std::vector<Setting>& beneath, const std::string& version);
 
 /// @throws InputError where some of the outputs were given and others lack
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now);

@@ -48,7 +48,10 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
 class CellRun {
  public:
   CellRun(fs::path cell, const RunOptions& options)
-      : cell_(std::move(cell)), options_(options), images_(read_image_names(cell_)) {}
+      : cell_(std::move(cell)),
+        options_(options),
+        images_(read_image_names(cell_)),
+        beneath_(unset_in(cell_ / "cell.toml", options.beneath)) {}
 
   CellOutcome run();
 
@@ -62,6 +65,7 @@ class CellRun {
   fs::path cell_;
   const RunOptions& options_;
   ImageNames images_;
+  std::vector<Setting> beneath_;
 };
 
 StageStatus CellRun::status(const Stage& stage) const {
@@ -70,7 +74,7 @@ StageStatus CellRun::status(const Stage& stage) const {
   }
   if (contains_name(options_.redo, stage.name)) return {StageState::must_run, "asked for"};
   return status_of(stage, read_record(cell_ / stage.folder / "record.json"),
-                   surroundings_of(stage, cell_, images_, options_.version));
+                   surroundings_of(stage, cell_, images_, beneath_, options_.version));
 }
 
 /// Before anything runs: the inputs are there, and every stage that will run accepts its parameters.
@@ -85,8 +89,10 @@ void CellRun::check_before_start() const {
     changed.push_back(stage.folder);
     for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image.key);
     for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
-    const ProcessResult check =
-        run_process({executable_of(stage, options_), "--check", "--config", (cell_ / "cell.toml").string()});
+    std::vector<std::string> command = {executable_of(stage, options_), "--check", "--config",
+                                        (cell_ / "cell.toml").string()};
+    for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
+    const ProcessResult check = run_process(command);
     if (check.exit_code != 0 || check.signal) {
       throw StageFailed("mbtfm-" + stage.name + " does not accept cell.toml",
                         check.signal ? exit_code::kBug : check.exit_code);
@@ -121,8 +127,9 @@ StageOutcome CellRun::start(const Stage& stage, const StageStatus& before, int t
     }
   }
   const fs::path record_file = cell_ / stage.folder / "record.json";
-  const std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
-  const StageSurroundings now = surroundings_of(stage, cell_, images_, options_.version);
+  std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
+  for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
+  const StageSurroundings now = surroundings_of(stage, cell_, images_, beneath_, options_.version);
   const bool had_record = fs::is_regular_file(record_file);
   const std::string record_before = had_record ? read_text(record_file) : std::string();
   write_begun(record_file, stage);

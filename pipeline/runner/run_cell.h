@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/runner/record.h"
+#include "pipeline/runner/settings.h"
 
 namespace mbtfm::runner {
 
@@ -16,6 +17,8 @@ struct RunOptions {
   bool is_quiet = false;
   std::vector<std::string> only;  ///< names of stages; empty: all
   std::vector<std::string> redo;  ///< stages to run even if up to date or changed by hand
+  std::string preset;             ///< name of what `beneath` comes from; empty: none
+  std::vector<Setting> beneath;   ///< in place of defaults, where cell.toml says nothing
   std::string version;
   std::function<void(const std::string&)> say;  ///< one line for each stage
 };

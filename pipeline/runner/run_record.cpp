@@ -37,6 +37,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["version"] = options.version;
   run["cell"] = fs::weakly_canonical(cell).filename().string();
   run["threads"] = options.threads;
+  if (!options.preset.empty()) run["preset"] = options.preset;
   run["converged"] = outcome.converged();
   run["effects"] = ordered_json::array();
   for (std::size_t i = 0; i < stages().size(); ++i) {
