@@ -2,6 +2,7 @@
 
 #include <map>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/cost/presets.h"
 
 namespace mbtfm::cost {
@@ -24,12 +25,7 @@ void add_slow(std::vector<Rung>& rungs) {
                                                 {"substrate", "displacement_tolerance", "0"}};
   add(rungs, "substrate", "elements_across_adhesion", {"1", "1.4", "2"}, refined);
   add(rungs, "substrate", "element", {"q1-p0"}, refined);
-  for (const char* tolerance : {"0.02"}) {
-    rungs.push_back(
-        {.knob = "model",
-         .value = std::string("refined to ") + tolerance,
-         .settings = {{"substrate", "model", "refined"}, {"substrate", "displacement_tolerance", tolerance}}});
-  }
+  rungs.push_back({.knob = "model", .value = "refined", .settings = {{"substrate", "model", "refined"}}});
   for (const char* evaluations : {"100", "1000"}) {
     add(rungs, "fit", "method", {"plain-cg", "blockwise-cg"}, {{"fit", "max_evaluations", evaluations}});
     for (Rung* rung : {&rungs[rungs.size() - 2], &rungs[rungs.size() - 1]})
@@ -44,26 +40,30 @@ void add_slow(std::vector<Rung>& rungs) {
 }  // namespace
 
 std::vector<Rung> ladder(Extent extent) {
+  // The costly ones come last: where time runs out, they are what lacks.
   std::vector<Rung> rungs = {{.knob = "as it is", .value = ""}};
-  for (const Preset& preset : presets()) {
-    if (!preset.settings.empty())
-      rungs.push_back({.knob = "preset", .value = preset.name, .settings = preset.settings});
-  }
-  add(rungs, "fit", "n_meshes", {"1", "2", "4", "16", "32"});
-  add(rungs, "network", "edge_length_um", {"3", "2", "1.2", "1"});
+  const auto add_preset = [&](const char* name) {
+    rungs.push_back({.knob = "preset", .value = name, .settings = preset_named(name).settings});
+  };
+  add_preset("fast");
+  add(rungs, "fit", "n_meshes", {"1", "2", "4"});
+  add(rungs, "network", "edge_length_um", {"3", "2"});
   add(rungs, "substrate", "model", {"half-space", "layer"});
-  add(rungs, "substrate", "cells_per_thickness", {"1", "3"});
   for (const double share : {0.125, 0.25, 0.5}) {
-    rungs.push_back({.knob = "beads", .value = std::to_string(share).substr(0, 5), .bead_share = share});
+    rungs.push_back({.knob = "beads", .value = shortest(share), .bead_share = share});
   }
+  add(rungs, "fit", "surface_lines", {"40"});
   add(rungs, "fit", "tolerance", {"0.1", "0.01", "0.0001"});
   add(rungs, "cables", "smoothing", {"0.01", "0.001", "1e-07"});
   add(rungs, "cables", "force_tolerance", {"0.001", "1e-05", "1e-12"});
   add(rungs, "fit", "model_error", {"none"});
   add(rungs, "fit", "loss", {"huber"});
-  add(rungs, "fit", "surface_lines", {"40"});
-  add(rungs, "fit", "bootstrap", {"100"});
+  add(rungs, "substrate", "cells_per_thickness", {"1", "3"});
   rungs.push_back({.knob = "threads", .value = "1", .threads = 1});
+  add(rungs, "network", "edge_length_um", {"1.2", "1"});
+  add(rungs, "fit", "n_meshes", {"16", "32"});
+  add(rungs, "fit", "bootstrap", {"100"});
+  add_preset("high");
   if (extent == Extent::whole) add_slow(rungs);
   return rungs;
 }

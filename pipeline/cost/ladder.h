@@ -12,9 +12,9 @@ namespace mbtfm::cost {
 /// One choice of one knob; everything else is as the cell has it.
 struct Rung {
   std::string knob, value;
-  std::vector<runner::Setting> settings;
-  double bead_share = 1;       ///< of the beads that are used
-  std::optional<int> threads;  ///< or as many as the study has
+  std::vector<runner::Setting> settings = {};
+  double bead_share = 1;            ///< of the beads that are used
+  std::optional<int> threads = {};  ///< or as many as the study has
 };
 
 enum class Extent { quick, whole };  ///< whole: those that take minutes, too

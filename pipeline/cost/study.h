@@ -27,7 +27,7 @@ struct Measurement {
   double cpu_seconds = 0;  ///< of all threads, likewise
   double peak_memory_MB = 0;
   int n_runs = 0;            ///< 0: there was no time for it
-  std::string failure;       ///< how it ended, where not well
+  std::string failure = {};  ///< how it ended, where not well
   double tension_error = 0;  ///< |t − reference| / |reference| over the fibres
   double force_error = 0;    ///< of the total force, relative
   double stated_error = 0;   ///< what the error budget says of the tensions
