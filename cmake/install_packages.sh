@@ -1,15 +1,18 @@
 #!/usr/bin/env bash
 # Install the Debian packages that mbtfm builds with, those that lack only. As root or through sudo; says what lacks
-# where it can do neither.
+# where it can do neither. Arguments: further packages.
 set -euo pipefail
 
 packages=(
   g++ cmake ninja-build ccache mold
   libopencv-dev libvtk9-dev libeigen3-dev libdeal.ii-dev libboost-dev libboost-thread-dev libcgal-dev
   libsuitesparse-dev libmetis-dev libfftw3-dev libopenblas0-pthread libopenblas-pthread-dev
-  libtiff-dev libpng-dev libzip-dev libexpat1-dev libssl-dev
+  libtiff-dev libpng-dev libjpeg62-turbo-dev libzip-dev libexpat1-dev libssl-dev
+  librsvg2-dev pkg-config fonts-dejavu-core
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
+  libjs-vega
   libgtest-dev libgmock-dev libbenchmark-dev
+  "$@"
 )
 
 missing=()

@@ -18,7 +18,8 @@ body { background: #fff }
 #row { display: flex; gap: 24px; align-items: center; width: 1400px; padding: 12px }
 #row > * { flex: 1; max-width: none }
 figcaption, h3 { display: none }
-figure > svg, figure > img { max-width: none }
+.buttons { display: none }
+figure { max-width: none }
 </style>
 <script>
 const row = document.createElement('div');

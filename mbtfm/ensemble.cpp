@@ -164,12 +164,19 @@ void add_estimates(EnsembleFit& all) {
   }
 }
 
-TensionFit fit_first(const network::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
-                     const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
-                     const std::optional<Eigen::VectorXd>& start_nN) {
-  if (parameters.loss != "squares") return fit_reweighted(data, network, adhesion_ids, parameters, threads, start_nN);
+struct FirstFit {
+  TensionFit fit;
+  std::string loss;
+};
+
+FirstFit fit_first(const network::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
+                   const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
+                   const std::optional<Eigen::VectorXd>& start_nN) {
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit);
-  return fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
+  TensionFit fit = fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
+  const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
+  if (loss == "squares") return {std::move(fit), loss};
+  return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
 }
 
 /// What each mesh makes of these tensions.
@@ -230,29 +237,30 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
     if (progress)
       progress(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
   };
-  TensionFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start_nN);
+  FirstFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start_nN);
+  all.loss = first.loss;
   tell();
   all.data = data.reduced;
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   if (parameters.model_error == "meshes" && n_meshes >= kFewestForModelError && !solved_misfit) {
-    const double variance = variance_beside_model_error(data, first.trial.forces_nN, n_tensions, parameters.loss);
+    const double variance = variance_beside_model_error(data, first.fit.trial.forces_nN, n_tensions, all.loss);
     all.model_error =
-        model_error(forces_at(networks, data.reduced, adhesion_ids, first.trial, threads), data.reduced, variance);
+        model_error(forces_at(networks, data.reduced, adhesion_ids, first.fit.trial, threads), data.reduced, variance);
     all.data = all.model_error->data;
   }
-  const Eigen::VectorXd answer = first.trial.tensions_nN;
+  const Eigen::VectorXd answer = first.fit.trial.tensions_nN;
   parallel_for(n_meshes, threads, [&](int m) {
     const auto i = static_cast<std::size_t>(m);
     const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit);
     const bool is_done = m == 0 && !all.model_error;
-    all.meshes[i] = describe(problem, is_done ? std::move(first) : fit_tensions(problem, parameters, 1, answer));
+    all.meshes[i] = describe(problem, is_done ? std::move(first.fit) : fit_tensions(problem, parameters, 1, answer));
     tell();
   });
   add_means(all);
   all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
                                static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
-  all.variance = all.model_error ? all.model_error->noise_variance
-                                 : misfit_variance(data, all.forces_nN, n_tensions, parameters.loss);
+  all.variance =
+      all.model_error ? all.model_error->noise_variance : misfit_variance(data, all.forces_nN, n_tensions, all.loss);
   parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   add_estimates(all);
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
@@ -263,7 +271,7 @@ Interval interval_95(const Estimate& estimate, int n_meshes) {
   const double normal = boost::math::quantile(boost::math::normal(), 0.975);
   const auto half_width = [&](double fitted) {
     const double error = std::hypot(fitted, estimate.spread);
-    if (n_meshes < 2 || estimate.from_mesh() <= 0) return normal * error;
+    if (n_meshes < 2 || error == 0 || estimate.from_mesh() <= 0) return normal * error;
     const double degrees = (n_meshes - 1) / std::pow(std::min(1.0, estimate.from_mesh() / error), 4);
     return boost::math::quantile(boost::math::students_t(std::min(degrees, 1e6)), 0.975) * error;
   };

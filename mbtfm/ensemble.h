@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "mbtfm/intervals.h"
@@ -47,6 +48,7 @@ struct EnsembleFit {
   double chi_squared_per_degree = 0;          ///< of the mean over meshes: 1 where the model explains all but the noise
   double variance = 0;                        ///< of a component of `data`: see misfit_variance
   ReducedData data;                           ///< as the fit weighs it
+  std::string loss;                           ///< that the first fit called for
   std::optional<ModelError> model_error;      ///< where the fit counts with one
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is

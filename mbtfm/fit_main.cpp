@@ -256,7 +256,7 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
-  const DisplacementField fitted = fitted_field(inputs, data, fit);
+  const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const auto budget_start = std::chrono::steady_clock::now();
   summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
@@ -277,6 +277,8 @@ StageReport fit(const FitStageParameters& p, StageContext& context) {
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
+  write_displacement(context.output("out", "displacement_without_fibres.csv"),
+                     field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(fit, data), weight_array(data)});
   context.progress(0.95, "surface of the gel");

@@ -113,13 +113,13 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"n_beads", std::int64_t(inputs.beads.size())},
             {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
             {"method", parameters.method},
-            {"loss", parameters.loss},
+            {"loss", fit.loss},
             {"reason", fit.report.reason}};
   return s;
 }
 
-DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, const EnsembleFit& fit) {
-  const Eigen::VectorXd model = data.compliance_um_per_nN * fit.forces_nN;
+DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data) {
+  const Eigen::VectorXd model = data.compliance_um_per_nN * forces_nN;
   DisplacementField field = inputs.beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);

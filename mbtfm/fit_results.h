@@ -22,7 +22,7 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell);
 FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
                       const std::vector<network::CableNetwork>& networks, const FitParameters& parameters);
 /// The model's displacement at the beads.
-DisplacementField fitted_field(const FitInputs& inputs, const LinearData& data, const EnsembleFit& fit);
+DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data);
 
 /// @param more  further arrays, by bead
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,

@@ -21,7 +21,8 @@ ModelScore score(const std::string& name, int n_parameters, double misfit, doubl
           .chi_squared = chi_squared,
           .relative_l2 = 0,
           .aic = chi_squared + 2.0 * n_parameters,
-          .bic = chi_squared + n_parameters * std::log(static_cast<double>(data.n_used))};
+          .bic = chi_squared + n_parameters * std::log(static_cast<double>(data.n_used)),
+          .forces_nN = {}};
 }
 
 /// The one tension of all cables that fits best: Gauss–Newton in one variable.
@@ -101,9 +102,10 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
       score("no-fibres", 1, misfit(uniform), variance, data),
       score("full", static_cast<int>(fit.fibre_ids.size()), misfit(fit.forces_nN), variance, data),
       score("adhesion-forces", static_cast<int>(reduced.compliance.rows()), reduced.floor_squared, variance, data)};
-  models[0].relative_l2 = relative_l2(data, uniform);
-  models[1].relative_l2 = relative_l2(data, fit.forces_nN);
-  models[2].relative_l2 = relative_l2(data, free);
+  models[0].forces_nN = uniform;
+  models[1].forces_nN = fit.forces_nN;
+  models[2].forces_nN = free;
+  for (ModelScore& model : models) model.relative_l2 = relative_l2(data, model.forces_nN);
   return models;
 }
 

@@ -26,8 +26,9 @@ struct ModelScore {
   std::string name;
   int n_parameters = 0;
   double chi_squared = 0, relative_l2 = 0;
-  double aic = 0;  ///< chi² + 2 k
-  double bic = 0;  ///< chi² + k ln n
+  double aic = 0;             ///< chi² + 2 k
+  double bic = 0;             ///< chi² + k ln n
+  Eigen::VectorXd forces_nN;  ///< by adhesion: fx, fy
 };
 /// no-fibres: a network of one tension; full: ours; adhesion-forces: every force for itself (thesis' null model).
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,

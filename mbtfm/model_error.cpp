@@ -1,7 +1,7 @@
 #include "mbtfm/model_error.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/QR>
-#include <Eigen/SVD>
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
@@ -44,11 +44,11 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   const MeshForces mean = mean_of(meshes);
   const Eigen::VectorXd variance = variance_between(meshes, mean.forces_nN);
   // C V Cᵀ = U diag(sizes) Uᵀ: in the coordinates Uᵀ y the errors of the rows are independent for every kappa
-  const Eigen::BDCSVD<Eigen::MatrixXd> svd(data.compliance * variance.cwiseSqrt().asDiagonal(), Eigen::ComputeFullU);
-  Eigen::VectorXd sizes = Eigen::VectorXd::Zero(data.compliance.rows());
-  sizes.head(svd.singularValues().size()) = svd.singularValues().cwiseAbs2();
-  const Eigen::MatrixXd C = svd.matrixU().transpose() * data.compliance;
-  const Eigen::VectorXd y = svd.matrixU().transpose() * data.target;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(data.compliance * variance.asDiagonal() *
+                                                             data.compliance.transpose());
+  const Eigen::VectorXd sizes = modes.eigenvalues().cwiseMax(0);  // rounding may leave some below
+  const Eigen::MatrixXd C = modes.eigenvectors().transpose() * data.compliance;
+  const Eigen::VectorXd y = modes.eigenvectors().transpose() * data.target;
   const Eigen::MatrixXd J = C * mean.derivatives;
   const Eigen::VectorXd residual = y - C * mean.forces_nN;
   const double expected = noise_variance * static_cast<double>(std::max<Eigen::Index>(1, J.rows() - J.cols()));

@@ -31,6 +31,11 @@ Eigen::VectorXd weights_of(const std::string& loss, const Eigen::VectorXd& resid
   return weights;
 }
 
+/// Where the middle bead is explained to rounding there is nothing to be robust against.
+bool is_exact(const LinearData& data, double scale) {
+  return scale <= 1e-9 * data.weight_per_um.cwiseProduct(data.displacement_um).cwiseAbs().maxCoeff();
+}
+
 /// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
 Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& residual, const Eigen::MatrixXd& J,
                                const Eigen::VectorXd& low, double scale) {
@@ -60,8 +65,7 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     const Eigen::VectorXd before = fit.trial.tensions_nN;
     const Eigen::VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
     const double scale = fixed_scale ? *fixed_scale : robust_scale(data, residual);
-    // Where the middle bead is explained to rounding there is nothing to be robust against.
-    if (scale <= 1e-9 * data.weight_per_um.cwiseProduct(data.displacement_um).cwiseAbs().maxCoeff()) break;
+    if (is_exact(data, scale)) break;
     const TensionProblem problem(network, data.reduced, adhesion_ids);
     const Eigen::MatrixXd J =
         data.weight_per_um.asDiagonal() * (data.compliance_um_per_nN * problem.force_derivatives(fit.trial));
@@ -77,6 +81,16 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
 }
 
 }  // namespace
+
+std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual) {
+  if (loss != "auto") return loss;
+  const double scale = robust_scale(data, weighted_residual);
+  if (is_exact(data, scale)) return "squares";
+  const std::vector<double> lengths = used_lengths(data, weighted_residual);
+  const double largest = *std::max_element(lengths.begin(), lengths.end()) / scale;
+  constexpr double kChance = 0.05;
+  return static_cast<double>(lengths.size()) * std::exp(-largest * largest / 2) < kChance ? "huber" : "squares";
+}
 
 double robust_weight(const std::string& loss, double residual) {
   if (loss == "squares") return 1;
@@ -95,14 +109,10 @@ double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_resi
 }
 
 TensionFit fit_reweighted(LinearData& data, const network::CableNetwork& network, const std::vector<int>& adhesion_ids,
-                          const FitParameters& parameters, int threads,
-                          const std::optional<Eigen::VectorXd>& start_nN) {
-  const TensionProblem problem(network, data.reduced, adhesion_ids);
-  TensionFit fit = fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
-  if (parameters.loss == "squares") return fit;
-  const std::string first = parameters.loss == "tukey" ? "huber" : parameters.loss;
-  fit = fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), first, {});
-  if (parameters.loss != "tukey") return fit;
+                          const FitParameters& parameters, const std::string& loss, int threads, TensionFit first) {
+  const std::string begin = loss == "tukey" ? "huber" : loss;
+  TensionFit fit = fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(first), begin, {});
+  if (loss != "tukey") return fit;
   const double scale = robust_scale(data, weighted_residual(data, fit.trial.forces_nN));
   return fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), "tukey", scale);
 }

@@ -11,6 +11,11 @@
 
 namespace mbtfm::inverse {
 
+/// The loss itself, or what the residuals call for where it is `auto`: huber if the largest one is larger than one case
+/// in twenty of Gaussian noise has it, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni; r in robust standard deviations),
+/// else squares. Few bad beads do the harm, and they stand out; a bead more or less beyond three deviations does none.
+std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual);
+
 /// Weight of a bead whose residual has this size, in robust standard deviations; 1 at zero (l1: large there).
 /// squares 1 | huber min(1, k/r), k = 1.500 | tukey (1 − (r/c)²)², c = 5.123 | l1 1/r.
 /// k and c keep 95 % efficiency where the noise is Gaussian in the plane (Maronna, Martin & Yohai, Robust Statistics,
@@ -21,12 +26,13 @@ double robust_weight(const std::string& loss, double residual);
 /// Standard deviation of a component that the middle of the residuals tells: median of |r_b| / 1.1774 (Rayleigh).
 double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual);
 
-/// Fit on this network, weigh the beads by their residuals, fit again, until the tensions stay. Tukey's loss, which has
-/// several minima, starts from Huber's. Leaves the weights in `data`.
+/// Weigh the beads by the residuals of a fit, fit on this network again, until the tensions stay. Tukey's loss, which
+/// has several minima, starts from Huber's. Leaves the weights in `data`.
+/// @param loss  all but squares
+/// @param first  the fit by least squares
 /// @return the last fit
 TensionFit fit_reweighted(LinearData& data, const network::CableNetwork& network, const std::vector<int>& adhesion_ids,
-                          const FitParameters& parameters, int threads,
-                          const std::optional<Eigen::VectorXd>& start_nN = {});
+                          const FitParameters& parameters, const std::string& loss, int threads, TensionFit first);
 
 /// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where
 /// the beads state their errors; else the same from the asymptotic variance of the loss (Maronna et al., 10.3):

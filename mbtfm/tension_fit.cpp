@@ -10,8 +10,11 @@ void declare(ParameterList& list, FitParameters& p) {
   list.table("fit");
   list.add("method", p.method, "how the tensions are found", {"gauss-newton", "blockwise-cg", "plain-cg"});
   list.add("gradients", p.gradients, "of the conjugate gradient methods", {"exact", "finite-difference"});
-  list.add("loss", p.loss, "what a bead's residual costs; all but squares bear outliers",
-           {"squares", "huber", "tukey", "l1"});
+  list.add(
+      "loss", p.loss,
+      "what a bead's residual costs; all but squares bear outliers; auto: huber where the largest residual is none "
+      "of Gaussian noise, else squares",
+      {"auto", "squares", "huber", "tukey", "l1"});
   list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial",
            {"compliance", "per-evaluation"});
   list.add("region_um", p.region_um, Range::not_negative(),

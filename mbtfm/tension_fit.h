@@ -14,7 +14,7 @@ namespace mbtfm::inverse {
 struct FitParameters {
   std::string method = "gauss-newton";   ///< converges in about ten steps; the others are kept for comparison
   std::string gradients = "exact";       ///< finite-difference: as in the thesis, one equilibrium a tension and side
-  std::string loss = "squares";          ///< best where the noise is Gaussian, which tracking's is but for its flags
+  std::string loss = "auto";             ///< squares are best where noise is Gaussian, which a few bad beads are not
   std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
   std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
   int n_meshes = 8;  ///< the spread between meshes is the largest error; its mean over eight is close to settled

@@ -7,10 +7,10 @@
 #include <Eigen/SparseCore>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <mutex>
 #include <numeric>
 
+#include "network/partial_cholesky.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::network {
@@ -29,8 +29,6 @@ constexpr int kManyBlocks = 4000;
 // both together are so narrow that the work for them is less than that for a panel.
 constexpr double kStoredZeros = 0.1;
 constexpr int kNarrow = 4;
-// Columns eliminated one by one before all to the right of them are updated at once: these stay in the nearest cache.
-constexpr int kChunk = 16;
 
 using PanelMap = Eigen::Map<Eigen::MatrixXd, Eigen::Unaligned, Eigen::OuterStride<>>;
 
@@ -296,27 +294,13 @@ void BlockCholesky::add_update(const Panel& child, const double* update, const P
 }
 
 void BlockCholesky::eliminate(const Panel& panel, double* update, double shift) {
-  const Eigen::Index height = 2 * panel.height(), width = 2 * panel.n_columns, below = height - width;
-  PanelMap l(factor_.data() + panel.values, height, width, Eigen::OuterStride<>(height));
-  for (Eigen::Index begin = 0; begin < width; begin += kChunk) {
-    const Eigen::Index end = std::min<Eigen::Index>(begin + kChunk, width);
-    for (Eigen::Index j = begin; j < end; ++j) {
-      auto column = l.col(j).tail(height - j);
-      if (j > begin)
-        column.noalias() -= l.block(j, begin, height - j, j - begin) * l.row(j).segment(begin, j - begin).transpose();
-      const double original = diagonal_[panel.first + j / 2](j % 2, j % 2) + shift;
-      const bool is_lost = !(column[0] > kLostPivot * original);
-      const double root = is_lost ? std::numeric_limits<double>::infinity() : std::sqrt(column[0]);
-      column *= 1 / root;
-      column[0] = root;
-    }
-    l.bottomRightCorner(height - end, width - end).noalias() -=
-        l.block(end, begin, height - end, end - begin) * l.block(end, begin, width - end, end - begin).transpose();
-  }
-  if (below > 0)
-    Eigen::Map<Eigen::MatrixXd>(update, below, below)
-        .selfadjointView<Eigen::Lower>()
-        .rankUpdate(l.bottomRows(below), -1.0);
+  std::vector<double> least_pivot(2 * panel.n_columns);
+  for (int j = 0; j < 2 * panel.n_columns; ++j)
+    least_pivot[j] = kLostPivot * (diagonal_[panel.first + j / 2](j % 2, j % 2) + shift);
+  partial_cholesky({.values = factor_.data() + panel.values,
+                    .height = 2 * static_cast<std::size_t>(panel.height()),
+                    .width = 2 * static_cast<std::size_t>(panel.n_columns)},
+                   least_pivot.data(), update);
 }
 
 void BlockCholesky::factorise(double shift) {
@@ -326,7 +310,7 @@ void BlockCholesky::factorise(double shift) {
   std::size_t top = 0;
   for (const Panel& panel : pattern_->panels) {
     double* update = updates_.data() + top;
-    std::fill_n(update, panel.update_size(), 0.0);
+    for (std::size_t j = 0, n = 2 * panel.rows.size(); j < n; ++j) std::fill_n(update + j * n + j, n - j, 0.0);
     assemble(panel, shift * mean_diagonal);
     while (!waiting.empty() && &pattern_->panels[pattern_->panels[waiting.back()].parent] == &panel) {
       const Panel& child = pattern_->panels[waiting.back()];
@@ -335,7 +319,9 @@ void BlockCholesky::factorise(double shift) {
       waiting.pop_back();
     }
     eliminate(panel, update, shift * mean_diagonal);
-    std::copy_n(update, panel.update_size(), updates_.data() + top);  // down to where the children's began
+    if (update != updates_.data() + top)  // down to where the children's began
+      for (std::size_t j = 0, n = 2 * panel.rows.size(); j < n; ++j)
+        std::copy_n(update + j * n + j, n - j, updates_.data() + top + j * n + j);
     if (panel.rows.empty()) continue;
     top += panel.update_size();
     waiting.push_back(static_cast<int>(&panel - pattern_->panels.data()));

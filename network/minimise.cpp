@@ -9,14 +9,20 @@ namespace {
 
 // The path of a cold start. Lengths are rounded off over a tenth of an edge at first, the stretch by mu = a hundredth
 // of force times edge: a network at rest, all of whose cables stand at the kink, is smooth then. Each stage sharpens
-// tenfold. At the last mu what rounding adds to a force is below the effect of the tensions that stand for zero.
+// threefold; where one step did for it the path is straight, and mu falls twentyfold. At the last mu what rounding adds
+// to a force is below the effect of the tensions that stand for zero.
 constexpr double kFirstEps = 0.1;
 constexpr double kFirstMu = 1e-2;
 constexpr double kLastMu = 1e-9;
-constexpr double kSharpening = 0.1;
-// A stage is left once a step went (nearly) its full length and no net force exceeds the force scale: more accuracy is
-// lost again when the energy sharpens.
+constexpr double kSharpening = 0.3;
+constexpr double kBoldSharpening = 0.05;
+// A stage is left once no net force exceeds the force scale and the slope at a step's start was below mu for each
+// second cable if the step went (nearly) its full length, for each tenth in any case. More accuracy is lost again when
+// the energy sharpens; with less, slack cables far from the path throw the next steps far off, and the finer the mesh
+// the more such cables share one step length.
 constexpr double kFullStep = 0.9;
+constexpr double kSlopePerCable = 0.5;
+constexpr double kSlopePerCableOfCutStep = 0.1;
 // A warm start that has not converged by then is far away: the path is shorter.
 constexpr int kWarmSteps = 25;
 // A line search ends where the slope has fallen to this part of the first: finer costs more than it saves.
@@ -183,14 +189,18 @@ class Newton : public Descent {
     }
   }
 
-  /// One step of Newton's method for positions and duals, the duals eliminated. @returns the part of it taken
-  double step() {
+  struct Step {
+    double length = 0;    ///< the part of it taken
+    double slope_fJ = 0;  ///< of the energy at its start, per full step
+  };
+  /// One step of Newton's method for positions and duals, the duals eliminated.
+  Step step() {
     find_stiffness();
     const OnLine start = find_direction();
     const double length = line_search(start, 1, kNewtonReduction);
     advance(length);
     find_gradient();
-    return length;
+    return {length, start.slope};
   }
 
  private:
@@ -301,11 +311,17 @@ Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& c
     Rounding rounding{.eps_um = kFirstEps * options.edge_length_um, .mu_fJ = kFirstMu * unit_mu_fJ};
     minimiser.set_rounding(rounding);
     minimiser.reset_duals();
-    for (; rounding.mu_fJ >= kLastMu * unit_mu_fJ; rounding.mu_fJ *= kSharpening) {
+    while (rounding.mu_fJ >= kLastMu * unit_mu_fJ) {
       minimiser.set_rounding(rounding);
-      double taken = 0;
-      while (may_step(options.max_iterations) && (taken < kFullStep || minimiser.residual_nN() > options.force_nN))
-        taken = step();
+      const auto is_near_path = [&](const Newton::Step& taken) {
+        const double slope = taken.length < kFullStep ? kSlopePerCableOfCutStep : kSlopePerCable;
+        return -taken.slope_fJ <= slope * rounding.mu_fJ * static_cast<double>(cables.size()) &&
+               minimiser.residual_nN() <= options.force_nN;
+      };
+      int n_steps = 0;
+      for (bool is_near = false; !is_near && may_step(options.max_iterations); ++n_steps)
+        is_near = is_near_path(step());
+      rounding.mu_fJ *= n_steps == 1 ? kBoldSharpening : kSharpening;
       rounding.eps_um = std::max(kSharpening * rounding.eps_um, options.eps_um);
     }
     minimiser.set_rounding(sharp);

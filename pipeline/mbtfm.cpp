@@ -2,7 +2,11 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
+#include <cstdlib>
+#include <map>
+#include <optional>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
@@ -16,8 +20,10 @@
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/image_sets.h"
+#include "pipeline/runner/lock.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/verify.h"
 
 namespace {
 
@@ -31,37 +37,48 @@ struct CommandLine {
   fs::path stage_folder = runner::executable_folder();
   int threads = available_threads();
   int jobs = 1;
-  bool is_quiet = false;
+  bool is_quiet = false, only_list = false, only_table = false, is_checked = false;
   std::vector<std::string> only, redo, patterns;
-  fs::path template_toml;
+  fs::path template_toml, out, inputs;
+  std::optional<double> timeout_s;
+  std::optional<std::uint64_t> memory_bytes;
   std::string preset, accuracy;
   double budget_min = 10;  // a study that one waits for
   int repeats = 3;         // whose median one busy moment does not move
   bool is_whole = false;
 };
 
-void say(const std::string& line) { std::fprintf(stderr, "mbtfm: %s\n", line.c_str()); }
+bool is_terminal() { return isatty(STDERR_FILENO) != 0; }
 
-runner::CellOutcome run_with(const CommandLine& line, const std::string& preset) {
-  runner::RunOptions options{.stage_folder = line.stage_folder,
-                             .threads = line.threads,
-                             .is_quiet = line.is_quiet,
-                             .only = line.only,
-                             .redo = line.redo,
-                             .preset = preset,
-                             .beneath = {},
-                             .version = kVersion,
-                             .say = line.is_quiet ? nullptr : say};
-  if (!preset.empty()) options.beneath = cost::preset_named(preset).settings;
-  return runner::run_cell(line.folder, options);
+// What stands on the line of a terminal before gives way.
+void say(const std::string& line) {
+  std::fprintf(stderr, "%smbtfm: %s\n", is_terminal() ? "\r\033[K" : "", line.c_str());
+}
+void show(const std::string& line) { std::fprintf(stderr, "\r\033[K%s", line.c_str()); }
+
+runner::RunOptions run_options(const CommandLine& line) {
+  return {.stage_folder = line.stage_folder,
+          .threads = line.threads,
+          .is_quiet = line.is_quiet,
+          .is_checked = line.is_checked,
+          .only = line.only,
+          .redo = line.redo,
+          .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
+          .preset = line.preset,
+          .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
+          .version = kVersion,
+          .say = line.is_quiet ? nullptr : say,
+          .finish = nullptr};
 }
 
-runner::CellOutcome run_to_accuracy(const CommandLine& line) {
+runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
   const double wanted = cost::parse_accuracy(line.accuracy);
   if (!line.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
   runner::CellOutcome outcome;
   const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
-    outcome = run_with(line, preset);
+    options.preset = preset;
+    options.beneath = cost::preset_named(preset).settings;
+    outcome = runner::run_cell(line.folder, options);
     const std::optional<ErrorBudget> budget = read_fit_summary(line.folder / "4_fit/fit.json").error_budget;
     if (budget) return *budget;
     throw InputError((line.folder / "4_fit/fit.json").string(), "an error budget", "none", "run with --redo fit");
@@ -72,46 +89,77 @@ runner::CellOutcome run_to_accuracy(const CommandLine& line) {
 }
 
 int run(const CommandLine& line) {
-  const runner::CellOutcome outcome = line.accuracy.empty() ? run_with(line, line.preset) : run_to_accuracy(line);
-  if (fs::is_regular_file(line.folder / "4_fit/fit.json")) {
+  runner::RunOptions options = run_options(line);
+  options.finish = [&] {
+    if (!fs::is_regular_file(line.folder / "4_fit/fit.json")) return;
     report::update_report(line.folder);
     if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
-  }
+  };
+  const runner::CellOutcome outcome =
+      line.accuracy.empty() ? runner::run_cell(line.folder, options) : run_to_accuracy(line, options);
   if (outcome.converged()) return kDone;
-  std::string names;
-  for (const auto& stage : outcome.stages) {
-    if (!stage.converged) names += (names.empty() ? "" : ", ") + stage.stage;
-  }
-  std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", names.c_str());
+  std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", outcome.not_converged().c_str());
   return kNotSolved;
 }
 
-int batch(const CommandLine& line) {
+/// The cells below the folder, made from images first where patterns say so.
+std::vector<fs::path> cells_of(const CommandLine& line) {
   std::vector<runner::ImagePattern> patterns;
   for (const std::string& text : line.patterns) patterns.push_back(runner::parse_pattern(text));
   if (!patterns.empty()) runner::make_cell_folders(line.folder, patterns, line.template_toml);
-  const std::vector<fs::path> cells = runner::find_cells(line.folder);
+  return runner::find_cells(line.folder);
+}
+
+std::vector<std::string> arguments_of_cell(const CommandLine& line) {
   std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
-                                        "--stages-dir", line.stage_folder.string()};
+                                        "--stages-dir", line.stage_folder.string(), "--checked"};
   if (!line.preset.empty()) arguments.insert(arguments.end(), {"--preset", line.preset});
   if (!line.accuracy.empty()) arguments.insert(arguments.end(), {"--accuracy", line.accuracy});
   for (const std::string& stage : line.only) arguments.insert(arguments.end(), {"--only", stage});
   for (const std::string& stage : line.redo) arguments.insert(arguments.end(), {"--redo", stage});
-  const auto outcomes = runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
-                                                  .arguments = arguments,
-                                                  .jobs = line.jobs,
-                                                  .only = line.only,
-                                                  .say = line.is_quiet ? nullptr : say});
-  int n_failed = 0;
-  for (const runner::BatchCell& cell : outcomes) {
-    if (cell.exit_code == 0) continue;
-    ++n_failed;
-    std::fprintf(stderr, "mbtfm: %s: exit code %d: %s\n", cell.cell.c_str(), cell.exit_code, cell.message.c_str());
+  if (line.timeout_s) arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.timeout_s)});
+  if (line.memory_bytes) arguments.insert(arguments.end(), {"--memory", std::to_string(*line.memory_bytes)});
+  return arguments;
+}
+
+int batch(const CommandLine& line) {
+  const std::vector<fs::path> cells = cells_of(line);
+  if (line.only_list) {
+    std::fputs(runner::list_cells(cells, run_options(line), line.threads).c_str(), stdout);
+    return kDone;
   }
+  const auto outcomes = line.only_table
+                            ? runner::outcomes_so_far(cells, run_options(line), line.threads)
+                            : runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
+                                                        .arguments = arguments_of_cell(line),
+                                                        .jobs = line.jobs,
+                                                        .threads = line.threads,
+                                                        .run = run_options(line),
+                                                        .say = line.is_quiet ? nullptr : say,
+                                                        .show = line.is_quiet || !is_terminal() ? nullptr : show});
+  const auto n_failed =
+      std::count_if(outcomes.begin(), outcomes.end(), [](const auto& cell) { return cell.exit_code != 0; });
   const fs::path table = line.folder / "batch.csv";
+  if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
   runner::write_batch_table(table, line.folder, outcomes, line.only);
-  std::fprintf(stderr, "mbtfm: %zu cells done, %d failed; %s\n", outcomes.size() - n_failed, n_failed, table.c_str());
+  say(std::to_string(outcomes.size() - n_failed) + " cells done, " + std::to_string(n_failed) + " failed; " +
+      table.string());
   return n_failed == 0 ? kDone : kFailed;
+}
+
+int tell(const runner::Verification& found, const std::string& what) {
+  for (const std::string& difference : found.differences) std::printf("%s\n", difference.c_str());
+  if (found.differences.empty()) std::printf("%s: %d files, all as run.json tells\n", what.c_str(), found.n_files);
+  return found.differences.empty() ? kDone : kFailed;
+}
+
+int verify(const CommandLine& line) { return tell(runner::verify_cell(line.folder), line.folder.string()); }
+
+int repeat(const CommandLine& line) {
+  const bool is_file = fs::is_regular_file(line.folder);
+  const fs::path run_json = is_file ? line.folder : line.folder / "run.json";
+  const fs::path inputs = line.inputs.empty() ? run_json.parent_path() : line.inputs;
+  return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
 }
 
 /// Become mbtfm-stats.
@@ -125,7 +173,12 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
                                         "--threads",
                                         std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
-  arguments.insert(arguments.end(), further.begin(), further.end());
+  for (const std::string& argument : further) {
+    // the one flag that people write with a dash
+    constexpr std::string_view kDashed = "--condition-from";
+    const bool is_dashed = argument.starts_with(kDashed);
+    arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
+  }
   std::vector<char*> pointers;
   for (std::string& argument : arguments) pointers.push_back(argument.data());
   pointers.push_back(nullptr);
@@ -179,6 +232,13 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   command->add_option("--redo", line.redo, "run this stage, or these, even if up to date or changed by hand")
       ->allow_extra_args(false);
   command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
+  const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
+  command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
+      ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
+      ->check(CLI::PositiveNumber);
+  command->add_option("--memory", line.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
+      ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
+      ->check(CLI::PositiveNumber);
 }
 
 int start(int argc, char** argv) {
@@ -188,6 +248,7 @@ int start(int argc, char** argv) {
   app.require_subcommand(1);
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
   add_stage_options(run_command, line);
+  run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
@@ -197,6 +258,16 @@ int start(int argc, char** argv) {
                    "{cell} for the cell's name, as in adhesion='{cell}_pax.tif'")
       ->allow_extra_args(false);
   batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
+  batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
+  batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
+  CLI::App* verify_command =
+      add_command(app, line, "verify", "hash all inputs and outputs anew: as run.json tells?", "CELL");
+  CLI::App* repeat_command =
+      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", "CELL");
+  repeat_command->add_option("--out", line.out, "the new cell folder")->required();
+  repeat_command->add_option("--inputs", line.inputs, "where the inputs are; default: beside run.json");
+  repeat_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
+      ->capture_default_str();
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
   CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", "CELL");
@@ -218,6 +289,8 @@ int start(int argc, char** argv) {
   if (run_command->parsed()) return run(line);
   if (batch_command->parsed()) return batch(line);
   if (cost_command->parsed()) return cost_study(line);
+  if (verify_command->parsed()) return verify(line);
+  if (repeat_command->parsed()) return repeat(line);
   if (stats_command->parsed()) return stats(line, stats_command->remaining());
   return compare(line);
 }
@@ -226,11 +299,15 @@ int start(int argc, char** argv) {
 
 int main(int argc, char** argv) {
   runner::watch_interrupts();
+  if (is_terminal()) setenv("MBTFM_TERMINAL", "1", 1);  // the stages' own progress is seen
   try {
     return start(argc, argv);
   } catch (const runner::StageFailed& error) {
     std::fprintf(stderr, "mbtfm: error: %s\n", error.what());
-    return error.exit_code;
+    return error.failure.exit_code;
+  } catch (const runner::CellBusy& error) {
+    std::fprintf(stderr, "mbtfm: error: %s\n", error.what());
+    return kBusy;
   } catch (...) {
     return report_current_exception("mbtfm");
   }

@@ -1,36 +1,59 @@
 /// mbtfm-stats: tables, tests and figures over all finished cells of a folder.
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/stage.h"
+#include "pipeline/statistics/png.h"
 #include "pipeline/statistics/study_files.h"
+
+namespace mbtfm::statistics {
+namespace {
+
+/// The study read, its files entered into the record.
+Study read_study(const StudyParameters& parameters, StageContext& context) {
+  const Path folder = context.input("cells");
+  const std::optional<Path> table = context.has_input("table") ? std::optional(context.input("table")) : std::nullopt;
+  Study study = read_study(folder, parameters, table, context.threads);
+  for (const StudyCell& cell : study.cells) {
+    for (const std::string& file : files_of_a_cell()) context.input("cells", {cell.name + "/" + file});
+    for (const std::string& file : further_files_of_a_cell()) {
+      const std::string name = cell.name + "/" + file;
+      if (std::filesystem::is_regular_file(folder / name)) context.input("cells", {name});
+    }
+  }
+  return study;
+}
+
+StageReport statistics(const StudyParameters& parameters, StageContext& context) {
+  const Study study = read_study(parameters, context);
+  const Analysis analysis = analyse(study, parameters);
+  for (const auto& [name, text] : tables_of(study, analysis)) write_text(context.output("out", name), text);
+  const std::vector<Figure> figures = figures_of(study, analysis, parameters);
+  constexpr double kPixels = 2;  // by unit of the drawing: sharp in print at 8 cm for each chart (300 dpi)
+  for (const Figure& figure : figures) {
+    const std::string svg = svg_of(figure);
+    write_text(context.output("out", "figures/" + figure.name + ".svg"), svg);
+    write_png(context.output("out", "figures/" + figure.name + ".png"), svg, kPixels);
+  }
+  write_text(context.output("out", "report.html"), study_html(study, analysis, figures, parameters));
+  StageReport report;
+  report.summary = std::to_string(study.cells.size()) + " cells, " +
+                   std::to_string(analysis.tensions.sample.values.size()) + " tensions; " +
+                   std::to_string(study.left_out.size()) + " cells left out, " +
+                   std::to_string(analysis.warnings.size()) + " warnings: see report.html";
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::statistics
 
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using namespace mbtfm::statistics;
   return run_stage<StudyParameters>(
       {.name = "stats",
-       .purpose = "statistics of stress-fibre tensions by type, over all finished cells of a folder",
+       .purpose = "statistics of stress-fibre tensions and adhesion forces over all finished cells of a folder",
        .files = {{"cells", FileArgument::Kind::input, "folder with cell folders"},
-                 {"out", FileArgument::Kind::output_folder,
-                  "cells.csv, adhesions.csv, fibres.csv, types.csv, tests.csv, figures/, report.html"}}},
-      argc, argv, [](const StudyParameters& parameters, StageContext& context) {
-        const Path folder = context.input("cells");
-        const Study study = read_study(folder);
-        for (const StudyCell& cell : study.cells) {
-          for (const std::string& file : files_of_a_cell()) context.input("cells", {cell.name + "/" + file});
-        }
-        write_text(context.output("out", "cells.csv"), cells_csv(study));
-        write_text(context.output("out", "adhesions.csv"), adhesions_csv(study));
-        write_text(context.output("out", "fibres.csv"), fibres_csv(study));
-        write_text(context.output("out", "types.csv"), types_csv(study, parameters));
-        write_text(context.output("out", "tests.csv"), tests_csv(study));
-        write_text(context.output("out", "figures/tensions_by_type.svg"), tensions_by_type_svg(study));
-        write_text(context.output("out", "figures/forces_by_cell.svg"), forces_by_cell_svg(study));
-        write_text(context.output("out", "figures/adhesion_forces.svg"), adhesion_forces_svg(study));
-        write_text(context.output("out", "report.html"), study_html(study, parameters));
-        StageReport report;
-        report.summary = std::to_string(study.cells.size()) + " cells, " +
-                         std::to_string(measured_fibres(study).size()) + " tensions, " +
-                         std::to_string(study.unfinished.size()) + " unfinished cells left out";
-        return report;
-      });
+                 {"table", FileArgument::Kind::optional_input,
+                  "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},
+                 {"out", FileArgument::Kind::output_folder, "tables, figures/ (SVG and PNG), report.html"}}},
+      argc, argv, statistics::statistics);
 }

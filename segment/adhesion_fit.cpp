@@ -96,7 +96,7 @@ struct Difference {
 };
 
 std::array<Difference, 3> differences(const BlurredEllipse& e, const Priors& p) {
-  const double brightness = std::max(e.brightness, 1e-300);
+  const double brightness = std::max(e.brightness, 1e-100);  // far off, and its square a number still
   return {{{kBrightness, std::log(brightness) - p.brightness.mean, 1 / brightness, p.brightness.weight},
            {kDome, e.dome - p.dome.mean, 1, p.dome.weight},
            {kBlur, std::log(e.blur) - p.blur.mean, 1, p.blur.weight}}};

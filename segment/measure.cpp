@@ -6,9 +6,15 @@
 
 #include "segment/beads.h"
 #include "segment/follow.h"
+#include "segment/match.h"
 
 namespace mbtfm::segment {
 namespace {
+
+// Of a bead's width. Where beads scatter by a tenth of it, two of them differ by 0.4 widths at three standard
+// deviations, which costs a window a twentieth of its likeness; with less, it is steepness or another bead that a
+// dissimilar window shows.
+constexpr double kLoose = 0.1;
 
 bool is_inside(const Plane& plane, Vec2 place, double margin) {
   return place.x >= margin && place.y >= margin && place.x <= plane.width - 1 - margin &&
@@ -122,9 +128,6 @@ void look_again(const Scene& scene, const Dissimilarity& allowed, const std::vec
   const auto is_spoilt = [&](const Track& track) {
     return track.is_good() && 1 - track.found.similarity > std::max(kNoMatter, 2 * allowed.median);
   };
-  // Where beads scatter by a tenth of their width, two of them differ by 0.4 widths at three standard deviations, which
-  // costs a twentieth of likeness; with less, it is steepness or another bead that a dissimilar window shows.
-  constexpr double kLoose = 0.1;
   if (typical_spread(motions_around(scene, tracks)) < kLoose * scene.bead_sigma()) return;
   std::vector<Motion> starts = motions_of(tracks);
   for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -236,6 +239,34 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
     if (track.is_good() && !allowed.is_same(track)) track.flag = "no partner";
   }
   flag_changed_light(scene, tracks);
+}
+
+void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks) {
+  const double scatter = typical_spread(motions_around(scene, tracks));
+  if (scatter < kLoose * scene.bead_sigma()) return;
+  const auto spots = matched_spots(scene, tracks, scatter);
+  std::vector<Track> all = tracks;
+  std::vector<Motion> starts = motions_of(tracks);
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (!spots[k]) continue;
+    // a bead keeps its shape, however steep the field
+    starts[k] = {.u = scene.stressed.positions[*spots[k]] - scene.position(static_cast<int>(k))};
+    all[k].flag.clear();
+  }
+  const Spots stressed = sorted(expected_spots(scene, all, starts), std::max(4.0, scene.spacing()));
+  const Dissimilarity allowed = dissimilarity(scene, least_similarity, tracks);
+  std::vector<Track> found(tracks.size());
+  for_each_bead(scene, [&](int k) {
+    if (!spots[k]) return;
+    auto alone = measured_alone(scene, k, starts[k], stressed);
+    if (alone && allowed.is_same(*alone)) found[k] = std::move(*alone);
+  });
+  check_backwards(scene, found);
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (found[k].is_good()) tracks[k] = std::move(found[k]);
+  }
+  flag_changed_light(scene, tracks);
+  check_claims(scene, tracks);
 }
 
 void verify(const Scene& scene, std::vector<Track>& tracks) {

@@ -11,4 +11,8 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
 /// Registered from where it went, a bead must come back to where it was; no two beads go to one place.
 void verify(const Scene& scene, std::vector<Track>& tracks);
 
+/// Where beads are loose, find again what no window found, or what its neighbours contradicted: matched with the spots
+/// that are left over (match.h), measured without the others' pictures, verified.
+void recover(const Scene& scene, double least_similarity, std::vector<Track>& tracks);
+
 }  // namespace mbtfm::segment

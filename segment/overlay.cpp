@@ -114,6 +114,7 @@ class Canvas {
   }
   const cv::Mat& picture() const { return picture_; }
   double pixel_um() const { return pixel_um_; }
+  Vec2 corner_um() const { return corner_um_; }
 
  private:
   cv::Point2d at(Vec2 p_um) const { return to_pixels(p_um - corner_um_, pixel_um_); }
@@ -217,6 +218,10 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   for (const Fibre& f : cell.fibres) canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
 }
 
+Picture picture_of(const cv::Mat& rgb) {
+  return {rgb.cols, rgb.rows, std::vector<std::uint8_t>(rgb.data, rgb.data + rgb.total() * 3)};
+}
+
 }  // namespace
 
 View view_of(const Segmentation& s) {
@@ -240,7 +245,14 @@ Picture draw_overlay(const std::optional<Channel>& adhesion, const std::optional
   cv::Mat whole;
   const int width = canvas.picture().cols;
   cv::vconcat(canvas.picture(), legend(entries_of(s.cell, canvas.pixel_um(), width), width), whole);
-  return {whole.cols, whole.rows, std::vector<std::uint8_t>(whole.data, whole.data + whole.total() * 3)};
+  return picture_of(whole);
+}
+
+Ground draw_ground(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin, const Segmentation& s) {
+  constexpr double kGroundSide = 1000;  // px: a page shows it some 600 px wide, and carries it
+  const Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kGroundSide);
+  return {picture_of(canvas.picture()), canvas.corner_um(),
+          canvas.pixel_um() * Vec2{double(canvas.picture().cols), double(canvas.picture().rows)}};
 }
 
 cv::Mat draw_thumbnail(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,

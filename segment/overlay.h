@@ -16,6 +16,14 @@ namespace mbtfm::segment {
 Picture draw_overlay(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
                      const Segmentation& segmentation);
 
+/// The same part of the images without any mark, and where it lies, for pages that draw the marks themselves.
+struct Ground {
+  Picture picture;
+  Vec2 low_um, size_um;
+};
+Ground draw_ground(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                   const Segmentation& segmentation);
+
 /// The part of the specimen that a picture shows.
 struct View {
   Vec2 low_um, high_um;

@@ -1,5 +1,6 @@
 #include <opencv2/core/utility.hpp>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/stage.h"
 #include "segment/cell_rois.h"
@@ -76,13 +77,18 @@ StageReport report_of(const std::vector<Segmentation>& cells) {
           .effects = {}};
 }
 
-void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay) {
+void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay,
+                const Ground& ground) {
   const auto out = [&](const char* file) { return context.output("out", folder + file); };
   write_adhesions(out("adhesions.csv"), s.cell.adhesions);
   write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
   write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um);
   write_cell_vtp(out("cell.vtp"), s.cell);
   write_png(out("overlay.png"), overlay);
+  write_jpeg(out("images.jpg"), ground.picture);
+  CsvText place({"x_um", "y_um", "width_um", "height_um"});
+  place.add(ground.low_um.x).add(ground.low_um.y).add(ground.size_um.x).add(ground.size_um.y).end_row();
+  write_text(out("images.csv"), place.str());
   write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
 }
 
@@ -105,7 +111,8 @@ StageReport run(const SegmentParameters& parameters, StageContext& context) {
   const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
-    write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]));
+    write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]),
+               draw_ground(adhesion, actin, cells[i]));
   }
   if (!parameters.contact_sheet.empty())
     write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));
@@ -133,6 +140,6 @@ int main(int argc, char** argv) {
                  {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines used as fibres (.roi or .zip)"},
                  {"out", FileArgument::Kind::output_folder,
                   "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
-                  "RoiSet.zip"}}},
+                  "images.jpg, images.csv, RoiSet.zip"}}},
       argc, argv, mbtfm::segment::run);
 }

@@ -91,6 +91,8 @@ Measured measured_beads(const Scene& scene, std::vector<Track> tracks, const std
   verify(scene, tracks);
   if (turn) flag_turned_out(scene, *turn, tracks);
   flag_outliers(scene, parameters.outlier_threshold, tracks);
+  recover(scene, parameters.least_similarity, tracks);
+  if (turn) flag_turned_out(scene, *turn, tracks);  // those found again
   Pooling pooling = pooled(scene, tracks);
   return {std::move(tracks), std::move(pooling)};
 }

@@ -76,7 +76,8 @@ class RelaxedBeads {
   /// 3. Each is registered backwards, compared with its neighbours (Westerweel & Scarano, Exp Fluids 39:1096, 2005) and
   ///    flagged where it fails: `no partner`, `ambiguous` (does not come back, goes where another bead goes), `edge`,
   ///    `neighbours disagree`.
-  /// 4. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
+  /// 4. Where beads are loose, those that no window found are matched by pattern, light and neighbours (match.h).
+  /// 5. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
   ///
   /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
   /// @throws InvalidData where the stressed image shows no beads, others than the relaxed one, or the sizes differ

@@ -1,7 +1,6 @@
 #include "substrate/cholesky.h"
 
 #include <cholmod.h>
-#include <dlfcn.h>
 
 #include <cmath>
 #include <cstdint>
@@ -9,6 +8,7 @@
 #include <mutex>
 #include <variant>
 
+#include "pipeline/contract/blas.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 #include "substrate/factor_file.h"
@@ -16,12 +16,6 @@
 namespace mbtfm::substrate {
 
 namespace {
-
-/// The BLAS' own threads off: ours share its work, and other numbers of them round differently.
-void keep_blas_to_one_thread() {
-  static const auto set = reinterpret_cast<void (*)(int)>(dlsym(RTLD_DEFAULT, "openblas_set_num_threads"));
-  if (set) set(1);
-}
 
 /// Pattern of the block matrix as a sparse matrix of CHOLMOD that owns nothing.
 cholmod_sparse pattern_of(const BlockMatrix& m) {

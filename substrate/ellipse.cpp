@@ -24,8 +24,8 @@ void check(const std::vector<Ellipse>& ellipses) {
     if (!is_finite(e.centre_um) || !std::isfinite(e.angle_rad)) {
       throw InvalidData(element, "a finite centre and angle", "another");
     }
-    const bool is_ordered = e.semi_minor_um > 0 && e.semi_minor_um <= e.semi_major_um * (1 + 1e-9);
-    if (!is_ordered || !std::isfinite(e.semi_major_um)) {
+    const bool is_finite = std::isfinite(e.semi_minor_um) && std::isfinite(e.semi_major_um);
+    if (!is_finite || e.semi_minor_um <= 0 || e.semi_minor_um > e.semi_major_um * (1 + 1e-9)) {
       throw InvalidData("axes of " + element, "0 < semi_minor_um <= semi_major_um",
                         "'" + std::to_string(e.semi_minor_um) + "' and '" + std::to_string(e.semi_major_um) + "'");
     }

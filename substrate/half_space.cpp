@@ -158,8 +158,10 @@ Sym2 chord_moments_um(Vec2 point_um, double semi_major_um, double semi_minor_um)
     s.cos_0 = scaled.x / s.r;
     s.sin_0 = scaled.y / s.r;
   }
-  const double n = std::ceil(kDigits / (2 * std::log(exp_of_height(s)))) + 1;
-  Sym2 moments = n <= kMostMidpoints ? midpoint_moments(s, static_cast<int>(n)) : graded_moments(s);
+  const double digits_a_point = 2 * std::log(exp_of_height(s));  // none at the rim
+  Sym2 moments = kDigits <= (kMostMidpoints - 1) * digits_a_point
+                     ? midpoint_moments(s, static_cast<int>(std::ceil(kDigits / digits_a_point)) + 1)
+                     : graded_moments(s);
   if ((point_um.x < 0) != (point_um.y < 0)) moments.xy = -moments.xy;
   return 2 * s.a * s.b * moments;
 }

@@ -1,8 +1,10 @@
-/// Charts of curves and points as SVG, for every program that draws one.
+/// Charts of curves and points: described once, drawn as SVG files and as charts that zoom and answer the mouse in
+/// pages.
 #pragma once
 
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -23,12 +25,43 @@ inline constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#00805C", "#B8
 enum class Scale { linear, logarithmic };
 
 struct Axis {
-  std::string label;  ///< with the unit
-  double low = 0, high = 1;
+  std::string label;         ///< with the unit
+  double low = 0, high = 1;  ///< a linear axis may run downwards: low > high
   Scale scale = Scale::linear;
+  /// Ticks with names, for groups in a row, in place of numbers.
+  std::vector<std::pair<double, std::string>> names = {};
 };
+/// Of rows with names from the top down, at 0, 1, 2, …, for a y axis.
+Axis row_axis(const std::vector<std::string>& names);
 /// That holds all finite values (positive ones if logarithmic) and some room on both sides.
 Axis axis_over(std::string label, const std::vector<double>& values, Scale scale);
+/// Where a value lies between the ends of its axis, 0 to 1; NaN where it has no place.
+double share(const Axis& axis, double value);
+
+/// Something drawn in the frame. `style` is CSS of SVG: fill, stroke, stroke-width, stroke-dasharray, ….
+struct Mark {
+  enum class Kind {
+    curve,    ///< through `points`
+    polygon,  ///< with corners `points`
+    pieces,   ///< of line, between each two of `points`
+    bar,      ///< a rectangle between two opposite corners
+    error,    ///< a line between two points with a stop at each end
+    dot,
+    diamond,
+    arrow,    ///< from a point, by `shift_px`
+    upright,  ///< across the frame at x
+    level,    ///< across the frame at y
+    label,    ///< `text` centred on a point, on a white rim
+    picture   ///< between two opposite corners: the image whose address is `text`
+  };
+  Kind kind = Kind::dot;
+  std::vector<Vec2> points = {};  ///< in the units of the axes
+  std::string style = {};
+  std::string hover = {};  ///< what one reads where the mouse rests on it
+  std::string text = {};
+  double radius_px = 0;  ///< of a dot or diamond
+  Vec2 shift_px = {};    ///< of an arrow, in a frame of the SVG's width; in pages it grows with the frame
+};
 
 /// One frame with two axes. What reaches beyond the frame is cut off.
 class Chart {
@@ -39,29 +72,63 @@ class Chart {
   void subtitle(std::string text, std::string colour);
   /// The x axis in another unit, along the upper side: its value is `factor` times that of the lower.
   void second_x_axis(std::string label, double factor);
-  void curve(const std::vector<Vec2>& points, const std::string& style);
+  /// Height of the frame, where the usual one does not suit.
+  void frame_height(double height_px);
+  /// A unit of x is as long as one of y: a map.
+  void same_scales();
+
+  void curve(const std::vector<Vec2>& points, const std::string& style, const std::string& hover = {});
+  void polygon(const std::vector<Vec2>& corners, const std::string& style, const std::string& hover = {});
+  /// Separate pieces of line, as one thing.
+  void pieces(const std::vector<std::pair<Vec2, Vec2>>& pieces, const std::string& style,
+              const std::string& hover = {});
+  /// A filled rectangle between two opposite corners.
+  void bar(Vec2 corner, Vec2 opposite, const std::string& style, const std::string& hover = {});
+  /// An error bar, along x or y.
+  void error(Vec2 from, Vec2 to, const std::string& style, const std::string& hover = {});
   void dot(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
-  /// A word beside a point.
-  void label(Vec2 at, const std::string& text, const std::string& colour);
+  void diamond(Vec2 at, double radius_px, const std::string& style, const std::string& hover = {});
+  void arrow(Vec2 from, Vec2 shift_px, const std::string& style);
   /// A line across the frame at x, or at y.
   void upright(double x, const std::string& style);
   void level(double y, const std::string& style);
+  void label(Vec2 at, const std::string& text);
+  /// @param address  "data:image/…" where a page must stand alone
+  void picture(Vec2 corner, Vec2 opposite, const std::string& address);
   /// A line of the key, in the frame's upper corner on the given side.
   void key(const std::string& text, const std::string& colour);
   enum class KeySide { left, right };
   void put_key(KeySide side) { key_side_ = side; }
 
-  static constexpr double kWidth_px = 460, kHeight_px = 370;
-  std::string str() const;  ///< its elements, from (0, 0) to the width and height
+  static constexpr double kWidth_px = 460;
+  static constexpr double kFrameWidth_px = 362;
+  double height_px() const;  ///< of the SVG
+  std::string str() const;   ///< SVG elements, from (0, 0) to the width and height
+
+  /// The frame with axes and marks for Vega (https://vega.github.io), as JSON: it fills the width that its signal
+  /// `width` gives, and shows what lies within its signals `xdom` and `ydom`. Title, subtitle and key are not in it.
+  std::string vega() const;
+  const std::string& title() const { return title_; }
+  const std::string& subtitle() const { return subtitle_; }
+  const std::string& subtitle_colour() const { return subtitle_colour_; }
+  /// text, colour
+  const std::vector<std::pair<std::string, std::string>>& keys() const { return keys_; }
 
  private:
-  Vec2 place(Vec2 value) const;
-  std::string title_, subtitle_, subtitle_colour_, second_label_, body_;
+  double ink_height_px() const;
+  std::string title_, subtitle_, subtitle_colour_, second_label_;
   Axis x_, y_;
+  std::vector<Mark> marks_;
   double second_factor_ = 0;  ///< 0: no second axis
+  double frame_height_px_;
+  bool are_scales_same_ = false;
   std::vector<std::pair<std::string, std::string>> keys_;
   KeySide key_side_ = KeySide::right;
 };
+
+/// Shaft and two-stroke head of an arrow from (0, 0), as the path of an SVG; short arrows get a short head, those of
+/// less than a dot nothing.
+std::string arrow_path(Vec2 shift_px);
 
 /// Charts beside each other in rows, with lines of text below, as a file of its own.
 std::string svg_file(const std::vector<Chart>& charts, int n_columns, const std::vector<std::string>& caption);

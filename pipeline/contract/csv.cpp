@@ -221,7 +221,7 @@ void write_text(const std::filesystem::path& file, std::string_view text) {
 }
 
 std::filesystem::path temporary_name(const std::filesystem::path& file) {
-  return file.parent_path() / (".partial-" + std::to_string(getpid()) + "-" + file.filename().string());
+  return file.parent_path() / (std::string(kPartialPrefix) + std::to_string(getpid()) + "-" + file.filename().string());
 }
 
 void write_whole(const std::filesystem::path& file, std::string_view text) {

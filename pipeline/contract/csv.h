@@ -76,6 +76,8 @@ std::string read_text(const std::filesystem::path& file);
 /// Write all or throw. @throws OutputError
 void write_text(const std::filesystem::path& file, std::string_view text);
 
+/// How the name of a file begins that is not whole yet.
+inline constexpr std::string_view kPartialPrefix = ".partial-";
 /// The name under which a file is written until it is whole: beside its own, with the same extension.
 std::filesystem::path temporary_name(const std::filesystem::path& file);
 /// Write to the temporary name and rename. @throws OutputError

@@ -17,6 +17,8 @@ inline constexpr int kInput = 3;
 inline constexpr int kNotSolved = 4;  ///< the outputs are there, marked
 inline constexpr int kOutput = 5;
 inline constexpr int kBug = 70;           ///< EX_SOFTWARE of sysexits.h
+inline constexpr int kBusy = 75;          ///< EX_TEMPFAIL of sysexits.h: another run works on the cell
+inline constexpr int kTimedOut = 124;     ///< as of timeout(1)
 inline constexpr int kInterrupted = 130;  ///< as shells count: 128 + SIGINT
 }  // namespace exit_code
 

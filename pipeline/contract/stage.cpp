@@ -10,6 +10,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/blas.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/hash.h"
 #include "pipeline/contract/json.h"
@@ -97,7 +98,8 @@ void set_files(StageContext& context, const StageDescription& description, const
 
 /// A line that is overwritten as the work goes on, on a terminal only.
 Progress terminal_progress(const std::string& stage, bool is_quiet) {
-  const bool is_shown = !is_quiet && isatty(STDERR_FILENO);
+  // mbtfm passes on what a stage prints; where it prints on a terminal, it says so
+  const bool is_shown = !is_quiet && (isatty(STDERR_FILENO) || std::getenv("MBTFM_TERMINAL") != nullptr);
   return [stage, is_shown, last = -1](double fraction, std::string_view what) mutable {
     if (was_interrupted) throw Interrupted("interrupted; nothing was written");
     const int percent = static_cast<int>(100 * fraction);
@@ -269,6 +271,7 @@ int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<StageReport(StageContext&)>& body) {
   const std::string& stage = description.name;
   watch_signals();
+  keep_blas_to_one_thread();
   try {
     ParameterList list;
     declare_parameters(list);

@@ -193,8 +193,9 @@ void check(const DisplacementField& field) {
 void check(const Gel& gel) {
   require_positive(gel.youngs_modulus_kPa, "youngs_modulus_kPa", "the gel");
   require_positive(gel.thickness_um, "thickness_um", "the gel");
-  require(gel.poisson_ratio >= 0 && gel.poisson_ratio < 0.5, "'poisson_ratio' of the gel",
-          "a number from 0 to below 0.5 (0.49 or 0.499 for an incompressible gel)", shown(gel.poisson_ratio));
+  require(std::isfinite(gel.poisson_ratio) && gel.poisson_ratio >= 0 && gel.poisson_ratio < 0.5,
+          "'poisson_ratio' of the gel", "a number from 0 to below 0.5 (0.49 or 0.499 for an incompressible gel)",
+          shown(gel.poisson_ratio));
 }
 
 void check(const Network& network) {

@@ -63,7 +63,7 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
       const Measurement& m = study.measurements[static_cast<std::size_t>(i)];
       chart.dot({m.cpu_seconds, m.tension_error}, 5, "fill:" + colour + ";stroke:#fff",
                 fmt::format("{}: {:.2g} s, error {:.3g}", name_of(m.rung), m.cpu_seconds, m.tension_error));
-      chart.label({m.cpu_seconds, m.tension_error}, m.rung.value, colour);
+      chart.label({m.cpu_seconds, m.tension_error}, m.rung.value);
     }
     chart.key(knob, colour);
   }

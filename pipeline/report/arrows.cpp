@@ -1,13 +1,17 @@
 #include "pipeline/report/arrows.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
 
+#include "pipeline/report/colours.h"
+
 namespace mbtfm::report {
 namespace {
 
-// Arrows across the map at most: one every 16 px.
+// Arrows across the map at most: one every 12 px of a frame as the charts' SVG has it.
 constexpr double kArrowsAcross = 31;
 // The mean of nine beads has a third of their noise.
 constexpr double kMembers = 9;
@@ -64,26 +68,34 @@ AveragedField averaged(const VectorField& field, const Box& box, double side_um)
 }
 
 ArrowScale arrow_scale(const std::vector<Vec2>& vectors) {
-  // The longest arrows but for the top 1 %, in px of the drawing: long enough to compare, short enough to tell apart.
-  constexpr double kLongArrow_px = 44;
+  // The longest arrows but for the top 1 %, in px of such a frame: long enough to compare, short enough to tell apart.
+  constexpr double kLongArrow_px = 32;
   std::vector<double> lengths;
   for (const Vec2 v : vectors) lengths.push_back(norm(v));
   const double top = percentile(lengths, 0.99);
   return {.top = top, .px_per_unit = top > 0 ? kLongArrow_px / top : 0};
 }
 
-void draw_arrows(MapDrawing& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
-                 const std::string& unit) {
-  if (!(scale.top > 0)) return;
+std::string draw_arrows(charts::Chart& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
+                        const std::string& unit) {
+  if (!(scale.top > 0)) return {};
   const ColourScale colours{.low = 0, .high = round_end(scale.top), .label = what + " (" + unit + ")"};
-  map.begin_group("fill:none;stroke-width:1.5");
   for (std::size_t i = 0; i < field.vectors.size(); ++i) {
-    map.arrow(field.positions_um[i], scale.px_per_unit * field.vectors[i], colours.colour(norm(field.vectors[i])));
+    map.arrow(field.positions_um[i], scale.px_per_unit * field.vectors[i],
+              "stroke-width:1.4;stroke:" + colours.colour(norm(field.vectors[i])));
   }
-  map.end_group();
-  const double legend = round_below(scale.top);
-  map.arrow_legend(scale.px_per_unit * legend, readable(legend) + " " + unit);
-  map.colour_bar(colours);
+  return legend(arrow_legend(scale, unit) + colour_bar(colours));
+}
+
+std::string arrow_legend(const ArrowScale& scale, const std::string& unit) {
+  if (!(scale.top > 0)) return {};
+  const double value = charts::round_below(scale.top), length_px = scale.px_per_unit * value;
+  // --frame: width of the frame in that of the charts' SVG; set by the page's script
+  return fmt::format(
+      "<span class=\"arrow\"><svg viewBox=\"0 -6 {0:.1f} 12\" preserveAspectRatio=\"none\" "
+      "style=\"width:calc({0:.1f}px*var(--frame,1))\"><path d=\"{1}\" style=\"fill:none;stroke:#111;stroke-width:1.6;"
+      "vector-effect:non-scaling-stroke\"/></svg>{2} {3}</span>",
+      length_px, charts::arrow_path({length_px, 0}), charts::readable(value), unit);
 }
 
 }  // namespace mbtfm::report

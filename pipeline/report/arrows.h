@@ -4,9 +4,14 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/report/svg.h"
+#include "pipeline/charts/chart.h"
 
 namespace mbtfm::report {
+
+/// A part of the plane.
+struct Box {
+  Vec2 low, high;
+};
 
 /// Vectors at points, to be drawn as arrows.
 struct VectorField {
@@ -34,9 +39,12 @@ struct ArrowScale {
 /// Of no length where nothing moves.
 ArrowScale arrow_scale(const std::vector<Vec2>& vectors);
 
-/// Draw a field with its arrow legend and colour bar. @param what  named in the colour bar
-void draw_arrows(MapDrawing& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
-                 const std::string& unit);
+/// Draw a field, each arrow in the colour of its length. @param what  named in the colour bar
+/// @returns the legend as HTML: an arrow and a colour bar
+std::string draw_arrows(charts::Chart& map, const VectorField& field, const ArrowScale& scale, const std::string& what,
+                        const std::string& unit);
+/// What an arrow's length means, as HTML.
+std::string arrow_legend(const ArrowScale& scale, const std::string& unit);
 
 /// The value below which a share (0 to 1) of the values lies; 0 of none.
 double percentile(std::vector<double> values, double share);

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/report/svg.h"
+#include "pipeline/report/numbers.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/report/tension_table.h"
 

@@ -4,11 +4,19 @@
 
 #include <algorithm>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/polyline.h"
 #include "pipeline/report/arrows.h"
+#include "pipeline/report/base64.h"
+#include "pipeline/report/colours.h"
+#include "pipeline/report/hover.h"
+#include "pipeline/report/numbers.h"
+#include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {
 namespace {
+
+using charts::Chart;
 
 constexpr int kEllipseCorners = 16;  // an ellipse is a few px long
 
@@ -18,18 +26,34 @@ constexpr double kMargin_um = 5;
 Box map_box(const CellResults& results) {
   std::vector<Vec2> points = results.cell.outline_um;
   for (const Adhesion& adhesion : results.cell.adhesions) points.push_back(adhesion.position_um);
-  return box_of(points, kMargin_um);
+  Box box{points.front(), points.front()};
+  for (const Vec2 p : points) {
+    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y)};
+    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y)};
+  }
+  const Vec2 margin{kMargin_um, kMargin_um};
+  return {box.low - margin, box.high + margin};
 }
 
-MapDrawing new_map(const CellResults& results) {
-  MapDrawing map(map_box(results));
+Chart empty_map(const Box& box, const std::string& title) {
+  Chart map(title, {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
+  map.same_scales();
+  return map;
+}
+
+Chart new_map(const CellResults& results, const std::string& title) {
+  Chart map = empty_map(map_box(results), title);
   map.polygon(results.cell.outline_um, kOutlineStyle);
   return map;
 }
 
-void draw_adhesions(MapDrawing& map, const CellResults& results, const std::string& style) {
-  for (const Adhesion& adhesion : results.cell.adhesions)
-    map.polygon(ellipse_corners(adhesion, kEllipseCorners), style);
+enum class Hover { none, whole };  // texts make the page large: not on each map
+
+void draw_adhesions(Chart& map, const CellResults& results, const std::string& style, Hover hover) {
+  for (const Adhesion& adhesion : results.cell.adhesions) {
+    map.polygon(ellipse_corners(adhesion, kEllipseCorners), style,
+                hover == Hover::whole ? hover_of(adhesion, results) : std::string());
+  }
 }
 
 using Pieces = std::vector<std::pair<Vec2, Vec2>>;
@@ -52,16 +76,15 @@ SortedLinks sorted_links(const Network& network, const std::vector<double>& link
   return sorted;
 }
 
-/// What one reads where the mouse rests on a fibre.
-std::string fibre_text(const CellResults& results, int fibre_id) {
-  const auto tension = results.tensions.find(fibre_id);
-  return tension == results.tensions.end()
-             ? fmt::format("fibre {}: not fitted", fibre_id)
-             : fmt::format("fibre {}: {} nN", fibre_id, readable(tension->second.tension_nN));
+std::map<int, std::string> fibre_texts(const CellResults& results) {
+  std::map<int, std::string> texts;
+  for (const Fibre& fibre : results.cell.fibres) texts[fibre.fibre_id] = hover_of(fibre, results);
+  return texts;
 }
 
-void draw_fibre_ids(MapDrawing& map, const CellResults& results) {
-  const double clear_um = 15 / map.px_per_um();  // about a label's width
+void draw_fibre_ids(Chart& map, const CellResults& results) {
+  const Box box = map_box(results);
+  const double clear_um = 15 * (box.high.x - box.low.x) / Chart::kFrameWidth_px;  // about a label's width
   for (const Fibre& fibre : results.cell.fibres) {
     map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(), std::to_string(fibre.fibre_id));
   }
@@ -77,59 +100,90 @@ ColourScale tension_scale(const CellResults& results, NetworkForm form) {
   return scale;
 }
 
-void draw_web(MapDrawing& map, const CellResults& results, const Pieces& web) {
-  draw_adhesions(map, results, "fill:#cfe3f3;stroke:#7aa6c8;stroke-width:0.5");
+void draw_web(Chart& map, const CellResults& results, const Pieces& web, Hover hover) {
   map.pieces(web, "stroke:#bbb;stroke-width:0.5");
+  draw_adhesions(map, results, "fill:#cfe3f3;stroke:#7aa6c8;stroke-width:0.5", hover);
 }
 
-constexpr const char* kHalo = "stroke:#fff;stroke-width:5;stroke-linecap:round";
+// As wide as a mouse can rest on.
+constexpr const char* kHalo = "stroke:#fff;stroke-width:7;stroke-linecap:round";
 constexpr const char* kThick = "stroke-width:3;stroke-linecap:round;stroke:";
 
 Figure original_network(const CellResults& results) {
-  MapDrawing map = new_map(results);
+  Chart map = new_map(results, "Where the fibres are");
   const ColourScale scale = tension_scale(results, NetworkForm::original);
   const SortedLinks links = sorted_links(results.network, {});
-  draw_web(map, results, links.web);
+  const std::map<int, std::string> texts = fibre_texts(results);
+  draw_web(map, results, links.web, Hover::whole);
   for (const auto& [id, pieces] : links.fibres) {
     const auto tension = results.tensions.find(id);
-    const std::string text = fibre_text(results, id);
-    map.pieces(pieces, kHalo, text);
+    map.pieces(pieces, kHalo, texts.at(id));
     map.pieces(pieces, kThick + (tension == results.tensions.end() ? "#555" : scale.colour(tension->second.tension_nN)),
-               text);
+               texts.at(id));
   }
   draw_fibre_ids(map, results);
-  if (scale.high > 0) map.colour_bar(scale);
-  return {"Where the fibres are", map.str("network before contraction"),
+  return {map,
           fmt::format("Stress fibres with their numbers, coloured by their fitted tension, in the network of the first "
                       "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: adhesions, which "
                       "hold the vertices inside them.",
-                      results.network.vertices_um.size(), results.network.links.size())};
+                      results.network.vertices_um.size(), results.network.links.size()),
+          legend(colour_bar(scale))};
 }
 
 Figure contracted_network(const CellResults& results) {
-  MapDrawing map = new_map(results);
+  Chart map = new_map(results, "Network in equilibrium");
   const ColourScale scale = tension_scale(results, NetworkForm::contracted);
   const SortedLinks links = sorted_links(results.contracted.network, results.contracted.link_force_nN);
-  draw_web(map, results, links.web);
+  const std::map<int, std::string> texts = fibre_texts(results);
+  draw_web(map, results, links.web, Hover::none);
   for (const auto& [id, pieces] : links.fibres) {
-    const std::string text = fibre_text(results, id);
     const std::vector<double>& carried_nN = links.carried_nN.at(id);
-    map.pieces(pieces, kHalo, text);
+    map.pieces(pieces, kHalo, texts.at(id));
     for (std::size_t k = 0; k < pieces.size(); ++k) {
       map.pieces({pieces[k]}, kThick + scale.colour(carried_nN[k]),
-                 fmt::format("{}; this link carries {} nN", text, readable(carried_nN[k])));
+                 fmt::format("{}\nthis link carries {} nN", texts.at(id), readable(carried_nN[k])));
     }
   }
-  if (scale.high > 0) map.colour_bar(scale);
-  return {"Network in equilibrium", map.str("contracted network"),
+  return {map,
           "The same network where its tensions have drawn it; each link of a fibre is coloured by the force that it "
-          "carries."};
+          "carries.",
+          legend(colour_bar(scale))};
 }
 
 }  // namespace
 
+Figure segmentation_map(const CellResults& results) {
+  const bool is_dark = results.images.has_value();
+  Chart map =
+      empty_map(is_dark ? Box{results.images->low_um, results.images->high_um} : map_box(results), "Segmentation");
+  if (is_dark) {
+    map.picture(results.images->low_um, results.images->high_um,
+                "data:image/jpeg;base64," + base64(read_text(results.images->file)));
+  }
+  map.polygon(results.cell.outline_um, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
+  // nearly invisible fill: the mouse finds the whole ellipse
+  draw_adhesions(map, results, "fill:#ff9be6;fill-opacity:0.12;stroke:#ff9be6;stroke-width:1.1", Hover::whole);
+  std::string types;
+  for (const FibreType type : {FibreType::dorsal, FibreType::arc, FibreType::ventral}) {
+    types += fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>{}</span>",
+                         is_dark ? bright_colour_of(type) : colour_of(type), full_name_of(type));
+  }
+  for (const Fibre& fibre : results.cell.fibres) {
+    map.curve(fibre.points_um,
+              std::string("stroke-width:2.6;stroke-linecap:round;stroke:") +
+                  (is_dark ? bright_colour_of(fibre.type) : colour_of(fibre.type)),
+              hover_of(fibre, results));
+  }
+  draw_fibre_ids(map, results);
+  return {map,
+          is_dark ? "Adhesions, fibres and outline over the images they were found in: actin grey, adhesions purple. "
+                    "Full size: 1_segment/overlay.png."
+                  : "Adhesions, fibres and outline.",
+          legend(types + "<span><span class=\"type\" style=\"background:#ff9be6\"></span>adhesion</span>")};
+}
+
 Figure adhesion_map(const CellResults& results) {
-  MapDrawing map = new_map(results);
+  Chart map = new_map(results, "Forces on the substrate");
   const auto by_id = adhesions_by_id(results.cell);
   std::vector<double> tractions;
   std::vector<Vec2> forces;
@@ -142,23 +196,16 @@ Figure adhesion_map(const CellResults& results) {
   for (std::size_t i = 0; i < results.forces.size(); ++i) {
     const Adhesion& adhesion = *by_id.at(results.forces[i].adhesion_id);
     map.polygon(ellipse_corners(adhesion, kEllipseCorners),
-                "stroke:#333;stroke-width:0.5;fill:" + colours.colour(tractions[i]),
-                fmt::format("adhesion {}: {} nN, {} kPa on {} µm²", adhesion.adhesion_id, readable(norm(forces[i])),
-                            readable(tractions[i]), readable(adhesion.area_um2)));
+                "stroke:#333;stroke-width:0.5;fill:" + colours.colour(tractions[i]), hover_of(adhesion, results));
   }
-  map.begin_group("fill:none;stroke-width:1.5");
   for (const AdhesionForce& force : results.forces) {
-    map.arrow(by_id.at(force.adhesion_id)->position_um, scale.px_per_unit * force.force_nN, "#111");
+    map.arrow(by_id.at(force.adhesion_id)->position_um, scale.px_per_unit * force.force_nN,
+              "stroke-width:1.4;stroke:#111");
   }
-  map.end_group();
-  if (scale.top > 0) {
-    const double legend = round_below(scale.top);
-    map.arrow_legend(scale.px_per_unit * legend, readable(legend) + " nN");
-  }
-  if (colours.high > 0) map.colour_bar(colours);
-  return {"Forces on the substrate", map.str("adhesions with their forces"),
+  return {map,
           "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force of the cell on the "
-          "substrate. Dashed: the cell’s outline. The few highest tractions share the colour at the bar’s end."};
+          "substrate. Dashed: the cell’s outline. The few highest tractions share the colour at the bar’s end.",
+          legend(arrow_legend(scale, "nN") + colour_bar(colours))};
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {
@@ -172,30 +219,29 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
   const double side_um = averaging_side_um(measured, box);
   const AveragedField means = averaged(measured, box, side_um);
   const ArrowScale scale = arrow_scale(means.means.vectors);
-  const auto drawn = [&](const VectorField& field, const std::string& title, const std::string& what) {
-    MapDrawing map = new_map(results);
-    draw_adhesions(map, results, "fill:#ddd;stroke:none");
-    draw_arrows(map, field, scale, what, "µm");
-    return map.str(title);
+  const auto drawn = [&](const VectorField& field, const std::string& title, const std::string& what,
+                         const std::string& caption) {
+    Chart map = new_map(results, title);
+    draw_adhesions(map, results, "fill:#ddd", Hover::none);
+    const std::string explained = draw_arrows(map, field, scale, what, "µm");
+    return Figure{map, caption, explained};
   };
   std::vector<Figure> figures = {
-      {"Measured displacement", drawn(means.means, "displacement of the beads", "displacement"),
-       fmt::format(
-           "Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average, so that their noise "
-           "fades; it begins where they lie on the relaxed gel. The fit uses every bead by itself.",
-           side_um, means.mean_members)}};
+      drawn(means.means, "Measured displacement", "displacement",
+            fmt::format(
+                "Each arrow is the mean of the beads in a square of {:.1f} µm, {:.0f} on average, so that their noise "
+                "fades; it begins where they lie on the relaxed gel. The fit uses every bead by itself.",
+                side_um, means.mean_members))};
   if (!results.residual) return figures;
   residual = {results.residual->positions_um, results.residual->residual_um};
   fitted = measured;
   for (std::size_t i = 0; i < fitted.vectors.size(); ++i) fitted.vectors[i] = fitted.vectors[i] - residual.vectors[i];
-  figures.push_back({"Fitted displacement",
-                     drawn(averaged(fitted, box, side_um).means, "fitted displacement", "displacement"),
-                     "What the model says at the same beads, averaged in the same squares and drawn to the same "
-                     "scale."});
-  figures.push_back({"Measured minus fitted",
-                     drawn(averaged(residual, box, side_um).means, "residual displacement", "difference"),
-                     "Same squares, same scale. Bead noise points anywhere; arrows that point the same way over a "
-                     "region are the model’s error."});
+  figures.push_back(drawn(averaged(fitted, box, side_um).means, "Fitted displacement", "displacement",
+                          "What the model says at the same beads, averaged in the same squares and drawn to the same "
+                          "scale."));
+  figures.push_back(drawn(averaged(residual, box, side_um).means, "Measured minus fitted", "difference",
+                          "Same squares, same scale. Bead noise points anywhere; arrows that point the same way over a "
+                          "region are the model’s error."));
   return figures;
 }
 

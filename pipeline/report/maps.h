@@ -1,18 +1,23 @@
-/// The report's maps of a cell, each one an <svg> element.
+/// The report's maps of a cell: x to the right, y down, both in um.
 #pragma once
 
 #include <string>
 #include <vector>
 
+#include "pipeline/charts/chart.h"
 #include "pipeline/report/results.h"
 
 namespace mbtfm::report {
 
 /// A map and what must be known to read it.
 struct Figure {
-  std::string title, svg, caption;
+  charts::Chart chart;
+  std::string caption;
+  std::string legend;  ///< HTML
 };
 
+/// Outline, adhesions and fibres over the images that they were found in, where there are any.
+Figure segmentation_map(const CellResults& results);
 /// Ellipses coloured by traction, with the force on the substrate as arrows.
 Figure adhesion_map(const CellResults& results);
 /// Measured displacement, and where results.residual is known also the fitted one and the difference: means over the

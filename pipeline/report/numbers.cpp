@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/report/svg.h"
-
 namespace mbtfm::report {
 
 namespace {

@@ -4,7 +4,11 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/charts/chart.h"
+
 namespace mbtfm::report {
+
+using charts::readable;
 
 /// Decimals that show two digits of an error. @param error  > 0
 int decimals_for(double error);

@@ -5,7 +5,11 @@
 #include <utility>
 #include <vector>
 
+#include "pipeline/charts/chart.h"
+
 namespace mbtfm::report {
+
+using charts::html_escaped;
 
 /// Cells are HTML already; `is_number` columns are aligned to the right and sorted as numbers.
 struct Table {
@@ -16,17 +20,28 @@ struct Table {
   std::vector<Column> columns;
   std::vector<std::vector<std::string>> rows;
 };
+
+/// A file that a reader can take out of the page.
+struct Download {
+  std::string name, text;
+};
+
 /// A table whose rows sort by a click on a column's title.
 std::string html_of(const Table& table);
+/// The same with a link to its numbers, all digits of them.
+std::string html_of(const Table& table, const Download& csv);
 /// Two columns: name, value.
 std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs);
 
+/// A section with its line in the page's table of contents.
 std::string section(const std::string& title, const std::string& content);
 /// Folded until clicked.
 std::string folded(const std::string& title, const std::string& content);
-std::string figure(const std::string& title, const std::string& picture, const std::string& caption);
+/// A chart that zooms and answers the mouse. @param legend  HTML below the frame
+std::string figure(const charts::Chart& chart, const std::string& caption, const std::string& legend = {});
 
-/// A whole page with its styles and its script inside: it asks for nothing from anywhere.
-std::string page(const std::string& title, const std::string& body);
+/// A whole page with its styles, scripts and Vega inside: it asks for nothing from anywhere. @param head  HTML before
+/// the table of contents
+std::string page(const std::string& title, const std::string& head, const std::string& body);
 
 }  // namespace mbtfm::report

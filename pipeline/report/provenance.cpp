@@ -4,7 +4,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/report/svg.h"
+#include "pipeline/report/numbers.h"
 
 namespace mbtfm::report {
 namespace {
@@ -73,7 +73,6 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
                                     .seconds = effect.value("seconds", 0.0) > 0 ? number_of(effect, "seconds") : "",
                                     .is_on = effect.at("on")});
     }
-    provenance.error_budget = flat(run, "error_budget");
   } catch (const ordered_json::exception& error) {
     throw InputError(run_file.string(), "a run.json as mbtfm run writes it", error.what());
   }

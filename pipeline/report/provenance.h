@@ -26,8 +26,6 @@ struct Provenance {
   std::string version;
   std::vector<StageLine> stages;
   std::vector<EffectLine> effects;
-  /// name, value
-  std::vector<std::pair<std::string, std::string>> error_budget;
 };
 
 /// Of run.json; empty where there is none. @throws InputError where it is malformed

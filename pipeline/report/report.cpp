@@ -7,18 +7,20 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/hash.h"
 #include "pipeline/contract/version.h"
-#include "pipeline/report/base64.h"
+#include "pipeline/report/error_budget.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/maps.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
 #include "pipeline/report/results.h"
-#include "pipeline/report/svg.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/report/tension_table.h"
 
 namespace mbtfm::report {
+
+extern const std::string_view kParaviewScript;  // view_in_paraview.py, made into C++ by the build
+
 namespace {
 
 std::string findings_section(const CellResults& results, const Provenance& provenance) {
@@ -42,31 +44,32 @@ std::string findings_section(const CellResults& results, const Provenance& prove
   return section("In short", html + "</ul>\n");
 }
 
+std::string html_of(const Figure& map) { return figure(map.chart, map.caption, map.legend); }
+
+/// A file of the cell as it lies in its folder.
+Download file_of(const CellResults& results, const std::string& file) {
+  const std::filesystem::path path = results.folder / file;
+  return {results.name + "_" + path.filename().string(), read_text(path)};
+}
+
 std::string tension_section(const CellResults& results) {
-  std::string html = "<div class=\"grid\">\n";
-  html += figure("Tension of each fibre", tension_plot(results),
-                 "By type, the strongest first. The interval holds the bead noise and, where several meshes were "
-                 "fitted, the spread between them.");
-  const Figure network = network_map(results, NetworkForm::original);
-  html += figure(network.title, network.svg, network.caption) + "</div>\n" + html_of(tension_table(results));
-  html += tension_notes(results);
-  return section("Tensions", html);
+  return section("Tensions",
+                 "<div class=\"grid\">\n" +
+                     figure(tension_plot(results),
+                            "By type, the strongest first. The interval holds the bead noise and, where several meshes "
+                            "were fitted, the spread between them.",
+                            tension_plot_legend(results)) +
+                     html_of(network_map(results, NetworkForm::original)) + "</div>\n" +
+                     html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) + tension_notes(results));
 }
 
 std::string map_section(const CellResults& results) {
-  std::string html = "<div class=\"grid\">\n";
-  const auto add = [&](const Figure& f) { html += figure(f.title, f.svg, f.caption); };
-  if (results.overlay) {
-    html +=
-        figure("Segmentation",
-               "<img alt=\"segmentation over the images\" src=\"data:image/png;base64," +
-                   base64(read_text(*results.overlay)) + "\">",
-               "Adhesions, fibres and outline over the images they were found in. Numbers are the ids of the tables; "
-               "adhesions without room for theirs have none. Full size: 1_segment/overlay.png.");
-  }
-  add(adhesion_map(results));
-  for (const Figure& map : displacement_maps(results)) add(map);
-  add(network_map(results, NetworkForm::contracted));
+  std::string html =
+      "<p class=\"sub screen\">The mouse tells what it rests on. Ctrl and wheel, or the buttons, zoom; dragging moves; "
+      "a double click shows all again.</p><div class=\"grid\">\n" +
+      html_of(segmentation_map(results)) + html_of(adhesion_map(results));
+  for (const Figure& map : displacement_maps(results)) html += html_of(map);
+  html += html_of(network_map(results, NetworkForm::contracted));
   return section("Maps", html +
                              "</div>\n<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
                              "outer corner of its top left pixel.</p>");
@@ -107,7 +110,7 @@ std::string adhesion_section(const CellResults& results) {
       "torques {}{}.</p>\n",
       top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque),
       balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
-  html += html_of(top);
+  html += html_of(top, file_of(results, "4_fit/adhesion_forces.csv"));
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
   return section("Forces of the adhesions", html);
 }
@@ -161,7 +164,6 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
   }
   std::string html = html_of(stages);
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
-  if (!provenance.error_budget.empty()) html += "<h3>Error budget</h3>\n" + html_of_pairs(provenance.error_budget);
   html += folded("Figures of the fit", figure_pairs(results));
   for (const StageLine& stage : provenance.stages) {
     if (!stage.parameters.empty()) html += folded("Parameters of " + stage.name, html_of_pairs(stage.parameters));
@@ -194,19 +196,25 @@ std::string fingerprint(const std::filesystem::path& cell) {
 std::string report_html(const std::filesystem::path& cell) {
   const CellResults results = read_results(cell);
   const Provenance provenance = read_provenance(cell / "run.json");
-  std::string body = fmt::format(
+  const std::string head = fmt::format(
       "<h1>{}</h1><p class=\"what\">Tensions of the stress fibres and forces of the adhesions of one cell, by "
       "model-based traction force microscopy</p>\n<p class=\"sub\">Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} "
       "µm thick · mbtfm {}</p>\n",
       html_escaped(results.name), readable(results.gel.youngs_modulus_kPa), readable(results.gel.poisson_ratio),
       readable(results.gel.thickness_um), kVersion);
-  body += findings_section(results, provenance);
+  std::string body = findings_section(results, provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
-  body += map_section(results) + adhesion_section(results) + provenance_section(results, provenance);
-  return page(results.name + " – mbtfm", body);
+  body += map_section(results) + adhesion_section(results);
+  if (const auto budget = read_error_budget(cell / "run.json"); !budget.empty())
+    body += section("Error budget", error_budget_html(budget, results.name));
+  body += provenance_section(results, provenance);
+  return page(results.name + " – mbtfm", head, body);
 }
 
 void update_report(const std::filesystem::path& cell) {
+  const std::filesystem::path script = cell / "view_in_paraview.py";
+  if (!std::filesystem::is_regular_file(script) || read_text(script) != kParaviewScript)
+    write_whole(script, std::string(kParaviewScript));
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
   if (std::filesystem::is_regular_file(file) && read_text(file).ends_with(signature)) return;

@@ -1,5 +1,6 @@
 #include "pipeline/report/results.h"
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parameters.h"
 
@@ -25,6 +26,15 @@ std::optional<Residual> residual_of(const DisplacementField& measured, const Pat
   return residual;
 }
 
+std::optional<Images> images_of(const Path& segmentation) {
+  const Path file = segmentation / "images.jpg", place = segmentation / "images.csv";
+  if (!fs::is_regular_file(file) || !fs::is_regular_file(place)) return {};
+  const CsvTable table(place);
+  if (table.n_rows() != 1) throw InputError(place.string(), "one row", std::to_string(table.n_rows()));
+  const Vec2 low_um{table.number(0, "x_um"), table.number(0, "y_um")};
+  return Images{file, low_um, low_um + Vec2{table.number(0, "width_um"), table.number(0, "height_um")}};
+}
+
 }  // namespace
 
 CellResults read_results(const Path& cell) {
@@ -44,7 +54,7 @@ CellResults read_results(const Path& cell) {
   results.fit = read_fit_summary(cell / "4_fit/fit.json");
   results.residual = residual_of(results.displacement, cell / "4_fit/fitted_displacement.csv");
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
-  if (fs::is_regular_file(cell / "1_segment/overlay.png")) results.overlay = cell / "1_segment/overlay.png";
+  results.images = images_of(cell / "1_segment");
   return results;
 }
 

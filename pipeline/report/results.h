@@ -16,6 +16,12 @@ struct Residual {
   std::vector<Vec2> positions_um, residual_um;
 };
 
+/// The images behind a segmentation, as one picture, and where it lies.
+struct Images {
+  Path file;  ///< JPEG
+  Vec2 low_um, high_um;
+};
+
 struct CellResults {
   Path folder;
   std::string name;
@@ -29,7 +35,7 @@ struct CellResults {
   FitSummary fit;
   std::optional<Residual> residual;
   std::optional<Comparison> comparison;  ///< of a simulated cell
-  std::optional<Path> overlay;           ///< picture of the segmentation
+  std::optional<Images> images;
 };
 
 /// @throws InputError where a file that the stages write lacks or is malformed

@@ -4,12 +4,13 @@
 
 #include <algorithm>
 
-#include "pipeline/report/svg.h"
+#include "pipeline/report/hover.h"
+#include "pipeline/report/numbers.h"
 
 namespace mbtfm::report {
 namespace {
 
-constexpr double kWidth_px = 560, kLeft_px = 104, kRight_px = 16, kRow_px = 20, kTop_px = 34, kBottom_px = 46;
+using charts::Chart;
 
 /// Largest value to show.
 double largest_nN(const std::vector<FibreRow>& rows) {
@@ -21,64 +22,17 @@ double largest_nN(const std::vector<FibreRow>& rows) {
   return largest > 0 ? 1.03 * largest : 1;
 }
 
-std::string axis(double largest, double px_per_nN, double bottom) {
-  std::string svg;
-  const double step = round_below(largest / 4);
-  for (int i = 0; i * step <= largest; ++i) {
-    const double x = kLeft_px + px_per_nN * i * step;
-    svg += fmt::format(
-        "<path d=\"M{0:.1f},{1}V{2:.1f}\" class=\"grid\"/><text x=\"{0:.1f}\" y=\"{3:.1f}\" "
-        "text-anchor=\"middle\">{4}</text>",
-        x, kTop_px, bottom, bottom + 17, readable(i * step));
-  }
-  return svg + fmt::format("<text x=\"{:.1f}\" y=\"{:.1f}\" text-anchor=\"middle\">tension (nN)</text>\n",
-                           (kLeft_px + kWidth_px - kRight_px) / 2, bottom + 37);
-}
-
-std::string mark(double x, double y, const char* colour, bool is_filled) {
-  return fmt::format("<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"4.5\" style=\"stroke:{};stroke-width:2;fill:{}\"/>", x, y,
-                     colour, is_filled ? colour : "#fff");
-}
-
-std::string truth_mark(double x, double y) {
-  return fmt::format("<path d=\"M{:.1f},{:.1f}l5,5l-5,5l-5,-5z\" style=\"fill:#fff;stroke:#000;stroke-width:1.4\"/>", x,
-                     y - 5);
-}
-
-std::string legend(bool has_truth, bool has_unidentifiable) {
-  std::string svg = mark(kLeft_px, 14, "#555", true) +
-                    fmt::format("<path d=\"M{:.0f},14h26\" style=\"stroke:#555;stroke-width:2\"/>", kLeft_px - 13) +
-                    fmt::format("<text x=\"{:.0f}\" y=\"19\">fit, 95 % interval</text>", kLeft_px + 20);
-  if (has_truth) {
-    svg += truth_mark(kLeft_px + 188, 14) + fmt::format("<text x=\"{:.0f}\" y=\"19\">truth</text>", kLeft_px + 199);
-  }
-  if (has_unidentifiable) {
-    svg += mark(kLeft_px + 268, 14, "#555", false) +
-           fmt::format("<text x=\"{:.0f}\" y=\"19\">not identifiable</text>", kLeft_px + 279);
-  }
-  return svg + "\n";
-}
-
-std::string row_of(const FibreRow& row, double y, double px_per_nN) {
-  const char* colour = colour_of(row.fibre->type);
-  const double x = kLeft_px + px_per_nN * row.tension.tension_nN;
-  std::string hover = fmt::format("fibre {} ({}): {} nN", row.fibre->fibre_id, full_name_of(row.fibre->type),
-                                  readable(row.tension.tension_nN));
-  std::string svg;
-  if (row.tension.low_nN && row.tension.high_nN) {
-    hover += fmt::format(" [{}, {}]", readable(*row.tension.low_nN), readable(*row.tension.high_nN));
-    svg += fmt::format(
-        "<path d=\"M{0:.1f},{1:.1f}H{2:.1f}M{0:.1f},{3:.1f}v8M{2:.1f},{3:.1f}v8\" "
-        "style=\"stroke:{4};stroke-width:2\"/>",
-        kLeft_px + px_per_nN * *row.tension.low_nN, y, kLeft_px + px_per_nN * *row.tension.high_nN, y - 4, colour);
-  }
-  svg += mark(x, y, colour, row.tension.identifiable);
+void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& results) {
+  const std::string colour = colour_of(row.fibre->type);
+  std::string hover = hover_of(*row.fibre, results);
+  if (row.true_tension_nN) hover += "\ntruth " + readable(*row.true_tension_nN) + " nN";
+  const Tension& t = row.tension;
+  if (t.low_nN && t.high_nN) chart.error({*t.low_nN, y}, {*t.high_nN, y}, "stroke-width:2;stroke:" + colour, hover);
+  chart.dot({t.tension_nN, y}, 4.5, "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff"),
+            hover);
   if (row.true_tension_nN) {
-    hover += ", truth " + readable(*row.true_tension_nN);
-    svg += truth_mark(kLeft_px + px_per_nN * *row.true_tension_nN, y);
+    chart.diamond({*row.true_tension_nN, y}, 5.5, "fill:#fff;stroke:#000;stroke-width:1.4", hover);
   }
-  return fmt::format("<g><title>{}</title><text x=\"{:.0f}\" y=\"{:.1f}\" text-anchor=\"end\">{} {}</text>{}</g>\n",
-                     html_escaped(hover), kLeft_px - 8, y + 5, name_of(row.fibre->type), row.fibre->fibre_id, svg);
 }
 
 }  // namespace
@@ -107,6 +61,18 @@ const char* full_name_of(FibreType type) {
   return "";
 }
 
+const char* bright_colour_of(FibreType type) {
+  switch (type) {
+    case FibreType::dorsal:
+      return "#56b4ff";
+    case FibreType::arc:
+      return "#ffb728";
+    case FibreType::ventral:
+      return "#00d68f";
+  }
+  return "#ddd";
+}
+
 std::vector<FibreRow> fibre_rows(const CellResults& results) {
   std::vector<FibreRow> rows;
   for (const Fibre& fibre : results.cell.fibres) {
@@ -131,20 +97,28 @@ std::vector<FibreRow> fibre_rows(const CellResults& results) {
   return rows;
 }
 
-std::string tension_plot(const CellResults& results) {
+Chart tension_plot(const CellResults& results) {
   const std::vector<FibreRow> rows = fibre_rows(results);
+  std::vector<std::string> names;
+  for (const FibreRow& row : rows) names.push_back(fmt::format("{} {}", name_of(row.fibre->type), row.fibre->fibre_id));
   const double largest = largest_nN(rows);
-  const double px_per_nN = (kWidth_px - kLeft_px - kRight_px) / largest;
-  const double bottom = kTop_px + kRow_px * static_cast<double>(rows.size());
-  const bool has_unidentifiable =
-      std::any_of(rows.begin(), rows.end(), [](const FibreRow& row) { return !row.tension.identifiable; });
-  std::string svg = fmt::format("<svg viewBox=\"0 0 {} {:.0f}\" role=\"img\" aria-label=\"tensions of the fibres\">\n",
-                                kWidth_px, bottom + kBottom_px);
-  svg += axis(largest, px_per_nN, bottom) + legend(results.comparison.has_value(), has_unidentifiable);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    svg += row_of(rows[i], kTop_px + kRow_px * (static_cast<double>(i) + 0.5), px_per_nN);
+  // from a little below zero: the mark of a tension of zero is seen whole
+  Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(names));
+  constexpr double kRow_px = 20;
+  chart.frame_height(kRow_px * static_cast<double>(rows.size()));
+  for (std::size_t i = 0; i < rows.size(); ++i) draw_row(chart, rows[i], static_cast<double>(i), results);
+  return chart;
+}
+
+std::string tension_plot_legend(const CellResults& results) {
+  std::string text = "●&nbsp;fit with its 95&nbsp;% interval";
+  if (results.comparison) text += " · ◇&nbsp;truth";
+  for (const FibreRow& row : fibre_rows(results)) {
+    if (row.tension.identifiable) continue;
+    text += " · ○&nbsp;not identifiable";
+    break;
   }
-  return svg + "</svg>\n";
+  return "<div class=\"legend\"><span>" + text + "</span></div>\n";
 }
 
 }  // namespace mbtfm::report

@@ -3,15 +3,20 @@
 
 #include <string>
 
+#include "pipeline/charts/chart.h"
 #include "pipeline/report/results.h"
 
 namespace mbtfm::report {
 
-/// One row a fibre, by type, the strongest first; an <svg> element.
-std::string tension_plot(const CellResults& results);
+/// One row a fibre, by type, the strongest first.
+charts::Chart tension_plot(const CellResults& results);
+/// Its marks explained, as HTML.
+std::string tension_plot_legend(const CellResults& results);
 
 /// Colour of a fibre type (Okabe & Ito: told apart by colour-blind eyes).
 const char* colour_of(FibreType type);
+/// The same, lighter for the dark ground of an image.
+const char* bright_colour_of(FibreType type);
 /// "dorsal", "transverse arc", "ventral"
 const char* full_name_of(FibreType type);
 

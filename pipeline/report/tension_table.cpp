@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "pipeline/report/numbers.h"
-#include "pipeline/report/svg.h"
 #include "pipeline/report/tension_plot.h"
 
 namespace mbtfm::report {

@@ -1,16 +1,18 @@
 #include "pipeline/runner/batch.h"
 
 #include <algorithm>
+#include <chrono>
 #include <fstream>
-#include <iomanip>
+#include <map>
 #include <mutex>
-#include <sstream>
+#include <thread>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
-#include "pipeline/runner/batch_table.h"
-#include "pipeline/runner/process.h"
+#include "pipeline/runner/batch_progress.h"
+#include "pipeline/runner/lock.h"
+#include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -26,46 +28,132 @@ void collect_cells(const fs::path& folder, std::vector<fs::path>& cells) {
   }
 }
 
-/// The first line of a log that tells of an error: it is the cause of those after it; or else its last line.
-std::string first_error(const fs::path& log_file) {
-  std::ifstream log(log_file);
-  std::string last;
-  for (std::string line; std::getline(log, line);) {
-    if (line.find(": error: ") != std::string::npos) return line;
-    if (!line.empty()) last = line;
-  }
-  return last;
+constexpr const char* kRunRecord = "run.json";
+
+std::string first_line(const std::string& text) { return text.substr(0, text.find('\n')); }
+
+/// When run.json was written last, to tell whether this run wrote it.
+std::optional<fs::file_time_type> time_of_record(const fs::path& cell) {
+  std::error_code is_missing;
+  const auto time = fs::last_write_time(cell / kRunRecord, is_missing);
+  return is_missing ? std::nullopt : std::optional(time);
+}
+
+/// A run is killed where it takes longer than all of its stages may, and a minute to hash, to report and to end.
+ProcessLimits limits_of_cell(const ProcessLimits& of_stage) {
+  constexpr double kMargin_s = 60;
+  if (!of_stage.seconds) return {};
+  return {.seconds = static_cast<double>(stages().size()) * *of_stage.seconds + kMargin_s, .memory_bytes = {}};
+}
+
+void tell_of_failure(const std::optional<RecordedFailure>& failure, BatchCell& cell) {
+  if (!failure) return;
+  cell.failed_stage = failure->stage;
+  cell.how = failure->how;
+  if (!failure->message.empty()) cell.message = first_line(failure->message);
 }
 
 BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
-  const fs::path log = cell / "run.log";
   std::vector<std::string> command = {options.program.string(), "run", cell.string(), "--quiet"};
   command.insert(command.end(), options.arguments.begin(), options.arguments.end());
-  BatchCell outcome{.cell = cell, .exit_code = 0, .seconds = 0, .message = {}};
+  BatchCell outcome{.cell = cell, .message = {}, .failed_stage = {}, .how = {}};
   try {
-    write_text(log, "");
-    const ProcessResult result = run_process(command, log);
+    write_text(cell / "run.log", "");
+    const auto record_before = time_of_record(cell);
+    std::ofstream log(cell / "run.log", std::ios::app);
+    const ProcessResult result = run_process(command, limits_of_cell(options.run.limits),
+                                             [&](std::string_view text) { log << text << std::flush; });
     outcome.seconds = result.seconds;
-    outcome.exit_code = result.signal ? 128 + *result.signal : result.exit_code;  // the shell's convention
-    if (result.signal) outcome.message = how_it_ended(result);
-    if (!result.signal && result.exit_code != 0) outcome.message = first_error(log);
+    outcome.exit_code = exit_code_of(result);
+    if (outcome.exit_code == 0 || outcome.exit_code == exit_code::kBusy) return outcome;
+    outcome.how = how_it_ended(result);
+    outcome.message = first_line(error_in(result.last_output));
+    if (time_of_record(cell) == record_before) return outcome;
+    tell_of_failure(recorded_failure(cell), outcome);
   } catch (const OutputError& error) {  // no log, no process: this cell's matter, not the batch's
-    outcome.exit_code = 5;
+    outcome.exit_code = exit_code::kOutput;
+    outcome.how = "not started";
     outcome.message = error.what();
   }
   return outcome;
 }
 
-std::string progress_line(const BatchCell& cell, int n_done, std::size_t n, const std::vector<std::string>& only) {
-  std::ostringstream line;
-  line << '[' << n_done << '/' << n << "] " << cell.cell.string() << ": " << std::fixed << std::setprecision(1)
-       << cell.seconds << " s: ";
-  if (cell.exit_code == 0) {
-    line << last_summary(cell.cell, only);
-  } else {
-    line << "FAILED, exit code " << cell.exit_code;
+/// What a batch sees of a cell before it runs it.
+struct Look {
+  enum class Finding { done, to_run, busy };
+  Finding finding = Finding::to_run;
+  std::vector<std::string> stages;  ///< that may run
+  BatchCell outcome;                ///< of a cell that is done
+};
+
+/// Is there anything to do for the cell? Where it is not even readable, `mbtfm run` tells why.
+Look look_at(const fs::path& cell, const RunOptions& options) {
+  Look look;
+  look.outcome.cell = cell;
+  try {
+    const CellLock lock(cell, options.only);
+    const CellOutcome now = look_at_cell(cell, options);
+    for (const StageOutcome& stage : now.stages) {
+      const StageState state = stage.status.state;
+      if (state == StageState::must_run || state == StageState::up_to_date) look.stages.push_back(stage.stage);
+    }
+    if (!is_done(cell, options, now)) return look;
+    look.finding = Look::Finding::done;
+    if (now.converged()) return look;
+    look.outcome.exit_code = exit_code::kNotSolved;
+    look.outcome.how = "exit code " + std::to_string(exit_code::kNotSolved);
+    look.outcome.failed_stage = now.not_converged();
+    look.outcome.message = "not converged; the outputs are marked";
+  } catch (const CellBusy&) {
+    look.finding = Look::Finding::busy;
+  } catch (const InputError&) {
+    // to run
+  } catch (const OutputError&) {
+    // to run
   }
-  return line.str();
+  return look;
+}
+
+/// Wait until no other run is in the cell, do what it has left, and take the outcome.
+BatchCell run_when_free(const fs::path& cell, const BatchOptions& options) {
+  constexpr std::chrono::milliseconds kPause(200);  // a look costs about a millisecond
+  for (;;) {
+    const Look look = look_at(cell, options.run);
+    if (look.finding == Look::Finding::done) return look.outcome;
+    if (look.finding == Look::Finding::to_run) {
+      const BatchCell outcome = run_one(cell, options);
+      if (outcome.exit_code != exit_code::kBusy) return outcome;
+    }
+    throw_if_interrupted();
+    std::this_thread::sleep_for(kPause);
+  }
+}
+
+/// Once for all cells of the same parameters, which are most as a rule: do the stages accept them? Starting a stage to
+/// ask costs up to half a second, and a wrong parameter should be told before an hour's work, not after it.
+/// The outcomes of cells that are refused say so.
+void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options) {
+  std::map<std::pair<std::string, std::string>, std::vector<Look*>> cells_by_settings;
+  for (Look& look : looks) {
+    if (look.finding == Look::Finding::done || look.stages.empty()) continue;
+    const Settings settings = read_settings(look.outcome.cell / "cell.toml");
+    for (const std::string& stage : look.stages) cells_by_settings[{stage, settings.at(stage)}].push_back(&look);
+  }
+  for (const auto& [key, same] : cells_by_settings) {
+    const auto stage =
+        std::find_if(stages().begin(), stages().end(), [&](const Stage& s) { return s.name == key.first; });
+    try {
+      check_parameters(*stage, same.front()->outcome.cell / "cell.toml", options.run, [](std::string_view) {});
+    } catch (const StageFailed& error) {
+      for (Look* look : same) {
+        look->finding = Look::Finding::done;
+        look->outcome.exit_code = error.failure.exit_code;
+        look->outcome.failed_stage = stage->name;
+        look->outcome.how = error.failure.how;
+        look->outcome.message = first_line(error.failure.message);
+      }
+    }
+  }
 }
 
 }  // namespace
@@ -83,17 +171,73 @@ std::vector<fs::path> find_cells(const fs::path& folder) {
 }
 
 std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const BatchOptions& options) {
-  std::vector<BatchCell> outcomes(cells.size());
-  std::mutex output;  // of the lines on the terminal only
-  int n_done = 0;
-  parallel_for(static_cast<int>(cells.size()), options.jobs, [&](int i) {
+  const int n = static_cast<int>(cells.size());
+  std::vector<Look> looks(cells.size());
+  parallel_for(n, options.threads, [&](int i) { looks[i] = look_at(cells[i], options.run); });
+  check_parameters_once(looks, options);
+  std::vector<BatchCell> outcomes;
+  std::vector<int> to_run, busy;
+  for (int i = 0; i < n; ++i) {
+    outcomes.push_back(std::move(looks[i].outcome));
+    if (looks[i].finding == Look::Finding::to_run) to_run.push_back(i);
+    if (looks[i].finding == Look::Finding::busy) busy.push_back(i);
+  }
+  const int n_to_run = static_cast<int>(to_run.size() + busy.size());
+  if (options.say) options.say(std::to_string(n) + " cells, " + std::to_string(n_to_run) + " of them to run");
+  BatchProgress progress(n_to_run, options);
+  std::mutex busy_mutex;
+  parallel_for(static_cast<int>(to_run.size()), options.jobs, [&](int k) {
+    const int i = to_run[k];
+    progress.starts(cells[i]);
     outcomes[i] = run_one(cells[i], options);
-    const std::lock_guard lock(output);
-    ++n_done;
-    if (!options.say) return;
-    options.say(progress_line(outcomes[i], n_done, cells.size(), options.only));
+    if (outcomes[i].exit_code != exit_code::kBusy) return progress.ended(outcomes[i]);
+    progress.put_off(cells[i]);
+    const std::lock_guard guard(busy_mutex);
+    busy.push_back(i);
+  });
+  parallel_for(static_cast<int>(busy.size()), options.jobs, [&](int k) {
+    outcomes[busy[k]] = run_when_free(cells[busy[k]], options);
+    progress.ended(outcomes[busy[k]]);
   });
   return outcomes;
+}
+
+std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const RunOptions& options, int threads) {
+  std::vector<BatchCell> outcomes(cells.size());
+  parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
+    const Look look = look_at(cells[i], options);
+    outcomes[i] = look.outcome;
+    if (look.finding == Look::Finding::done) return;
+    outcomes[i].exit_code = exit_code::kFailed;
+    outcomes[i].how = look.finding == Look::Finding::busy ? "being run" : "not run";
+    tell_of_failure(recorded_failure(cells[i]), outcomes[i]);
+  });
+  return outcomes;
+}
+
+std::string list_cells(const std::vector<fs::path>& cells, const RunOptions& options, int threads) {
+  std::vector<std::optional<CellOutcome>> looks(cells.size());
+  std::vector<std::string> errors(cells.size());
+  parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
+    try {
+      looks[i] = look_at_cell(cells[i], options);
+    } catch (const InputError& error) {
+      errors[i] = error.what();
+    }
+  });
+  CsvText csv({"cell", "stage", "state", "why"});
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (!looks[i]) {
+      csv.add(cells[i].string()).add("").add("unreadable").add(errors[i]);
+      csv.end_row();
+      continue;
+    }
+    for (const StageOutcome& stage : looks[i]->stages) {
+      csv.add(cells[i].string()).add(stage.stage).add(name_of(stage.status.state)).add(stage.status.why);
+      csv.end_row();
+    }
+  }
+  return csv.str();
 }
 
 }  // namespace mbtfm::runner

@@ -1,10 +1,12 @@
-/// Many cells, each in a process of its own: a crash never touches the others.
+/// Many cells, each in processes of its own: a crash, a hang or a hunger for memory never touches the others.
 #pragma once
 
 #include <filesystem>
 #include <functional>
 #include <string>
 #include <vector>
+
+#include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::runner {
 
@@ -13,21 +15,35 @@ namespace mbtfm::runner {
 std::vector<std::filesystem::path> find_cells(const std::filesystem::path& folder);
 
 struct BatchOptions {
-  std::filesystem::path program;       ///< mbtfm itself
-  std::vector<std::string> arguments;  ///< passed on to `mbtfm run`
-  int jobs = 1;                        ///< cells at a time
-  std::vector<std::string> only;       ///< stages whose summary is told; empty: all
-  std::function<void(const std::string&)> say;
+  std::filesystem::path program;                 ///< mbtfm itself
+  std::vector<std::string> arguments;            ///< passed on to `mbtfm run`
+  int jobs = 1;                                  ///< cells at a time
+  int threads = 1;                               ///< to look at cells with
+  RunOptions run;                                ///< what `arguments` say, to tell which cells are done
+  std::function<void(const std::string&)> say;   ///< a line for each cell that was run
+  std::function<void(const std::string&)> show;  ///< a line that the next one replaces, for a terminal
 };
 
 struct BatchCell {
   std::filesystem::path cell;
   int exit_code = 0;
   double seconds = 0;
-  std::string message;  ///< where it failed: the first error it printed
+  std::string message;       ///< why it failed: the first error it printed
+  std::string failed_stage;  ///< empty where it failed outside of one
+  std::string how;           ///< "exit code 3", "timed out after 60 s"
 };
 
-/// `mbtfm run` for every cell. What it prints goes to run.log in the cell folder.
+/// `mbtfm run` for every cell that is not up to date; what it prints goes to run.log in the cell folder. Cells that
+/// another batch works on come last: what it leaves undone is done then.
+/// @throws Interrupted
 std::vector<BatchCell> run_batch(const std::vector<std::filesystem::path>& cells, const BatchOptions& options);
+
+/// The same for the cells as they are: runs nothing. What is left undone counts as failed.
+std::vector<BatchCell> outcomes_so_far(const std::vector<std::filesystem::path>& cells, const RunOptions& options,
+                                       int threads);
+
+/// A table, as CSV, of each stage of each cell: cell, stage, state, why. Runs nothing. A cell that cannot be read has
+/// one row, state "unreadable".
+std::string list_cells(const std::vector<std::filesystem::path>& cells, const RunOptions& options, int threads);
 
 }  // namespace mbtfm::runner

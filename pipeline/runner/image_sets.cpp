@@ -114,7 +114,7 @@ std::vector<std::string> make_cell_folders(const fs::path& folder, const std::ve
     cells.push_back(name);
     if (fs::exists(toml)) continue;
     fs::create_directories(cell);
-    write_text(toml, toml_of(settings, images, folder, cell));
+    write_whole(toml, toml_of(settings, images, folder, cell));
   }
   return cells;
 }

@@ -1,77 +1,144 @@
 #include "pipeline/runner/process.h"
 
 #include <fcntl.h>
+#include <poll.h>
 #include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <cerrno>
 #include <chrono>
+#include <cmath>
 #include <csignal>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::runner {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 // The shell's code for a command that cannot be executed.
 constexpr int kCannotExecute = 127;
+// How often we look whether the program is over its time, or ours is: unnoticed by people, and costs nothing.
+constexpr int kTick_ms = 100;
+// For an interrupted program to end by itself. Stages look for the signal at each step of their progress.
+constexpr double kGrace_s = 10;
+// Of the output, kept for messages: an error and its hint, never the whole log.
+constexpr std::size_t kTailBytes = 8192;
 
 std::atomic<bool> was_interrupted = false;
-constexpr const char* kStopped = "interrupted; finished stages are kept";
 extern "C" void note_interrupt(int) { was_interrupted = true; }
 
+double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
+
 /// The child, between fork and exec: only async-signal-safe calls, as other threads of the parent may hold locks.
-[[noreturn]] void become(char* const* arguments, int log_descriptor) {
-  prctl(PR_SET_PDEATHSIG, SIGTERM);
-  if (log_descriptor >= 0) {
-    dup2(log_descriptor, STDOUT_FILENO);
-    dup2(log_descriptor, STDERR_FILENO);
-  }
+[[noreturn]] void become(char* const* arguments, int output, pid_t parent) {
+  setpgid(0, 0);
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  if (getppid() != parent) _exit(kCannotExecute);  // it died before that call
+  dup2(output, STDOUT_FILENO);
+  dup2(output, STDERR_FILENO);
   execv(arguments[0], arguments);
   _exit(kCannotExecute);
 }
 
-}  // namespace
+/// A program that runs: its process group and what it prints.
+class Child {
+ public:
+  Child(const std::vector<std::string>& command, const Sink& sink);
+  ~Child() { close(output_); }
+  Child(const Child&) = delete;
+  Child& operator=(const Child&) = delete;
 
-void watch_interrupts() {
-  struct sigaction action {};
-  action.sa_handler = note_interrupt;
-  sigaction(SIGINT, &action, nullptr);
-}
+  /// Wait for output or a tick of the clock, and pass on what there is.
+  void listen();
+  bool has_ended() const;
+  std::uint64_t memory_bytes() const;  ///< that it holds
+  void signal_group(int signal) const { kill(-pid_, signal); }
+  /// End what is left of its group, and take its result. After has_ended only.
+  ProcessResult result();
 
-ProcessResult run_process(const std::vector<std::string>& command,
-                          const std::optional<std::filesystem::path>& log_file) {
-  if (was_interrupted) throw Interrupted(kStopped);
+ private:
+  bool read_once();
+
+  pid_t pid_ = -1;
+  int output_ = -1;
+  bool is_output_open_ = true;
+  const Sink& sink_;
+  std::string tail_;
+};
+
+Child::Child(const std::vector<std::string>& command, const Sink& sink) : sink_(sink) {
   std::vector<char*> arguments;
   for (const std::string& argument : command) arguments.push_back(const_cast<char*>(argument.c_str()));
   arguments.push_back(nullptr);
-  if (access(arguments[0], X_OK) != 0) {
-    throw OutputError("cannot start " + command[0] + ": " + std::strerror(errno));
-  }
-  int log_descriptor = -1;
-  if (log_file) {
-    log_descriptor = open(log_file->c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0666);
-    if (log_descriptor < 0) throw OutputError("cannot write " + log_file->string() + ": " + std::strerror(errno));
-  }
-
-  const auto start = std::chrono::steady_clock::now();
-  const pid_t child = fork();
-  if (child == 0) become(arguments.data(), log_descriptor);
+  const auto fail = [&] { throw OutputError("cannot start " + command[0] + ": " + std::strerror(errno)); };
+  if (access(arguments[0], X_OK) != 0) fail();
+  std::array<int, 2> ends{};
+  if (pipe2(ends.data(), O_CLOEXEC | O_NONBLOCK) != 0) fail();
+  fcntl(ends[1], F_SETFL, 0);  // the program's end is an ordinary one
+  output_ = ends[0];
+  const pid_t parent = getpid();
+  pid_ = fork();
+  if (pid_ == 0) become(arguments.data(), ends[1], parent);
   const int fork_error = errno;
-  if (log_descriptor >= 0) close(log_descriptor);
-  if (child < 0) throw OutputError("cannot start " + command[0] + ": " + std::strerror(fork_error));
+  close(ends[1]);
+  if (pid_ < 0) {
+    close(output_);
+    errno = fork_error;
+    fail();
+  }
+  setpgid(pid_, pid_);  // here, too: whoever comes first
+}
 
+bool Child::read_once() {
+  std::array<char, 4096> block;
+  const ssize_t n = read(output_, block.data(), block.size());
+  if (n == 0) is_output_open_ = false;
+  if (n <= 0) return false;
+  const std::string_view text(block.data(), static_cast<std::size_t>(n));
+  sink_(text);
+  tail_ += text;
+  if (tail_.size() > kTailBytes) tail_.erase(0, tail_.size() - kTailBytes);
+  return true;
+}
+
+void Child::listen() {
+  pollfd place{.fd = is_output_open_ ? output_ : -1, .events = POLLIN, .revents = 0};
+  // Where the output is closed, the program ends in this moment as a rule.
+  const int wait_ms = is_output_open_ ? kTick_ms : 1;
+  if (poll(&place, 1, wait_ms) > 0) read_once();
+}
+
+bool Child::has_ended() const {
+  siginfo_t info{};
+  return waitid(P_PID, static_cast<id_t>(pid_), &info, WEXITED | WNOHANG | WNOWAIT) == 0 && info.si_pid == pid_;
+}
+
+std::uint64_t Child::memory_bytes() const {
+  std::ifstream statm("/proc/" + std::to_string(pid_) + "/statm");
+  std::uint64_t all_pages = 0, resident_pages = 0;
+  statm >> all_pages >> resident_pages;
+  return resident_pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
+
+ProcessResult Child::result() {
+  signal_group(SIGKILL);  // not reaped yet: its number cannot be another's
+  while (read_once()) {
+  }
   int status = 0;
   rusage usage{};
-  while (wait4(child, &status, 0, &usage) < 0 && errno == EINTR) {
+  while (wait4(pid_, &status, 0, &usage) < 0 && errno == EINTR) {
   }
-  if (was_interrupted) throw Interrupted(kStopped);
   ProcessResult result;
-  result.seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   const auto seconds_of = [](const timeval& t) {
     return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
   };
@@ -80,14 +147,86 @@ ProcessResult run_process(const std::vector<std::string>& command,
   result.peak_memory_MB = static_cast<double>(usage.ru_maxrss) * kMegabytePerKibibyte;
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);
   result.exit_code = WIFEXITED(status) ? WEXITSTATUS(status) : 0;
+  result.last_output = std::move(tail_);
+  return result;
+}
+
+}  // namespace
+
+void watch_interrupts() {
+  struct sigaction action {};
+  action.sa_handler = note_interrupt;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+}
+
+void throw_if_interrupted() {
+  if (was_interrupted) throw Interrupted("interrupted; finished stages are kept");
+}
+
+void print_on(std::string_view text) {
+  while (!text.empty()) {
+    const ssize_t n = write(STDERR_FILENO, text.data(), text.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n <= 0) return;  // nobody listens any more: no reason to stop the work
+    text.remove_prefix(static_cast<std::size_t>(n));
+  }
+}
+
+ProcessResult run_process(const std::vector<std::string>& command, const ProcessLimits& limits, const Sink& sink) {
+  throw_if_interrupted();
+  const auto start = Clock::now();
+  Child child(command, sink);
+  std::optional<Clock::time_point> asked_to_end;
+  auto exceeded = ProcessResult::Limit::none;
+  while (!child.has_ended()) {
+    child.listen();
+    if (was_interrupted && !asked_to_end) {
+      asked_to_end = Clock::now();
+      child.signal_group(SIGTERM);
+    }
+    if (asked_to_end && seconds_since(*asked_to_end) > kGrace_s) child.signal_group(SIGKILL);
+    if (limits.seconds && seconds_since(start) > *limits.seconds) exceeded = ProcessResult::Limit::seconds;
+    if (limits.memory_bytes && child.memory_bytes() > *limits.memory_bytes) exceeded = ProcessResult::Limit::memory;
+    if (exceeded != ProcessResult::Limit::none) child.signal_group(SIGKILL);
+  }
+  ProcessResult result = child.result();
+  result.seconds = seconds_since(start);
+  if (result.signal) result.exceeded = exceeded;  // or else it ended by itself in the last moment
+  throw_if_interrupted();
   return result;
 }
 
 std::string how_it_ended(const ProcessResult& result) {
-  if (result.signal) {
-    return "killed by signal " + std::to_string(*result.signal) + " (" + strsignal(*result.signal) + ")";
+  std::ostringstream text;
+  if (result.exceeded == ProcessResult::Limit::memory) {
+    text << "took too much memory (" << std::lround(result.peak_memory_MB) << " MB)";
+  } else if (result.exceeded == ProcessResult::Limit::seconds) {
+    text << "timed out after " << brief(result.seconds) << " s";
+  } else if (result.signal) {
+    text << "killed by signal " << *result.signal << " (" << strsignal(*result.signal) << ")";
+  } else {
+    text << "exit code " << result.exit_code;
   }
-  return "exit code " + std::to_string(result.exit_code);
+  return text.str();
+}
+
+int exit_code_of(const ProcessResult& result) {
+  if (result.exceeded == ProcessResult::Limit::seconds) return exit_code::kTimedOut;
+  return result.signal ? 128 + *result.signal : result.exit_code;
+}
+
+std::string error_in(const std::string& output) {
+  std::istringstream lines(output);
+  std::string errors, last;
+  for (std::string line; std::getline(lines, line);) {
+    line.erase(0, line.rfind('\r') + 1);  // npos + 1 is 0; before it stands a progress line that was overwritten
+    if (line.starts_with("\033[K")) line.erase(0, 3);
+    if (line.empty()) continue;
+    if (!errors.empty() || line.find("error: ") != std::string::npos) errors += (errors.empty() ? "" : "\n") + line;
+    last = line;
+  }
+  return errors.empty() ? last : errors;
 }
 
 std::filesystem::path executable_folder() { return std::filesystem::read_symlink("/proc/self/exe").parent_path(); }

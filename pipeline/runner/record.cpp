@@ -9,7 +9,6 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/hash.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -38,14 +37,6 @@ std::string first_difference(const Hashes& before, const Hashes& now) {
 }
 
 }  // namespace
-
-Hashes hash_files(const fs::path& cell, const std::vector<std::string>& names) {
-  Hashes hashes;
-  for (const std::string& name : names) {
-    if (fs::is_regular_file(cell / name)) hashes[name] = sha256_of_file(cell / name);
-  }
-  return hashes;
-}
 
 std::optional<StageRecord> read_record(const fs::path& record_file) {
   if (!fs::is_regular_file(record_file)) return {};
@@ -81,16 +72,21 @@ bool is_begun(const fs::path& record_file) {
   return fs::is_regular_file(record_file) && parse_json(record_file).contains("run");
 }
 
-void complete_record(const fs::path& record_file, const StageRecord& record, double seconds, double peak_memory_MB) {
+void complete_record(const fs::path& record_file, const StageRecord& record, const StageRun& run) {
   nlohmann::ordered_json whole = nlohmann::ordered_json::parse(read_text(record_file));
-  whole["run"] = {{"finished", record.finished}, {"converged", record.converged},
-                  {"version", record.version},   {"settings", json::parse(record.settings)},
-                  {"inputs", record.inputs},     {"outputs", record.outputs},
-                  {"seconds", seconds},          {"peak_memory_MB", peak_memory_MB}};
+  whole["run"] = {{"finished", record.finished},
+                  {"converged", record.converged},
+                  {"version", record.version},
+                  {"settings", json::parse(record.settings)},
+                  {"inputs", record.inputs},
+                  {"outputs", record.outputs},
+                  {"command", run.command},
+                  {"seconds", run.seconds},
+                  {"peak_memory_MB", run.peak_memory_MB}};
   write_whole(record_file, whole.dump(1) + "\n");
 }
 
-std::string settings_of(const Stage& stage, const fs::path& toml_file, const std::vector<Setting>& beneath) {
+Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
   toml::table whole;
   try {
     whole = toml::parse(read_text(toml_file), toml_file.string());
@@ -98,19 +94,23 @@ std::string settings_of(const Stage& stage, const fs::path& toml_file, const std
     throw InputError(toml_file.string() + ":" + std::to_string(error.source().begin.line), "a TOML file",
                      std::string(error.description()));
   }
-  toml::table relevant;
-  for (const auto& [key, value] : whole) {
-    const std::string table = value.is_table() ? std::string(key.str()) : std::string();
-    if (std::find(stage.tables.begin(), stage.tables.end(), table) != stage.tables.end()) relevant.insert(key, value);
+  Settings settings;
+  for (const Stage& stage : stages()) {
+    toml::table relevant;
+    for (const auto& [key, value] : whole) {
+      const std::string table = value.is_table() ? std::string(key.str()) : std::string();
+      if (std::find(stage.tables.begin(), stage.tables.end(), table) != stage.tables.end()) relevant.insert(key, value);
+    }
+    std::ostringstream text;
+    text << toml::json_formatter(relevant);
+    json values = json::parse(text.str());
+    for (const Setting& setting : beneath) {
+      if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
+      values[setting.table][setting.key] = setting.value;
+    }
+    settings[stage.name] = values.dump();
   }
-  std::ostringstream text;
-  text << toml::json_formatter(relevant);
-  json settings = json::parse(text.str());
-  for (const Setting& setting : beneath) {
-    if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
-    settings[setting.table][setting.key] = setting.value;
-  }
-  return settings.dump();
+  return settings;
 }
 
 namespace {
@@ -150,19 +150,18 @@ std::string name_of(StageState state) {
   throw InternalError("unknown stage state");
 }
 
-StageSurroundings surroundings_of(const Stage& stage, const fs::path& cell, const ImageNames& images,
-                                  const std::vector<Setting>& beneath, const std::string& version) {
+StageSurroundings surroundings_of(const Stage& stage, const CellNow& now, const std::optional<StageRecord>& record) {
   std::vector<std::string> outputs = stage.writes;
-  if (const auto record = read_record(cell / stage.folder / "record.json")) {
+  if (record) {
     for (const auto& [name, hash] : record->outputs) {
       if (std::find(outputs.begin(), outputs.end(), name) == outputs.end()) outputs.push_back(name);
     }
   }
-  return {.version = version,
-          .settings = settings_of(stage, cell / "cell.toml", beneath),
-          .inputs = hash_files(cell, inputs_of(stage, cell, images)),
-          .outputs = hash_files(cell, outputs),
-          .has_images = !files_of(images_of(stage, images), cell, images).empty()};
+  return {.version = now.version,
+          .settings = now.settings.at(stage.name),
+          .inputs = now.hashes.hash(inputs_of(stage, now.cell, now.images)),
+          .outputs = now.hashes.hash(outputs),
+          .has_images = !files_of(images_of(stage, now.images), now.cell, now.images).empty()};
 }
 
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now) {

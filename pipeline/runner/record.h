@@ -7,16 +7,12 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/runner/hash_cache.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/settings.h"
 #include "pipeline/runner/stages.h"
 
 namespace mbtfm::runner {
-
-/// SHA-256 by path relative to the cell folder.
-using Hashes = std::map<std::string, std::string>;
-/// A file that does not exist is left out.
-Hashes hash_files(const std::filesystem::path& cell, const std::vector<std::string>& names);
 
 /// The runner's part of a stage's record.json.
 struct StageRecord {
@@ -36,14 +32,20 @@ void write_begun(const std::filesystem::path& record_file, const Stage& stage);
 void forget_begun(const std::filesystem::path& record_file);
 /// The record is still the one of write_begun.
 bool is_begun(const std::filesystem::path& record_file);
-/// Add the runner's part to the record that the stage wrote (or to none).
-void complete_record(const std::filesystem::path& record_file, const StageRecord& record, double seconds,
-                     double peak_memory_MB);
+/// What a stage took, and how it was started.
+struct StageRun {
+  std::vector<std::string> command;  ///< paths relative to the cell folder
+  double seconds = 0;
+  double peak_memory_MB = 0;
+};
+/// Add the runner's part to the record that the stage wrote.
+void complete_record(const std::filesystem::path& record_file, const StageRecord& record, const StageRun& run);
 
-/// The tables of cell.toml that `stage` depends on, as JSON with sorted keys. @throws InputError
+/// By stage, the tables of cell.toml that it depends on, as JSON with sorted keys.
+using Settings = std::map<std::string, std::string>;
 /// @param beneath  values that stand in place of defaults
-std::string settings_of(const Stage& stage, const std::filesystem::path& toml_file,
-                        const std::vector<Setting>& beneath = {});
+/// @throws InputError
+Settings read_settings(const std::filesystem::path& toml_file, const std::vector<Setting>& beneath = {});
 
 /// Paths, relative to the cell folder, of the files that a stage reads: its images as far as they are there, and the
 /// files of earlier stages.
@@ -62,14 +64,22 @@ struct StageStatus {
 };
 std::string name_of(StageState state);
 
+/// A cell as it is now.
+struct CellNow {
+  const std::filesystem::path& cell;
+  const ImageNames& images;
+  const Settings& settings;
+  HashCache& hashes;
+  std::string version;  ///< of the program
+};
+
 /// What the stage would be run with now.
 struct StageSurroundings {
   std::string version, settings;
   Hashes inputs, outputs;
   bool has_images = true;  ///< one at least of those that it must have
 };
-StageSurroundings surroundings_of(const Stage& stage, const std::filesystem::path& cell, const ImageNames& images,
-                                  const std::vector<Setting>& beneath, const std::string& version);
+StageSurroundings surroundings_of(const Stage& stage, const CellNow& now, const std::optional<StageRecord>& record);
 
 /// @throws InputError where some of the outputs were given and others lack
 StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& record, const StageSurroundings& now);

@@ -1,6 +1,7 @@
 #include "pipeline/runner/run_cell.h"
 
 #include <algorithm>
+#include <exception>
 #include <iomanip>
 #include <mutex>
 #include <sstream>
@@ -9,7 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/runner/lock.h"
-#include "pipeline/runner/process.h"
+#include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -44,6 +45,48 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
   return command;
 }
 
+/// The command as run.json tells it: paths relative to the cell folder, the program by its name.
+std::vector<std::string> command_to_tell(std::vector<std::string> command, const fs::path& cell) {
+  command.front() = fs::path(command.front()).filename().string();
+  const std::string prefix = (cell / "").string();
+  for (std::string& argument : command) {
+    if (argument.starts_with(prefix)) argument.erase(0, prefix.size());
+  }
+  return command;
+}
+
+/// Files that a run which was killed had not finished.
+void remove_partial_files(const fs::path& folder) {
+  if (!fs::is_directory(folder)) return;
+  std::vector<fs::path> partial;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    if (entry.path().filename().string().starts_with(kPartialPrefix)) partial.push_back(entry.path());
+  }
+  for (const fs::path& file : partial) fs::remove(file);
+}
+
+StageFailure failure_of(const ProcessResult& result) {
+  return {.exit_code = exit_code_of(result), .how = how_it_ended(result), .message = error_in(result.last_output)};
+}
+
+/// Do a part of a stage's work; where that throws, the outcome tells of it, too.
+void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
+  try {
+    work();
+  } catch (const Interrupted&) {
+    throw;
+  } catch (const StageFailed& error) {
+    outcome.failure = error.failure;
+    throw;
+  } catch (const OutputError& error) {
+    outcome.failure = {.exit_code = exit_code::kOutput, .how = "could not be written", .message = error.what()};
+    throw;
+  } catch (const std::exception& error) {
+    outcome.failure = {.exit_code = exit_code::kInput, .how = "not started", .message = error.what()};
+    throw;
+  }
+}
+
 /// One cell's run: the parts that several steps need.
 class CellRun {
  public:
@@ -51,52 +94,79 @@ class CellRun {
       : cell_(std::move(cell)),
         options_(options),
         images_(read_image_names(cell_)),
-        beneath_(unset_in(cell_ / "cell.toml", options.beneath)) {}
+        beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
+        settings_(read_settings(cell_ / "cell.toml", beneath_)),
+        hashes_(cell_) {}
 
+  CellOutcome look();
   CellOutcome run();
 
  private:
-  StageStatus status(const Stage& stage) const;
-  void check_before_start() const;
-  StageOutcome bring_up_to_date(const Stage& stage, int threads) const;
-  StageOutcome start(const Stage& stage, const StageStatus& status, int threads) const;
+  struct Present {
+    std::optional<StageRecord> record;
+    StageSurroundings surroundings;
+    StageStatus status;
+  };
+  Present present(const Stage& stage);
+  void check_before_start(CellOutcome& now) const;
+  void run_chains(CellOutcome& outcome);
+  void bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome);
+  void start(const Stage& stage, const StageSurroundings& now, int threads, StageOutcome& outcome);
   void say(const Stage& stage, const std::string& what) const;
 
   fs::path cell_;
   const RunOptions& options_;
   ImageNames images_;
   std::vector<Setting> beneath_;
+  Settings settings_;
+  HashCache hashes_;
 };
 
-StageStatus CellRun::status(const Stage& stage) const {
+CellRun::Present CellRun::present(const Stage& stage) {
+  Present now;
+  now.record = read_record(cell_ / stage.folder / "record.json");
   if (!is_asked(stage, options_.only)) {
-    return {StageState::not_asked, "left out by --only"};
+    now.status = {StageState::not_asked, "left out by --only"};
+    return now;
   }
-  if (contains_name(options_.redo, stage.name)) return {StageState::must_run, "asked for"};
-  return status_of(stage, read_record(cell_ / stage.folder / "record.json"),
-                   surroundings_of(stage, cell_, images_, beneath_, options_.version));
+  now.surroundings = surroundings_of(
+      stage, {.cell = cell_, .images = images_, .settings = settings_, .hashes = hashes_, .version = options_.version},
+      now.record);
+  now.status = contains_name(options_.redo, stage.name) ? StageStatus{StageState::must_run, "asked for"}
+                                                        : status_of(stage, now.record, now.surroundings);
+  return now;
+}
+
+CellOutcome CellRun::look() {
+  CellOutcome outcome;
+  for (const Stage& stage : stages()) {
+    const Present now = present(stage);
+    outcome.stages.push_back(
+        {.stage = stage.name,
+         .status = now.status,
+         .converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged,
+         .failure = {}});
+  }
+  hashes_.save();
+  return outcome;
 }
 
 /// Before anything runs: the inputs are there, and every stage that will run accepts its parameters.
-void CellRun::check_before_start() const {
+void CellRun::check_before_start(CellOutcome& now) const {
   std::vector<std::string> changed;  // folders whose stage will run
-  for (const Stage& stage : stages()) {
-    const StageStatus now = status(stage);
+  for (std::size_t i = 0; i < stages().size(); ++i) {
+    const Stage& stage = stages()[i];
+    const StageState state = now.stages[i].status.state;
     const bool follows = std::any_of(stage.reads.begin(), stage.reads.end(), [&](const std::string& file) {
       return contains_name(changed, fs::path(file).begin()->string());
     });
-    if (now.state != StageState::must_run && !(follows && now.state == StageState::up_to_date)) continue;
+    if (state != StageState::must_run && !(follows && state == StageState::up_to_date)) continue;
     changed.push_back(stage.folder);
-    for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image.key);
-    for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
-    std::vector<std::string> command = {executable_of(stage, options_), "--check", "--config",
-                                        (cell_ / "cell.toml").string()};
-    for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
-    const ProcessResult check = run_process(command);
-    if (check.exit_code != 0 || check.signal) {
-      throw StageFailed("mbtfm-" + stage.name + " does not accept cell.toml",
-                        check.signal ? exit_code::kBug : check.exit_code);
-    }
+    note_failure(now.stages[i], [&] {
+      for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image.key);
+      for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
+      if (!options_.is_checked) check_parameters(stage, cell_ / "cell.toml", options_);
+    });
   }
 }
 
@@ -107,19 +177,17 @@ void CellRun::say(const Stage& stage, const std::string& what) const {
   options_.say(line.str());
 }
 
-StageOutcome CellRun::bring_up_to_date(const Stage& stage, int threads) const {
-  const StageStatus now = status(stage);
-  if (now.state == StageState::must_run) return start(stage, now, threads);
-  const auto record = read_record(cell_ / stage.folder / "record.json");
-  say(stage, name_of(now.state) + ": " + now.why);
-  return {.stage = stage.name,
-          .status = now,
-          .was_run = false,
-          .converged = now.state != StageState::up_to_date || !record || record->converged,
-          .seconds = 0};
+void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {
+  note_failure(outcome, [&] {
+    const Present now = present(stage);
+    outcome.status = now.status;
+    if (now.status.state == StageState::must_run) return start(stage, now.surroundings, threads, outcome);
+    outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
+    say(stage, name_of(now.status.state) + ": " + now.status.why);
+  });
 }
 
-StageOutcome CellRun::start(const Stage& stage, const StageStatus& before, int threads) const {
+void CellRun::start(const Stage& stage, const StageSurroundings& now, int threads, StageOutcome& outcome) {
   for (const std::string& file : stage.reads) {
     if (!fs::is_regular_file(cell_ / file)) {
       throw InputError((cell_ / file).string(), "a file that an earlier stage makes", "none",
@@ -129,53 +197,46 @@ StageOutcome CellRun::start(const Stage& stage, const StageStatus& before, int t
   const fs::path record_file = cell_ / stage.folder / "record.json";
   std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
   for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
-  const StageSurroundings now = surroundings_of(stage, cell_, images_, beneath_, options_.version);
   const bool had_record = fs::is_regular_file(record_file);
   const std::string record_before = had_record ? read_text(record_file) : std::string();
+  remove_partial_files(record_file.parent_path());
   write_begun(record_file, stage);
-  const ProcessResult result = run_process(command);
+  const ProcessResult result = run_process(command, options_.limits);
   // A stage that did not converge and yet wrote its outputs has written a record, too.
-  const bool converged = result.exit_code != exit_code::kNotSolved;
-  const bool has_outputs = !result.signal && (result.exit_code == 0 || (!converged && !is_begun(record_file)));
+  outcome.converged = result.exit_code != exit_code::kNotSolved;
+  outcome.seconds = result.seconds;
+  const bool has_outputs = !result.signal && (result.exit_code == 0 || (!outcome.converged && !is_begun(record_file)));
   if (!has_outputs) {
     // A stage that ends by itself has left its outputs as they were: so must be the record.
     if (!result.signal && had_record) write_whole(record_file, record_before);
     if (!result.signal && !had_record) forget_begun(record_file);
-    throw StageFailed("mbtfm-" + stage.name + ": " + how_it_ended(result),
-                      result.signal ? exit_code::kBug : result.exit_code);
+    throw StageFailed(stage.name, failure_of(result));
   }
-  const Hashes outputs = hash_files(cell_, stage.writes);
+  const Hashes outputs = hashes_.hash(stage.writes);
   for (const std::string& file : stage.writes) {
-    if (!outputs.contains(file)) throw StageFailed("mbtfm-" + stage.name + " did not write " + file, 70);
+    if (outputs.contains(file)) continue;
+    throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file, .message = {}});
   }
-  complete_record(record_file,
-                  {.finished = true,
-                   .converged = converged,
-                   .version = now.version,
-                   .settings = now.settings,
-                   .inputs = now.inputs,
-                   .outputs = outputs},
-                  result.seconds, result.peak_memory_MB);
+  complete_record(
+      record_file,
+      {.finished = true,
+       .converged = outcome.converged,
+       .version = now.version,
+       .settings = now.settings,
+       .inputs = now.inputs,
+       .outputs = outputs},
+      {.command = command_to_tell(command, cell_), .seconds = result.seconds, .peak_memory_MB = result.peak_memory_MB});
+  outcome.was_run = true;
   std::ostringstream line;
   line << std::fixed << std::setprecision(1) << result.seconds << " s, " << std::setprecision(0)
-       << result.peak_memory_MB << " MB" << (converged ? "" : ", NOT CONVERGED") << " (" << before.why << ")";
+       << result.peak_memory_MB << " MB" << (outcome.converged ? "" : ", NOT CONVERGED") << " (" << outcome.status.why
+       << ")";
   say(stage, line.str());
-  return {.stage = stage.name, .status = before, .was_run = true, .converged = converged, .seconds = result.seconds};
 }
 
-CellOutcome CellRun::run() {
-  for (const auto& names : {options_.only, options_.redo}) {
-    for (const std::string& name : names) {
-      const bool is_known =
-          std::any_of(stages().begin(), stages().end(), [&](const Stage& stage) { return stage.name == name; });
-      if (!is_known) throw UsageError("unknown stage '" + name + "': expected segment, track, network or fit");
-    }
-  }
-  check_before_start();
-  // Tracking needs nothing of the cell: it runs beside segmentation and network. The fit needs both.
+/// Tracking needs nothing of the cell: it runs beside segmentation and network. The fit needs both.
+void CellRun::run_chains(CellOutcome& outcome) {
   const std::vector<Stage>& all = stages();
-  CellOutcome outcome;
-  outcome.stages.resize(all.size());
   const std::vector<std::vector<int>> chains = {{0, 2}, {1}};
   const auto is_wanted = [&](const std::vector<int>& chain) {
     return std::any_of(chain.begin(), chain.end(), [&](int i) { return is_asked(all[i], options_.only); });
@@ -185,17 +246,78 @@ CellOutcome CellRun::run() {
     return workers == 1 ? options_.threads
                         : (chain == 0 ? options_.threads - options_.threads / 2 : options_.threads / 2);
   };
+  // A chain that fails does not stop the other: what is done does not depend on the number of threads.
+  std::vector<std::exception_ptr> errors(chains.size());
   parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
-    for (const int i : chains[chain]) outcome.stages[i] = bring_up_to_date(all[i], threads_of(chain));
+    try {
+      for (const int i : chains[chain]) bring_up_to_date(all[i], threads_of(chain), outcome.stages[i]);
+    } catch (...) {
+      errors[chain] = std::current_exception();
+    }
   });
-  outcome.stages.back() = bring_up_to_date(all.back(), options_.threads);
+  for (const std::exception_ptr& error : errors) {
+    if (error) std::rethrow_exception(error);
+  }
+  bring_up_to_date(all.back(), options_.threads, outcome.stages.back());
+}
+
+CellOutcome CellRun::run() {
+  const bool is_whole = options_.only.empty();  // and no other run is in the cell
+  if (is_whole) remove_partial_files(cell_);
+  CellOutcome outcome = look();
+  const bool has_work = std::any_of(outcome.stages.begin(), outcome.stages.end(), [](const StageOutcome& stage) {
+    return stage.status.state == StageState::must_run;
+  });
+  try {
+    check_before_start(outcome);
+    if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
+    run_chains(outcome);
+  } catch (const std::exception&) {
+    try {
+      write_run_record(cell_, options_, outcome);
+    } catch (const std::exception&) {
+      // the disk is full, as a rule: the error that is on its way says so
+    }
+    throw;
+  }
+  // A report of what is no more must not outlive a kill between here and the next one.
+  if (has_work) fs::remove(cell_ / "report.html");
+  write_run_record(cell_, options_, outcome);
+  hashes_.save();
   return outcome;
+}
+
+void expect_known(const RunOptions& options) {
+  for (const auto& names : {options.only, options.redo}) {
+    for (const std::string& name : names) {
+      const bool is_known =
+          std::any_of(stages().begin(), stages().end(), [&](const Stage& stage) { return stage.name == name; });
+      if (!is_known) throw UsageError("unknown stage '" + name + "': expected segment, track, network or fit");
+    }
+  }
 }
 
 }  // namespace
 
 bool CellOutcome::converged() const {
   return std::all_of(stages.begin(), stages.end(), [](const StageOutcome& stage) { return stage.converged; });
+}
+
+std::string CellOutcome::not_converged() const {
+  std::string names;
+  for (const StageOutcome& stage : stages) {
+    if (!stage.converged) names += (names.empty() ? "" : ", ") + stage.stage;
+  }
+  return names;
+}
+
+void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink) {
+  const ProcessResult check =
+      run_process({executable_of(stage, options), "--check", "--config", toml_file.string()}, {}, sink);
+  if (check.exit_code == 0 && !check.signal) return;
+  StageFailure failure = failure_of(check);
+  failure.how = "does not accept cell.toml";
+  throw StageFailed(stage.name, std::move(failure));
 }
 
 ImageNames read_image_names(const fs::path& cell) {
@@ -212,11 +334,26 @@ ImageNames read_image_names(const fs::path& cell) {
 }
 
 CellOutcome run_cell(const fs::path& cell, const RunOptions& options) {
+  expect_known(options);
   CellRun run(cell, options);
-  const FolderLock lock(cell);
+  const CellLock lock(cell, options.only);
+  lock.share_with_programs();  // a stage that outlives us still holds its cell
   const CellOutcome outcome = run.run();
-  write_run_record(cell, options, outcome);
+  if (options.finish) options.finish();
   return outcome;
+}
+
+CellOutcome look_at_cell(const fs::path& cell, const RunOptions& options) {
+  expect_known(options);
+  return CellRun(cell, options).look();
+}
+
+bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome& now) {
+  for (const StageOutcome& stage : now.stages) {
+    if (stage.status.state == StageState::must_run) return false;
+  }
+  if (is_asked(stages().back(), options.only) && !fs::is_regular_file(cell / "report.html")) return false;
+  return run_record_tells_of(cell, options);
 }
 
 }  // namespace mbtfm::runner

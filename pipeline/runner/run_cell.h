@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/runner/process.h"
 #include "pipeline/runner/record.h"
 #include "pipeline/runner/settings.h"
 
@@ -15,12 +16,22 @@ struct RunOptions {
   std::filesystem::path stage_folder;  ///< where the stages' executables are
   int threads = 1;
   bool is_quiet = false;
+  bool is_checked = false;        ///< every stage is known to accept its parameters
   std::vector<std::string> only;  ///< names of stages; empty: all
   std::vector<std::string> redo;  ///< stages to run even if up to date or changed by hand
+  ProcessLimits limits;           ///< of each stage
   std::string preset;             ///< name of what `beneath` comes from; empty: none
   std::vector<Setting> beneath;   ///< in place of defaults, where cell.toml says nothing
   std::string version;
   std::function<void(const std::string&)> say;  ///< one line for each stage
+  std::function<void()> finish;                 ///< called when the stages are done, the cell still being ours
+};
+
+/// How a stage that ended with an error did so.
+struct StageFailure {
+  int exit_code = 0;  ///< as the shell counts
+  std::string how;    ///< "exit code 3", "timed out after 60 s"
+  std::string message;
 };
 
 /// What became of a stage in this run.
@@ -30,26 +41,37 @@ struct StageOutcome {
   bool was_run = false;
   bool converged = true;
   double seconds = 0;  ///< of this run
+  std::optional<StageFailure> failure;
 };
 
 struct CellOutcome {
   std::vector<StageOutcome> stages;
   bool converged() const;
+  /// "fit, network"; empty where all did
+  std::string not_converged() const;
 };
 
 /// A stage ended with an error, which it has printed itself.
 struct StageFailed : std::runtime_error {
-  int exit_code = 0;
-  StageFailed(const std::string& message, int code) : std::runtime_error(message), exit_code(code) {}
+  StageFailure failure;
+  StageFailed(const std::string& stage, StageFailure what)
+      : std::runtime_error("mbtfm-" + stage + ": " + what.how), failure(std::move(what)) {}
 };
 
-/// Bring the stages of a cell folder up to date and write run.json.
+/// Bring the stages of a cell folder up to date and write run.json, also where a stage fails.
 /// A stage that does not converge marks its outputs; the later ones still run.
-/// @throws InputError where an input lacks, UsageError for an unknown stage, StageFailed
+/// @throws InputError where an input lacks, UsageError for an unknown stage, CellBusy, StageFailed
 CellOutcome run_cell(const std::filesystem::path& cell, const RunOptions& options);
 
-/// Merge the records of all stages to run.json.
-void write_run_record(const std::filesystem::path& cell, const RunOptions& options, const CellOutcome& outcome);
+/// What run_cell would find, without starting anything: by stage, its status. @throws InputError, UsageError
+CellOutcome look_at_cell(const std::filesystem::path& cell, const RunOptions& options);
+
+/// Of look_at_cell: there is nothing left to do for the stages asked for, and run.json and the report tell of it.
+bool is_done(const std::filesystem::path& cell, const RunOptions& options, const CellOutcome& now);
+
+/// Does the stage accept this cell.toml? It prints why not. @throws StageFailed where it does not
+void check_parameters(const Stage& stage, const std::filesystem::path& toml_file, const RunOptions& options,
+                      const Sink& sink = print_on);
 
 /// Names of [images] from cell.toml. @throws InputError where there is no cell.toml, or for an unknown table or key
 ImageNames read_image_names(const std::filesystem::path& cell);

@@ -1,166 +1,304 @@
+/// The figures of cells and fibres; those of adhesions and directions are in adhesion_figures.cpp.
 #include <fmt/format.h>
 
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <set>
 
-#include "pipeline/report/svg.h"
 #include "pipeline/report/tension_plot.h"
-#include "pipeline/statistics/rank_tests.h"
+#include "pipeline/statistics/drawing.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-using report::html_escaped;
-using report::readable;
-using report::round_below;
-
-constexpr double kWidth_px = 560, kHeight_px = 360, kLeft_px = 62, kTop_px = 16, kRight_px = 16, kBottom_px = 56;
-constexpr double kInkWidth_px = kWidth_px - kLeft_px - kRight_px, kInkHeight_px = kHeight_px - kTop_px - kBottom_px;
-
-/// Opens a figure that can also stand alone as a file.
-std::string begin(const std::string& label) {
-  return fmt::format(
-      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {} {}\" role=\"img\" aria-label=\"{}\" "
-      "font-family=\"system-ui,DejaVu Sans,sans-serif\" font-size=\"14\">\n"
-      "<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n",
-      kWidth_px, kHeight_px, html_escaped(label));
-}
-
-double y_of(double value, double largest) { return kTop_px + kInkHeight_px * (1 - value / largest); }
-double x_of(double value, double largest) { return kLeft_px + kInkWidth_px * value / largest; }
-
-std::string y_axis(double largest, const std::string& label) {
-  std::string svg;
-  const double step = round_below(largest / 3);
-  for (int i = 0; i * step <= largest; ++i) {
-    svg += fmt::format(
-        "<path d=\"M{0},{1:.1f}H{2}\" stroke=\"#e3e5e8\"/><text x=\"{3}\" y=\"{4:.1f}\" "
-        "text-anchor=\"end\">{5}</text>",
-        kLeft_px, y_of(i * step, largest), kWidth_px - kRight_px, kLeft_px - 6, y_of(i * step, largest) + 5,
-        readable(i * step));
-  }
-  return svg + fmt::format("<text transform=\"translate(16,{:.1f}) rotate(-90)\" text-anchor=\"middle\">{}</text>\n",
-                           kTop_px + kInkHeight_px / 2, html_escaped(label));
-}
-
-std::string x_axis(double largest, const std::string& label) {
-  std::string svg;
-  const double step = round_below(largest / 4);
-  for (int i = 0; i * step <= largest; ++i) {
-    svg += fmt::format(
-        "<path d=\"M{0:.1f},{1}v4\" stroke=\"#444\"/><text x=\"{0:.1f}\" y=\"{2}\" "
-        "text-anchor=\"middle\">{3}</text>",
-        x_of(i * step, largest), kTop_px + kInkHeight_px, kTop_px + kInkHeight_px + 18, readable(i * step));
-  }
-  return svg + fmt::format("<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{}</text>\n",
-                           kLeft_px + kInkWidth_px / 2, kTop_px + kInkHeight_px + 40, html_escaped(label));
-}
+using charts::Axis;
+using charts::Chart;
+using charts::readable;
 
 /// Between −0.5 and 0.5, evenly spread whatever the number of points (golden ratio).
-double spread(int i) {
+double spread(std::size_t i) {
   constexpr double kGolden = 0.61803398874989485;
-  return std::fmod(i * kGolden, 1.0) - 0.5;
+  return std::fmod(static_cast<double>(i) * kGolden, 1.0) - 0.5;
 }
 
-}  // namespace
-
-std::string tensions_by_type_svg(const Study& study) {
-  std::map<FibreType, std::vector<MeasuredFibre>> by_type;
+double largest_of(const Sample& sample) {
   double largest = 0;
-  for (const MeasuredFibre& f : measured_fibres(study)) {
-    by_type[f.fibre->type].push_back(f);
-    largest = std::max(largest, f.tension->tension_nN);
-  }
-  largest = largest > 0 ? 1.05 * largest : 1;
-  std::string svg = begin("tension by fibre type") + y_axis(largest, "tension (nN)");
-  constexpr double kColumn_px = kInkWidth_px / std::size(kFibreTypes);
-  for (std::size_t i = 0; i < std::size(kFibreTypes); ++i) {
-    const FibreType type = kFibreTypes[i];
-    const auto& fibres = by_type[type];
-    const double centre = kLeft_px + kColumn_px * (static_cast<double>(i) + 0.5);
-    std::vector<double> tensions;
-    for (const MeasuredFibre& f : fibres) {
-      tensions.push_back(f.tension->tension_nN);
-      svg += fmt::format(
-          "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"3\" fill=\"{}\" fill-opacity=\".6\"><title>{}, fibre "
-          "{}: {} nN</title></circle>\n",
-          centre + 0.5 * kColumn_px * spread(static_cast<int>(tensions.size())), y_of(tensions.back(), largest),
-          report::colour_of(type), html_escaped(f.cell->name), f.fibre->fibre_id, readable(tensions.back()));
-    }
-    if (!tensions.empty()) {
-      svg += fmt::format("<path d=\"M{:.1f},{:.1f}h{:.1f}\" stroke=\"#000\" stroke-width=\"2.5\"/>\n",
-                         centre - 0.3 * kColumn_px, y_of(describe(tensions).median, largest), 0.6 * kColumn_px);
-    }
-    svg += fmt::format(
-        "<text x=\"{0:.1f}\" y=\"{1}\" text-anchor=\"middle\">{2}</text><text x=\"{0:.1f}\" y=\"{3}\" "
-        "text-anchor=\"middle\" fill=\"#555\">n = {4}</text>\n",
-        centre, kTop_px + kInkHeight_px + 20, report::full_name_of(type), kTop_px + kInkHeight_px + 40, fibres.size());
-  }
-  return svg + "</svg>\n";
+  for (const Observation& o : sample.values) largest = std::max(largest, o.value);
+  return largest > 0 ? largest : 1;
 }
 
-std::string forces_by_cell_svg(const Study& study) {
+std::string counts(const std::vector<Observation>& own, const std::string& each) {
+  return fmt::format("{} {}, {} cells", own.size(), each, n_cells_of(own));
+}
+
+/// Where a condition's column is drawn beside the kind's place.
+double place_of(const Sample& sample, int condition, int kind) {
+  constexpr double kUsed = 0.8;  // of the place between two kinds
+  return kind + kUsed * ((condition + 0.5) / sample.n_conditions() - 0.5);
+}
+
+std::string colour_of(const Sample& sample, int condition, int kind) {
+  return sample.n_conditions() == 1 ? report::colour_of(kFibreTypes[kind]) : condition_colour(condition);
+}
+
+/// The kinds side by side.
+Axis kind_axis(const Sample& sample) {
+  Axis axis{.label = {}, .low = -0.5, .high = sample.n_kinds() - 0.5};
+  for (int kind = 0; kind < sample.n_kinds(); ++kind)
+    axis.names.emplace_back(kind, kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]));
+  return axis;
+}
+
+/// "n = 56, 48, 56 fibres of 8, 8, 8 cells", in the order of the kinds.
+std::string counts_by_kind(const Sample& sample) {
+  std::string n, cells;
+  for (int kind = 0; kind < sample.n_kinds(); ++kind) {
+    std::vector<Observation> own;
+    std::copy_if(sample.values.begin(), sample.values.end(), std::back_inserter(own),
+                 [&](const Observation& o) { return o.kind == kind; });
+    n += (kind == 0 ? "" : ", ") + std::to_string(own.size());
+    cells += (kind == 0 ? "" : ", ") + std::to_string(n_cells_of(own));
+  }
+  return "n = " + n + " " + sample.each + " of " + cells + " cells";
+}
+
+std::size_t n_keys_of(const Sample& sample) { return sample.n_conditions() > 1 ? sample.conditions.size() : 0; }
+
+void add_condition_keys(Chart& chart, const Sample& sample) {
+  for (int c = 0; c < sample.n_conditions() && sample.n_conditions() > 1; ++c) {
+    std::set<int> cells;
+    int n = 0;
+    for (const Observation& o : sample.values) {
+      if (o.group / sample.n_kinds() != c) continue;
+      cells.insert(o.cell);
+      ++n;
+    }
+    chart.key(fmt::format("{}: {} {}, {} cells", sample.conditions[static_cast<std::size_t>(c)], n, sample.each,
+                          cells.size()),
+              condition_colour(c));
+  }
+}
+
+Figure tensions_by_type(const Study& study, const Analysis& analysis) {
+  const Sample& sample = analysis.tensions.sample;
+  Chart chart("Tension by fibre type", kind_axis(sample),
+              Axis{.label = "tension (nN)", .low = 0, .high = end_below_keys(largest_of(sample), n_keys_of(sample))});
+  chart.subtitle(counts_by_kind(sample), "#555");
+  const std::vector<MeasuredFibre> fibres = measured_fibres(study);
+  std::map<int, std::size_t> n_of;
+  constexpr double kDots = 0.5;  // of a condition's column
+  const double width = 0.8 / sample.n_conditions();
+  for (std::size_t i = 0; i < fibres.size(); ++i) {
+    const Observation& o = sample.values[i];  // in the order of the fibres
+    const int condition = o.group / sample.n_kinds();
+    chart.dot({place_of(sample, condition, o.kind) + kDots * width * spread(n_of[o.group]++), o.value}, 2.6,
+              "fill:" + colour_of(sample, condition, o.kind) + ";fill-opacity:.5",
+              fmt::format("{}, fibre {}: {} nN", fibres[i].cell->name, fibres[i].fibre->fibre_id, readable(o.value)));
+  }
+  for (const Summary& s : analysis.tensions.summaries) {
+    const double x = place_of(sample, index_of(sample.conditions, s.condition), index_of(sample.kinds, s.kind));
+    chart.curve({{x - 0.35 * width, s.plain.median}, {x + 0.35 * width, s.plain.median}},
+                "stroke:#000;stroke-width:2.5");
+    if (!s.model) continue;
+    const double beside = x + 0.42 * width;
+    chart.error({beside, s.model->low}, {beside, s.model->high}, "stroke:#000;stroke-width:1.6");
+    chart.dot({beside, s.model->estimate}, 3.4, "fill:#fff;stroke:#000;stroke-width:1.6",
+              fmt::format("mean {} nN", readable(s.model->estimate)));
+  }
+  add_condition_keys(chart, sample);
+  return {.name = "tensions_by_type",
+          .title = "Tension of each fibre",
+          .caption =
+              "One dot a fibre; bar: median; ring: mean of the mixed model with its 95 % interval, the cell "
+              "being the unit.",
+          .charts = {chart}};
+}
+
+/// Distribution of the tensions of each type, with the share above the thresholds.
+Figure tension_distributions(const Analysis& analysis, const StudyParameters& parameters) {
+  const Sample& sample = analysis.tensions.sample;
+  Figure figure{.name = "tension_distributions",
+                .title = "Distribution of the tensions",
+                .caption = fmt::format("Share of a type's fibres by tension. Upright lines: {} and {} nN.",
+                                       readable(parameters.weak_tension_nN), readable(parameters.strong_tension_nN)),
+                .charts = {},
+                .n_columns = 3};
+  for (int kind = 0; kind < sample.n_kinds(); ++kind) {
+    std::vector<Histogram> all;
+    for (int c = 0; c < sample.n_conditions(); ++c) {
+      const std::vector<Observation> own = sample.of_group(c, kind);
+      all.push_back(
+          {.label =
+               own.empty() ? "" : prefix_of(sample.conditions[static_cast<std::size_t>(c)]) + counts(own, sample.each),
+           .colour = colour_of(sample, c, kind),
+           .values = values_of(own)});
+    }
+    Chart chart = histogram_chart(kind_for_people(sample.kinds[static_cast<std::size_t>(kind)]), "tension (nN)",
+                                  "share of the fibres", all, 0, largest_of(sample) * 1.0001, charts::Scale::linear);
+    chart.upright(parameters.weak_tension_nN, "stroke:#555;stroke-dasharray:4 3");
+    chart.upright(parameters.strong_tension_nN, "stroke:#555;stroke-dasharray:4 3");
+    figure.charts.push_back(chart);
+  }
+  return figure;
+}
+
+Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters) {
+  const Sample& sample = analysis.tensions.sample;
+  Figure figure{.name = "fibres_above",
+                .title = "Share of the fibres above a tension",
+                .caption =
+                    "Bars: 95 % interval (Wilson’s, at the number of independent fibres that would scatter as "
+                    "the cells do). Cross: the share without the blur of the measurement’s error.",
+                .charts = {},
+                .n_columns = 2};
+  for (const double threshold : {parameters.weak_tension_nN, parameters.strong_tension_nN}) {
+    Chart chart("Above " + readable(threshold) + " nN", kind_axis(sample),
+                Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
+    chart.subtitle(counts_by_kind(sample), "#555");
+    for (const ShareAbove& s : analysis.shares) {
+      if (s.threshold_nN != threshold) continue;
+      const int condition = index_of(sample.conditions, s.condition), kind = index_of(sample.kinds, s.kind);
+      const double x = place_of(sample, condition, kind);
+      const std::string colour = colour_of(sample, condition, kind);
+      chart.error({x, 100 * s.share.interval.low}, {x, 100 * s.share.interval.high},
+                  "stroke:" + colour + ";stroke-width:1.6");
+      chart.dot({x, 100 * s.share.value}, 4, "fill:" + colour,
+                fmt::format("{}{}: {} % of {} fibres", prefix_of(s.condition), kind_for_people(s.kind),
+                            readable(100 * s.share.value), s.n));
+      const double y = 100 * s.without_error, r = 0.04;
+      chart.curve({{x + 2 * r, y - 1.5}, {x + 4 * r, y + 1.5}}, "stroke:#000;stroke-width:1.6");
+      chart.curve({{x + 2 * r, y + 1.5}, {x + 4 * r, y - 1.5}}, "stroke:#000;stroke-width:1.6");
+    }
+    add_condition_keys(chart, sample);
+    figure.charts.push_back(chart);
+  }
+  return figure;
+}
+
+Figure forces_by_cell(const Study& study) {
   std::vector<const StudyCell*> cells;
   double largest = 0;
   for (const StudyCell& cell : study.cells) {
     cells.push_back(&cell);
-    largest = std::max(largest, 1.05 * cell.fit.total_force_nN);
+    largest = std::max(largest, cell.fit.total_force_nN);
   }
-  if (!(largest > 0)) largest = 1;
   std::stable_sort(cells.begin(), cells.end(), [](const StudyCell* a, const StudyCell* b) {
-    return a->fit.total_force_nN > b->fit.total_force_nN;
+    return a->condition != b->condition ? a->condition < b->condition : a->fit.total_force_nN > b->fit.total_force_nN;
   });
-  std::string svg = begin("total force by cell") + y_axis(largest, "total force (nN)");
-  const double column = kInkWidth_px / static_cast<double>(cells.size());
-  const double bar = std::min(60.0, 0.8 * column);
+  const double n = static_cast<double>(cells.size());
+  Chart chart("Total force of each cell",
+              Axis{.label = fmt::format("{} cells", cells.size()), .low = 0, .high = n, .names = {{n / 2, ""}}},
+              Axis{.label = "force (nN)", .low = 0, .high = end_below_keys(largest, study.conditions.size() + 1)});
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const FitSummary& fit = cells[i]->fit;
-    const double left = kLeft_px + column * (static_cast<double>(i) + 0.5) - bar / 2;
+    const double left = static_cast<double>(i) + 0.1, right = left + 0.8;
     const double network = std::clamp(fit.network_force_nN, 0.0, fit.total_force_nN);
-    const double y_network = y_of(network, largest), y_total = y_of(fit.total_force_nN, largest);
-    svg += fmt::format(
-        "<g><title>{}: {} nN, of the network {} nN</title><rect x=\"{:.1f}\" y=\"{:.1f}\" "
-        "width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#0072B2\"/>",
-        html_escaped(cells[i]->name), readable(fit.total_force_nN), readable(network), left, y_total, bar,
-        y_network - y_total);
-    svg += fmt::format("<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"{:.1f}\" height=\"{:.1f}\" fill=\"#c9ccd1\"/></g>\n",
-                       left, y_network, bar, kTop_px + kInkHeight_px - y_network);
+    const std::string hover =
+        fmt::format("{}: {} nN, of the network {} nN", cells[i]->name, readable(fit.total_force_nN), readable(network));
+    chart.bar({left, network}, {right, fit.total_force_nN}, "fill:" + condition_colour(cells[i]->condition), hover);
+    chart.bar({left, 0}, {right, network}, "fill:#c9ccd1", hover);
   }
-  svg += fmt::format(
-      "<text x=\"{:.1f}\" y=\"{}\" text-anchor=\"middle\">{} cells; blue: fibres, grey: actin network"
-      "</text>\n",
-      kLeft_px + kInkWidth_px / 2, kTop_px + kInkHeight_px + 30, cells.size());
-  return svg + "</svg>\n";
+  for (std::size_t c = 0; c < study.conditions.size(); ++c)
+    chart.key(prefix_of(study.conditions[c]) + "fibres", condition_colour(static_cast<int>(c)));
+  chart.key("network", "#6b7078");
+  return {.name = "forces_by_cell",
+          .title = "Total force of each cell",
+          .caption =
+              "Sum of the force magnitudes over adhesions, the strongest cell first: what the fibres add, on "
+              "what the network has without them.",
+          .charts = {chart}};
 }
 
-std::string adhesion_forces_svg(const Study& study) {
-  struct Point {
-    double area_um2, force_nN;
-    bool connected;
-  };
-  std::vector<Point> points;
-  double largest_area = 0, largest_force = 0;
-  for (const StudyCell& cell : study.cells) {
-    std::map<int, double> area;
-    for (const Adhesion& adhesion : cell.cell.adhesions) area[adhesion.adhesion_id] = adhesion.area_um2;
-    for (const AdhesionForce& force : cell.forces) {
-      points.push_back({area.at(force.adhesion_id), norm(force.force_nN), force.connected});
-      largest_area = std::max(largest_area, 1.05 * points.back().area_um2);
-      largest_force = std::max(largest_force, 1.05 * points.back().force_nN);
+const std::map<std::string, std::string>& labels() {
+  static const std::map<std::string, std::string> list = {{"total_force_nN", "total force (nN)"},
+                                                          {"fibre_force_nN", "force of the fibres (nN)"},
+                                                          {"network_force_nN", "force of the network (nN)"},
+                                                          {"n_adhesions", "number of adhesions"},
+                                                          {"adhesion_area_um2", "area of all adhesions (µm²)"},
+                                                          {"cell_area_um2", "area of the cell (µm²)"},
+                                                          {"n_fibres", "number of fibres"}};
+  return list;
+}
+
+/// "force (nN)" without what stands in brackets.
+std::string without_unit(const std::string& label) { return label.substr(0, label.find(" (")); }
+
+Figure force_correlations(const Study& study, const Analysis& analysis) {
+  Figure figure{.name = "force_correlations",
+                .title = "Forces and size of the cell",
+                .caption =
+                    "One dot a cell. Lines through the origin by least squares: slope ± standard error, and "
+                    "Pearson’s correlation r.",
+                .charts = {},
+                .n_columns = 3};
+  std::map<std::pair<std::string, std::string>, std::vector<const Correlation*>> panels;
+  std::vector<std::pair<std::string, std::string>> order;
+  for (const Correlation& c : analysis.correlations) {
+    const std::pair key{c.size, c.force};
+    if (!panels.contains(key)) order.push_back(key);
+    panels[key].push_back(&c);
+  }
+  for (const auto& key : order) {
+    double x_end = 0, y_end = 0;
+    for (const Correlation* c : panels[key]) {
+      for (const double x : c->x) x_end = std::max(x_end, x);
+      for (const double y : c->y) y_end = std::max(y_end, y);
     }
+    Chart chart(without_unit(labels().at(key.second)) + " by " + without_unit(labels().at(key.first)),
+                Axis{.label = labels().at(key.first), .low = 0, .high = 1.05 * x_end},
+                Axis{.label = labels().at(key.second), .low = 0, .high = end_below_keys(y_end, panels[key].size())});
+    chart.put_key(Chart::KeySide::left);
+    for (const Correlation* c : panels[key]) {
+      const std::string colour = condition_colour(index_of(study.conditions, c->condition));
+      for (std::size_t i = 0; i < c->x.size(); ++i)
+        chart.dot({c->x[i], c->y[i]}, 3.2, "fill:" + colour + ";fill-opacity:.7",
+                  study.cells[static_cast<std::size_t>(c->cells[i])].name);
+      chart.curve({{0, 0}, {x_end, c->line.slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
+      std::string text = prefix_of(c->condition) + readable(c->line.slope);
+      if (c->line.slope_error) text += fmt::format(" ± {:.2g}", *c->line.slope_error);
+      if (c->line.correlation) text += ", r = " + readable(std::round(100 * *c->line.correlation) / 100);
+      chart.key(text + fmt::format(", n = {}", c->line.n), colour);
+    }
+    figure.charts.push_back(chart);
   }
-  if (!(largest_force > 0)) largest_force = 1;
-  std::string svg = begin("force against area of the adhesions") + y_axis(largest_force, "force (nN)");
-  svg += x_axis(largest_area, "area (µm²)");
-  for (const Point& p : points) {
-    svg += fmt::format(
-        "<circle cx=\"{:.1f}\" cy=\"{:.1f}\" r=\"2.6\" stroke=\"#0072B2\" fill=\"{}\" "
-        "fill-opacity=\".7\"/>\n",
-        x_of(p.area_um2, largest_area), y_of(p.force_nN, largest_force), p.connected ? "#0072B2" : "#fff");
+  return figure;
+}
+
+}  // namespace
+
+std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
+  std::vector<Figure> figures;
+  if (!analysis.tensions.sample.values.empty()) {
+    figures.push_back(tensions_by_type(study, analysis));
+    figures.push_back(strong_fibres(analysis, parameters));
+    figures.push_back(tension_distributions(analysis, parameters));
   }
-  return svg + "</svg>\n";
+  figures.push_back(forces_by_cell(study));
+  figures.push_back(force_correlations(study, analysis));
+  for (Figure& figure : adhesion_figures_of(analysis)) figures.push_back(std::move(figure));
+  std::erase_if(figures, [](const Figure& figure) { return figure.charts.empty(); });
+  return figures;
+}
+
+std::string svg_of(const Figure& figure) {
+  // a line holds about 50 characters for each column of charts
+  std::vector<std::string> lines(1);
+  const std::size_t width =
+      50 * static_cast<std::size_t>(std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())));
+  std::string word;
+  for (const char c : figure.caption + " ") {
+    if (c != ' ') {
+      word += c;
+      continue;
+    }
+    if (!lines.back().empty() && lines.back().size() + word.size() > width) lines.emplace_back();
+    lines.back() += (lines.back().empty() ? "" : " ") + word;
+    word.clear();
+  }
+  return charts::svg_file(figure.charts, std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())),
+                          lines);
 }
 
 }  // namespace mbtfm::statistics

@@ -48,25 +48,6 @@ Ranks joint_ranks(const std::vector<std::vector<double>>& groups) {
 
 }  // namespace
 
-Description describe(std::vector<double> values) {
-  if (values.empty()) throw InvalidData("a sample", "at least one value", "none");
-  std::sort(values.begin(), values.end());
-  Description d;
-  d.n = static_cast<int>(values.size());
-  d.mean = std::accumulate(values.begin(), values.end(), 0.0) / d.n;
-  d.median = (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
-  double squares = 0;
-  for (const double v : values) squares += (v - d.mean) * (v - d.mean);
-  d.standard_deviation = d.n > 1 ? std::sqrt(squares / (d.n - 1)) : 0;
-  return d;
-}
-
-double fraction_above(const std::vector<double>& values, double threshold) {
-  if (values.empty()) throw InvalidData("a sample", "at least one value", "none");
-  const auto n = std::count_if(values.begin(), values.end(), [&](double v) { return v > threshold; });
-  return static_cast<double>(n) / static_cast<double>(values.size());
-}
-
 TestResult kruskal_wallis(const std::vector<std::vector<double>>& groups) {
   if (groups.size() < 2) throw InvalidData("the groups", "at least two", std::to_string(groups.size()));
   const Ranks ranks = joint_ranks(groups);

@@ -5,16 +5,6 @@
 
 namespace mbtfm::statistics {
 
-struct Description {
-  int n = 0;
-  double mean = 0, median = 0;
-  double standard_deviation = 0;  ///< with n − 1; 0 for n = 1
-};
-/// @throws InvalidData where there is no value
-Description describe(std::vector<double> values);
-/// Share of values above the threshold, 0 to 1.
-double fraction_above(const std::vector<double>& values, double threshold);
-
 struct TestResult {
   double statistic = 0;
   double p_value = 1;
@@ -30,6 +20,28 @@ TestResult kruskal_wallis(const std::vector<std::vector<double>>& groups);
 /// Source: Mann & Whitney, Ann. Math. Stat. 18, 50 (1947); from about 8 values a group on.
 /// @throws InvalidData where a group is empty or all values are equal
 TestResult mann_whitney(const std::vector<double>& a, const std::vector<double>& b);
+
+/// A value of a group, measured in a cell; both from 0.
+struct ClusteredValue {
+  double value = 0;
+  int group = 0;
+  int cell = 0;
+};
+/// Do the groups differ, with the cell for the unit: the rank-sum test of one value drawn from each cell, averaged over
+/// all ways to draw. Cells may hold values of one group or of several; each counts once, however many values it has.
+/// The sum over all pairs of groups is a chi-squared with n groups − 1 degrees of freedom; with few cells F with as
+/// many and n cells − n groups + 1 degrees (as Hotelling's T² of the cells' contributions), which is what is used.
+/// `statistic` is that F.
+/// Source: Datta & Satten, J. Am. Stat. Assoc. 100, 908 (2005), with each cell weighing the same in the pooled ranks.
+/// @throws InvalidData for fewer than two groups, an empty one, too few cells, or groups without any scatter
+TestResult clustered_rank_test(const std::vector<ClusteredValue>& values);
+
+/// What the test sums: by group, the mean over all draws of its rank sum over (cells + 1), and what it would be if the
+/// groups did not differ.
+struct ClusteredRanks {
+  std::vector<double> sum, expected;
+};
+ClusteredRanks clustered_ranks(const std::vector<ClusteredValue>& values);
 
 /// Holm's correction for several tests: the same order as given.
 /// Source: Holm, Scand. J. Stat. 6, 65 (1979).

@@ -5,107 +5,83 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
 #include "pipeline/runner/batch.h"
-#include "pipeline/statistics/rank_tests.h"
+#include "pipeline/statistics/conditions.h"
 
 namespace mbtfm::statistics {
 namespace fs = std::filesystem;
 namespace {
 
-using Groups = std::map<FibreType, std::vector<double>>;
-
-Groups tensions_by_type(const std::vector<MeasuredFibre>& fibres) {
-  Groups groups;
-  for (const MeasuredFibre& f : fibres) groups[f.fibre->type].push_back(f.tension->tension_nN);
-  return groups;
+std::optional<DisplacementField> field_where_there(const Path& file) {
+  if (!fs::is_regular_file(file)) return std::nullopt;
+  return read_displacement(file);
 }
 
-/// The median of each type in each cell.
-Groups medians_by_type(const std::vector<MeasuredFibre>& fibres) {
-  std::map<std::pair<FibreType, std::string>, std::vector<double>> by_cell;
-  for (const MeasuredFibre& f : fibres) by_cell[{f.fibre->type, f.cell->name}].push_back(f.tension->tension_nN);
-  Groups groups;
-  for (const auto& [key, values] : by_cell) groups[key.first].push_back(describe(values).median);
-  return groups;
-}
-
-TypeSummary summarise(const std::string& cell, FibreType type, int n_cells, const std::vector<double>& tensions_nN,
-                      const StudyParameters& parameters) {
-  const Description d = describe(tensions_nN);
-  return {.cell = cell,
-          .type = type,
-          .n_cells = n_cells,
-          .n_fibres = d.n,
-          .mean_nN = d.mean,
-          .median_nN = d.median,
-          .sd_nN = d.standard_deviation,
-          .fraction_above_weak = fraction_above(tensions_nN, parameters.weak_tension_nN),
-          .fraction_above_strong = fraction_above(tensions_nN, parameters.strong_tension_nN)};
-}
-
-bool are_all_equal(const std::vector<double>& a, const std::vector<double>& b) {
-  const auto is_first = [&](double v) { return v == a.front(); };
-  return std::all_of(a.begin(), a.end(), is_first) && std::all_of(b.begin(), b.end(), is_first);
-}
-
-void add_tests(const Groups& groups, Unit unit, std::vector<TypeTest>& tests) {
-  std::vector<std::pair<FibreType, std::vector<double>>> usable;
-  for (const auto& [type, values] : groups) {
-    if (values.size() >= 2) usable.emplace_back(type, values);
+StudyCell read_study_cell(const Path& folder, const std::string& name, const StudyParameters& parameters) {
+  StudyCell c{.name = name,
+              .condition = 0,
+              .cell = read_cell(folder / "1_segment"),
+              .forces = read_adhesion_forces(folder / "4_fit/adhesion_forces.csv"),
+              .tensions = read_tensions(folder / "4_fit/tensions.csv"),
+              .fit = read_fit_summary(folder / "4_fit/fit.json"),
+              .directions = {}};
+  std::set<int> ids;
+  for (const Adhesion& a : c.cell.adhesions) ids.insert(a.adhesion_id);
+  for (const AdhesionForce& f : c.forces) {
+    if (ids.contains(f.adhesion_id)) continue;
+    throw InputError((folder / "4_fit/adhesion_forces.csv").string(), "adhesions of 1_segment/adhesions.csv",
+                     "adhesion " + std::to_string(f.adhesion_id),
+                     "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
-  if (usable.size() < 2) return;
-  std::vector<std::vector<double>> all;
-  int n = 0;
-  for (const auto& [type, values] : usable) {
-    all.push_back(values);
-    n += static_cast<int>(values.size());
+  c.directions = directions_of(c.cell, {.measured = field_where_there(folder / further_files_of_a_cell()[0]),
+                                        .fitted = field_where_there(folder / further_files_of_a_cell()[1]),
+                                        .without_fibres = field_where_there(folder / further_files_of_a_cell()[2]),
+                                        .noise_um = c.fit.noise_um,
+                                        .near_um = parameters.near_adhesion_um});
+  return c;
+}
+
+/// Why a cell cannot enter, as its folder tells; empty: it can.
+std::string obstacle(const Path& cell) {
+  for (const std::string& file : files_of_a_cell()) {
+    if (!fs::is_regular_file(cell / file)) return "no fit: " + file + " is not there";
   }
-  if (std::all_of(all.begin(), all.end(), [&](const auto& group) { return are_all_equal(all.front(), group); })) return;
-  const TestResult h = kruskal_wallis(all);
-  tests.push_back({.test = "Kruskal-Wallis",
-                   .unit = unit,
-                   .group_a = "all types",
-                   .group_b = {},
-                   .n_a = n,
-                   .n_b = 0,
-                   .statistic = h.statistic,
-                   .p_value = h.p_value,
-                   .p_holm = {},
-                   .effect = h.statistic / (n - 1)});
-  const std::size_t first_pair = tests.size();
-  std::vector<double> p_values;
-  for (std::size_t i = 0; i < usable.size(); ++i) {
-    for (std::size_t k = i + 1; k < usable.size(); ++k) {
-      const auto& [type_a, a] = usable[i];
-      const auto& [type_b, b] = usable[k];
-      if (are_all_equal(a, b)) continue;
-      const TestResult u = mann_whitney(a, b);
-      const double n_pairs = static_cast<double>(a.size()) * static_cast<double>(b.size());
-      tests.push_back({.test = "Mann-Whitney",
-                       .unit = unit,
-                       .group_a = std::string(name_of(type_a)),
-                       .group_b = std::string(name_of(type_b)),
-                       .n_a = static_cast<int>(a.size()),
-                       .n_b = static_cast<int>(b.size()),
-                       .statistic = u.statistic,
-                       .p_value = u.p_value,
-                       .p_holm = {},
-                       .effect = 2 * u.statistic / n_pairs - 1});
-      p_values.push_back(u.p_value);
-    }
+  return {};
+}
+
+void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell) {
+  const std::set<std::string> names(condition_of_cell.begin(), condition_of_cell.end());
+  study.conditions.assign(names.begin(), names.end());
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    study.cells[i].condition = static_cast<int>(std::distance(names.begin(), names.find(condition_of_cell[i])));
   }
-  const std::vector<double> corrected = holm(p_values);
-  for (std::size_t i = 0; i < corrected.size(); ++i) tests[first_pair + i].p_holm = corrected[i];
+}
+
+[[noreturn]] void no_cell_left(const Path& folder, const std::vector<LeftOutCell>& left_out) {
+  std::string found = "none of " + std::to_string(left_out.size());
+  if (!left_out.empty()) found += " (" + left_out.front().name + ": " + left_out.front().reason + ")";
+  throw InputError(folder.string(), "at least one finished cell", found,
+                   "run them first: mbtfm batch " + folder.string());
 }
 
 }  // namespace
 
 void declare(ParameterList& list, StudyParameters& parameters) {
   list.table("stats");
+  list.add("condition_from", parameters.condition_from,
+           "where a cell's condition is told: `folder` (the first folder below the study's), `folder2` (the one below "
+           "that), or the name of a column of --table; empty: one condition");
+  list.add("with_not_converged", parameters.with_not_converged, "cells whose fit did not converge enter, too");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::positive(),
            "the share of fibres above this tension is given (nN)");
   list.add("strong_tension_nN", parameters.strong_tension_nN, Range::positive(),
            "the share of fibres above this tension is given, too (nN)");
+  list.add("near_adhesion_um", parameters.near_adhesion_um, Range::positive(),
+           "beads this near to an adhesion's centre, or on it, tell which way it moves (um)");
+  list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
+           "draws of cells behind the intervals of means and medians");
+  list.add("bootstrap_seed", parameters.bootstrap_seed, "of these draws");
 }
 
 const std::vector<std::string>& files_of_a_cell() {
@@ -116,27 +92,42 @@ const std::vector<std::string>& files_of_a_cell() {
   return files;
 }
 
-Study read_study(const Path& folder) {
+const std::vector<std::string>& further_files_of_a_cell() {
+  static const std::vector<std::string> files = {"2_track/displacement.csv", "4_fit/fitted_displacement.csv",
+                                                 "4_fit/displacement_without_fibres.csv"};
+  return files;
+}
+
+Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {
+  const std::vector<Path> folders = runner::find_cells(folder);
+  std::vector<std::string> names;
+  for (const Path& cell : folders) {
+    const std::string name = cell.lexically_relative(folder).generic_string();
+    names.push_back(name == "." ? fs::weakly_canonical(cell).filename().string() : name);
+  }
+  const std::vector<CellNote> notes = notes_of(names, parameters.condition_from, table);
+  std::vector<std::optional<StudyCell>> read(folders.size());
+  std::vector<std::string> reasons(folders.size());
+  parallel_for(static_cast<int>(folders.size()), threads, [&](int index) {
+    const auto i = static_cast<std::size_t>(index);
+    reasons[i] = notes[i].reason_to_exclude;
+    if (reasons[i].empty()) reasons[i] = obstacle(folders[i]);
+    if (!reasons[i].empty()) return;
+    read[i] = read_study_cell(folders[i], names[i], parameters);
+    if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
+  });
   Study study;
-  for (const Path& cell : runner::find_cells(folder)) {
-    std::string name = cell.lexically_relative(folder).generic_string();
-    if (name == ".") name = fs::weakly_canonical(cell).filename().string();
-    const auto& files = files_of_a_cell();
-    if (!std::all_of(files.begin(), files.end(), [&](const auto& file) { return fs::is_regular_file(cell / file); })) {
-      study.unfinished.push_back(name);
+  std::vector<std::string> condition_of_cell;
+  for (std::size_t i = 0; i < folders.size(); ++i) {
+    if (!reasons[i].empty()) {
+      study.left_out.push_back({names[i], notes[i].condition, reasons[i]});
       continue;
     }
-    study.cells.push_back({.name = name,
-                           .cell = read_cell(cell / "1_segment"),
-                           .forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv"),
-                           .tensions = read_tensions(cell / "4_fit/tensions.csv"),
-                           .fit = read_fit_summary(cell / "4_fit/fit.json")});
+    study.cells.push_back(std::move(*read[i]));
+    condition_of_cell.push_back(notes[i].condition);
   }
-  if (study.cells.empty()) {
-    throw InputError(folder.string(), "at least one finished cell",
-                     "none of " + std::to_string(study.unfinished.size()),
-                     "run them first: mbtfm batch " + folder.string());
-  }
+  if (study.cells.empty()) no_cell_left(folder, study.left_out);
+  number_conditions(study, condition_of_cell);
   return study;
 }
 
@@ -153,31 +144,11 @@ std::vector<MeasuredFibre> measured_fibres(const Study& study) {
   return fibres;
 }
 
-std::vector<TypeSummary> summarise_types(const Study& study, const StudyParameters& parameters) {
-  const std::vector<MeasuredFibre> fibres = measured_fibres(study);
-  std::vector<TypeSummary> list;
-  std::map<FibreType, std::set<std::string>> cells_with;
-  for (const MeasuredFibre& f : fibres) cells_with[f.fibre->type].insert(f.cell->name);
-  for (const auto& [type, tensions] : tensions_by_type(fibres)) {
-    list.push_back(summarise("", type, static_cast<int>(cells_with[type].size()), tensions, parameters));
-  }
-  for (const StudyCell& cell : study.cells) {
-    std::vector<MeasuredFibre> own;
-    std::copy_if(fibres.begin(), fibres.end(), std::back_inserter(own),
-                 [&](const MeasuredFibre& f) { return f.cell == &cell; });
-    for (const auto& [type, tensions] : tensions_by_type(own)) {
-      list.push_back(summarise(cell.name, type, 1, tensions, parameters));
-    }
-  }
-  return list;
-}
-
-std::vector<TypeTest> test_types(const Study& study) {
-  const std::vector<MeasuredFibre> fibres = measured_fibres(study);
-  std::vector<TypeTest> tests;
-  add_tests(tensions_by_type(fibres), Unit::fibre, tests);
-  add_tests(medians_by_type(fibres), Unit::cell_median, tests);
-  return tests;
+std::optional<double> standard_error_nN(const Tension& t) {
+  constexpr double kQuantile95 = 1.959964;  // of the normal distribution
+  if (!t.high_nN) return std::nullopt;
+  if (t.low_nN && *t.low_nN > 0) return (*t.high_nN - *t.low_nN) / (2 * kQuantile95);
+  return std::max(0.0, *t.high_nN - t.tension_nN) / kQuantile95;
 }
 
 }  // namespace mbtfm::statistics

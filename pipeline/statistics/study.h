@@ -1,4 +1,4 @@
-/// Many cells together: what was measured in each, and how fibre types differ.
+/// The finished cells of a folder: what was measured in each, under which condition, and which do not enter.
 #pragma once
 
 #include <optional>
@@ -7,33 +7,50 @@
 
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/parameters.h"
+#include "pipeline/statistics/directions.h"
 
 namespace mbtfm::statistics {
 
 struct StudyParameters {
-  double weak_tension_nN = 1;    ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
-  double strong_tension_nN = 5;  ///< a third of the ventral ones are above it
+  std::string condition_from{};     ///< empty: all cells are of one condition
+  bool with_not_converged = false;  ///< a fit that did not converge is no measurement
+  double weak_tension_nN = 1;       ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
+  double strong_tension_nN = 5;     ///< a third of the ventral ones are above it
+  double near_adhesion_um = 1.5;    ///< beads lie some 1 um apart: about seven of them around an adhesion
+  int bootstrap_draws = 2000;       ///< ends of the intervals then repeat to some 5 % of their half width
+  std::uint64_t bootstrap_seed = 1;
 };
 void declare(ParameterList& list, StudyParameters& parameters);
 
 /// A finished cell.
 struct StudyCell {
-  std::string name;  ///< its folder, relative to the study's
+  std::string name;   ///< its folder, relative to the study's
+  int condition = 0;  ///< index into Study::conditions
   Cell cell;
   std::vector<AdhesionForce> forces;
   std::vector<Tension> tensions;
   FitSummary fit;
+  std::vector<Direction> directions;
+};
+
+struct LeftOutCell {
+  std::string name, condition, reason;
 };
 
 struct Study {
-  std::vector<StudyCell> cells;
-  std::vector<std::string> unfinished;  ///< cells without a fit
+  std::vector<std::string> conditions;  ///< in the order of the alphabet; one without a name where none were asked for
+  std::vector<StudyCell> cells;         ///< those that enter
+  std::vector<LeftOutCell> left_out;
 };
 
-/// Files that are read of each cell, relative to its folder.
+/// Files that must be there of each finished cell, and those that are read where they are, relative to its folder.
 const std::vector<std::string>& files_of_a_cell();
-/// @throws InputError where no cell is finished, or a file is malformed
-Study read_study(const Path& folder);
+const std::vector<std::string>& further_files_of_a_cell();
+
+/// @param table  column `cell` (a cell's folder), any columns of conditions, and `exclude` with the reason why a cell
+///               must not enter, empty for those that do; or none
+/// @throws InputError where no cell is left, a file is malformed, or the table names a cell that is not there
+Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads);
 
 /// A fibre whose tension could be identified.
 struct MeasuredFibre {
@@ -43,29 +60,7 @@ struct MeasuredFibre {
 };
 std::vector<MeasuredFibre> measured_fibres(const Study& study);
 
-/// Tensions of one type, of one cell or of all.
-struct TypeSummary {
-  std::string cell;  ///< empty: all cells
-  FibreType type = FibreType::arc;
-  int n_cells = 0, n_fibres = 0;
-  double mean_nN = 0, median_nN = 0, sd_nN = 0;
-  double fraction_above_weak = 0, fraction_above_strong = 0;
-};
-std::vector<TypeSummary> summarise_types(const Study& study, const StudyParameters& parameters);
-
-/// What is counted as one observation. The fibres of a cell are not independent of each other: tests by fibre
-/// overstate the evidence, tests of the cells' medians do not.
-enum class Unit { fibre, cell_median };
-struct TypeTest {
-  std::string test;
-  Unit unit = Unit::fibre;
-  std::string group_a, group_b;  ///< group_b empty: all types together
-  int n_a = 0, n_b = 0;          ///< observations
-  double statistic = 0, p_value = 1;
-  std::optional<double> p_holm;  ///< corrected for the three pairs
-  double effect = 0;             ///< pairs: rank-biserial correlation, −1 to 1; all: epsilon squared, 0 to 1
-};
-/// Kruskal–Wallis over the types, Mann–Whitney between each two; left out where a group has fewer than two values.
-std::vector<TypeTest> test_types(const Study& study);
+/// Half the 95 % interval over its quantile: of the upper half, where zero cuts the lower; none without an interval.
+std::optional<double> standard_error_nN(const Tension& tension);
 
 }  // namespace mbtfm::statistics

@@ -2,24 +2,35 @@
 #pragma once
 
 #include <string>
+#include <utility>
 
-#include "pipeline/statistics/study.h"
+#include "pipeline/charts/chart.h"
+#include "pipeline/statistics/analysis.h"
 
 namespace mbtfm::statistics {
 
-std::string cells_csv(const Study& study);
-std::string adhesions_csv(const Study& study);
-std::string fibres_csv(const Study& study);
-std::string types_csv(const Study& study, const StudyParameters& parameters);
-std::string tests_csv(const Study& study);
+/// Every table with the name of its file.
+std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis);
 
-/// Every fibre's tension by type with the median, as one <svg> element.
-std::string tensions_by_type_svg(const Study& study);
-/// Total force of each cell, the strongest first: the share of the fibres and of the network.
-std::string forces_by_cell_svg(const Study& study);
-/// Force of each adhesion against its area; filled: a fibre ends on it.
-std::string adhesion_forces_svg(const Study& study);
+/// Charts that belong together, with a caption.
+struct Figure {
+  std::string name;  ///< of its files, without the ending
+  std::string title, caption;
+  std::vector<charts::Chart> charts;
+  int n_columns = 1;
+};
+std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters);
+/// As a file of its own.
+std::string svg_of(const Figure& figure);
 
-std::string study_html(const Study& study, const StudyParameters& parameters);
+/// What was found, a sentence for each question, with interval, test and numbers of cells and fibres.
+struct Findings {
+  std::string title;
+  std::vector<std::string> sentences;
+};
+std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters);
+
+std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
+                       const StudyParameters& parameters);
 
 }  // namespace mbtfm::statistics

@@ -1,63 +1,91 @@
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "pipeline/contract/version.h"
 #include "pipeline/report/page.h"
-#include "pipeline/report/svg.h"
-#include "pipeline/report/tension_plot.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-using report::html_escaped;
-using report::readable;
+using charts::html_escaped;
+using charts::readable;
 using report::Table;
 
 std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
 
-Table types_table(const Study& study, const StudyParameters& parameters) {
-  Table table{{{"cell"},
+std::string interval_text(const std::optional<Interval>& interval) {
+  return interval ? readable(interval->low) + " to " + readable(interval->high) : "–";
+}
+
+bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
+
+/// The one place where a figure enters the page.
+std::string embedded(const Figure& figure) {
+  std::string html = "<h3>" + html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
+  for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
+  return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
+}
+
+Table types_table(const Study& study, const Analysis& analysis) {
+  Table table{{{"condition"},
                {"type"},
                {"cells", true},
                {"fibres", true},
-               {"mean (nN)", true},
+               {"mean, mixed model (nN)", true},
+               {"95 %", true},
+               {"plain mean (nN)", true},
+               {"95 %, cells drawn anew", true},
                {"median (nN)", true},
                {"SD (nN)", true},
-               {"> " + readable(parameters.weak_tension_nN) + " nN (%)", true},
-               {"> " + readable(parameters.strong_tension_nN) + " nN (%)", true}},
+               {"SD without error (nN)", true}},
               {}};
-  for (const TypeSummary& s : summarise_types(study, parameters)) {
-    table.rows.push_back({s.cell.empty() ? "<b>all</b>" : html_escaped(s.cell), report::full_name_of(s.type),
-                          std::to_string(s.n_cells), std::to_string(s.n_fibres), readable(s.mean_nN),
-                          readable(s.median_nN), readable(s.sd_nN), readable(100 * s.fraction_above_weak),
-                          readable(100 * s.fraction_above_strong)});
+  for (const Summary& s : analysis.tensions.summaries) {
+    table.rows.push_back({html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells),
+                          std::to_string(s.n), s.model ? readable(s.model->estimate) : "–",
+                          interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
+                          readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
+                          readable(s.plain.standard_deviation), readable(s.without_error.standard_deviation)});
+  }
+  if (!has_conditions(study)) {
+    table.columns.erase(table.columns.begin());
+    for (auto& row : table.rows) row.erase(row.begin());
   }
   return table;
 }
 
-Table tests_table(const Study& study) {
-  Table table{{{"test"},
-               {"counted"},
+Table tests_table(const Measure& m) {
+  Table table{{{"within"},
+               {"test"},
+               {"unit"},
                {"groups"},
-               {"n"},
+               {"observations"},
+               {"cells"},
                {"statistic", true},
+               {"d.f.", true},
                {"p", true},
                {"p (Holm)", true},
-               {"effect size", true}},
+               {"effect", true},
+               {"95 %"},
+               {"effect is"}},
               {}};
-  for (const TypeTest& t : test_types(study)) {
+  for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
-    table.rows.push_back({t.test, t.unit == Unit::fibre ? "fibres" : "medians of cells",
-                          is_pair ? t.group_a + " against " + t.group_b : t.group_a,
-                          is_pair ? fmt::format("{} and {}", t.n_a, t.n_b) : std::to_string(t.n_a),
-                          readable(t.statistic), p_text(t.p_value), t.p_holm ? p_text(*t.p_holm) : "–",
-                          readable(t.effect)});
+    table.rows.push_back({html_escaped(t.within), t.test, name_of(t.unit),
+                          html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
+                          is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
+                          is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
+                          readable(t.statistic), t.degrees ? readable(*t.degrees) : "–", p_text(t.p_value),
+                          t.p_holm ? p_text(*t.p_holm) : "–", t.effect_name.empty() ? "–" : readable(t.effect),
+                          interval_text(t.interval), html_escaped(t.effect_name)});
   }
   return table;
 }
 
 Table cells_table(const Study& study) {
   Table table{{{"cell"},
+               {"condition"},
                {"fibres", true},
                {"adhesions", true},
                {"total force (nN)", true},
@@ -65,65 +93,81 @@ Table cells_table(const Study& study) {
                {"of network (nN)", true},
                {"relative L2", true},
                {"expected", true},
-               {"converged"}},
+               {"enters"}},
               {}};
   for (const StudyCell& c : study.cells) {
-    table.rows.push_back({html_escaped(c.name), std::to_string(c.cell.fibres.size()),
-                          std::to_string(c.cell.adhesions.size()), readable(c.fit.total_force_nN),
-                          readable(c.fit.fibre_force_nN), readable(c.fit.network_force_nN), readable(c.fit.relative_l2),
-                          readable(c.fit.expected_relative_l2), c.fit.converged ? "yes" : "<b>no</b>"});
+    table.rows.push_back({html_escaped(c.name), html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
+                          std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
+                          readable(c.fit.total_force_nN), readable(c.fit.fibre_force_nN),
+                          readable(c.fit.network_force_nN), readable(c.fit.relative_l2),
+                          readable(c.fit.expected_relative_l2), c.fit.converged ? "yes" : "yes, not converged"});
+  }
+  for (const LeftOutCell& c : study.left_out) {
+    table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), "", "", "", "", "", "", "",
+                          "<b>no:</b> " + html_escaped(c.reason)});
   }
   return table;
 }
 
-std::string overview(const Study& study) {
-  std::size_t n_fibres = 0, n_adhesions = 0, n_not_converged = 0;
+std::string list_of(const std::vector<std::string>& sentences) {
+  std::string html = "<ul>\n";
+  for (const std::string& s : sentences) html += "<li>" + html_escaped(s) + "</li>\n";
+  return html + "</ul>\n";
+}
+
+std::string overview(const Study& study, const Analysis& analysis) {
+  std::size_t n_fibres = 0, n_adhesions = 0;
   for (const StudyCell& c : study.cells) {
     n_fibres += c.cell.fibres.size();
     n_adhesions += c.cell.adhesions.size();
-    n_not_converged += c.fit.converged ? 0 : 1;
   }
-  const std::size_t n_measured = measured_fibres(study).size();
   std::string html = fmt::format(
-      "<p>{} cells with {} adhesions and {} stress fibres; the tensions of {} of them could "
-      "be identified and enter the statistics.</p>\n",
-      study.cells.size(), n_adhesions, n_fibres, n_measured);
-  if (n_not_converged > 0)
-    html += fmt::format("<p><b>The fit of {} cells did not converge.</b></p>\n", n_not_converged);
-  if (!study.unfinished.empty()) {
-    html += fmt::format("<p>Without a fit and left out: {} cells", study.unfinished.size());
-    for (std::size_t i = 0; i < study.unfinished.size(); ++i) {
-      html += (i == 0 ? " (" : ", ") + html_escaped(study.unfinished[i]);
-    }
-    html += ").</p>\n";
-  }
+      "<p>{} cells{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter "
+      "the statistics. {} cells were left out: see the table of cells.</p>\n",
+      study.cells.size(), has_conditions(study) ? fmt::format(" under {} conditions", study.conditions.size()) : "",
+      n_adhesions, n_fibres, analysis.tensions.sample.values.size(), study.left_out.size());
+  if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
   return html;
 }
 
+constexpr const char* kHowToRead =
+    "<p class=\"sub\">Two-sided. The fibres of a cell are not independent: tests whose unit is the observation "
+    "overstate the evidence; those with the unit cell do not (clustered rank sum: Datta &amp; Satten 2005; mixed "
+    "model: "
+    "random effects of the cell and of each kind in it, known error of each value, Satterthwaite’s degrees of "
+    "freedom). "
+    "Holm’s correction is over the pairs that one question compares.</p>\n";
+
 }  // namespace
 
-std::string study_html(const Study& study, const StudyParameters& parameters) {
-  std::string body = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
-                                 study.cells.size(), kVersion);
-  body += report::section("In short", overview(study));
-  body += report::section(
-      "Tension by fibre type",
-      "<div class=\"grid\">\n" +
-          report::figure("Tension of each fibre", tensions_by_type_svg(study), "One dot a fibre; bar: median.") +
-          report::figure("Total force of each cell", forces_by_cell_svg(study),
-                         "Sum of the force magnitudes over adhesions, the strongest cell first.") +
-          report::figure("Force and area of adhesions", adhesion_forces_svg(study),
-                         "Filled: a segmented fibre ends on the adhesion.") +
-          "</div>\n" + report::html_of(types_table(study, parameters)));
-  body += report::section(
-      "Tests between types",
-      report::html_of(tests_table(study)) +
-          "<p class=\"sub\">Two-sided. The fibres of a cell are not independent: tests that count fibres overstate the "
-          "evidence; those that count one median a cell and type do not. Effect size: rank-biserial correlation for "
-          "pairs (positive: the first group is stronger), epsilon squared for all. Holm’s correction is over the "
-          "pairs. Types with fewer than two values are left out.</p>\n");
-  body += report::section("Cells", report::html_of(cells_table(study)));
-  return report::page("Stress-fibre tensions – mbtfm", body);
+std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
+                       const StudyParameters& parameters) {
+  const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
+                                       study.cells.size(), kVersion);
+  std::string body = report::section("In short", overview(study, analysis));
+  std::string found;
+  for (const Findings& f : findings_of(analysis, parameters)) {
+    if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
+  }
+  body += report::section("What was found", found);
+  std::string pictures;
+  for (const Figure& figure : figures) pictures += embedded(figure);
+  body += report::section("Figures", pictures);
+  const auto files = tables_of(study, analysis);
+  const auto with_file = [&](const Table& table, const std::string& name) {
+    const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
+    return report::html_of(table, {file->first, file->second});
+  };
+  body += report::section("Tension by fibre type", with_file(types_table(study, analysis), "types.csv"));
+  std::string tests;
+  for (const Measure* m : analysis.measures()) {
+    if (!m->comparisons.empty())
+      tests +=
+          report::folded("Tests of the " + m->sample.name + " of " + m->sample.each, report::html_of(tests_table(*m)));
+  }
+  body += report::section("Tests", tests + kHowToRead);
+  body += report::section("Cells", with_file(cells_table(study), "cells.csv"));
+  return report::page("Stress-fibre tensions – mbtfm", head, body);
 }
 
 }  // namespace mbtfm::statistics

@@ -4,45 +4,74 @@
 #include <map>
 
 #include "pipeline/contract/csv.h"
-#include "pipeline/statistics/rank_tests.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
+namespace {
+
+CsvText& add(CsvText& csv, const std::optional<Interval>& interval) {
+  return csv.add(interval ? std::optional(interval->low) : std::nullopt)
+      .add(interval ? std::optional(interval->high) : std::nullopt);
+}
 
 std::string cells_csv(const Study& study) {
-  CsvText csv({"cell", "n_adhesions", "n_fibres", "n_dorsal", "n_arc", "n_ventral", "cell_area_um2",
-               "adhesion_area_um2", "total_force_nN", "network_force_nN", "fibre_force_nN", "network_tension_nN",
-               "network_surface_tension_nN_per_um", "relative_l2", "expected_relative_l2", "noise_um", "n_meshes",
-               "converged"});
+  const std::vector<std::string> header = {"cell",
+                                           "condition",
+                                           "included",
+                                           "reason",
+                                           "n_adhesions",
+                                           "n_fibres",
+                                           "n_dorsal",
+                                           "n_arc",
+                                           "n_ventral",
+                                           "cell_area_um2",
+                                           "adhesion_area_um2",
+                                           "total_force_nN",
+                                           "network_force_nN",
+                                           "fibre_force_nN",
+                                           "network_tension_nN",
+                                           "network_surface_tension_nN_per_um",
+                                           "relative_l2",
+                                           "expected_relative_l2",
+                                           "noise_um",
+                                           "n_meshes",
+                                           "converged"};
+  CsvText csv(header);
   for (const StudyCell& c : study.cells) {
     std::map<FibreType, int> n_of;
     for (const Fibre& fibre : c.cell.fibres) ++n_of[fibre.type];
-    double adhesion_area = 0;
-    for (const Adhesion& adhesion : c.cell.adhesions) adhesion_area += adhesion.area_um2;
+    const CellFigures figures = figures_of(c);
     std::optional<double> network_tension;
     for (const Tension& t : c.tensions) {
       if (t.fibre_id == 0) network_tension = t.tension_nN;
     }
-    csv.add(c.name).add(static_cast<int>(c.cell.adhesions.size())).add(static_cast<int>(c.cell.fibres.size()));
+    csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(1).add("");
+    csv.add(static_cast<int>(c.cell.adhesions.size())).add(static_cast<int>(c.cell.fibres.size()));
     for (const FibreType type : kFibreTypes) csv.add(n_of[type]);
-    csv.add(std::abs(signed_area_um2(c.cell.outline_um))).add(adhesion_area);
+    csv.add(figures.cell_area_um2).add(figures.adhesion_area_um2);
     csv.add(c.fit.total_force_nN).add(c.fit.network_force_nN).add(c.fit.fibre_force_nN).add(network_tension);
     csv.add(c.fit.network_surface_tension_nN_per_um).add(c.fit.relative_l2).add(c.fit.expected_relative_l2);
     csv.add(c.fit.noise_um).add(c.fit.n_meshes).add(c.fit.converged ? 1 : 0);
+    csv.end_row();
+  }
+  for (const LeftOutCell& c : study.left_out) {
+    csv.add(c.name).add(c.condition).add(0).add(c.reason);
+    for (std::size_t i = 4; i < header.size(); ++i) csv.add("");
     csv.end_row();
   }
   return csv.str();
 }
 
 std::string adhesions_csv(const Study& study) {
-  CsvText csv({"cell", "adhesion_id", "x_um", "y_um", "area_um2", "eccentricity", "fx_nN", "fy_nN", "force_nN",
-               "traction_kPa", "sigma_nN", "connected"});
+  CsvText csv({"cell", "condition", "adhesion_id", "x_um", "y_um", "area_um2", "eccentricity", "fx_nN", "fy_nN",
+               "force_nN", "traction_kPa", "sigma_nN", "connected"});
   for (const StudyCell& c : study.cells) {
     std::map<int, const Adhesion*> by_id;
     for (const Adhesion& adhesion : c.cell.adhesions) by_id[adhesion.adhesion_id] = &adhesion;
     for (const AdhesionForce& force : c.forces) {
       const Adhesion& a = *by_id.at(force.adhesion_id);
-      csv.add(c.name).add(a.adhesion_id).add(a.position_um.x).add(a.position_um.y).add(a.area_um2).add(a.eccentricity);
+      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(a.adhesion_id);
+      csv.add(a.position_um.x).add(a.position_um.y).add(a.area_um2).add(a.eccentricity);
       csv.add(force.force_nN.x).add(force.force_nN.y).add(norm(force.force_nN));
       csv.add(norm(force.force_nN) / a.area_um2).add(force.sigma_nN).add(force.connected ? 1 : 0);
       csv.end_row();
@@ -52,44 +81,185 @@ std::string adhesions_csv(const Study& study) {
 }
 
 std::string fibres_csv(const Study& study) {
-  CsvText csv({"cell", "fibre_id", "type", "length_um", "width_um", "confidence", "tension_nN", "low_nN", "high_nN",
-               "identifiable"});
+  CsvText csv({"cell", "condition", "fibre_id", "type", "length_um", "width_um", "confidence", "tension_nN", "low_nN",
+               "high_nN", "sigma_nN", "identifiable"});
   for (const StudyCell& c : study.cells) {
     std::map<int, const Tension*> tension;
     for (const Tension& t : c.tensions) tension[t.fibre_id] = &t;
     for (const Fibre& fibre : c.cell.fibres) {
       const auto t = tension.find(fibre.fibre_id);
       if (t == tension.end()) continue;
-      csv.add(c.name).add(fibre.fibre_id).add(name_of(fibre.type)).add(length_um(fibre.points_um)).add(fibre.width_um);
-      csv.add(fibre.confidence).add(t->second->tension_nN).add(t->second->low_nN).add(t->second->high_nN);
-      csv.add(t->second->identifiable ? 1 : 0);
+      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(fibre.fibre_id);
+      csv.add(name_of(fibre.type)).add(length_um(fibre.points_um)).add(fibre.width_um).add(fibre.confidence);
+      csv.add(t->second->tension_nN).add(t->second->low_nN).add(t->second->high_nN);
+      csv.add(standard_error_nN(*t->second)).add(t->second->identifiable ? 1 : 0);
       csv.end_row();
     }
   }
   return csv.str();
 }
 
-std::string types_csv(const Study& study, const StudyParameters& parameters) {
-  CsvText csv({"cell", "type", "n_cells", "n_fibres", "mean_nN", "median_nN", "sd_nN",
-               fmt::format("fraction_above_{:g}_nN", parameters.weak_tension_nN),
-               fmt::format("fraction_above_{:g}_nN", parameters.strong_tension_nN)});
-  for (const TypeSummary& s : summarise_types(study, parameters)) {
-    csv.add(s.cell.empty() ? "all" : s.cell).add(name_of(s.type)).add(s.n_cells).add(s.n_fibres);
-    csv.add(s.mean_nN).add(s.median_nN).add(s.sd_nN).add(s.fraction_above_weak).add(s.fraction_above_strong);
+void add_summary(CsvText& csv, const Summary& s) {
+  csv.add(s.n_cells).add(s.n).add(s.plain.mean);
+  add(csv, s.mean_interval);
+  csv.add(s.model ? std::optional(s.model->estimate) : std::nullopt);
+  add(csv, s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt);
+  csv.add(s.plain.median);
+  add(csv, s.median_interval);
+  csv.add(s.plain.standard_deviation).add(s.typical_error).add(s.without_error.standard_deviation);
+}
+
+/// Columns of add_summary; `unit` begins with an underscore or is empty.
+std::vector<std::string> summary_columns(const std::string& counted, const std::string& unit) {
+  std::vector<std::string> list = {"n_cells", "n_" + counted};
+  for (const char* name : {"mean", "mean_low", "mean_high", "model_mean", "model_low", "model_high", "median",
+                           "median_low", "median_high", "sd", "typical_error", "sd_without_error"}) {
+    list.push_back(name + unit);
+  }
+  return list;
+}
+
+std::string types_csv(const Study& study, const Analysis& analysis) {
+  std::vector<std::string> header = {"condition", "cell", "type"};
+  for (const std::string& column : summary_columns("fibres", "_nN")) header.push_back(column);
+  std::vector<double> thresholds;
+  for (const ShareAbove& s : analysis.shares) {
+    if (std::find(thresholds.begin(), thresholds.end(), s.threshold_nN) != thresholds.end()) continue;
+    thresholds.push_back(s.threshold_nN);
+    for (const char* what : {"", "_low", "_high", "_without_error"})
+      header.push_back(fmt::format("fraction_above_{:g}_nN{}", s.threshold_nN, what));
+  }
+  CsvText csv(header);
+  for (const Summary& s : analysis.tensions.summaries) {
+    csv.add(s.condition).add("all").add(s.kind);
+    add_summary(csv, s);
+    for (const ShareAbove& share : analysis.shares) {
+      if (share.condition != s.condition || share.kind != s.kind) continue;
+      csv.add(share.share.value).add(share.share.interval.low).add(share.share.interval.high).add(share.without_error);
+    }
+    csv.end_row();
+  }
+  const Sample& sample = analysis.tensions.sample;
+  for (const Summary& s : analysis.tensions_by_cell) {
+    csv.add(s.condition).add(s.cell).add(s.kind);
+    add_summary(csv, s);
+    for (const double threshold : thresholds) {
+      int n = 0;
+      for (const Observation& o : sample.values) {
+        n += study.cells[static_cast<std::size_t>(o.cell)].name == s.cell && o.value > threshold &&
+             sample.kinds[static_cast<std::size_t>(o.kind)] == s.kind;
+      }
+      csv.add(static_cast<double>(n) / s.n).add("").add("").add("");
+    }
     csv.end_row();
   }
   return csv.str();
 }
 
-std::string tests_csv(const Study& study) {
-  CsvText csv({"test", "unit", "group_a", "group_b", "n_a", "n_b", "statistic", "p", "p_holm", "effect"});
-  for (const TypeTest& t : test_types(study)) {
-    csv.add(t.test).add(t.unit == Unit::fibre ? "fibre" : "cell median").add(t.group_a).add(t.group_b);
-    csv.add(t.n_a).add(t.group_b.empty() ? std::optional<int>() : std::optional<int>(t.n_b));
-    csv.add(t.statistic).add(t.p_value).add(t.p_holm).add(t.effect);
-    csv.end_row();
+std::string summaries_csv(const Analysis& analysis) {
+  std::vector<std::string> header = {"quantity", "condition", "kind"};
+  for (const std::string& column : summary_columns("observations", "")) header.push_back(column);
+  CsvText csv(header);
+  for (const Measure* m : analysis.measures()) {
+    for (const Summary& s : m->summaries) {
+      csv.add(m->sample.column).add(s.condition).add(s.kind);
+      add_summary(csv, s);
+      csv.end_row();
+    }
   }
   return csv.str();
+}
+
+/// The scatter between cells, between the kinds of a cell and within them.
+std::string variances_csv(const Analysis& analysis) {
+  CsvText csv({"quantity", "component", "standard_deviation"});
+  const auto row = [&](const Sample& sample, const std::string& component, double variance) {
+    csv.add(sample.column).add(component).add(std::sqrt(variance)).end_row();
+  };
+  for (const Measure* m : analysis.measures()) {
+    if (!m->model) continue;
+    row(m->sample, "cell", m->model->fit.cell_variance);
+    row(m->sample, "kind in a cell", m->model->fit.cell_kind_variance);
+    for (int k = 0; k < m->model->fit.residual_variance.size(); ++k)
+      row(m->sample, "within: " + m->sample.kinds[static_cast<std::size_t>(k)], m->model->fit.residual_variance[k]);
+  }
+  return csv.str();
+}
+
+std::string tests_csv(const Analysis& analysis) {
+  CsvText csv({"quantity", "question", "within", "test", "unit", "group_a", "group_b", "n_a", "n_b", "cells_a",
+               "cells_b", "statistic", "degrees_of_freedom", "p", "p_holm", "effect", "effect_is", "effect_low",
+               "effect_high"});
+  for (const Measure* m : analysis.measures()) {
+    for (const Comparison& t : m->comparisons) {
+      const bool is_pair = !t.group_b.empty();
+      csv.add(t.column).add(t.question).add(t.within).add(t.test).add(name_of(t.unit)).add(t.group_a).add(t.group_b);
+      csv.add(t.n_a).add(is_pair ? std::optional(t.n_b) : std::nullopt);
+      csv.add(t.cells_a).add(is_pair ? std::optional(t.cells_b) : std::nullopt);
+      csv.add(t.statistic).add(t.degrees).add(t.p_value).add(t.p_holm);
+      csv.add(t.effect_name.empty() ? std::nullopt : std::optional(t.effect)).add(t.effect_name);
+      add(csv, t.interval).end_row();
+    }
+  }
+  return csv.str();
+}
+
+std::string correlations_csv(const Analysis& analysis) {
+  CsvText csv({"force", "size", "condition", "n_cells", "slope", "slope_error", "slope_low", "slope_high", "r"});
+  for (const Correlation& c : analysis.correlations) {
+    csv.add(c.force).add(c.size).add(c.condition).add(c.line.n).add(c.line.slope).add(c.line.slope_error);
+    add(csv, c.slope_interval).add(c.line.correlation).end_row();
+  }
+  return csv.str();
+}
+
+std::string area_bins_csv(const Analysis& analysis) {
+  CsvText csv({"condition", "connected", "area_low_um2", "area_high_um2", "n_cells", "n_adhesions", "mean_area_um2",
+               "mean_force_nN", "low_nN", "high_nN"});
+  for (const AreaBin& b : analysis.area_bins) {
+    csv.add(b.condition).add(b.is_connected ? 1 : 0).add(b.low_um2).add(b.high_um2).add(b.n_cells).add(b.n_adhesions);
+    csv.add(b.mean_area_um2).add(b.mean_force_nN);
+    add(csv, b.interval_nN).end_row();
+  }
+  return csv.str();
+}
+
+std::string directions_csv(const Study& study) {
+  CsvText csv({"cell", "condition", "relation", "adhesion_id", "fibre_id", "angle_deg"});
+  for (const StudyCell& c : study.cells) {
+    for (const Direction& d : c.directions) {
+      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(name_of(d.relation));
+      csv.add(d.adhesion_id).add(d.fibre_id).add(d.angle_deg).end_row();
+    }
+  }
+  return csv.str();
+}
+
+std::string direction_means_csv(const Analysis& analysis) {
+  CsvText csv({"relation", "condition", "n_cells", "n", "mean_angle_deg", "low_deg", "high_deg", "chance_deg",
+               "mean_cosine", "cosine_low", "cosine_high"});
+  for (const DirectionSummary& s : analysis.directions) {
+    csv.add(name_of(s.relation)).add(s.condition).add(s.n_cells).add(s.n).add(s.mean_angle_deg);
+    add(csv, s.angle_interval_deg).add(largest_angle_deg(s.relation) / 2).add(s.mean_cosine);
+    add(csv, s.cosine_interval).end_row();
+  }
+  return csv.str();
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis) {
+  return {{"cells.csv", cells_csv(study)},
+          {"adhesions.csv", adhesions_csv(study)},
+          {"fibres.csv", fibres_csv(study)},
+          {"types.csv", types_csv(study, analysis)},
+          {"tests.csv", tests_csv(analysis)},
+          {"summaries.csv", summaries_csv(analysis)},
+          {"variances.csv", variances_csv(analysis)},
+          {"correlations.csv", correlations_csv(analysis)},
+          {"adhesion_bins.csv", area_bins_csv(analysis)},
+          {"directions.csv", directions_csv(study)},
+          {"direction_means.csv", direction_means_csv(analysis)}};
 }
 
 }  // namespace mbtfm::statistics

@@ -43,10 +43,10 @@ TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
     }
     const test::Agreement found = test::agreement(ours, theirs);
     RecordProperty("median_px_" + std::to_string(frame), std::to_string(found.median_px));
-    // What a field means over a window is a matter of the window where it turns within it: a registration at the very
-    // points, in windows of 10 to 16 px, differs from this reference by 0.13 to 0.22 px.
-    EXPECT_LE(found.median_px, 0.2);
-    EXPECT_GE(found.correlation, 0.94);
+    // What a field means over a window is a matter of the window where it turns within it: another correlation of the
+    // same images in the same windows differs from this reference by 0.17 and 0.14 px.
+    EXPECT_LE(found.median_px, 0.18);
+    EXPECT_GE(found.correlation, 0.95);
   }
 }
 

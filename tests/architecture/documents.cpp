@@ -1,6 +1,7 @@
 /// The pages of docs/ are in step with the program.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <regex>
 
 #include "pipeline/contract/files.h"
@@ -46,6 +47,25 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "parameters.md", page);
   EXPECT_EQ(read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+}
+
+/// Each test of tests/stability says what is hard and what must come out, and has its line in the catalogue.
+TEST(Documents, the_catalogue_lists_every_hard_case) {
+  const std::string page = read_text(kDocs / "hard-cases.md");
+  const std::regex any_test("\nTEST(_P)?\\("), stated("\nTEST(_P)?\\(\\w+, (\\w+)\\) \\{\\s*test::hard_case\\(");
+  for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "tests/stability")) {
+    const std::string text = read_text(entry.path());
+    const auto count = [&](const std::regex& what) {
+      return std::distance(std::sregex_iterator(text.begin(), text.end(), what), {});
+    };
+    EXPECT_EQ(count(any_test), count(stated)) << entry.path() << ": a test without its hard_case(physics, expected)";
+    for (std::sregex_iterator at(text.begin(), text.end(), stated), end; at != end; ++at) {
+      std::string name = (*at)[2];
+      std::replace(name.begin(), name.end(), '_', ' ');
+      EXPECT_NE(page.find("| " + name), page.npos)
+          << name << ": write the page anew with build/tests/hard_cases_page docs/hard-cases.md";
+    }
+  }
 }
 
 }  // namespace

@@ -33,10 +33,11 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"opencv2/", {"segment"}},
     {"tiff", {"segment"}},
     {"png", {"segment"}},
+    {"jpeglib", {"segment"}},
     {"zip", {"segment"}},
     {"expat", {"segment"}},
     {"CGAL/", {"network"}},
-    {"Eigen/", {"network", "substrate", "mbtfm", "samples"}},
+    {"Eigen/", {"network", "substrate", "mbtfm", "samples", "pipeline"}},
     {"fftw3", {"mbtfm"}},
     {"deal.II/", {"substrate"}},
     {"cholmod", {"substrate"}},
@@ -46,10 +47,12 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"boost/", {"mbtfm", "pipeline/contract"}},
     {"vtk", {"pipeline/contract"}},
     {"CLI/", {"pipeline", "pipeline/contract"}},
-    {"nlohmann/", {"pipeline", "pipeline/contract"}},
+    {"nlohmann/", {"pipeline", "pipeline/charts", "pipeline/contract"}},
     {"fmt/", {"pipeline", "pipeline/charts", "pipeline/contract"}},
     {"toml++/", {"pipeline", "pipeline/contract"}},
     {"openssl/", {"pipeline/contract"}},
+    {"librsvg/", {"pipeline"}},
+    {"cairo/", {"pipeline"}},
 };
 
 struct Include {

@@ -2,6 +2,7 @@
 /// each of which has a step of its own (`noise`, relative to the largest displacement), and whether their flags are
 /// right.
 ///
+/// Peaks: detected beads that the field moves by more than 5 px; how many of them are tracked rightly, and wrongly.
 /// A vector is wrong where it is further than 1 px from the step of every bead within 2 px that both images show; beads
 /// that leave the picture are rightly flagged, too.
 #include <cstdio>
@@ -49,12 +50,18 @@ struct Flags {
   int n = 0, n_right = 0;
 };
 
+struct Peaks {
+  int n = 0, n_right = 0, n_wrong = 0;
+};
+
 struct Counts {
   std::map<std::string, Flags> flags;
+  Peaks peaks;
   test::MeanSquare own, field;  ///< px, of a component, about the bead's own step and about the field
   test::MeanSquare variance;    ///< of error/sigma about the field
   Counts& operator+=(const Counts& other) {
     for (const auto& [name, f] : other.flags) flags[name].n += f.n, flags[name].n_right += f.n_right;
+    peaks.n += other.peaks.n, peaks.n_right += other.peaks.n_right, peaks.n_wrong += other.peaks.n_wrong;
     own += other.own, field += other.field, variance += other.variance;
     return *this;
   }
@@ -79,9 +86,15 @@ Counts counted(const segment::Tracking& tracking, const Pair& pair, const sample
     Flags& flags = counts.flags[bead.flag];
     ++flags.n;
     flags.n_right += is_good ? off <= 1 : off > 1 || is_leaving;
-    if (!is_good || around.empty()) continue;
+    if (around.empty()) continue;
+    const Vec2 field_um = pair.experiment.displacement[around[0]].displacement_um;
+    if (norm(field_um) > 5 * pixel) {
+      ++counts.peaks.n;
+      if (is_good) ++(off <= 1 ? counts.peaks.n_right : counts.peaks.n_wrong);
+    }
+    if (!is_good) continue;
     if (off < kLost) counts.own.add(0.5 * off * off);
-    const Vec2 error = bead.displacement_um - pair.experiment.displacement[around[0]].displacement_um;
+    const Vec2 error = bead.displacement_um - field_um;
     counts.field.add(0.5 * dot(error, error) / (pixel * pixel));
     counts.variance.add(0.5 * dot(error, error) / (bead.sigma_um * bead.sigma_um));
   }
@@ -98,9 +111,10 @@ void print(const char* what, const Counts& counts) {
       n_flagged += f.n, n_right += f.n_right;
     }
   }
-  std::printf("%s  %6.1f %%  %4d  %.3f  %.3f  %.3f  %.3f  %.2f ", what, 100.0 * (n - n_flagged) / n, n_missed,
-              n_right / std::max(1.0, 1.0 * n_right + n_missed), n_right / std::max(1.0, 1.0 * n_flagged),
-              counts.own.root(), counts.field.root(), counts.variance.mean());
+  std::printf("%s  %6.1f %%  %4d  %.3f  %.3f  %.3f  %.3f  %.2f   %d+%d of %d ", what, 100.0 * (n - n_flagged) / n,
+              n_missed, n_right / std::max(1.0, 1.0 * n_right + n_missed), n_right / std::max(1.0, 1.0 * n_flagged),
+              counts.own.root(), counts.field.root(), counts.variance.mean(), counts.peaks.n_right,
+              counts.peaks.n_wrong, counts.peaks.n);
   for (const auto& [name, f] : counts.flags) {
     if (!name.empty()) std::printf("  %s %d of %d", name.c_str(), f.n_right, f.n);
   }
@@ -119,7 +133,7 @@ int main(int argc, char** argv) {
   const int threads = static_cast<int>(argument(4, 2));
   p.noise = argument(5, p.noise);
   p.microscope.bead_photons = argument(6, p.microscope.bead_photons);
-  std::printf("seed  tracked  wrong recall prec.  own    field  var   flags that are right\n");
+  std::printf("seed  tracked  wrong recall prec.  own    field  var   peaks       flags that are right\n");
   Counts all;
   for (int seed = static_cast<int>(argument(2, 101)); seed <= argument(3, 105); ++seed) {
     p.seed = static_cast<std::uint64_t>(seed);

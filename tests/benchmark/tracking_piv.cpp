@@ -57,9 +57,10 @@ test::BeadPair redrawn(const segment::Image& relaxed, const segment::Tracking& t
   return pair;
 }
 
-std::vector<Vec2> seen(const std::vector<test::Moved>& beads, const std::vector<Vec2>& places, double bead_sigma) {
+std::vector<Vec2> seen(const std::vector<test::Moved>& beads, const std::vector<Vec2>& places, double bead_sigma,
+                       int window) {
   std::vector<Vec2> result;
-  for (const Vec2 place : places) result.push_back(test::as_correlation_sees(beads, place, bead_sigma));
+  for (const Vec2 place : places) result.push_back(test::as_correlation_sees(beads, place, bead_sigma, window));
   return result;
 }
 
@@ -91,7 +92,7 @@ int main(int argc, char** argv) {
     const auto tracking = segment::track_beads(relaxed, stressed, 1.0, {}, 2);
     const double sigma = tracking.bead_sigma_um;
     const auto& places = reference.places;
-    const std::vector<Vec2> ours = seen(test::moved_beads(tracking), places, sigma);
+    const std::vector<Vec2> ours = seen(test::moved_beads(tracking), places, sigma, window);
     std::printf("frame %d: %d of %zu beads, scatter %.2f px\n", frame, tracking.n_good, tracking.field.size(),
                 tracking.scatter_um);
     print("tracked, against the reference", ours, reference.u);
@@ -101,11 +102,11 @@ int main(int argc, char** argv) {
     const auto pair = redrawn(relaxed, tracking);
     std::vector<test::Moved> truth;
     for (std::size_t k = 0; k < pair.positions.size(); ++k) truth.push_back({pair.positions[k], pair.displacements[k]});
-    const auto perfect = seen(truth, places, sigma);
+    const auto perfect = seen(truth, places, sigma, window);
     const auto drawn = correlated(pair.relaxed, pair.stressed, places, perfect, window);
     print("drawn anew: a perfect tracker, against correlation", perfect, drawn);
     const auto again =
-        seen(test::moved_beads(segment::track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2)), places, sigma);
+        seen(test::moved_beads(segment::track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2)), places, sigma, window);
     print("drawn anew: tracked, against correlation", again, drawn);
     print("drawn anew: tracked, against a perfect tracker", again, perfect);
     print("correlation of the pair drawn anew, against the reference", drawn, reference.u);

@@ -7,6 +7,7 @@
 #include "segment/emptiness.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/hard_case.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -14,16 +15,20 @@ namespace {
 using namespace mbtfm::test;
 
 TEST(Adhesions, names_a_pixel_that_is_no_number) {
+  test::hard_case("a NaN in the image", "an error that names the pixel");
   Image image = even_image(20, 20, 1);
   image.at(3, 4) = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THROW(find_adhesions(image, 0.1, AdhesionParameters{}), InvalidData);
 }
 
 TEST(Adhesions, takes_saturated_adhesions) {
+  test::hard_case("the camera saturates in the adhesions", "all found");
   DrawnScene s = drawn_scene(10, 7);
   for (float& value : s.adhesion_image.pixels) value = std::min(value, 400.0f);
   const auto found = find_adhesions(s.adhesion_image, s.kPixel_um, AdhesionParameters{});
-  EXPECT_EQ(score_adhesions(s.adhesions, found).n_matched, 5);
+  const int n_matched = score_adhesions(s.adhesions, found).n_matched;
+  EXPECT_EQ(n_matched, 5);
+  test::came_out(std::to_string(n_matched) + " of " + std::to_string(s.adhesions.size()));
 }
 
 /// The error of a segmentation that finds nothing.
@@ -48,46 +53,56 @@ Image noisy(float level, double noise, std::uint64_t seed) {
 }
 
 TEST(Emptiness, a_constant_image_is_called_so) {
+  test::hard_case("the camera saw nothing", "an error with the value");
   EXPECT_EQ(emptiness_of(even_image(20, 20, 100)), "every pixel is 100");
   EXPECT_EQ(finding(even_image(200, 150, 0), std::nullopt), "every pixel is 0");
+  test::came_out("every pixel is 0");
   EXPECT_EQ(finding(std::nullopt, even_image(200, 150, 65535)), "every pixel is 65535");
 }
 
 TEST(Emptiness, a_saturated_image_is_called_so) {
+  test::hard_case("the exposure cut off all that is brighter than the cytosol", "an error with the share of pixels");
   DrawnScene s = drawn_scene(10, 1);
   for (float& value : s.adhesion_image.pixels) value = std::min(value, 190.0f);  // into the cytosol
   const std::string found = finding(s.adhesion_image, s.actin_image);
   EXPECT_NE(found.find("% of the pixels at 190"), std::string::npos) << found;
   EXPECT_NE(found.find("saturated"), std::string::npos) << found;
+  test::came_out(found);
 }
 
 TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {
+  test::hard_case("an empty field", "an error with the brightest spot in noise deviations");
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
     const std::string found = finding(noisy(200, 15, seed), std::nullopt);
     EXPECT_NE(found.find("nothing above the noise, the brightest spot 4."), std::string::npos) << found;
     const std::string no_cell = finding(std::nullopt, noisy(200, 15, seed));
     EXPECT_NE(no_cell.find("no cell"), std::string::npos) << no_cell;
+    test::came_out(found);
   }
 }
 
 TEST(Emptiness, spots_of_the_wrong_size_are_called_so) {
+  test::hard_case("all spots are smaller than asked for", "an error with their number and the parameter");
   Image image = noisy(100, 5, 4);
   draw_ellipse(image, ellipse(1, {20, 15}, 0.8, 0.5, 0), 500, 0.15, 0.1);
   AdhesionParameters p;
   p.adhesion_smallest_um2 = 1;
   EXPECT_TRUE(find_adhesions(image, 0.1, p).empty());
+  test::came_out(why_no_adhesions(image, 0.1, p));
   EXPECT_EQ(why_no_adhesions(image, 0.1, p),
             "of 1 spots none is larger than adhesion_smallest_um2 = 1 and smaller than adhesion_largest_um2 = 25");
 }
 
 TEST(Emptiness, a_picture_is_not_called_empty) {
+  test::hard_case("few grey levels, but a cell", "no such error");
   const DrawnScene s = drawn_scene(0, 1);  // few grey levels: an even ground, an even cell
   EXPECT_EQ(emptiness_of(s.adhesion_image), "");
   EXPECT_EQ(emptiness_of(s.actin_image), "");
 }
 
 TEST(Emptiness, a_sheet_of_cells_is_called_so) {
+  test::hard_case("touching cells fill the field", "an error that asks for single cells");
   Image image = even_image(900, 900, 100);
   for (int i = 0; i < 16; ++i)
     draw_ellipse(image, ellipse(1, {45.0 * (i % 4) + 22, 45.0 * (i / 4) + 22}, 52, 47, 0.3 * i), 100, 0.2, 0.2);
@@ -101,10 +116,12 @@ TEST(Emptiness, a_sheet_of_cells_is_called_so) {
     FAIL() << "a sheet of cells passes as one";
   } catch (const InputError& error) {
     EXPECT_EQ(error.expected, "single cells");
+    test::came_out("expected single cells, found " + error.found);
   }
 }
 
 TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
+  test::hard_case("clouds of all shapes that no ellipse fits", "valid ellipses within the allowed sizes, or none");
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
     // noise summed over 7 x 7 pixels twice: clouds of all shapes, which no ellipse fits
@@ -129,9 +146,11 @@ TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
 }
 
 TEST(Adhesions, are_not_the_bright_body_of_a_cell) {
+  test::hard_case("a bright cell body without adhesions", "none, and the reason");
   Image image = noisy(100, 5, 5);
   draw_ellipse(image, ellipse(1, {20, 15}, 24, 16, 0.5), 1000, 0.15, 0.1);
   EXPECT_TRUE(find_adhesions(image, 0.1, {}).empty());
+  test::came_out(why_no_adhesions(image, 0.1, {}));
   EXPECT_EQ(why_no_adhesions(image, 0.1, {}),
             "bright areas and edges, but no spot higher than the steps of its background");
 }

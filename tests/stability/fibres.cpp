@@ -5,6 +5,7 @@
 
 #include "segment/fibres.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/hard_case.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::segment {
@@ -17,10 +18,12 @@ std::vector<Fibre> fibres_of(const Image& image, double pixel_um = 0.1) {
 }
 
 TEST(Fibres, of_a_constant_image_are_none) {
+  test::hard_case("an empty image at any level", "none");
   for (const float level : {0.0f, 100.0f, 65535.0f}) EXPECT_TRUE(fibres_of(even_image(200, 150, level)).empty());
 }
 
 TEST(Fibres, of_noise_alone_are_none) {
+  test::hard_case("noise at three pixel sizes", "none");
   for (const std::uint64_t seed : {1, 2, 3})
     for (const double pixel_um : {0.05, 0.1, 0.2}) {
       SCOPED_TRACE(std::to_string(seed) + " " + std::to_string(pixel_um));
@@ -31,6 +34,7 @@ TEST(Fibres, of_noise_alone_are_none) {
 }
 
 TEST(Fibres, of_a_saturated_image_are_none) {
+  test::hard_case("the camera saturates everywhere", "none");
   Image image = even_image(300, 300, 70000);
   add_noise(image, 3000, 1);
   for (float& value : image.pixels) value = std::min(value, 65535.0f);
@@ -38,6 +42,7 @@ TEST(Fibres, of_a_saturated_image_are_none) {
 }
 
 TEST(Fibres, take_images_of_few_pixels_and_narrow_ones) {
+  test::hard_case("images of 1 to 17 pixels", "none, no error");
   for (const int side : {1, 2, 5, 17}) {
     EXPECT_TRUE(fibres_of(even_image(side, side, 3)).empty());
     EXPECT_TRUE(fibres_of(even_image(side, 700, 3)).empty());
@@ -47,6 +52,7 @@ TEST(Fibres, take_images_of_few_pixels_and_narrow_ones) {
 /// The stated meaning of fibre_false_per_cell: where 0.5 lines a cell are expected, Poisson's chance of more than two
 /// is 1.4 %.
 TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
+  test::hard_case("a meshwork makes chains that look like fibres", "no more than its stated false rate allows");
   for (const std::string quality : {"poor", "ordinary", "good"}) {
     SCOPED_TRACE(quality);
     const SimulatedCell cell = simulated_cell("no-fibres", quality, 1);
@@ -57,6 +63,7 @@ TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
 }
 
 TEST(Fibres, of_a_step_are_none) {
+  test::hard_case("an edge of brightness, as at the cell's rim", "none");
   Image image = even_image(256, 256, 100);
   for (int row = 0; row < 256; ++row)
     for (int column = 0; column < 256; ++column)
@@ -66,6 +73,7 @@ TEST(Fibres, of_a_step_are_none) {
 }
 
 TEST(Fibres, are_the_same_for_any_number_of_threads) {
+  test::hard_case("1, 2 and 4 threads", "the same bits");
   const DrawnScene scene = drawn_scene(20, 1);
   const int before = cv::getNumThreads();
   std::vector<std::vector<Fibre>> found;

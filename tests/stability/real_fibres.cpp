@@ -4,6 +4,7 @@
 #include <filesystem>
 
 #include "segment/segment_cell.h"
+#include "tests/support/hard_case.h"
 #include "tests/support/segmentation_score.h"
 
 namespace mbtfm::segment {
@@ -46,6 +47,7 @@ double agreement(const std::vector<Fibre>& a, std::vector<Fibre> b, double toler
 }
 
 TEST(RealFibres, of_cells_on_discs_lie_inside_the_cell) {
+  test::hard_case("six real cells on discs", "fibres inside the cell, 0.35 to 3 mm of them");
   REQUIRE_DATA();
   for (const DiscCell& disc : kDiscCells) {
     SCOPED_TRACE(disc.file);
@@ -58,6 +60,7 @@ TEST(RealFibres, of_cells_on_discs_lie_inside_the_cell) {
 }
 
 TEST(RealFibres, are_the_same_in_brighter_turned_and_mirrored_images) {
+  test::hard_case("the same cells 20 % brighter or darker, turned, mirrored", "the same fibres (F >= 0.9)");
   REQUIRE_DATA();
   for (const DiscCell& disc : kDiscCells) {
     SCOPED_TRACE(disc.file);
@@ -105,6 +108,7 @@ double near_share(const Image& a, const Image& b) {
 /// A carpet of 1 000 straight sticks of 1 to 2 pixels' width, 20 pixels long. No pixel size is known: 0.3 um makes them
 /// as wide as fibres are. By default most of a carpet is meshwork, of which any number is allowed here.
 TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
+  test::hard_case("a carpet of 1 000 sticks, 1 to 2 pixels wide", "F >= 0.97");
   REQUIRE_DATA();
   constexpr double kAssumedPixel_um = 0.3;
   const Image image = read_image(kActin / "synthetic_segmentfibers/SBXIQ_gauss.tif");
@@ -124,6 +128,7 @@ TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
 }
 
 TEST(RealFibres, of_a_layer_of_many_cells_are_found_without_an_outline) {
+  test::hard_case("a closed layer of cells", "fibres of at least the least length");
   REQUIRE_DATA();
   const Image image = read_image(kActin / "bronchial_monolayer/U13_72_P1_5_SF.tif");
   const auto fibres = find_fibres(image, {}, {}, *image.pixel_size_um, FibreParameters{});

@@ -4,6 +4,7 @@
 #include "pipeline/contract/errors.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/hard_case.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -17,10 +18,12 @@ void expect_nothing(const Image& image) {
 }
 
 TEST(Segmentation, finds_nothing_in_a_constant_image) {
+  test::hard_case("an empty image at any level", "no adhesion, fibre or outline");
   for (const float level : {0.0f, 100.0f, 65535.0f}) expect_nothing(even_image(200, 150, level));
 }
 
 TEST(Segmentation, finds_nothing_in_noise_alone) {
+  test::hard_case("noise without a cell", "no adhesion, fibre or outline");
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
     Image image = even_image(512, 512, 200);
@@ -30,10 +33,12 @@ TEST(Segmentation, finds_nothing_in_noise_alone) {
 }
 
 TEST(Segmentation, takes_images_of_few_pixels) {
+  test::hard_case("images of 1 to 17 pixels", "nothing, no error");
   for (const int side : {1, 2, 5, 17}) expect_nothing(even_image(side, side, 3));
 }
 
 TEST(Segmentation, says_what_is_missing) {
+  test::hard_case("no image, no pixel size, two sizes, empty channels", "an error that names each");
   SegmentParameters p;
   const Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
   EXPECT_THROW(segment_cell({}, {}, p), UsageError);

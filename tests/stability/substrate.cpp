@@ -8,6 +8,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 #include "substrate/gel_vtu.h"
+#include "tests/support/hard_case.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/temporary_folder.h"
 
@@ -38,21 +39,26 @@ double tolerance_of(const std::string& model) {
 }
 
 TEST_P(Model, copes_with_thin_and_thick_gels_near_incompressibility) {
+  test::hard_case("h = 2 and 1 000 um, nu = 0 and 0.4999", "the layer's exact field within the model's tolerance");
   if (std::string(GetParam()) == "half-space") GTEST_SKIP() << "has no thickness";
+  double worst = 0;
   for (const auto& [thickness, half_side] : {std::pair{2.0, 4.0}, std::pair{1000.0, 40.0}}) {
     for (const double nu : {0.0, 0.4999}) {
       const Gel gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = thickness};
       const auto points = test::scattered_points(200, half_side);
       const std::vector<Ellipse> ellipse = {{{0.1, 0.2}, 0.6, 0.3, 0.4}};
       const Eigen::MatrixXd layer = compliance("layer", gel, points, ellipse);
-      EXPECT_LT(test::mean_column_difference(compliance(GetParam(), gel, points, ellipse), layer),
-                tolerance_of(GetParam()))
-          << "nu " << nu << ", thickness " << thickness;
+      const double difference = test::mean_column_difference(compliance(GetParam(), gel, points, ellipse), layer);
+      EXPECT_LT(difference, tolerance_of(GetParam())) << "nu " << nu << ", thickness " << thickness;
+      worst = std::max(worst, difference);
     }
   }
+  test::came_out("differs by " + test::two_digits(worst) + ", allowed " + test::two_digits(tolerance_of(GetParam())));
 }
 
 TEST_P(Model, copes_with_slender_and_tiny_and_overlapping_adhesions) {
+  test::hard_case("1 : 10, 0.01 um², over each other, the same twice",
+                  "finite, equal columns for equal ones, the exact field within the tolerance");
   // 1:10; 0.01 um²; two over each other; the same twice
   const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.2, 0.3},
                                          {{6, 1}, 0.08, 0.0398, 1},
@@ -65,10 +71,14 @@ TEST_P(Model, copes_with_slender_and_tiny_and_overlapping_adhesions) {
   EXPECT_LT((g.middleCols(6, 2) - g.middleCols(8, 2)).norm(), 1e-12 * g.norm());
   const Eigen::MatrixXd reference =
       compliance(std::string(GetParam()) == "half-space" ? "half-space" : "layer", kGel, points, ellipses);
-  EXPECT_LT(test::mean_column_difference(g, reference), tolerance_of(GetParam()));
+  const double difference = test::mean_column_difference(g, reference);
+  EXPECT_LT(difference, tolerance_of(GetParam()));
+  test::came_out("differs by " + test::two_digits(difference) + ", allowed " +
+                 test::two_digits(tolerance_of(GetParam())));
 }
 
 TEST_P(Model, is_continuous_through_the_centre_and_the_rim) {
+  test::hard_case("a bead exactly at the centre or on the rim", "finite, and continuous to 1e-7");
   for (const double b : {0.1, 0.5, 1.0}) {
     const Ellipse ellipse = {{0, 0}, 1, b, 0};
     std::vector<Vec2> points;
@@ -89,6 +99,7 @@ TEST_P(Model, is_continuous_through_the_centre_and_the_rim) {
 }
 
 TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
+  test::hard_case("nu >= 0.5, E <= 0, axes of zero, NaN", "an error for each");
   const SubstrateParameters parameters = test::model_named(GetParam());
   for (const Gel& gel : {Gel{8.4, 0.5, 20}, Gel{8.4, 0.6, 20}, Gel{8.4, -0.1, 20}, Gel{0, 0.4, 20}, Gel{-1, 0.4, 20},
                          Gel{8.4, 0.4, 0}, Gel{NAN, 0.4, 20}, Gel{8.4, NAN, 20}}) {
@@ -107,6 +118,7 @@ TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
 }
 
 TEST_P(Model, takes_empty_scenes) {
+  test::hard_case("no beads, no adhesions", "empty matrices, no displacement");
   const auto model = make_substrate(kGel, test::model_named(GetParam()), 1);
   EXPECT_EQ(model->compliance_um_per_nN({}, {}).size(), 0);
   EXPECT_EQ(model->compliance_um_per_nN({{0, 0}}, {}).rows(), 2);
@@ -117,6 +129,7 @@ TEST_P(Model, takes_empty_scenes) {
 }
 
 TEST(Substrate, names_the_models_it_knows) {
+  test::hard_case("a misspelt model", "an error that lists the models");
   try {
     make_substrate(kGel, test::model_named("layr"), 1);
     FAIL();
@@ -128,6 +141,7 @@ TEST(Substrate, names_the_models_it_knows) {
 }
 
 TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
+  test::hard_case("5 MB allowed; a scene of 1 mm on a gel of 1 um", "an error before memory is taken");
   for (const char* name : {"split", "refined"}) {
     SubstrateParameters parameters = test::model_named(name);
     parameters.memory_limit_GB = 0.005;
@@ -137,6 +151,7 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
       FAIL() << name;
     } catch (const NotSolved& error) {
       EXPECT_NE(error.report.reason.find("memory"), std::string::npos) << error.report.reason;
+      test::came_out(error.report.reason);
     }
   }
   // a scene of 1 mm on a gel of 1 um: no grid of it fits
@@ -150,6 +165,7 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
 }
 
 TEST(Substrate, says_which_mesh_would_fit_the_memory) {
+  test::hard_case("memory for part of the mesh asked for", "an error with the mesh that would fit");
   SubstrateParameters parameters = test::model_named("refined");
   parameters.displacement_tolerance = 0;
   parameters.precision = "double";
@@ -161,18 +177,23 @@ TEST(Substrate, says_which_mesh_would_fit_the_memory) {
       FAIL();
     } catch (const NotSolved& error) {
       EXPECT_NE(error.report.reason.find(fitting), std::string::npos) << error.report.reason;
+      test::came_out(error.report.reason);
     }
   }
 }
 
 TEST(Substrate, takes_a_thousand_adhesions) {
+  test::hard_case("1 000 adhesions", "the exact field to 0.2 %");
   const auto points = test::scattered_points(200, 60);
   const auto ellipses = test::scattered_ellipses(1000, 60);
   const Eigen::MatrixXd layer = compliance("layer", kGel, points, ellipses);
-  EXPECT_LT(test::mean_column_difference(compliance("split", kGel, points, ellipses), layer), 2e-3);
+  const double difference = test::mean_column_difference(compliance("split", kGel, points, ellipses), layer);
+  EXPECT_LT(difference, 2e-3);
+  test::came_out("split differs from layer by " + test::two_digits(difference));
 }
 
 TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
+  test::hard_case("1 000 adhesions, 0.5 and 1 GB", "an error before more than that is taken");
   const auto points = test::scattered_points(200, 60);
   const auto ellipses = test::scattered_ellipses(1000, 60);
   SubstrateParameters parameters = test::model_named("refined");
@@ -191,10 +212,13 @@ TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
     }
   }
   getrusage(RUSAGE_SELF, &after);
-  EXPECT_LT(1e-6 * static_cast<double>(after.ru_maxrss - before.ru_maxrss), 1.0);  // the larger limit
+  const double taken_GB = 1e-6 * static_cast<double>(after.ru_maxrss - before.ru_maxrss);
+  EXPECT_LT(taken_GB, 1.0);  // the larger limit
+  test::came_out(test::two_digits(taken_GB) + " GB taken before the error");
 }
 
 TEST(Substrate, takes_adhesions_that_touch_a_side) {
+  test::hard_case("an ellipse touches the gel's side", "finite, more than on an endless layer");
   // the scene's rectangle is the block: the ellipse's tip touches the side
   SubstrateParameters parameters = test::model_named("refined");
   parameters.side_distance_um = 1e-6;
@@ -217,6 +241,8 @@ std::string choice(const Gel& gel, const SubstrateParameters& parameters, const 
 }
 
 TEST(Automatic, takes_the_cheapest_model_that_is_right) {
+  test::hard_case("thick and thin gels, near sides, layers of other modulus",
+                  "auto takes the cheapest model that is right");
   const auto points = test::scattered_points(100, 10);
   const std::vector<Ellipse> ellipses = {{{1, 2}, 1, 0.5, 0.3}};
   SubstrateParameters parameters = test::model_named("auto");
@@ -236,6 +262,7 @@ TEST(Automatic, takes_the_cheapest_model_that_is_right) {
 }
 
 TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
+  test::hard_case("scenes at the limit of auto's choice", "what is left out is below the tolerance");
   const auto points = test::scattered_points(1000, 30);
   const auto ellipses = test::scattered_ellipses(6, 25);
   SubstrateParameters parameters = test::model_named("auto");
@@ -260,6 +287,7 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
 }
 
 TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
+  test::hard_case("malformed modulus profiles", "an error for each");
   SubstrateParameters parameters = test::model_named("refined");
   for (const char* text : {"0", "0:", "0:8, -1:4", "0:0", "5:8, 2:4", "0:8 4:4", "a:8", "0:8, 4:4x", "0:-3"}) {
     parameters.modulus_profile = text;
@@ -291,6 +319,7 @@ std::filesystem::path only_file(const std::filesystem::path& folder) {
 }
 
 TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
+  test::hard_case("damaged cache files, four writers at once", "the same bits as without a cache");
   const test::TemporaryFolder folder;
   const auto points = test::scattered_points(50, 20);
   const auto ellipses = test::scattered_ellipses(5, 15);
@@ -329,6 +358,7 @@ TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
 }
 
 TEST(Substrate, writes_its_surface_for_paraview) {
+  test::hard_case("the surface as VTU", "complete, compressed, without NaN");
   const test::TemporaryFolder folder;
   const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.5, 0.3}, {{8, 3}, 1, 0.5, 1}};
   const auto model = make_substrate(kGel, test::model_named("layer"), 2);

@@ -5,6 +5,7 @@
 
 #include "mbtfm/model_checks.h"
 #include "pipeline/contract/errors.h"
+#include "tests/support/hard_case.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -28,21 +29,26 @@ void expect_sound(const EnsembleFit& fit) {
 }
 
 TEST(TensionFitHard, starts_from_1e_6_to_1e3_nN_end_at_the_same_tensions) {
+  test::hard_case("starts over nine decades", "the same tensions to 0.2 standard errors");
   const TensionScene scene = tension_scene("case_22", 1000, 0.07, 5);
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
   const Trial first = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
   const Eigen::MatrixXd covariance = covariance_nN2(local_misfit(first, problem.jacobian(first)), 1);
+  double worst = 0;
   for (const double start : {1e-6, 1e-3, 1.0, 1e3}) {
     const Trial other = fit_gauss_newton(problem, {}, Eigen::VectorXd::Constant(problem.n_tensions(), start)).trial;
     for (Eigen::Index i = 0; i < first.tensions_nN.size(); ++i) {
       // the fit stops where the last steps tell less than a thirtieth of a standard error; there may be a few
       EXPECT_NEAR(other.tensions_nN[i], first.tensions_nN[i], 0.2 * std::sqrt(covariance(i, i)))
           << "tension " << i << ", started at " << start << " nN";
+      worst = std::max(worst, std::abs(other.tensions_nN[i] - first.tensions_nN[i]) / std::sqrt(covariance(i, i)));
     }
   }
+  test::came_out("within " + test::two_digits(worst) + " standard errors");
 }
 
 TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
+  test::hard_case("the data cannot tell two parallel fibres apart", "said so, with their sum, which is known");
   Cell cell = test::round_cell(12, 12);
   test::add_ventral(cell, 1, 7);
   test::add_ventral(cell, 3, 9);
@@ -66,9 +72,12 @@ TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
   EXPECT_LE(std::abs(groups[0].sum_nN.value - 5), 4 * groups[0].sum_nN.noise);
   // the sum is worth reporting: better known than either by what a correlation of −0.95 means, sqrt(2 (1 − 0.95))
   EXPECT_LT(groups[0].sum_nN.noise, 0.35 * fit.tensions_nN[3].noise);
+  test::came_out("sum " + test::two_digits(groups[0].sum_nN.value) + " ± " + test::two_digits(groups[0].sum_nN.noise) +
+                 " nN, each ± " + test::two_digits(fit.tensions_nN[3].noise) + " nN");
 }
 
 TEST(TensionFitHard, a_hundred_fibres) {
+  test::hard_case("a hundred dorsal fibres, some without tension", "errors as stated");
   Cell cell = test::round_cell(30, 100);
   Eigen::VectorXd tensions(101);
   tensions[0] = 0.06;
@@ -97,9 +106,11 @@ TEST(TensionFitHard, a_hundred_fibres) {
   ASSERT_GT(n, 30);
   // Mean square of errors in standard errors: 1 ± sqrt(2/n), correlated, so twice that; three of those.
   EXPECT_LT(sum / n, 1 + 6 * std::sqrt(2.0 / n));
+  test::came_out("mean squared error over stated variance " + test::two_digits(sum / n));
 }
 
 TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_would_do) {
+  test::hard_case("four beads for a dozen tensions", "an error with the number that would do");
   TensionScene scene = tension_scene("case_21", 4, 0.05, 3);
   try {
     fit_own_network(scene);
@@ -107,10 +118,12 @@ TEST(TensionFitHard, fewer_beads_than_unknowns_are_refused_with_the_count_that_w
   } catch (const InvalidData& error) {
     const std::string enough = "at least " + std::to_string((scene.tensions_nN.size() + 1) / 2) + " good beads";
     EXPECT_NE(std::string(error.what()).find(enough), std::string::npos) << error.what();
+    test::came_out(error.what());
   }
 }
 
 TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_covers) {
+  test::hard_case("beads on one side of the cell only", "intervals widen, and cover");
   TensionScene scene = tension_scene("case_21", 3000, 0.05, 4);
   const EnsembleFit everywhere = fit_own_network(scene);
   double middle_um = 0;  // beads are kept on one side only
@@ -122,16 +135,19 @@ TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_cov
   expect_sound(fit);
   double widest = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
-    widest = std::max(widest, fit.tensions_nN[i].noise / everywhere.tensions_nN[i].noise);
+    const double before = everywhere.tensions_nN[i].noise;  // none where the tension is held at zero
+    if (before > 0) widest = std::max(widest, fit.tensions_nN[i].noise / before);
     const Interval interval = interval_95(fit.tensions_nN[i], 1);
     const double sigmas = 2 * fit.tensions_nN[i].noise;  // beyond the interval: four standard errors
     EXPECT_LE(interval.low - sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
     EXPECT_GE(interval.high + sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
   }
   EXPECT_GT(widest, 2);
+  test::came_out("up to " + test::two_digits(widest) + " times as wide");
 }
 
 TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
+  test::hard_case("a dead cell: noise only", "all intervals but one at most reach zero");
   TensionScene scene = tension_scene("case_21", 1000, 0.05, 5);
   const double sigma_um = 0.02;
   std::mt19937_64 random(6);
@@ -147,9 +163,11 @@ TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
   for (const Estimate& e : fit.tensions_nN) n_covering += interval_95(e, 1).low <= 1e-9 ? 1 : 0;
   // 95 % intervals, at the bound 97.5 %: of a dozen one may miss
   EXPECT_GE(n_covering, static_cast<int>(fit.tensions_nN.size()) - 1);
+  test::came_out(std::to_string(n_covering) + " of " + std::to_string(fit.tensions_nN.size()));
 }
 
 TEST(TensionFitHard, one_adhesion_that_carries_everything) {
+  test::hard_case("seven fibres meet in one adhesion", "noise-free tensions to 1e-5; sound with 10 % noise");
   Cell cell = test::round_cell(15, 16);
   for (const int end : {6, 7, 8, 9, 10, 11, 12}) test::add_ventral(cell, 1, end);
   Eigen::VectorXd tensions(8);
@@ -158,12 +176,15 @@ TEST(TensionFitHard, one_adhesion_that_carries_everything) {
   const EnsembleFit exact = fit_own_network(scene);
   expect_sound(exact);
   // noise-free; the fibres meet at a small angle, which costs digits
-  EXPECT_LE((values_of(exact) - tensions).tail(7).cwiseAbs().maxCoeff(), 1e-5 * 8);
+  const double worst_nN = (values_of(exact) - tensions).tail(7).cwiseAbs().maxCoeff();
+  EXPECT_LE(worst_nN, 1e-5 * 8);
+  test::came_out("noise-free within " + test::two_digits(worst_nN) + " nN of 5 to 8 nN");
   measure(scene, 0.1, 8);
   expect_sound(fit_own_network(scene));
 }
 
 TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
+  test::hard_case("noise 100 %", "wider intervals that cover");
   TensionScene scene = tension_scene("case_22", 2000, 0.05, 9);
   const EnsembleFit little = fit_own_network(scene);
   measure(scene, 1.0, 10);
@@ -178,6 +199,7 @@ TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
   }
   // binomial, 0.95 of a dozen or more: 80 % is four standard deviations below
   EXPECT_GE(n_covering, static_cast<int>(0.8 * static_cast<double>(much.tensions_nN.size())));
+  test::came_out(std::to_string(n_covering) + " of " + std::to_string(much.tensions_nN.size()) + " cover");
 }
 
 }  // namespace

@@ -12,24 +12,34 @@ namespace mbtfm::test {
 /// A bead of an image pair, px.
 struct Moved {
   Vec2 place, u;
-  double weight = 1;
 };
 
-/// Image correlation over a window sees what most of its beads do: the mode of their displacements, as wide as the
-/// correlation of two beads.
-inline Vec2 as_correlation_sees(const std::vector<Moved>& beads, Vec2 place, double bead_sigma_px) {
-  constexpr double kWindow = 10;  // px: about the standard deviation of a square of 32
+/// Share of a Gaussian picture at `apart` from the middle of a stretch that lies in it.
+inline double share_within(double apart, double half, double sigma) {
+  const double scale = 1 / (std::sqrt(2.0) * sigma);
+  return 0.5 * (std::erf(scale * (apart + half)) - std::erf(scale * (apart - half)));
+}
+
+/// Image correlation in a square window of `side` px sees what most of its beads do: the mode of their displacements,
+/// each with the share of its picture that the window holds, as wide as the correlation of two beads.
+inline Vec2 as_correlation_sees(const std::vector<Moved>& beads, Vec2 place, double bead_sigma_px, int side = 32) {
+  const Vec2 middle = place - Vec2{0.5, 0.5};  // of an even number of pixels, those before the place's own come first
+  std::vector<double> shares;
+  for (const Moved& bead : beads) {
+    const Vec2 d = bead.place - middle;
+    shares.push_back(share_within(d.x, 0.5 * side, bead_sigma_px) * share_within(d.y, 0.5 * side, bead_sigma_px));
+  }
   Vec2 mode;
   for (int step = 0; step < 30; ++step) {
     const double width = step < 3 ? 4 : std::sqrt(2.0) * bead_sigma_px;
     double weights = 0;
     Vec2 sum;
-    for (const Moved& bead : beads) {
-      const Vec2 apart = bead.u - mode, d = bead.place - place;
-      const double weight =
-          bead.weight * std::exp(-dot(d, d) / (2 * kWindow * kWindow) - dot(apart, apart) / (2 * width * width));
+    for (std::size_t k = 0; k < beads.size(); ++k) {
+      if (shares[k] < 1e-6) continue;
+      const Vec2 apart = beads[k].u - mode;
+      const double weight = shares[k] * std::exp(-dot(apart, apart) / (2 * width * width));
       weights += weight;
-      sum += weight * bead.u;
+      sum += weight * beads[k].u;
     }
     mode = (1 / weights) * sum;
   }

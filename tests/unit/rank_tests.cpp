@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/statistics/descriptive.h"
 
 namespace mbtfm::statistics {
 namespace {

@@ -2,7 +2,9 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <chrono>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pipeline/contract/csv.h"
@@ -25,7 +27,8 @@ void make_executable(const fs::path& file, const std::string& text) {
 }
 
 // Each output is a line that the stage's inputs decide, but for the segmentation: it is the same for all images, as for
-// two images that differ outside the cell only. With exit-<name> beside it, a stage ends with the code in that file.
+// two images that differ outside the cell only. With exit-<name> beside it, a stage ends with the code in that file;
+// shell-<name> is run first.
 constexpr const char* kStageScript = R"sh(#!/bin/sh
 here=$(dirname "$0"); name=$(basename "$0"); name=${name#mbtfm-}; all=""
 while [ $# -gt 0 ]; do
@@ -41,6 +44,7 @@ while [ $# -gt 0 ]; do
 done
 if [ -n "$check" ]; then grep -q refuse_$name "$config" && { echo "mbtfm-$name: error: refused" >&2; exit 2; }; exit 0; fi
 echo $name >> "$here/calls"
+[ -f "$here/shell-$name" ] && . "$here/shell-$name"
 code=0; [ -f "$here/exit-$name" ] && code=$(cat "$here/exit-$name")
 [ $code -ne 0 ] && [ $code -ne 4 ] && { echo "mbtfm-$name: error: made to fail" >&2; exit $code; }
 sum=$(cat $all "$config" | cksum)
@@ -59,8 +63,15 @@ class Runner : public testing::Test {
   TemporaryFolder folder_;
   const fs::path cell_ = folder_ / "cell";
   const fs::path bin_ = folder_ / "bin";
-  RunOptions options_{
-      .stage_folder = bin_, .threads = 2, .is_quiet = true, .only = {}, .redo = {}, .version = "1", .say = nullptr};
+  RunOptions options_{.stage_folder = bin_,
+                      .threads = 2,
+                      .is_quiet = true,
+                      .only = {},
+                      .redo = {},
+                      .limits = {},
+                      .version = "1",
+                      .say = nullptr,
+                      .finish = nullptr};
 
   void SetUp() override {
     fs::create_directories(cell_);
@@ -207,7 +218,7 @@ TEST_F(Runner, passes_on_the_exit_code_and_resumes) {
     started();
     FAIL() << "no error";
   } catch (const StageFailed& error) {
-    EXPECT_EQ(error.exit_code, 3);
+    EXPECT_EQ(error.failure.exit_code, 3);
   }
   EXPECT_EQ(calls(), "network segment track");
   fs::remove(bin_ / "exit-network");
@@ -232,8 +243,110 @@ TEST_F(Runner, only_runs_the_stages_asked_for) {
 }
 
 TEST_F(Runner, keeps_away_from_a_cell_that_another_run_holds) {
-  const FolderLock lock(cell_);
-  EXPECT_THROW(started(), InputError);
+  const CellLock lock(cell_, {});
+  EXPECT_THROW(started(), CellBusy);
+}
+
+TEST_F(Runner, works_on_a_stage_while_another_run_holds_other_stages) {
+  const CellLock lock(cell_, {"track", "fit"});
+  options_.only = {"segment"};
+  EXPECT_EQ(started(), "segment");
+  options_.only = {"track"};
+  EXPECT_THROW(started(), CellBusy);
+}
+
+nlohmann::json run_record(const fs::path& cell) { return nlohmann::json::parse(read_text(cell / "run.json")); }
+
+TEST_F(Runner, tells_in_run_json_which_stage_failed_and_why) {
+  write_text(bin_ / "exit-network", "3");
+  EXPECT_THROW(started(), StageFailed);
+  const auto run = run_record(cell_);
+  EXPECT_EQ(run["outcome"], "failed");
+  EXPECT_EQ(run["stages"]["segment"]["state"], "run");
+  EXPECT_EQ(run["stages"]["network"]["state"], "failed");
+  EXPECT_EQ(run["stages"]["network"]["failure"]["exit_code"], 3);
+  EXPECT_EQ(run["stages"]["network"]["failure"]["message"], "mbtfm-network: error: made to fail");
+  EXPECT_EQ(run["stages"]["fit"]["state"], "not run");
+  fs::remove(bin_ / "exit-network");
+  started();
+  EXPECT_EQ(run_record(cell_)["outcome"], "done");
+  EXPECT_FALSE(run_record(cell_)["stages"]["network"].contains("failure"));
+}
+
+TEST_F(Runner, tells_in_run_json_of_a_crash_and_of_refused_parameters) {
+  write_text(bin_ / "shell-track", "kill -SEGV $$");
+  EXPECT_THROW(started(), StageFailed);
+  EXPECT_EQ(run_record(cell_)["stages"]["track"]["failure"]["exit_code"], 128 + 11);
+  write_parameters("[fit]\nrefuse_fit = 1\n");
+  EXPECT_THROW(started(), StageFailed);
+  EXPECT_EQ(run_record(cell_)["stages"]["fit"]["failure"]["how"], "does not accept cell.toml");
+}
+
+TEST_F(Runner, stages_that_are_run_one_by_one_leave_the_same_record) {
+  for (const char* stage : {"segment", "track", "network", "fit"}) {
+    options_.only = {stage};
+    EXPECT_EQ(started(), stage);
+  }
+  const auto run = run_record(cell_);
+  EXPECT_EQ(run["outcome"], "done");
+  for (const auto& stage : run["stages"]) EXPECT_EQ(stage["state"], "run");
+}
+
+TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
+  // The stage waits for a child that would write a file later; neither may be left.
+  write_text(bin_ / "shell-segment", "(trap '' TERM; sleep 3; touch " + (folder_ / "survived").string() + ") & wait");
+  options_.limits.seconds = 0.2;
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const StageFailed& error) {
+    EXPECT_EQ(error.failure.exit_code, 124);
+    EXPECT_NE(error.failure.how.find("timed out"), std::string::npos);
+  }
+  EXPECT_EQ(run_process({"/bin/sh", "-c", "sleep 4"}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(folder_ / "survived"));
+}
+
+TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
+  write_text(
+      bin_ / "shell-segment",
+      "head -c 200000000 /dev/zero | tail -c 1 > /dev/null; x=$(head -c 200000000 /dev/zero | tr '\\0' x); sleep 60");
+  options_.limits.memory_bytes = 100'000'000;
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const StageFailed& error) {
+    EXPECT_EQ(error.failure.exit_code, 128 + 9);
+    EXPECT_NE(error.failure.how.find("took too much memory"), std::string::npos) << error.failure.how;
+  }
+}
+
+TEST_F(Runner, a_file_that_was_changed_and_given_its_old_times_again_is_noticed) {
+  const auto old = fs::file_time_type::clock::now() - std::chrono::hours(1);
+  fs::last_write_time(cell_ / "beads_relaxed.tif", old);
+  started();
+  EXPECT_EQ(started(), "");
+  write_text(cell_ / "beads_relaxed.tif", "baeds_relaxed.tif");  // the same size
+  fs::last_write_time(cell_ / "beads_relaxed.tif", old);
+  EXPECT_EQ(started(), "fit track");
+}
+
+TEST_F(Runner, a_damaged_list_of_hashes_does_no_harm) {
+  started();
+  for (const char* text : {"", "x", "0 1 2 3 4 5 cell.toml\n", "\xff\n\n"}) {
+    write_text(cell_ / ".mbtfm.hashes", text);
+    EXPECT_EQ(started(), "");
+  }
+}
+
+TEST_F(Runner, removes_what_a_killed_run_left_half_written) {
+  started();
+  write_text(cell_ / "2_track/.partial-1-displacement.csv", "half");
+  write_text(cell_ / ".partial-1-run.json", "half");
+  options_.redo = {"track"};
+  started();
+  EXPECT_FALSE(fs::exists(cell_ / "2_track/.partial-1-displacement.csv"));
+  EXPECT_FALSE(fs::exists(cell_ / ".partial-1-run.json"));
 }
 
 TEST_F(Runner, names_of_images_are_globs_that_fit_one_file) {
@@ -289,6 +402,8 @@ TEST_F(Runner, hand_drawn_rois_that_are_asked_for_by_name_must_be_there) {
 
 TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   const TemporaryFolder folder;
+  fs::create_directories(folder / "bin");
+  for (const Stage& stage : stages()) make_executable(folder / ("bin/mbtfm-" + stage.name), "#!/bin/sh\n");
   for (const char* name : {"a", "b", "deeper/c"}) {
     fs::create_directories(folder / name);
     write_text(folder / (std::string(name) + "/cell.toml"), "");
@@ -299,8 +414,19 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
                   "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
   const auto cells = find_cells(folder.path());
   ASSERT_EQ(cells.size(), 3u);
-  const auto outcomes =
-      run_batch(cells, {.program = folder / "mbtfm", .arguments = {}, .jobs = 2, .only = {}, .say = nullptr});
+  const auto outcomes = run_batch(cells, {.program = folder / "mbtfm",
+                                          .arguments = {},
+                                          .jobs = 2,
+                                          .threads = 2,
+                                          .run = {.stage_folder = folder / "bin",
+                                                  .only = {},
+                                                  .redo = {},
+                                                  .limits = {},
+                                                  .version = "1",
+                                                  .say = nullptr,
+                                                  .finish = nullptr},
+                                          .say = nullptr,
+                                          .show = nullptr});
   EXPECT_EQ(outcomes[0].exit_code, 0);
   EXPECT_EQ(outcomes[1].exit_code, 3);
   EXPECT_EQ(outcomes[1].message, "mbtfm: error: broken");

@@ -2,78 +2,271 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/statistics/conditions.h"
+#include "pipeline/statistics/png.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/fake_cell.h"
+#include "tests/support/simulated_study.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-/// Two finished cells and one without a fit.
+/// Two conditions of two finished cells each, one cell without a fit and one that did not converge.
 struct FakeStudy {
   test::TemporaryFolder folder;
   FakeStudy() {
-    for (const unsigned seed : {1u, 2u}) {
-      const auto cell = folder / ("cell_" + std::to_string(seed));
+    for (const unsigned seed : {1u, 2u, 3u, 4u, 5u}) {
+      const auto cell = folder / (seed % 2 == 1 ? "control" : "treated") / ("cell_" + std::to_string(seed));
       test::write_given_stages(cell, test::round_cell());
       test::write_invented_fit(cell, seed);
     }
-    test::write_given_stages(folder / "cell_3", test::round_cell());
+    FitSummary fit = read_fit_summary(folder / "control/cell_5/4_fit/fit.json");
+    fit.converged = false;
+    write_fit_summary(folder / "control/cell_5/4_fit/fit.json", fit);
+    test::write_given_stages(folder / "treated/cell_6", test::round_cell());
+  }
+  Study read(const StudyParameters& parameters = {}, const std::optional<Path>& table = {}) const {
+    return read_study(folder.path(), parameters, table, 2);
   }
 };
 
-TEST(Study, counts_fibres_by_type_and_leaves_out_unfinished_cells) {
-  const FakeStudy fake;
-  const Study study = read_study(fake.folder.path());
-  EXPECT_EQ(study.unfinished, std::vector<std::string>{"cell_3"});
-  const auto types = summarise_types(study, {});
-  ASSERT_EQ(types.size(), 9u);  // three types of all cells, and of each of two
-  EXPECT_EQ(types[2].type, FibreType::ventral);
-  EXPECT_EQ(types[2].n_fibres, 4);
-  EXPECT_EQ(types[2].n_cells, 2);
-}
-
-TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
-  const FakeStudy fake;
-  Study study = read_study(fake.folder.path());
-  const auto all = measured_fibres(study).size();
-  for (Tension& t : study.cells[0].tensions) {
-    if (t.fibre_id == 2) t.identifiable = false;
+std::string reason_of(const Study& study, const std::string& cell) {
+  for (const LeftOutCell& c : study.left_out) {
+    if (c.name == cell) return c.reason;
   }
-  EXPECT_EQ(measured_fibres(study).size(), all - 1);
+  return {};
 }
 
-TEST(Study, tests_are_made_by_fibre_and_by_cell) {
+TEST(Study, leaves_out_cells_with_a_reason_that_the_table_keeps) {
   const FakeStudy fake;
-  const auto tests = test_types(read_study(fake.folder.path()));
-  // each way: Kruskal-Wallis and three pairs
-  ASSERT_EQ(tests.size(), 8u);
-  EXPECT_EQ(tests[0].n_a, 8);
-  EXPECT_EQ(tests[4].unit, Unit::cell_median);
-  EXPECT_EQ(tests[4].n_a, 6);
-  for (const TypeTest& t : tests) {
-    EXPECT_GE(t.p_value, 0);
-    EXPECT_LE(t.p_value, 1);
-    EXPECT_LE(std::abs(t.effect), 1);
-    EXPECT_GE(t.p_holm.value_or(1), t.p_value);
-  }
+  const Study study = fake.read();
+  EXPECT_EQ(study.cells.size(), 4u);
+  EXPECT_EQ(reason_of(study, "treated/cell_6").substr(0, 6), "no fit");
+  EXPECT_EQ(reason_of(study, "control/cell_5"), "the fit did not converge");
+  EXPECT_EQ(fake.read({.condition_from = {}, .with_not_converged = true}).cells.size(), 5u);
+  const CsvTable cells(tables_of(study, analyse(study, {}))[0].second, "cells.csv");
+  ASSERT_EQ(cells.n_rows(), 6);
+  EXPECT_EQ(cells.text(4, "cell"), "control/cell_5");
+  EXPECT_EQ(cells.text(4, "included"), "0");
+  EXPECT_EQ(cells.text(4, "reason"), "the fit did not converge");
 }
 
-TEST(Study, tables_have_one_line_for_each_thing) {
+TEST(Study, conditions_come_from_a_folder_or_a_table) {
   const FakeStudy fake;
-  const Study study = read_study(fake.folder.path());
-  const auto n_lines = [](const std::string& text) { return std::count(text.begin(), text.end(), '\n'); };
-  EXPECT_EQ(n_lines(cells_csv(study)), 1 + 2);
-  EXPECT_EQ(n_lines(adhesions_csv(study)), 1 + 2 * 12);
-  EXPECT_EQ(n_lines(fibres_csv(study)), 1 + 2 * 4);
-  EXPECT_EQ(n_lines(types_csv(study, {})), 1 + 9);
+  const Study by_folder = fake.read({.condition_from = "folder"});
+  EXPECT_EQ(by_folder.conditions, (std::vector<std::string>{"control", "treated"}));
+  EXPECT_EQ(by_folder.cells[3].condition, 1);
+  write_text(fake.folder / "study.csv",
+             "cell,drug,exclude\ncell_1,none,\ncontrol/cell_3,none,dividing\ncell_2,blebbistatin,\ncell_5,none,\n");
+  const Study by_table = fake.read({.condition_from = "drug"}, fake.folder / "study.csv");
+  EXPECT_EQ(by_table.conditions, (std::vector<std::string>{"blebbistatin", "none"}));
+  EXPECT_EQ(reason_of(by_table, "control/cell_3"), "dividing");
+  EXPECT_EQ(reason_of(by_table, "treated/cell_4"), "not in the table");
+}
+
+TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
+  const FakeStudy fake;
+  EXPECT_THROW(fake.read({.condition_from = "drug"}), UsageError);
+  EXPECT_THROW(fake.read({.condition_from = "folder2"}), InputError);
+  const auto table = [&](const std::string& text) {
+    write_text(fake.folder / "study.csv", text);
+    return std::optional<Path>(fake.folder / "study.csv");
+  };
+  EXPECT_THROW(fake.read({.condition_from = "drug"}, table("cell,dose\ncell_1,2\n")), InputError);
+  EXPECT_THROW(fake.read({}, table("cell\ncell_77\n")), InputError);
+  EXPECT_THROW(fake.read({}, table("cell\ncell_1\ncontrol/cell_1\n")), InputError);
+  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", table("cell\nx\n")), InputError);
 }
 
 TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
   const test::TemporaryFolder folder;
   test::write_given_stages(folder / "cell", test::round_cell());
-  EXPECT_THROW(read_study(folder.path()), InputError);
+  EXPECT_THROW(read_study(folder.path(), {}, {}, 1), InputError);
+}
+
+TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
+  const FakeStudy fake;
+  Study study = fake.read();
+  const auto all = measured_fibres(study).size();
+  for (Tension& t : study.cells[0].tensions) {
+    if (t.fibre_id == 2) t.identifiable = false;
+  }
+  EXPECT_EQ(measured_fibres(study).size(), all - 1);
+  const auto warnings = analyse(study, {}).warnings;
+  EXPECT_TRUE(std::any_of(warnings.begin(), warnings.end(),
+                          [](const std::string& w) { return w.find("could not be identified") != w.npos; }));
+}
+
+TEST(Study, the_error_of_a_tension_is_that_of_the_side_zero_does_not_cut) {
+  EXPECT_NEAR(*standard_error_nN({.tension_nN = 4, .low_nN = 2, .high_nN = 6}), 4 / (2 * 1.96), 1e-4);
+  EXPECT_NEAR(*standard_error_nN({.tension_nN = 1, .low_nN = 0, .high_nN = 5}), 4 / 1.96, 1e-3);
+  EXPECT_FALSE(standard_error_nN({.tension_nN = 1, .low_nN = {}, .high_nN = {}}));
+}
+
+/// A cell of two adhesions that face each other, a straight fibre between them, beads that move inwards.
+TEST(Directions, of_a_fibre_that_pulls_its_adhesions_are_zero) {
+  Cell cell = test::round_cell();
+  cell.adhesions.resize(2);
+  for (int i = 0; i < 2; ++i) {
+    cell.adhesions[static_cast<std::size_t>(i)].position_um = {10.0 + 20 * i, 30};
+    cell.adhesions[static_cast<std::size_t>(i)].angle_rad = 0;
+  }
+  cell.fibres.resize(1);
+  cell.fibres[0] = {.fibre_id = 1,
+                    .type = FibreType::ventral,
+                    .width_um = 0.6,
+                    .start_adhesion_id = 1,
+                    .end_adhesion_id = 2,
+                    .points_um = {{10, 30}, {30, 30}}};
+  DisplacementField measured, across;
+  for (const double x : {10.0, 10.5, 30.0, 29.5}) {
+    measured.push_back({.position_um = {x, 30.1}, .displacement_um = {x < 20 ? 0.5 : -0.5, 0}, .flag = {}});
+    across.push_back({.position_um = {x, 30.1}, .displacement_um = {0, 0.1}, .flag = {}});
+  }
+  const Displacements fields{measured, measured, across, 0.01, 1.5};
+  const auto list = directions_of(cell, fields);
+  EXPECT_EQ(list.size(), 8u);  // each of four relations at each end
+  for (const Direction& d : list)
+    EXPECT_NEAR(d.angle_deg, d.relation == Relation::without_fibres_measured ? 90 : 0, 1e-9) << name_of(d.relation);
+  Displacements noisy = fields;
+  noisy.noise_um = 1;  // the displacement of some beads then says nothing of its direction
+  EXPECT_EQ(directions_of(cell, noisy).size(), 2u);
+}
+
+TEST(Analysis, tests_are_made_by_fibre_and_by_cell_between_types_and_conditions) {
+  const Study study = test::simulated_study({.n_cells = 24, .n_conditions = 2, .condition_effect_nN = 2});
+  const Analysis analysis = analyse(study, {.bootstrap_draws = 200});
+  std::set<std::string> tests;
+  for (const Comparison& t : analysis.tensions.comparisons) {
+    tests.insert(t.question + ", " + t.test + ", " + name_of(t.unit));
+    EXPECT_GE(t.p_value, 0);
+    EXPECT_LE(t.p_value, 1);
+    EXPECT_GE(t.p_holm.value_or(1), t.p_value);
+    EXPECT_TRUE(!t.group_b.empty() || t.question == "between kinds");  // two conditions need no omnibus test
+  }
+  // between kinds: Kruskal-Wallis, Mann-Whitney by fibre and by median; clustered; mixed. Between conditions: no K-W
+  EXPECT_EQ(tests.size(), 6u + 4u);
+  EXPECT_EQ(analysis.tensions.summaries.size(), 6u);
+  EXPECT_EQ(analysis.correlations.size(), 2u * 12u);
+}
+
+/// Truth: dorsal 1.5, arcs 2.5, ventral 4 nN, and 2 more under the second condition.
+TEST(Analysis, the_mixed_model_finds_the_means_and_the_scatter_behind_the_errors) {
+  const test::StudySettings settings{.n_cells = 200, .n_conditions = 2, .condition_effect_nN = 2, .error_nN = 1};
+  const Analysis analysis = analyse(test::simulated_study(settings), {.bootstrap_draws = 200});
+  for (const Summary& s : analysis.tensions.summaries) {
+    const double truth = (s.kind == "dorsal" ? 1.5
+                          : s.kind == "arc"  ? 2.5
+                                             : 4) +
+                         (s.condition == "b" ? 2 : 0) + settings.offset_nN;
+    // four standard errors: one in 16 000
+    EXPECT_NEAR(s.model->estimate, truth, 4 * s.model->standard_error) << s.condition << s.kind;
+    const double scatter =
+        std::sqrt(settings.cell_sd_nN * settings.cell_sd_nN + settings.fibre_sd_nN * settings.fibre_sd_nN);
+    EXPECT_NEAR(s.without_error.standard_deviation, scatter, 0.15 * scatter)
+        << s.kind;  // 100 cells' sd: 7 %, two of it
+  }
+}
+
+/// Conditions that do not differ, cells that do. docs/statistics.md has the same with 1 500 studies.
+TEST(Analysis, tests_by_cell_hold_their_level_where_those_by_fibre_do_not) {
+  constexpr int kStudies = 200;
+  std::map<std::string, int> n_rejected;
+  for (int i = 0; i < kStudies; ++i) {
+    const Sample sample = sample_tensions(test::simulated_study({.n_cells = 12,
+                                                                 .n_conditions = 2,
+                                                                 .types_differ = false,
+                                                                 .type_in_cell_sd_nN = 0.7,
+                                                                 .seed = 100 + static_cast<std::uint64_t>(i)}));
+    for (const Comparison& c : compare(sample, model_of(sample))) {
+      if (c.question == "between conditions" && c.within == "ventral" && c.p_value < 0.05)
+        ++n_rejected[c.test + ", " + name_of(c.unit)];
+    }
+  }
+  // 5 % of 200 are 10, with a standard deviation of 3.1; four of it
+  EXPECT_LE(n_rejected["mixed model, cell"], 22);
+  EXPECT_LE(n_rejected["clustered rank sum, cell"], 22);
+  EXPECT_LE(n_rejected["Mann-Whitney, cell median"], 22);
+  EXPECT_GT(n_rejected["Mann-Whitney, observation"], 30);
+}
+
+TEST(Analysis, the_same_bytes_for_the_same_seed) {
+  const Study study = test::simulated_study({.n_cells = 12});
+  const auto once = tables_of(study, analyse(study, {.bootstrap_draws = 200}));
+  EXPECT_EQ(once, tables_of(study, analyse(study, {.bootstrap_draws = 200})));
+  const FakeStudy fake;
+  const Study one = read_study(fake.folder.path(), {}, {}, 1), four = read_study(fake.folder.path(), {}, {}, 4);
+  EXPECT_EQ(tables_of(one, analyse(one, {})), tables_of(four, analyse(four, {})));
+}
+
+/// All tables, figures and the page of a study can be made of it.
+void expect_whole(const Study& study) {
+  const StudyParameters parameters{.bootstrap_draws = 100};
+  const Analysis analysis = analyse(study, parameters);
+  for (const auto& [name, text] : tables_of(study, analysis)) {
+    EXPECT_NO_THROW(CsvTable(text, name)) << name;
+    EXPECT_EQ(text.find("nan"), text.npos) << name;
+    EXPECT_EQ(text.find("inf"), text.npos) << name;
+  }
+  const auto figures = figures_of(study, analysis, parameters);
+  EXPECT_FALSE(figures.empty());
+  for (const Figure& figure : figures) EXPECT_EQ(svg_of(figure).find("nan"), std::string::npos) << figure.name;
+  const std::string html = study_html(study, analysis, figures, parameters);
+  EXPECT_EQ(html.find("nan "), html.npos);
+}
+
+TEST(Analysis, works_on_what_lacks_most) {
+  Study one = test::simulated_study({.n_cells = 1});
+  expect_whole(one);
+  one.cells[0].cell.fibres.clear();
+  one.cells[0].tensions.resize(1);
+  expect_whole(one);
+  one.cells[0].forces.clear();
+  one.cells[0].cell.adhesions.clear();
+  expect_whole(one);
+  // one type only, one condition with a single cell, cells without fibres
+  Study lacking = test::simulated_study({.n_cells = 5, .n_conditions = 2});
+  for (StudyCell& c : lacking.cells) {
+    std::erase_if(c.cell.fibres, [](const Fibre& f) { return f.type != FibreType::ventral; });
+    if (&c != &lacking.cells[0]) c.condition = 1;
+  }
+  lacking.cells[2].cell.fibres.clear();
+  expect_whole(lacking);
+  // equal values everywhere
+  for (StudyCell& c : lacking.cells) {
+    for (Tension& t : c.tensions) t.tension_nN = 1;
+  }
+  expect_whole(lacking);
+}
+
+TEST(Analysis, a_single_cell_of_a_condition_is_warned_of) {
+  Study study = test::simulated_study({.n_cells = 5, .n_conditions = 2});
+  for (StudyCell& c : study.cells) c.condition = &c == &study.cells[0] ? 0 : 1;
+  const auto warnings = analyse(study, {.bootstrap_draws = 100}).warnings;
+  EXPECT_EQ(warnings.front().substr(0, 16), "a: a single cell");
+}
+
+TEST(Figures, are_drawn_into_pixels) {
+  const test::TemporaryFolder folder;
+  const Study study = test::simulated_study({.n_cells = 6});
+  const StudyParameters parameters{.bootstrap_draws = 100};
+  const Figure figure = figures_of(study, analyse(study, parameters), parameters).front();
+  write_png(folder / "figure.png", svg_of(figure), 2);
+  const std::string bytes = read_text(folder / "figure.png");
+  EXPECT_EQ(bytes.substr(1, 3), "PNG");
+  const auto big_endian = [&](std::size_t at) {
+    return (static_cast<unsigned char>(bytes[at + 2]) << 8) + static_cast<unsigned char>(bytes[at + 3]);
+  };
+  EXPECT_EQ(big_endian(16), 2 * static_cast<int>(charts::Chart::kWidth_px));
+  EXPECT_GT(bytes.size(), 10000u);  // an empty page of this size has some 4 kB
+  EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 2), OutputError);
 }
 
 }  // namespace

@@ -1,0 +1,24 @@
+/// run.json: how all that is in a cell folder came about.
+#pragma once
+
+#include <filesystem>
+
+#include "pipeline/runner/run_cell.h"
+
+namespace mbtfm::runner {
+
+/// Merge the records of all stages, and what became of them in this run, to run.json. Of stages that this run was not
+/// asked for, it keeps what an earlier one told.
+/// @throws OutputError
+void write_run_record(const std::filesystem::path& cell, const RunOptions& options, const CellOutcome& outcome);
+
+/// run.json is there and tells that every stage asked for is done.
+bool run_record_tells_of(const std::filesystem::path& cell, const RunOptions& options);
+
+/// "segment", "exit code 3", …: the failure that run.json tells of; empty where it tells of none.
+struct RecordedFailure {
+  std::string stage, how, message;
+};
+std::optional<RecordedFailure> recorded_failure(const std::filesystem::path& cell);
+
+}  // namespace mbtfm::runner

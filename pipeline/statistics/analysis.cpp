@@ -1,0 +1,139 @@
+#include "pipeline/statistics/analysis.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "pipeline/charts/chart.h"
+
+namespace mbtfm::statistics {
+namespace {
+
+using charts::readable;
+
+Measure measure(Sample sample, const std::vector<CellWeights>& draws) {
+  Measure m{.sample = std::move(sample), .model = {}, .summaries = {}, .comparisons = {}};
+  m.model = model_of(m.sample);
+  m.summaries = summarise(m.sample, m.model, draws);
+  m.comparisons = compare(m.sample, m.model);
+  return m;
+}
+
+void warn_of_few_cells(const Study& study, std::vector<std::string>& warnings) {
+  constexpr int kFew = 6;  // medians of five cells and five others cannot differ at p < 0.05 after correction
+  std::vector<int> n_of(study.conditions.size(), 0);
+  for (const StudyCell& cell : study.cells) ++n_of[static_cast<std::size_t>(cell.condition)];
+  for (std::size_t i = 0; i < n_of.size(); ++i) {
+    const std::string where = prefix_of(study.conditions[i]);
+    if (n_of[i] == 1) {
+      warnings.push_back(where + "a single cell: nothing can be said of how cells differ, and no test counts it.");
+    } else if (n_of[i] < kFew) {
+      warnings.push_back(
+          fmt::format("{}{} cells only: intervals with the cell as the unit are wide, and rest on the "
+                      "assumption that cells scatter normally.",
+                      where, n_of[i]));
+    }
+  }
+}
+
+void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<std::string>& warnings) {
+  int n_unknown = 0, n_fibres = 0;
+  std::set<const StudyCell*> with;
+  for (const MeasuredFibre& f : measured_fibres(study)) with.insert(f.cell);
+  for (const StudyCell& cell : study.cells) {
+    for (const Tension& t : cell.tensions) {
+      n_fibres += t.fibre_id != 0 ? 1 : 0;
+      n_unknown += t.fibre_id != 0 && !t.identifiable ? 1 : 0;
+    }
+  }
+  if (n_unknown > 0) {
+    warnings.push_back(fmt::format(
+        "The tensions of {} of {} fibres could not be identified and do not enter: where these are the weak ones, the "
+        "means of the others are too large.",
+        n_unknown, n_fibres));
+  }
+  if (with.size() < study.cells.size()) {
+    warnings.push_back(
+        fmt::format("{} cells have no fibre with a known tension: they enter the forces, not the "
+                    "tensions.",
+                    study.cells.size() - with.size()));
+  }
+  if (tensions.sample.n_without_error > 0) {
+    warnings.push_back(
+        fmt::format("{} tensions have no error bar; their error is taken for zero.", tensions.sample.n_without_error));
+  }
+  for (const Summary& s : tensions.summaries) {
+    const double variance = s.plain.standard_deviation * s.plain.standard_deviation;
+    if (s.n > 2 && s.without_error.reliability < 0.5 && variance > 0) {
+      warnings.push_back(
+          fmt::format("{}more than half of the scatter of the tensions of {} fibres is the error of "
+                      "their measurement (typically {} nN).",
+                      prefix_of(s.condition), kind_for_people(s.kind), readable(s.typical_error)));
+    }
+    if (!s.model || !s.mean_interval) continue;
+    if (std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error) {
+      warnings.push_back(fmt::format(
+          "{}the mixed model's mean tension of {} fibres, {} nN, is far from the plain mean, {} nN: fibres with large "
+          "error bars, or cells with many fibres, differ from the others. Give both.",
+          prefix_of(s.condition), kind_for_people(s.kind), readable(s.model->estimate), readable(s.plain.mean)));
+    }
+  }
+}
+
+/// Tests by observation that no test by cell bears out.
+void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warnings) {
+  constexpr double kLevel = 0.05;
+  for (const Comparison& by_value : m.comparisons) {
+    if (by_value.unit != Unit::observation || by_value.group_b.empty() || *by_value.p_holm >= kLevel) continue;
+    double smallest = 1;
+    for (const Comparison& by_cell : m.comparisons) {
+      const bool is_same = by_cell.unit == Unit::cell && by_cell.question == by_value.question &&
+                           by_cell.within == by_value.within && by_cell.group_a == by_value.group_a &&
+                           by_cell.group_b == by_value.group_b;
+      if (is_same) smallest = std::min(smallest, *by_cell.p_holm);
+    }
+    if (smallest < kLevel) continue;
+    warnings.push_back(fmt::format(
+        "{}{}: {} and {} {} differ where each counts for itself (p = {}), not with the cell as the unit (p = {}): to "
+        "claim the former would be pseudo-replication.",
+        prefix_of(by_value.within), m.sample.name, kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
+        m.sample.each, readable(*by_value.p_holm), readable(smallest)));
+  }
+}
+
+}  // namespace
+
+std::string prefix_of(const std::string& condition) {
+  return condition.empty() ? "" : kind_for_people(condition) + ": ";
+}
+
+std::string kind_for_people(const std::string& kind) { return kind == "arc" ? "transverse arc" : kind; }
+
+std::vector<const Measure*> Analysis::measures() const {
+  std::vector<const Measure*> all = {&tensions, &adhesion_forces, &adhesion_areas};
+  for (const Measure& m : cells) all.push_back(&m);
+  return all;
+}
+
+Analysis analyse(const Study& study, const StudyParameters& parameters) {
+  const std::vector<CellWeights> draws = draw_cells(study, parameters);
+  Analysis a;
+  a.tensions = measure(sample_tensions(study), draws);
+  a.tensions_by_cell = summarise_by_cell(a.tensions.sample, study);
+  a.shares = shares_above(a.tensions.sample, {parameters.weak_tension_nN, parameters.strong_tension_nN});
+  a.adhesion_forces = measure(sample_adhesion_forces(study), draws);
+  a.adhesion_areas = measure(sample_adhesion_areas(study), draws);
+  for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));
+  a.correlations = correlate_forces(study, draws);
+  a.area_bins = bin_by_area(study, draws);
+  a.directions = summarise_directions(study, draws);
+  warn_of_few_cells(study, a.warnings);
+  warn_of_tensions(study, a.tensions, a.warnings);
+  for (const Measure* m : a.measures()) warn_of_pseudo_replication(*m, a.warnings);
+  return a;
+}
+
+}  // namespace mbtfm::statistics

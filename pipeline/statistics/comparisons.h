@@ -1,0 +1,40 @@
+/// Tests between kinds (fibre types; connected adhesions or not) and between conditions.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/statistics/summaries.h"
+
+namespace mbtfm::statistics {
+
+/// What is counted as one observation. The fibres of a cell are not independent of each other: tests by observation
+/// overstate the evidence; those of one median a cell, and those with the cell for the cluster, do not.
+enum class Unit { observation, cell_median, cell };
+const char* name_of(Unit unit);
+
+struct Comparison {
+  std::string column;    ///< what is compared: Sample::column
+  std::string question;  ///< "between kinds", "between conditions"
+  std::string within;    ///< the condition, or the kind, that all groups share
+  std::string test;
+  Unit unit = Unit::observation;
+  std::string group_a, group_b;  ///< group_b empty: all groups together
+  int n_a = 0, n_b = 0;          ///< observations
+  int cells_a = 0, cells_b = 0;
+  double statistic = 0;
+  std::optional<double> degrees;  ///< of freedom, of the statistic's denominator
+  double p_value = 1;
+  std::optional<double> p_holm;  ///< corrected for all pairs of the same test and question
+  double effect = 0;
+  std::string effect_name;           ///< what the effect is: see docs/statistics.md
+  std::optional<Interval> interval;  ///< 95 %, of the effect
+};
+
+/// All tests of a sample; left out where a group has fewer than two observations, or all are equal.
+/// By observation and by the cells' medians: Kruskal–Wallis, then Mann–Whitney for each pair. With the cell for the
+/// unit: clustered rank-sum tests and the mixed model, F of all groups, then t of each pair's difference of means.
+std::vector<Comparison> compare(const Sample& sample, const std::optional<SampleModel>& model);
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,78 @@
+#include "pipeline/statistics/conditions.h"
+
+#include <algorithm>
+#include <map>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::statistics {
+namespace {
+
+/// 1 for "folder", 2 for "folder2", …; 0 for a column.
+int folder_level(const std::string& condition_from) {
+  if (!condition_from.starts_with("folder")) return 0;
+  const std::string level = condition_from.substr(6);
+  if (level.empty()) return 1;
+  return level.size() == 1 && level[0] >= '1' && level[0] <= '9' ? level[0] - '0' : 0;
+}
+
+std::string folder_of(const std::string& name, int level) {
+  const Path path(name);
+  if (std::distance(path.begin(), path.end()) <= level) {
+    throw InputError(name, "a folder of its condition above the cell, at level " + std::to_string(level),
+                     "the cell itself", "sort the cells into a folder for each condition, or name them in --table");
+  }
+  return std::next(path.begin(), level - 1)->string();
+}
+
+/// By its whole name, or by that of its own folder where no other cell's is the same.
+std::size_t index_of_cell(const std::vector<std::string>& names, const CsvTable& table, int row) {
+  const std::string asked = table.text(row, "cell");
+  const auto exact = std::find(names.begin(), names.end(), asked);
+  if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
+  std::vector<std::size_t> matches;
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (Path(names[i]).filename() == asked) matches.push_back(i);
+  }
+  if (matches.size() != 1) {
+    table.fail(row, "cell", "a cell folder of the study",
+               matches.empty() ? "names are relative to the folder of the study, as in " + names.front()
+                               : "several cells are called so: give the folders above it, too");
+  }
+  return matches.front();
+}
+
+}  // namespace
+
+std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std::string& condition_from,
+                               const std::optional<Path>& table) {
+  const int level = folder_level(condition_from);
+  const bool is_column = !condition_from.empty() && level == 0;
+  if (is_column && !table) {
+    throw UsageError("--condition-from " + condition_from +
+                     ": expected `folder`, or a column of a table given by --table");
+  }
+  std::vector<CellNote> notes(names.size());
+  for (std::size_t i = 0; level > 0 && i < names.size(); ++i) notes[i].condition = folder_of(names[i], level);
+  if (!table) return notes;
+  const CsvTable rows(*table);
+  rows.require(is_column ? std::vector<std::string>{"cell", condition_from} : std::vector<std::string>{"cell"});
+  std::vector<bool> is_named(names.size(), false);
+  for (int row = 0; row < rows.n_rows(); ++row) {
+    const std::size_t i = index_of_cell(names, rows, row);
+    if (is_named[i]) rows.fail(row, "cell", "each cell once");
+    is_named[i] = true;
+    if (rows.has("exclude")) notes[i].reason_to_exclude = rows.text(row, "exclude");
+    if (!is_column) continue;
+    notes[i].condition = rows.text(row, condition_from);
+    if (notes[i].condition.empty() && notes[i].reason_to_exclude.empty())
+      notes[i].reason_to_exclude = "no " + condition_from + " in the table";
+  }
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (!is_named[i]) notes[i].reason_to_exclude = "not in the table";
+  }
+  return notes;
+}
+
+}  // namespace mbtfm::statistics

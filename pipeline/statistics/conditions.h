@@ -1,0 +1,24 @@
+/// What a user says of the cells of a study: their condition, and which must not enter.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+
+namespace mbtfm::statistics {
+
+struct CellNote {
+  std::string condition;          ///< empty where none are asked for
+  std::string reason_to_exclude;  ///< empty: it enters
+};
+
+/// By cell. A cell that the table lacks does not enter.
+/// @param names  folders of the cells, relative to the study's
+/// @param condition_from  see StudyParameters
+/// @throws InputError where a cell has no such folder above it, the table no such column, or a row no cell
+std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std::string& condition_from,
+                               const std::optional<Path>& table);
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,63 @@
+/// What a fitted mixed model says of sums and differences of its means.
+#include <Eigen/Dense>
+#include <algorithm>
+#include <boost/math/distributions/fisher_f.hpp>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+
+#include "pipeline/statistics/mixed_model.h"
+
+namespace mbtfm::statistics {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+double satterthwaite_degrees(const MixedFit& fit, const VectorXd& weights) {
+  const double variance = weights.dot(fit.covariance * weights);
+  VectorXd slope(static_cast<Index>(fit.covariance_slopes.size()));
+  for (Index k = 0; k < slope.size(); ++k)
+    slope[k] = weights.dot(fit.covariance_slopes[static_cast<std::size_t>(k)] * weights);
+  const double spread = slope.dot(fit.variance_covariance * slope);
+  const double most = fit.n_observations - static_cast<double>(fit.mean.size());
+  return spread > 0 ? std::clamp(2 * variance * variance / spread, 1.0, std::max(1.0, most)) : std::max(1.0, most);
+}
+
+}  // namespace
+
+Contrast contrast_of(const MixedFit& fit, const VectorXd& weights) {
+  Contrast c;
+  c.estimate = weights.dot(fit.mean);
+  c.standard_error = std::sqrt(weights.dot(fit.covariance * weights));
+  c.degrees = satterthwaite_degrees(fit, weights);
+  c.t = c.estimate / c.standard_error;
+  const boost::math::students_t t(c.degrees);
+  c.p_value = std::min(1.0, 2 * cdf(complement(t, std::abs(c.t))));
+  const double half = quantile(t, 0.975) * c.standard_error;
+  c.low = c.estimate - half;
+  c.high = c.estimate + half;
+  return c;
+}
+
+FTest test_all_zero(const MixedFit& fit, const MatrixXd& contrasts) {
+  const MatrixXd spread = contrasts * fit.covariance * contrasts.transpose();
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(spread);
+  const MatrixXd axes = eigen.eigenvectors().transpose() * contrasts;  // independent contrasts, one a row
+  const double q = static_cast<double>(contrasts.rows());
+  FTest test{.numerator_degrees = q};
+  double expected = 0;  // of q F
+  for (Index i = 0; i < axes.rows(); ++i) {
+    const Contrast c = contrast_of(fit, axes.row(i).transpose());
+    test.f += c.t * c.t / q;
+    expected += c.degrees > 2 ? c.degrees / (c.degrees - 2) : 0;
+  }
+  test.denominator_degrees = contrasts.rows() == 1 ? contrast_of(fit, axes.row(0).transpose()).degrees
+                             : expected > q        ? 2 * expected / (expected - q)
+                                                   : 2;
+  test.p_value = cdf(complement(boost::math::fisher_f(q, test.denominator_degrees), test.f));
+  return test;
+}
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,65 @@
+/// Figures that describe a sample, and what a line or a share says with its error.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+namespace mbtfm::statistics {
+
+struct Description {
+  int n = 0;
+  double mean = 0, median = 0;
+  double standard_deviation = 0;  ///< with n − 1; 0 for n = 1
+};
+/// @throws InvalidData where there is no value
+Description describe(std::vector<double> values);
+/// Share of values above the threshold, 0 to 1.
+double fraction_above(const std::vector<double>& values, double threshold);
+
+struct Interval {
+  double low = 0, high = 0;
+};
+
+/// Wilson's 95 % interval of a share of n independent observations; n need not be whole.
+/// Source: Wilson, J. Am. Stat. Assoc. 22, 209 (1927).
+Interval wilson_interval(double share, double n);
+
+/// A share of all observations of all cells, with Wilson's interval at the number of independent observations that
+/// would scatter as much as the cells do. Source: Korn & Graubard, Survey Methodology 24, 193 (1998). Where none or all
+/// have the property the cells cannot tell how they scatter: each then counts once.
+struct Share {
+  double value = 0;
+  Interval interval;  ///< 95 %
+  double n_effective = 0;
+};
+struct CellCount {
+  int n = 0, n_with = 0;
+};
+/// @throws InvalidData where no cell has an observation
+Share share_over_cells(const std::vector<CellCount>& cells);
+
+/// y = slope x, by least squares; its error supposes one scatter of all points (R: lm(y ~ 0 + x)).
+struct LineThroughOrigin {
+  int n = 0;
+  double slope = 0;
+  std::optional<double> slope_error;  ///< standard error; none of one point
+  std::optional<double> correlation;  ///< Pearson's; none where x or y does not vary
+};
+/// @throws InvalidData where no x differs from zero
+LineThroughOrigin line_through_origin(const std::vector<double>& x, const std::vector<double>& y);
+
+/// What the values would be without their measurement errors, which are independent of them.
+struct Deconvolved {
+  double standard_deviation = 0;  ///< √(variance − mean error variance), 0 where the errors explain all scatter
+  double reliability = 0;         ///< share of the variance that is not error, 0 to 1
+};
+Deconvolved deconvolved_moments(const std::vector<double>& values, const std::vector<double>& error_variances);
+
+/// Share above a threshold without the blur of the errors: the distribution that makes the values most likely, given
+/// normal errors of known size, found by EM on a grid; a value at zero or below says only that the sum with its error
+/// was not positive. Source: Laird, J. Am. Stat. Assoc. 73, 805 (1978); Koenker & Mizera, ibid. 109, 674 (2014).
+/// @param values  not negative
+double deconvolved_fraction_above(const std::vector<double>& values, const std::vector<double>& error_variances,
+                                  double threshold);
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,161 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "pipeline/statistics/study_files.h"
+
+namespace mbtfm::statistics {
+namespace {
+
+using charts::readable;
+
+std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
+
+std::string plural_of(const Sample& sample, const std::string& kind) {
+  if (sample.each == "cells") return "cells";
+  return kind == "arc" ? "transverse arcs" : kind + " " + sample.each;
+}
+
+/// A sentence begins so, for people: "Control: ventral fibres".
+std::string capitalised(std::string text) {
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+  return text;
+}
+
+std::string mean_text(const Summary& s, const std::string& unit) {
+  if (!s.model) return fmt::format("{} {} (a single cell, no interval)", readable(s.plain.mean), unit);
+  return fmt::format("{} {} [95 % CI {} to {}]", readable(s.model->estimate), unit, readable(s.model->low),
+                     readable(s.model->high));
+}
+
+/// "ventral fibres carry a tension of 4.1 nN [95 % CI …; the cell as the unit, 12 cells, 80 fibres]".
+std::vector<std::string> means(const Measure& m) {
+  std::vector<std::string> list;
+  for (const Summary& s : m.summaries) {
+    std::string text = fmt::format("{}the mean {} of {} is {}", prefix_of(s.condition), m.sample.name,
+                                   plural_of(m.sample, s.kind), mean_text(s, m.sample.unit));
+    text += fmt::format(", the cell being the unit ({} cells", s.n_cells);
+    if (m.sample.each != "cells") text += fmt::format(", {} {}", s.n, m.sample.each);
+    text += ")";
+    if (m.sample.each != "cells" && s.typical_error > 0 && s.n > 2) {
+      text += fmt::format("; they scatter by {} {}, of which {} {} remain without the error of their measurement",
+                          readable(s.plain.standard_deviation), m.sample.unit,
+                          readable(s.without_error.standard_deviation), m.sample.unit);
+    }
+    list.push_back(capitalised(text + "."));
+  }
+  return list;
+}
+
+const Comparison* same_pair(const Measure& m, const Comparison& c, const std::string& test) {
+  const auto at = std::find_if(m.comparisons.begin(), m.comparisons.end(), [&](const Comparison& o) {
+    return o.test == test && o.unit == Unit::cell && o.question == c.question && o.within == c.within &&
+           o.group_a == c.group_a && o.group_b == c.group_b;
+  });
+  return at == m.comparisons.end() ? nullptr : &*at;
+}
+
+/// A sentence for each pair that the mixed model compares.
+std::vector<std::string> differences(const Measure& m) {
+  std::vector<std::string> list;
+  for (const Comparison& c : m.comparisons) {
+    if (c.test != "mixed model" || c.group_b.empty() || !c.interval) continue;
+    const bool is_of_kinds = c.question == "between kinds";
+    // the larger one first
+    const bool is_turned = c.effect < 0;
+    const std::string& larger = is_turned ? c.group_b : c.group_a;
+    const std::string& smaller = is_turned ? c.group_a : c.group_b;
+    const double low = is_turned ? -c.interval->high : c.interval->low,
+                 high = is_turned ? -c.interval->low : c.interval->high;
+    constexpr double kLevel = 0.05;
+    const bool is_clear = *c.p_holm < kLevel;
+    std::string text =
+        is_of_kinds
+            ? fmt::format("{}the {} of {} is {} larger than that of {}", prefix_of(c.within), m.sample.name,
+                          plural_of(m.sample, larger),
+                          is_clear ? readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably",
+                          plural_of(m.sample, smaller))
+            : fmt::format(
+                  "the {} of {} is {} larger under {} than under {}", m.sample.name, plural_of(m.sample, c.within),
+                  is_clear ? readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably", larger, smaller);
+    text += fmt::format(" (difference {} {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
+                        readable(std::abs(c.effect)), m.sample.unit, readable(low), readable(high),
+                        readable(*c.degrees), readable(std::abs(c.statistic)), p_text(*c.p_holm));
+    const Comparison* ranks = same_pair(m, c, m.sample.each == "cells" ? "Mann-Whitney" : "clustered rank sum");
+    if (ranks != nullptr)
+      text += fmt::format("; {}, {}", m.sample.each == "cells" ? "Mann–Whitney" : "clustered rank-sum test",
+                          p_text(*ranks->p_holm));
+    const int cells_a = is_turned ? c.cells_b : c.cells_a, cells_b = is_turned ? c.cells_a : c.cells_b;
+    text += fmt::format("; {} and {} cells", cells_a, cells_b);
+    if (m.sample.each != "cells")
+      text += fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, m.sample.each);
+    list.push_back(capitalised(text + ")."));
+  }
+  return list;
+}
+
+std::vector<std::string> shares(const Analysis& analysis, const StudyParameters& parameters) {
+  std::vector<std::string> list;
+  for (const ShareAbove& s : analysis.shares) {
+    if (s.threshold_nN != parameters.strong_tension_nN) continue;
+    list.push_back(capitalised(
+        fmt::format("{}{:.0f} % of the {} carry more than {} nN [95 % CI {:.0f} to {:.0f} %; {} fibres of {} "
+                    "cells], {:.0f} % "
+                    "without the blur of the measurement.",
+                    prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
+                    readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high, s.n, s.n_cells,
+                    100 * s.without_error)));
+  }
+  return list;
+}
+
+std::vector<std::string> lines(const Analysis& analysis) {
+  std::vector<std::string> list;
+  for (const Correlation& c : analysis.correlations) {
+    if (c.force != "total_force_nN" || !c.line.slope_error) continue;
+    const std::string by = c.size == "n_adhesions"         ? "adhesion"
+                           : c.size == "adhesion_area_um2" ? "µm² of adhesion"
+                           : c.size == "cell_area_um2"     ? "µm² of cell"
+                                                           : "fibre";
+    std::string text = fmt::format("{}the total force is {} ± {} nN for each {} ({} cells", prefix_of(c.condition),
+                                   readable(c.line.slope), readable(*c.line.slope_error), by, c.line.n);
+    if (c.line.correlation) text += ", r = " + readable(*c.line.correlation);
+    list.push_back(capitalised(text + ")."));
+  }
+  return list;
+}
+
+std::vector<std::string> directions(const Analysis& analysis) {
+  std::vector<std::string> list;
+  for (const DirectionSummary& s : analysis.directions) {
+    std::string text = fmt::format("{}{} differ by {:.0f}° in the mean", prefix_of(s.condition),
+                                   full_name_of(s.relation), s.mean_angle_deg);
+    if (s.angle_interval_deg)
+      text += fmt::format(" [95 % CI {:.0f}° to {:.0f}°]", s.angle_interval_deg->low, s.angle_interval_deg->high);
+    list.push_back(capitalised(text + fmt::format(", where chance would give {:.0f}° ({} angles of {} cells).",
+                                                  largest_angle_deg(s.relation) / 2, s.n, s.n_cells)));
+  }
+  return list;
+}
+
+void append(std::vector<std::string>& list, const std::vector<std::string>& more) {
+  list.insert(list.end(), more.begin(), more.end());
+}
+
+}  // namespace
+
+std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters) {
+  std::vector<std::string> tensions = means(analysis.tensions), adhesions = means(analysis.adhesion_forces), cells;
+  append(tensions, differences(analysis.tensions));
+  append(tensions, shares(analysis, parameters));
+  append(adhesions, differences(analysis.adhesion_forces));
+  append(adhesions, differences(analysis.adhesion_areas));
+  for (const Measure& m : analysis.cells) {
+    append(cells, means(m));
+    append(cells, differences(m));
+  }
+  append(cells, lines(analysis));
+  return {{"Tensions", tensions}, {"Adhesions", adhesions}, {"Cells", cells}, {"Directions", directions(analysis)}};
+}
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,155 @@
+#include "pipeline/statistics/summaries.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::statistics {
+namespace {
+
+std::vector<double> error_variances_of(const std::vector<Observation>& observations) {
+  std::vector<double> list;
+  for (const Observation& o : observations) list.push_back(o.error_variance);
+  return list;
+}
+
+Summary plain_summary(const std::string& condition, const std::string& kind, const std::vector<Observation>& own) {
+  const std::vector<double> values = values_of(own), errors = error_variances_of(own);
+  double error = 0;
+  for (const double e : errors) error += e / static_cast<double>(errors.size());
+  return {.cell = {},
+          .condition = condition,
+          .kind = kind,
+          .n_cells = n_cells_of(own),
+          .n = static_cast<int>(own.size()),
+          .plain = describe(values),
+          .typical_error = std::sqrt(error),
+          .without_error = deconvolved_moments(values, errors),
+          .mean_interval = {},
+          .median_interval = {},
+          .model = {}};
+}
+
+std::optional<Interval> mean_interval(const std::vector<Observation>& own, const std::vector<CellWeights>& draws) {
+  std::map<int, std::pair<double, double>> by_cell;  // number, sum
+  for (const Observation& o : own) {
+    by_cell[o.cell].first += 1;
+    by_cell[o.cell].second += o.value;
+  }
+  std::vector<std::optional<double>> means;
+  for (const CellWeights& w : draws) {
+    double n = 0, sum = 0;
+    for (const auto& [cell, pair] : by_cell) {
+      n += w[static_cast<std::size_t>(cell)] * pair.first;
+      sum += w[static_cast<std::size_t>(cell)] * pair.second;
+    }
+    means.push_back(n > 0 ? std::optional<double>(sum / n) : std::nullopt);
+  }
+  return bootstrap_interval(std::move(means), static_cast<int>(by_cell.size()));
+}
+
+std::optional<Interval> median_interval(std::vector<Observation> own, const std::vector<CellWeights>& draws) {
+  std::sort(own.begin(), own.end(), [](const Observation& a, const Observation& b) { return a.value < b.value; });
+  std::vector<std::optional<double>> medians;
+  for (const CellWeights& w : draws) {
+    double n = 0, seen = 0;
+    for (const Observation& o : own) n += w[static_cast<std::size_t>(o.cell)];
+    std::optional<double> median;
+    for (std::size_t i = 0; i < own.size() && !median && n > 0; ++i) {
+      seen += w[static_cast<std::size_t>(own[i].cell)];
+      if (2 * seen >= n) median = own[i].value;
+    }
+    medians.push_back(median);
+  }
+  return bootstrap_interval(std::move(medians), n_cells_of(own));
+}
+
+}  // namespace
+
+std::vector<CellWeights> draw_cells(const Study& study, const StudyParameters& parameters) {
+  std::vector<int> condition;
+  for (const StudyCell& cell : study.cells) condition.push_back(cell.condition);
+  return draw_cells(condition, parameters.bootstrap_draws, parameters.bootstrap_seed);
+}
+
+std::optional<SampleModel> model_of(const Sample& sample) {
+  std::vector<int> index(static_cast<std::size_t>(sample.n_conditions() * sample.n_kinds()), -1);
+  for (const Observation& o : sample.values) index[static_cast<std::size_t>(o.group)] = 0;
+  int n = 0;
+  for (int& i : index) i = i < 0 ? -1 : n++;
+  std::vector<Observation> data = sample.values;
+  for (Observation& o : data) o.group = index[static_cast<std::size_t>(o.group)];
+  try {
+    MixedFit fit = fit_mixed_model(std::move(data));
+    if (!fit.converged) return std::nullopt;
+    return SampleModel{.fit = std::move(fit), .index = std::move(index)};
+  } catch (const InvalidData&) {
+    return std::nullopt;
+  }
+}
+
+std::vector<Summary> summarise(const Sample& sample, const std::optional<SampleModel>& model,
+                               const std::vector<CellWeights>& draws) {
+  std::vector<Summary> list;
+  for (int condition = 0; condition < sample.n_conditions(); ++condition) {
+    for (int kind = 0; kind < sample.n_kinds(); ++kind) {
+      const std::vector<Observation> own = sample.of_group(condition, kind);
+      if (own.empty()) continue;
+      Summary s = plain_summary(sample.conditions[static_cast<std::size_t>(condition)],
+                                sample.kinds[static_cast<std::size_t>(kind)], own);
+      s.mean_interval = mean_interval(own, draws);
+      s.median_interval = median_interval(own, draws);
+      if (model && s.n_cells > 1) {
+        const int g = model->index[static_cast<std::size_t>(sample.group_of(condition, kind))];
+        s.model = contrast_of(model->fit, Eigen::VectorXd::Unit(model->fit.mean.size(), g));
+      }
+      list.push_back(std::move(s));
+    }
+  }
+  return list;
+}
+
+std::vector<Summary> summarise_by_cell(const Sample& sample, const Study& study) {
+  std::map<std::pair<int, int>, std::vector<Observation>> groups;
+  for (const Observation& o : sample.values) groups[{o.cell, o.kind}].push_back(o);
+  std::vector<Summary> list;
+  for (const auto& [key, own] : groups) {
+    const StudyCell& cell = study.cells[static_cast<std::size_t>(key.first)];
+    list.push_back(plain_summary(study.conditions[static_cast<std::size_t>(cell.condition)],
+                                 sample.kinds[static_cast<std::size_t>(key.second)], own));
+    list.back().cell = cell.name;
+  }
+  return list;
+}
+
+std::vector<ShareAbove> shares_above(const Sample& tensions, const std::vector<double>& thresholds_nN) {
+  std::vector<ShareAbove> list;
+  for (int condition = 0; condition < tensions.n_conditions(); ++condition) {
+    for (int kind = 0; kind < tensions.n_kinds(); ++kind) {
+      const std::vector<Observation> own = tensions.of_group(condition, kind);
+      if (own.empty()) continue;
+      for (const double threshold : thresholds_nN) {
+        std::map<int, CellCount> counts;
+        for (const Observation& o : own) {
+          ++counts[o.cell].n;
+          counts[o.cell].n_with += o.value > threshold ? 1 : 0;
+        }
+        std::vector<CellCount> cells;
+        for (const auto& [cell, count] : counts) cells.push_back(count);
+        list.push_back(
+            {.condition = tensions.conditions[static_cast<std::size_t>(condition)],
+             .kind = tensions.kinds[static_cast<std::size_t>(kind)],
+             .threshold_nN = threshold,
+             .n_cells = static_cast<int>(cells.size()),
+             .n = static_cast<int>(own.size()),
+             .share = share_over_cells(cells),
+             .without_error = deconvolved_fraction_above(values_of(own), error_variances_of(own), threshold)});
+      }
+    }
+  }
+  return list;
+}
+
+}  // namespace mbtfm::statistics

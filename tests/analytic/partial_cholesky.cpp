@@ -1,0 +1,50 @@
+#include "network/partial_cholesky.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <limits>
+#include <vector>
+
+namespace {
+
+using mbtfm::network::partial_cholesky;
+
+// Sizes about the tile (8 × 4), the chunk (16) and the depth (128) of the kernels.
+constexpr int kHeights[] = {1, 2, 7, 8, 9, 16, 18, 31, 128, 150, 290};
+
+TEST(PartialCholesky, is_the_factor_and_the_schur_complement) {
+  for (const int height : kHeights)
+    for (const int width : kHeights) {
+      if (width > height) continue;
+      SCOPED_TRACE(testing::Message() << height << " x " << width);
+      const int below = height - width;
+      // Eigenvalues from 1 to 1 + height: rounding stays below height² · 1e-16.
+      const Eigen::MatrixXd root = Eigen::MatrixXd::Random(height, height);
+      const Eigen::MatrixXd a = Eigen::MatrixXd::Identity(height, height) + root * root.transpose() / height;
+      const Eigen::MatrixXd whole = a.llt().matrixL();
+      Eigen::MatrixXd columns = a.leftCols(width), rest = a.bottomRightCorner(below, below);
+      const std::vector<double> least_pivot(width, 0);
+      partial_cholesky({columns.data(), static_cast<std::size_t>(height), static_cast<std::size_t>(width)},
+                       least_pivot.data(), rest.data());
+      const Eigen::MatrixXd lower = columns.triangularView<Eigen::Lower>();
+      EXPECT_LT((lower - whole.leftCols(width)).norm(), 1e-11);
+      const Eigen::MatrixXd corner = whole.bottomRightCorner(below, below);
+      const Eigen::MatrixXd difference = rest - corner * corner.transpose();
+      EXPECT_LT(difference.triangularView<Eigen::Lower>().toDenseMatrix().norm(), 1e-11);
+    }
+}
+
+TEST(PartialCholesky, a_lost_pivot_holds_its_direction_still) {
+  Eigen::Matrix3d a;
+  a << 4, 2, 2, 2, 1, 1, 2, 1, 5;  // the second column is half the first
+  double rest = a(2, 2);
+  Eigen::MatrixXd columns = a.leftCols(2);
+  const double least_pivot[] = {1e-14, 1e-14};
+  partial_cholesky({columns.data(), 3, 2}, least_pivot, &rest);
+  EXPECT_EQ(columns(1, 1), std::numeric_limits<double>::infinity());
+  EXPECT_EQ(columns(2, 1), 0);
+  EXPECT_DOUBLE_EQ(rest, 4);
+}
+
+}  // namespace

@@ -1,0 +1,29 @@
+#!/usr/bin/env bash
+# The hard cases (ctest label stability) in each mode: optimised, with traps where a NaN or an infinity is made, under
+# the address and undefined-behaviour sanitizers, under the thread sanitizer.
+#   tests/modes.sh [release|traps|asan-ubsan|tsan]...
+set -euo pipefail
+cd "$(dirname "$0")/.."
+modes=("$@")
+[ $# -gt 0 ] || modes=(release traps asan-ubsan tsan)
+
+build() {
+  cmake --preset "$1" >/dev/null
+  cmake --build --preset "$1"
+}
+
+hard_cases() {
+  ctest --test-dir "$1" -L stability --output-on-failure --no-tests=error -j "$(nproc)"
+}
+
+for mode in "${modes[@]}"; do
+  echo "== $mode"
+  case $mode in
+    release) build release && hard_cases build ;;
+    traps) build release && LD_PRELOAD=$PWD/build/tests/libmbtfm_fp_traps.so hard_cases build ;;
+    # the sanitizers take five to ten times as long: fewer random scenes
+    asan-ubsan) build asan-ubsan && MBTFM_SCENES=3 UBSAN_OPTIONS=print_stacktrace=1 hard_cases build-asan ;;
+    tsan) build tsan && MBTFM_SCENES=3 TSAN_OPTIONS="suppressions=$PWD/tests/support/tsan.supp halt_on_error=1" hard_cases build-tsan ;;
+    *) echo "unknown mode '$mode': release, traps, asan-ubsan, tsan" >&2; exit 2 ;;
+  esac
+done
