@@ -88,17 +88,6 @@ void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& n
   }
 }
 
-/// Standard error that the meshes add. Where the fit counts with their error the cell's own deviation is in its
-/// covariance, and the mean's is left: s² / n. Else that of one further mesh about the mean of these: s² (1 + 1/n).
-double spread_of(const std::vector<double>& values, bool is_cell_counted) {
-  const double n = static_cast<double>(values.size());
-  if (n < 2) return 0;
-  double mean = 0, sum = 0;
-  for (const double v : values) mean += v / n;
-  for (const double v : values) sum += (v - mean) * (v - mean);
-  return std::sqrt(sum / (n - 1) * (is_cell_counted ? 1 / n : 1 + 1 / n));
-}
-
 /// Mean and errors of a quantity that is linear in the tensions about each mesh's solution.
 /// @param value_of  of a mesh; @param gradient_of  by tension; @param own_variance  of the model, beside the tensions
 template <class ValueOf, class GradientOf>
@@ -262,6 +251,15 @@ double total_nN(const Eigen::VectorXd& forces_nN) {
   double sum = 0;
   for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
   return sum;
+}
+
+double spread_of(const std::vector<double>& values, bool is_cell_counted) {
+  const double n = static_cast<double>(values.size());
+  if (n < 2) return 0;
+  double mean = 0, sum = 0;
+  for (const double v : values) mean += v / n;
+  for (const double v : values) sum += (v - mean) * (v - mean);
+  return std::sqrt(sum / (n - 1) * (is_cell_counted ? 1 / n : 1 + 1 / n));
 }
 
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {

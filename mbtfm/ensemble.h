@@ -77,6 +77,11 @@ Interval interval_95(const Estimate& estimate, int n_meshes);
 /// Sum of the magnitudes of forces (fx, fy by adhesion).
 double total_nN(const Eigen::VectorXd& forces_nN);
 
+/// Standard error that the meshes add to the mean of these values, one a mesh. Where the fit counts with their error
+/// the cell's own deviation is in its covariance, and the mean's is left: s² / n. Else that of one further mesh about
+/// the mean of these: s² (1 + 1/n).
+double spread_of(const std::vector<double>& values, bool is_cell_counted);
+
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);
 

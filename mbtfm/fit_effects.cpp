@@ -112,6 +112,7 @@ void declare(ParameterList& list, FitStageParameters& p) {
   declare(list, p.cables);
   declare(list, p.substrate);
   declare(list, p.fit);
+  declare(list, p.segmentation);
   list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
   declare(list, p.effects,
           {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",

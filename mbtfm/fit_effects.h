@@ -1,6 +1,7 @@
 /// The effects of mbtfm-fit as a whole: the gel's, the network's and the fit's own.
 #pragma once
 
+#include "mbtfm/error_budget.h"
 #include "mbtfm/explain.h"
 #include "mbtfm/fit_results.h"
 #include "network/mesh.h"
@@ -14,6 +15,7 @@ struct FitStageParameters {
   network::CableParameters cables;
   substrate::SubstrateParameters substrate;
   FitParameters fit;
+  SegmentationErrors segmentation;
   EffectSwitches effects;
   bool explain = false;  ///< some seconds; what is off is off because it does not matter
 };

@@ -1,10 +1,12 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <map>
 
 #include "mbtfm/cross_validation.h"
 #include "mbtfm/effects.h"
+#include "mbtfm/error_budget.h"
 #include "mbtfm/fit_effects.h"
 #include "mbtfm/model_checks.h"
 #include "mbtfm/series.h"
@@ -18,6 +20,7 @@
 #include "pipeline/contract/stage.h"
 #include "substrate/compliance.h"
 #include "substrate/gel_vtu.h"
+#include "substrate/stated_error.h"
 
 namespace mbtfm::inverse {
 namespace {
@@ -67,10 +70,10 @@ std::vector<network::CableNetwork> span_ensemble(const FitInputs& inputs, const 
 }
 
 void write_surface(const Path& file, const substrate::Substrate& substrate, const Cell& cell,
-                   const std::vector<AdhesionForce>& forces) {
+                   const std::vector<AdhesionForce>& forces, int n_lines) {
   std::vector<Vec2> forces_nN;
   for (const AdhesionForce& f : forces) forces_nN.push_back(f.force_nN);
-  substrate::write_substrate_vtu(file, substrate, ellipses_of(cell), forces_nN);
+  substrate::write_substrate_vtu(file, substrate, ellipses_of(cell), forces_nN, n_lines);
 }
 
 /// The network must be that of the cell as it is taken, with fibres or without.
@@ -113,6 +116,24 @@ std::string names_of_groups(const EnsembleFit& fit) {
     text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error()) + " nN";
   }
   return text;
+}
+
+ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
+                      const std::vector<network::CableNetwork>& networks, const FitInputs& inputs,
+                      const substrate::Substrate& substrate, const FitStageParameters& p, int threads) {
+  const Figures figures = substrate.figures();
+  const bool lacks_base = std::find(figures.begin(), figures.end(),
+                                    Figures::value_type{"substrate_model", std::string("half-space")}) != figures.end();
+  return error_budget({.fit = fit,
+                       .data = data,
+                       .networks = networks,
+                       .cell = inputs.cell,
+                       .beads = inputs.beads,
+                       .gel = p.gel,
+                       .substrate_error = substrate::stated_error(p.substrate, figures),
+                       .lacks_base = lacks_base,
+                       .segmentation = p.segmentation},
+                      threads);
 }
 
 /// The checks of the model in a few figures.
@@ -259,6 +280,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  const auto budget_start = std::chrono::steady_clock::now();
+  summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
+  const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const Eigen::MatrixXd influence = influence_of(fit, data);
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence);
@@ -272,7 +296,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   if (drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *drawn);
   write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
   write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
-  write_fit_summary(context.output("out", "fit.json"), summary);
+  write_fit_summary(context.output("out", "fit.json"), summary, inputs.cell.fibres);
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
@@ -283,7 +307,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const std::string of_series =
       series.empty() ? "" : fit_frames(series, *substrate, inputs.cell, networks, fit, p.fit, coupling.is_on, context);
   context.progress(0.95, "surface of the gel");
-  write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces);
+  write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces, p.fit.surface_lines);
   context.progress(1, "done");
 
   const auto n_unidentifiable =
@@ -304,6 +328,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
     write_changes(context.output("out", "effects_left_out.csv"), changes, fit);
   }
   report.summary += of_series;
+  report.figures.emplace_back("error_budget_s", budget_s);
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";

@@ -57,7 +57,8 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   };
 
   constexpr double kLargest = 1e4;  // the meshes' spread would be a hundredth of the model's error: it tells nothing
-  double low = 1 + 1 / static_cast<double>(meshes.size()), high = low;
+  const double least = 1 + 1 / static_cast<double>(meshes.size());
+  double low = least, high = least;
   const auto is_too_small = [&](double kappa) {
     return misfit(J, residual, noise_share(kappa).cwiseSqrt()) > expected;
   };
@@ -70,8 +71,12 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
     (is_too_small(middle) ? low : high) = middle;
   }
 
-  ModelError error{
-      .force_variance_nN2 = high * variance, .noise_variance = noise_variance, .data = data, .noise_share = {}};
+  ModelError error{.force_variance_nN2 = high * variance,
+                   .kappa = high,
+                   .least_kappa = least,
+                   .noise_variance = noise_variance,
+                   .data = data,
+                   .noise_share = {}};
   error.noise_share = noise_share(high);
   const Eigen::VectorXd scale = error.noise_share.cwiseSqrt();
   error.data.compliance = scale.asDiagonal() * C;

@@ -18,6 +18,7 @@ namespace mbtfm::inverse {
 
 struct ModelError {
   Eigen::VectorXd force_variance_nN2;  ///< kappa V, by component of the forces
+  double kappa = 0, least_kappa = 0;   ///< as the misfit calls for; and as one further mesh would have
   double noise_variance = 0;           ///< s²: 1 where the beads' errors are as stated
   ReducedData data;             ///< C and y in coordinates in which the errors of both together have variance s²
   Eigen::VectorXd noise_share;  ///< by row of these: the part of s² that is the beads' noise

@@ -30,6 +30,8 @@ void declare(ParameterList& list, FitParameters& p) {
   list.add("frame_interval_s", p.frame_interval_s, Range::positive(), "time between the frames of a series (s)");
   list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
            "parametric bootstrap draws for the intervals; 0: from the misfit's profile");
+  list.add("surface_lines", p.surface_lines, Range::between(8, 10000),
+           "of the gel's surface in substrate.vtu, over the longer side of the cell");
   list.add("cross_validation", p.cross_validation, Range::between(0, 1000000),
            "draws of the tensions by fibre type, and with dorsal and ventral exchanged, whose misfits are compared; 0: "
            "none");

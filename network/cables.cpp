@@ -247,4 +247,50 @@ Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<doubl
   return result;
 }
 
+// With F = dU/dx and w the weights on the held vertices, the free ones following as they would such a displacement,
+// w_f = −H_ff⁻¹ H_fx w_x: a change dF at fixed x lets the sum change by −wᵀ dF. One solve serves every part of the
+// scene.
+GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium,
+                                                 const Eigen::MatrixXd& weights) const {
+  const std::vector<Cable> cables = impl_->cables(tensions_nN);
+  BlockCholesky h_ff = impl_->free.matrix;
+  h_ff.set_zero();
+  BlockCholesky::Columns w_f = BlockCholesky::Columns::Zero(2 * h_ff.n_blocks(), weights.cols());
+  for (std::size_t k = 0; k < cables.size(); ++k) {
+    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->rounding());
+    const Vec2 n = (1 / p.length_um) * equilibrium.spans_um[k];
+    const BlockCholesky::Block block = stiffness(p, equilibrium.spans_um[k], p.stiffness_nN_per_um, n);
+    impl_->free.add(h_ff, k, cables[k], block);
+    const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};
+    for (int e = 0; e < 2; ++e) {
+      const int unknown = impl_->free.unknown[ends[e]], adhesion = impl_->adhesion[ends[1 - e]];
+      if (unknown >= 0 && adhesion >= 0) w_f.middleRows<2>(2 * unknown) += block * weights.middleRows<2>(2 * adhesion);
+    }
+  }
+  h_ff.factorise();
+  h_ff.solve(w_f);
+
+  const auto rows_of = [&](int v) -> Eigen::MatrixXd {
+    return impl_->adhesion[v] >= 0 ? weights.middleRows<2>(2 * impl_->adhesion[v])
+                                   : Eigen::MatrixXd(w_f.middleRows<2>(2 * impl_->free.unknown[v]));
+  };
+  GeometryGradient gradient{
+      Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->held_vertices.size()), weights.cols()),
+      Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(cables.size()), weights.cols())};
+  for (std::size_t k = 0; k < cables.size(); ++k) {
+    const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->rounding());
+    const Vec2 n = (1 / p.length_um) * equilibrium.spans_um[k];
+    const Eigen::MatrixXd apart = rows_of(cables[k].vertex_b) - rows_of(cables[k].vertex_a);
+    gradient.by_link.row(static_cast<Eigen::Index>(k)) = -Eigen::RowVector2d(n.x, n.y) * apart;
+    // A new mesh takes its rest lengths from the new places: the cable turns, but keeps its force.
+    const Eigen::MatrixXd turned = stiffness(p, equilibrium.spans_um[k], 0, n) * apart;
+    const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};
+    for (int e = 0; e < 2; ++e) {
+      if (impl_->adhesion[ends[e]] < 0) continue;
+      gradient.by_held_vertex.middleRows<2>(2 * index_of(impl_->held_vertices, ends[e])) += (e == 0 ? 1 : -1) * turned;
+    }
+  }
+  return gradient;
+}
+
 }  // namespace mbtfm::network

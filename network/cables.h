@@ -41,6 +41,13 @@ struct Equilibrium {
   Report report;         ///< last_change: the largest net force on a free vertex (nN)
 };
 
+/// How sums of the adhesion forces answer to the scene, the tensions held.
+struct GeometryGradient {
+  Eigen::MatrixXd
+      by_held_vertex;       ///< rows 2i, 2i+1: as held_vertices()[i] lies elsewhere, its cables as strained as ever
+  Eigen::MatrixXd by_link;  ///< as the link's own tension grows
+};
+
 /// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix.
 class CableNetwork {
  public:
@@ -78,6 +85,11 @@ class CableNetwork {
                                              const Equilibrium& equilibrium) const;
   /// The same by held vertex: rows 2i, 2i+1 are the force on held_vertices()[i]. Moments of an adhesion follow from it.
   Eigen::MatrixXd reaction_derivatives(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
+
+  /// Gradients of the sums weightsᵀ R with respect to what the network was spanned over. @param weights  2·adhesions ×
+  /// sums
+  GeometryGradient geometry_gradient(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium,
+                                     const Eigen::MatrixXd& weights) const;
 
  private:
   struct Impl;

@@ -9,8 +9,12 @@
 #include <optional>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/contract/version.h"
+#include "pipeline/cost/accuracy.h"
+#include "pipeline/cost/presets.h"
+#include "pipeline/cost/study_report.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/report.h"
 #include "pipeline/runner/batch.h"
@@ -38,6 +42,10 @@ struct CommandLine {
   fs::path template_toml, out, inputs;
   std::optional<double> timeout_s;
   std::optional<std::uint64_t> memory_bytes;
+  std::string preset, accuracy;
+  double budget_min = 10;  // a study that one waits for
+  int repeats = 3;         // whose median one busy moment does not move
+  bool is_whole = false;
 };
 
 bool is_terminal() { return isatty(STDERR_FILENO) != 0; }
@@ -57,9 +65,28 @@ runner::RunOptions run_options(const CommandLine& line) {
           .redo = line.redo,
           .explain = line.explain,
           .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
+          .preset = line.preset,
+          .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
           .version = kVersion,
           .say = line.is_quiet ? nullptr : say,
           .finish = nullptr};
+}
+
+runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
+  const double wanted = cost::parse_accuracy(line.accuracy);
+  if (!line.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
+  runner::CellOutcome outcome;
+  const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
+    options.preset = preset;
+    options.beneath = cost::preset_named(preset).settings;
+    outcome = runner::run_cell(line.folder, options);
+    const std::optional<ErrorBudget> budget = read_fit_summary(line.folder / "4_fit/fit.json").error_budget;
+    if (budget) return *budget;
+    throw InputError((line.folder / "4_fit/fit.json").string(), "an error budget", "none", "run with --redo fit");
+  });
+  cost::record_accuracy(line.folder, wanted, reached);
+  say(reached.verdict);
+  return outcome;
 }
 
 int run(const CommandLine& line) {
@@ -69,7 +96,8 @@ int run(const CommandLine& line) {
     report::update_report(line.folder);
     if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
   };
-  const runner::CellOutcome outcome = runner::run_cell(line.folder, options);
+  const runner::CellOutcome outcome =
+      line.accuracy.empty() ? runner::run_cell(line.folder, options) : run_to_accuracy(line, options);
   if (outcome.converged()) return kDone;
   std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", outcome.not_converged().c_str());
   return kNotSolved;
@@ -86,6 +114,8 @@ std::vector<fs::path> cells_of(const CommandLine& line) {
 std::vector<std::string> arguments_of_cell(const CommandLine& line) {
   std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
                                         "--stages-dir", line.stage_folder.string(), "--checked"};
+  if (!line.preset.empty()) arguments.insert(arguments.end(), {"--preset", line.preset});
+  if (!line.accuracy.empty()) arguments.insert(arguments.end(), {"--accuracy", line.accuracy});
   for (const std::string& stage : line.only) arguments.insert(arguments.end(), {"--only", stage});
   for (const std::string& stage : line.redo) arguments.insert(arguments.end(), {"--redo", stage});
   if (line.timeout_s) arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.timeout_s)});
@@ -157,6 +187,20 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
   throw OutputError("cannot start " + program);
 }
 
+int cost_study(const CommandLine& line) {
+  const cost::Study study =
+      cost::measure(line.folder, {.stage_folder = line.stage_folder,
+                                  .threads = line.threads,
+                                  .budget_s = 60 * line.budget_min,
+                                  .repeats = line.repeats,
+                                  .extent = line.is_whole ? cost::Extent::whole : cost::Extent::quick,
+                                  .say = line.is_quiet ? nullptr : say});
+  const fs::path folder = line.folder / "cost";
+  cost::write_study(folder, study, fs::weakly_canonical(line.folder).filename().string());
+  if (!line.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
+  return kDone;
+}
+
 int compare(const CommandLine& line) {
   std::fputs(report::comparison_text(line.folder).c_str(), stdout);
   return kDone;
@@ -174,6 +218,15 @@ CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name,
 }
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
+  std::vector<std::string> names;
+  std::string meaning = "parameters, where cell.toml sets none";
+  for (const cost::Preset& preset : cost::presets()) {
+    names.push_back(preset.name);
+    meaning += (names.size() == 1 ? ": " : ", ") + preset.name + " (" + preset.purpose + ")";
+  }
+  CLI::Option* preset = command->add_option("--preset", line.preset, meaning)->check(CLI::IsMember(names));
+  command->add_option("--accuracy", line.accuracy, "the cheapest preset that finds the tensions to this error, as 5%")
+      ->excludes(preset);
   // one value a flag: else the folder that follows would be taken for another
   command->add_option("--only", line.only, "run this stage only, or these: segment, track, network, fit")
       ->allow_extra_args(false);
@@ -219,6 +272,16 @@ int start(int argc, char** argv) {
       ->capture_default_str();
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
+  CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", "CELL");
+  cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  cost_command->add_option("--repeats", line.repeats, "runs of each choice, at most; the median counts")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
+  cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
+      ->capture_default_str();
   add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", "CELL");
   try {
     app.parse(argc, argv);
@@ -227,6 +290,7 @@ int start(int argc, char** argv) {
   }
   if (run_command->parsed()) return run(line);
   if (batch_command->parsed()) return batch(line);
+  if (cost_command->parsed()) return cost_study(line);
   if (verify_command->parsed()) return verify(line);
   if (repeat_command->parsed()) return repeat(line);
   if (stats_command->parsed()) return stats(line, stats_command->remaining());

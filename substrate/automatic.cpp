@@ -13,14 +13,14 @@
 #include "substrate/effects.h"
 #include "substrate/models.h"
 #include "substrate/scene.h"
+#include "substrate/stated_error.h"
 
 namespace mbtfm::substrate {
 namespace {
 
-/// Cells of the grid of `split` over the thickness that leave no more than the tolerance: 0.1 % with 2.
+/// Cells of the grid of `split` over the thickness that leave no more than the tolerance.
 int cells_for(double tolerance) {
-  constexpr double kErrorOfTwo = 1e-3;
-  return std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kErrorOfTwo / tolerance))));
+  return std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kSplitErrorOfTwoCells / tolerance))));
 }
 
 std::string model_for(const Gel& gel, const SubstrateParameters& p, const GelEffects& effects) {

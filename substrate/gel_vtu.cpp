@@ -11,7 +11,6 @@ namespace mbtfm::substrate {
 
 namespace {
 
-constexpr int kLinesInside = 160;  // over the longer side of the scene: half a micrometre for a cell of 80
 constexpr int kLinesOutside = 12;  // on either side, growing
 constexpr double kGrowth = 1.25;   // of a step over the one before: 12 steps reach 68 inner ones
 
@@ -46,10 +45,10 @@ Vec2 traction_kPa(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>&
 }  // namespace
 
 void write_substrate_vtu(const std::filesystem::path& file, const Substrate& substrate,
-                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {
+                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN, int n_lines) {
   const Extent scene = extent_of({}, ellipses);
   const Vec2 size = scene.high_um - scene.low_um;
-  const double step = std::max(size.x, size.y) / kLinesInside;
+  const double step = std::max(size.x, size.y) / n_lines;
   const std::vector<double> x = graded_lines(scene.low_um.x, scene.high_um.x, step);
   const std::vector<double> y = graded_lines(scene.low_um.y, scene.high_um.y, step);
   std::vector<Vec2> points;

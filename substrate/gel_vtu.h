@@ -7,11 +7,15 @@
 
 namespace mbtfm::substrate {
 
+inline constexpr int kSurfaceLines = 160;  ///< half a micrometre for a cell of 80
+
 /// Write quadrilaterals over the scene, finer where the adhesions are, with `displacement_um` by point and
 /// `traction_kPa` by cell (forces of the adhesions that hold its centre, over their areas).
+/// @param n_lines  over the longer side of the scene
 /// @throws OutputError; InvalidData and NotSolved as Substrate::displacements_um
 void write_substrate_vtu(const std::filesystem::path& file, const Substrate& substrate,
-                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN);
+                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN,
+                         int n_lines = kSurfaceLines);
 
 /// Write the gel's inside: the boxes of `field`, with `displacement_um` by point and `stress_kPa` by box (xx, yy, zz,
 /// xy, yz, xz) where it has one. @throws OutputError

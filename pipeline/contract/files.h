@@ -59,6 +59,28 @@ void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& f
 /// Columns vertex, fx_nN, fy_nN: the force of the network on the substrate at each held vertex.
 void write_reactions(const Path& file, const std::vector<int>& vertices, const std::vector<Vec2>& forces_nN);
 
+/// What each source adds to a standard error. In squares they add up.
+struct ErrorParts {
+  double beads = 0;            ///< noise of the displacements
+  double segmentation = 0;     ///< shift, area and angle of the adhesions; free ends of the fibres
+  std::optional<double> mesh;  ///< one network is not another; none: a single mesh tells nothing of it
+  double substrate = 0;        ///< discretisation of the gel, or what its model leaves out
+  double solver = 0;           ///< where the iterations stopped
+  double model = 0;            ///< what the misfit calls for beside the beads' noise and the mesh
+};
+double total(const ErrorParts& parts);
+
+struct TensionError {
+  int fibre_id = 0;  ///< 0: the actin network
+  double tension_nN = 0;
+  ErrorParts parts_nN;
+};
+struct ErrorBudget {
+  std::vector<TensionError> tensions;
+  double total_force_nN = 0;
+  ErrorParts total_force_parts_nN;
+};
+
 /// What the fit found for the cell as a whole: fit.json.
 struct FitSummary {
   double relative_l2 = 0;           ///< |u_measured − u_model| / |u_measured|
@@ -71,10 +93,12 @@ struct FitSummary {
   int n_meshes = 1;
   int iterations = 0;
   bool converged = false;
+  std::optional<ErrorBudget> error_budget;
   Figures more;  ///< further figures, written after the named ones
 };
 FitSummary read_fit_summary(const Path& file);
-void write_fit_summary(const Path& file, const FitSummary& summary);
+/// @param fibres  whose types are written beside the tensions of the error budget
+void write_fit_summary(const Path& file, const FitSummary& summary, const std::vector<Fibre>& fibres = {});
 /// Named figures as one JSON object.
 void write_figures(const Path& file, const Figures& figures);
 

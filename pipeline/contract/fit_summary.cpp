@@ -1,3 +1,4 @@
+#include <cmath>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/csv.h"
@@ -24,7 +25,71 @@ void for_each_member(Summary& s, const Visit& visit) {
   visit("converged", s.converged);
 }
 
+/// The same of the parts of an error.
+template <class Parts, class Visit>
+void for_each_part(Parts& p, const Visit& visit) {
+  visit("beads", p.beads);
+  visit("segmentation", p.segmentation);
+  visit("mesh", p.mesh);
+  visit("substrate", p.substrate);
+  visit("solver", p.solver);
+  visit("model", p.model);
+}
+
+nlohmann::ordered_json json_of_parts(const ErrorParts& parts) {
+  nlohmann::ordered_json json;
+  for_each_part(parts, [&](const char* name, const std::optional<double>& part) {
+    json[name] = part ? nlohmann::ordered_json(*part) : nlohmann::ordered_json();
+  });
+  return json;
+}
+
+ErrorParts parts_of(const nlohmann::ordered_json& json) {
+  ErrorParts parts;
+  for_each_part(parts, [&](const char* name, auto& part) {
+    if (!json.at(name).is_null()) part = json.at(name).get<double>();
+  });
+  return parts;
+}
+
+nlohmann::ordered_json json_of_budget(const ErrorBudget& budget, const std::vector<Fibre>& fibres) {
+  nlohmann::ordered_json json = {{"fibres", nlohmann::ordered_json::array()}};
+  for (const TensionError& t : budget.tensions) {
+    nlohmann::ordered_json row = {{"fibre_id", t.fibre_id}, {"type", "network"}, {"tension_nN", t.tension_nN}};
+    for (const Fibre& f : fibres) {
+      if (f.fibre_id == t.fibre_id) row["type"] = name_of(f.type);
+    }
+    row["parts_nN"] = json_of_parts(t.parts_nN);
+    row["total_nN"] = total(t.parts_nN);
+    json["fibres"].push_back(row);
+  }
+  json["total_force"] = {{"total_force_nN", budget.total_force_nN},
+                         {"parts_nN", json_of_parts(budget.total_force_parts_nN)},
+                         {"total_nN", total(budget.total_force_parts_nN)}};
+  return json;
+}
+
+ErrorBudget budget_of(const nlohmann::ordered_json& json) {
+  ErrorBudget budget;
+  for (const auto& row : json.at("fibres")) {
+    budget.tensions.push_back({.fibre_id = row.at("fibre_id").get<int>(),
+                               .tension_nN = row.at("tension_nN").get<double>(),
+                               .parts_nN = parts_of(row.at("parts_nN"))});
+  }
+  const auto& force = json.at("total_force");
+  budget.total_force_nN = force.at("total_force_nN").get<double>();
+  budget.total_force_parts_nN = parts_of(force.at("parts_nN"));
+  return budget;
+}
+
 }  // namespace
+
+double total(const ErrorParts& parts) {
+  double sum = 0;
+  for_each_part(parts,
+                [&](const char*, const std::optional<double>& part) { sum += part.value_or(0) * part.value_or(0); });
+  return std::sqrt(sum);
+}
 
 FitSummary read_fit_summary(const Path& file) {
   FitSummary summary;
@@ -34,6 +99,7 @@ FitSummary read_fit_summary(const Path& file) {
     for (const auto& [name, value] : json.items()) {
       bool is_named = false;
       for_each_member(summary, [&](const char* known, auto&) { is_named = is_named || name == known; });
+      if (name == "error_budget") summary.error_budget = budget_of(value);
       if (!is_named && value.is_primitive() && !value.is_null()) summary.more.emplace_back(name, value_of(value));
     }
   } catch (const nlohmann::json::exception& error) {
@@ -42,10 +108,11 @@ FitSummary read_fit_summary(const Path& file) {
   return summary;
 }
 
-void write_fit_summary(const Path& file, const FitSummary& summary) {
+void write_fit_summary(const Path& file, const FitSummary& summary, const std::vector<Fibre>& fibres) {
   nlohmann::ordered_json json;
   for_each_member(summary, [&](const char* name, const auto& member) { json[name] = member; });
   for (const auto& [name, value] : summary.more) json[name] = json_of(value);
+  if (summary.error_budget) json["error_budget"] = json_of_budget(*summary.error_budget, fibres);
   write_text(file, json.dump(2) + "\n");
 }
 

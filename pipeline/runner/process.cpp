@@ -139,6 +139,10 @@ ProcessResult Child::result() {
   while (wait4(pid_, &status, 0, &usage) < 0 && errno == EINTR) {
   }
   ProcessResult result;
+  const auto seconds_of = [](const timeval& t) {
+    return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+  };
+  result.cpu_seconds = seconds_of(usage.ru_utime) + seconds_of(usage.ru_stime);
   constexpr double kMegabytePerKibibyte = 1024e-6;  // ru_maxrss is in KiB
   result.peak_memory_MB = static_cast<double>(usage.ru_maxrss) * kMegabytePerKibibyte;
   if (WIFSIGNALED(status)) result.signal = WTERMSIG(status);

@@ -29,6 +29,7 @@ struct ProcessResult {
   enum class Limit { none, seconds, memory };
   Limit exceeded = Limit::none;  ///< for which we killed it
   double seconds = 0;
+  double cpu_seconds = 0;  ///< of all its threads
   double peak_memory_MB = 0;
   std::string last_output;  ///< the end of what it printed
 };

@@ -86,7 +86,7 @@ void complete_record(const fs::path& record_file, const StageRecord& record, con
   write_whole(record_file, whole.dump(1) + "\n");
 }
 
-Settings read_settings(const fs::path& toml_file) {
+Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
   toml::table whole;
   try {
     whole = toml::parse(read_text(toml_file), toml_file.string());
@@ -110,7 +110,12 @@ Settings read_settings(const fs::path& toml_file) {
     if (!effects.empty()) relevant.insert("effects", effects);
     std::ostringstream text;
     text << toml::json_formatter(relevant);
-    settings[stage.name] = json::parse(text.str()).dump();
+    json values = json::parse(text.str());
+    for (const Setting& setting : beneath) {
+      if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
+      values[setting.table][setting.key] = setting.value;
+    }
+    settings[stage.name] = values.dump();
   }
   return settings;
 }

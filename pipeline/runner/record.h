@@ -9,6 +9,7 @@
 
 #include "pipeline/runner/hash_cache.h"
 #include "pipeline/runner/images.h"
+#include "pipeline/runner/settings.h"
 #include "pipeline/runner/stages.h"
 
 namespace mbtfm::runner {
@@ -42,8 +43,9 @@ void complete_record(const std::filesystem::path& record_file, const StageRecord
 
 /// By stage, the tables of cell.toml that it depends on, as JSON with sorted keys.
 using Settings = std::map<std::string, std::string>;
+/// @param beneath  values that stand in place of defaults
 /// @throws InputError
-Settings read_settings(const std::filesystem::path& toml_file);
+Settings read_settings(const std::filesystem::path& toml_file, const std::vector<Setting>& beneath = {});
 
 /// Paths, relative to the cell folder, of the files that a stage reads: its images as far as they are there, and the
 /// files of earlier stages.

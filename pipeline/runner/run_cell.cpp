@@ -98,7 +98,8 @@ class CellRun {
       : cell_(std::move(cell)),
         options_(options),
         images_(read_image_names(cell_)),
-        settings_(read_settings(cell_ / "cell.toml")),
+        beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
+        settings_(read_settings(cell_ / "cell.toml", beneath_)),
         hashes_(cell_) {}
 
   CellOutcome look();
@@ -120,6 +121,7 @@ class CellRun {
   fs::path cell_;
   const RunOptions& options_;
   ImageNames images_;
+  std::vector<Setting> beneath_;
   Settings settings_;
   HashCache hashes_;
 };
@@ -199,7 +201,8 @@ void CellRun::start(const Stage& stage, const StageSurroundings& now, int thread
     }
   }
   const fs::path record_file = cell_ / stage.folder / "record.json";
-  const std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
+  std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
+  for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
   const bool had_record = fs::is_regular_file(record_file);
   const std::string record_before = had_record ? read_text(record_file) : std::string();
   remove_partial_files(record_file.parent_path());

@@ -8,6 +8,7 @@
 
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/record.h"
+#include "pipeline/runner/settings.h"
 
 namespace mbtfm::runner {
 
@@ -20,6 +21,8 @@ struct RunOptions {
   std::vector<std::string> redo;  ///< stages to run even if up to date or changed by hand
   bool explain = false;           ///< let the fit estimate what the effects that are off would change
   ProcessLimits limits;           ///< of each stage
+  std::string preset;             ///< name of what `beneath` comes from; empty: none
+  std::vector<Setting> beneath;   ///< in place of defaults, where cell.toml says nothing
   std::string version;
   std::function<void(const std::string&)> say;  ///< one line for each stage
   std::function<void()> finish;                 ///< called when the stages are done, the cell still being ours

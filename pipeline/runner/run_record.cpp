@@ -112,6 +112,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["cell"] = fs::weakly_canonical(cell).filename().string();
   run["outcome"] = outcome_of(entries);
   run["threads"] = options.threads;
+  if (!options.preset.empty()) run["preset"] = options.preset;
   run["converged"] = std::all_of(entries.begin(), entries.end(),
                                  [](const ordered_json& entry) { return entry.value("converged", true); });
   run["images"] = images_in(cell);

@@ -121,6 +121,47 @@ TEST_P(Cables, derivatives_exert_no_net_force_and_no_net_torque) {
   }
 }
 
+TEST_P(Cables, geometry_gradients_agree_with_central_differences) {
+  std::mt19937 random(GetParam());
+  std::normal_distribution<double> normal;
+  const Eigen::VectorXd weights = Eigen::VectorXd::NullaryExpr(reference.size(), [&] { return normal(random); });
+  const network::GeometryGradient gradient = cables.geometry_gradient(tensions, equilibrium, weights);
+  const auto sum = [&](const Network& other) {
+    const CableNetwork changed(other);
+    return weights.dot(changed.adhesion_forces_nN(tensions, changed.equilibrium(tensions, equilibrium.positions_um)));
+  };
+  const double step = 1e-5, scale = gradient.by_held_vertex.lpNorm<Eigen::Infinity>();
+  for (std::size_t h = 0; h < cables.held_vertices().size(); h += 3) {
+    const int v = cables.held_vertices()[h];
+    const auto moved = [&](double by) {  // along x; every cable that ends there keeps its strain
+      Network other = net;
+      other.vertices_um[v].x += by;
+      for (std::size_t k = 0; k < net.links.size(); ++k) {
+        if (net.links[k].vertex_a != v && net.links[k].vertex_b != v) continue;
+        const Vec2 span = equilibrium.spans_um[k], after{span.x + (net.links[k].vertex_b == v ? by : -by), span.y};
+        if (norm(span) > 1e-3) other.links[k].rest_length_um *= norm(after) / norm(span);
+      }
+      return other;
+    };
+    const double difference = (sum(moved(step)) - sum(moved(-step))) / (2 * step);
+    EXPECT_NEAR(gradient.by_held_vertex(2 * static_cast<Eigen::Index>(h), 0), difference, 1e-4 * scale)
+        << "vertex " << v;
+  }
+  for (std::size_t k = 0; k < net.links.size(); k += 40) {
+    if (equilibrium.link_states[k] != CableState::slack) continue;  // there a larger share is more tension, no more
+    const double tension = tensions[static_cast<std::size_t>(net.links[k].fibre_id)];
+    const auto pulled = [&](double by) {
+      Network other = net;
+      other.links[k].share += by / tension;
+      return other;
+    };
+    const double difference = (sum(pulled(step)) - sum(pulled(-step))) / (2 * step);
+    EXPECT_NEAR(gradient.by_link(static_cast<Eigen::Index>(k), 0), difference,
+                1e-4 * gradient.by_link.lpNorm<Eigen::Infinity>())
+        << "link " << k;
+  }
+}
+
 TEST_P(Cables, each_step_lowers_the_energy) {
   double before = std::numeric_limits<double>::infinity();
   for (int steps = 1; steps <= 20; ++steps) {

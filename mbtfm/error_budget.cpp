@@ -1,0 +1,311 @@
+#include "mbtfm/error_budget.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/parallel.h"
+#include "substrate/layer.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using substrate::Ellipse;
+
+/// Linear answers of the tensions and, in the last row, of the total force.
+struct Gain {
+  MatrixXd of_tensions;  ///< where the tensions change
+  MatrixXd of_forces;    ///< where the beads show these forces in excess of the model's, by adhesion
+  MatrixXd of_model;     ///< where the model's forces lack these, tensions being what they are, and the beads show them
+};
+
+VectorXd directions_of(const VectorXd& forces_nN) {
+  VectorXd directions = VectorXd::Zero(forces_nN.size());
+  for (Index i = 0; i < forces_nN.size(); i += 2) {
+    const double size = forces_nN.segment<2>(i).norm();
+    if (size > 0) directions.segment<2>(i) = forces_nN.segment<2>(i) / size;
+  }
+  return directions;
+}
+
+/// dt = Cov Jᵀ C e / s² for an error e of the forces; total force: d|R| = eᵀ (dR/dt dt + dR).
+Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
+  const Index n = mesh.covariance_nN2.rows();
+  const MatrixXd J = fit.data.compliance * mesh.force_derivatives;
+  const MatrixXd M = mesh.covariance_nN2 * J.transpose() * fit.data.compliance / fit.variance;
+  const VectorXd e = directions_of(fit.forces_nN);
+  Gain gain{MatrixXd::Identity(n + 1, n), {}, {}};
+  gain.of_tensions.row(n) = e.transpose() * mesh.force_derivatives;
+  gain.of_forces = gain.of_tensions * M;
+  gain.of_model = gain.of_forces;
+  gain.of_model.row(n) -= e.transpose();
+  return gain;
+}
+
+VectorXd variances(const MatrixXd& gain, const VectorXd& variance) { return gain.cwiseAbs2() * variance; }
+
+/// The parts that each mesh tells, in squares, mean over the meshes.
+struct MeanVariances {
+  VectorXd beads, mesh, model, solver;
+};
+
+/// s² of the beads alone over the variance that the fit counts with: the rest is the model's where no model error is.
+double bead_share(const BudgetInputs& in) {
+  if (in.fit.model_error || !in.data.has_errors) return 1;
+  return std::min(1.0, noise_variance(in.data) / in.fit.variance);
+}
+
+/// How far the iterations stopped from the minimum, and the forces from balance.
+VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& gain) {
+  const network::Equilibrium& equilibrium = mesh.fit.trial.equilibrium;
+  const double n = static_cast<double>(equilibrium.positions_um.size());
+  // net forces left on the free vertices, as if at random
+  const double imbalance = equilibrium.report.last_change * std::sqrt(n) / std::max(fit.forces_nN.norm(), 1e-300);
+  VectorXd slope = mesh.local.g;
+  for (Index i = 0; i < slope.size(); ++i) {
+    if (mesh.local.tensions_nN[i] <= 0) slope[i] = std::min(slope[i], 0.0);  // at its bound, where the minimum is
+  }
+  const VectorXd step = mesh.covariance_nN2 * slope / fit.variance;
+  return (gain.of_tensions * step).cwiseAbs() + imbalance * (gain.of_tensions * mesh.local.tensions_nN).cwiseAbs();
+}
+
+MeanVariances mean_variances(const BudgetInputs& in) {
+  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + 1;
+  const double n = static_cast<double>(in.fit.meshes.size());
+  MeanVariances mean{VectorXd::Zero(n_rows), VectorXd::Zero(n_rows), VectorXd::Zero(n_rows), VectorXd::Zero(n_rows)};
+  for (const MeshFit& mesh : in.fit.meshes) {
+    const Gain gain = gain_of(in.fit, mesh);
+    const VectorXd noise =
+        (gain.of_tensions * mesh.noise_covariance_nN2).cwiseProduct(gain.of_tensions).rowwise().sum();
+    mean.beads += bead_share(in) / n * noise;
+    mean.solver += solver_error(in.fit, mesh, gain).cwiseAbs2() / n;
+    mean.model += (1 - bead_share(in)) / n * noise;
+    if (!in.fit.model_error) continue;
+    const double of_mesh = in.fit.model_error->least_kappa / in.fit.model_error->kappa;
+    const VectorXd both = variances(gain.of_model, in.fit.model_error->force_variance_nN2);
+    mean.mesh += of_mesh / n * both;
+    mean.model += (1 - of_mesh) / n * both;
+  }
+  return mean;
+}
+
+/// Variances between the meshes' own answers, tensions and total force.
+VectorXd spread_variances(const EnsembleFit& fit) {
+  const auto n = static_cast<Index>(fit.fibre_ids.size());
+  const VectorXd e = directions_of(fit.forces_nN);
+  VectorXd result(n + 1);
+  for (Index i = 0; i <= n; ++i) {
+    std::vector<double> values;
+    for (const MeshFit& mesh : fit.meshes) {
+      values.push_back(i < n ? mesh.fit.trial.tensions_nN[i] : e.dot(mesh.fit.trial.forces_nN));
+    }
+    result[i] = std::pow(spread_of(values, fit.model_error.has_value()), 2);
+  }
+  return result;
+}
+
+/// Answers to displacements of the beads, 2·beads columns: those of the forces that these displacements look like,
+/// (GᵀW²G)⁻¹ GᵀW² du. With C = Λ^½ Vᵀ that inverse is Cᵀ Λ⁻² C.
+MatrixXd gain_of_beads(const BudgetInputs& in, const Gain& gain) {
+  const MatrixXd& C = in.data.reduced.compliance;
+  const VectorXd inverse = C.rowwise().squaredNorm().cwiseInverse().cwiseAbs2();
+  const MatrixXd small = gain.of_forces * C.transpose() * inverse.asDiagonal() * C;
+  VectorXd weight = in.data.weight_per_um.cwiseAbs2();
+  for (Index b = 0; b < in.data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= in.data.bead_weight[b];
+  return small * in.data.compliance_um_per_nN.transpose() * weight.asDiagonal();
+}
+
+/// What an ellipse's standard errors make of it, and of the vertices that it holds.
+struct Variation {
+  Ellipse ellipse;
+  Vec2 shift_um;
+  double growth = 0, turn_rad = 0;
+};
+
+std::vector<Variation> variations_of(const Ellipse& ellipse, const SegmentationErrors& p) {
+  const double turn_rad = p.adhesion_angle_error_deg * std::numbers::pi / 180;
+  std::vector<Variation> all = {{ellipse, {p.adhesion_shift_error_um, 0}},
+                                {ellipse, {0, p.adhesion_shift_error_um}},
+                                {ellipse, {}, p.adhesion_area_error / 2},
+                                {ellipse, {}, 0, turn_rad}};
+  for (Variation& v : all) {
+    v.ellipse.centre_um += v.shift_um;
+    v.ellipse.semi_major_um *= 1 + v.growth;
+    v.ellipse.semi_minor_um *= 1 + v.growth;
+    v.ellipse.angle_rad += v.turn_rad;
+  }
+  return all;
+}
+
+// A shift's field falls as 1/r², so its effect on beads evenly spread as 1/r²: 3 % of its variance lies further than
+// this many semi-axes. There base and sides of the gel change nothing.
+constexpr double kReach = 6;
+
+/// Change of the displacement, by bead within reach, as the force of `before` comes from `after`.
+VectorXd answer_to_other_ellipse(const BudgetInputs& in, const MatrixXd& of_beads, const std::vector<Index>& near,
+                                 const Ellipse& before, const Ellipse& after, Vec2 force_nN) {
+  const substrate::HalfSpaceEllipse old(in.gel, before), other(in.gel, after);
+  VectorXd answer = VectorXd::Zero(of_beads.rows());
+  for (const Index b : near) {
+    const Vec2 at = in.beads[static_cast<std::size_t>(b)].position_um;
+    const substrate::Sym2 a = other.compliance_um_per_nN(at), c = old.compliance_um_per_nN(at);
+    const substrate::Sym2 change{a.xx - c.xx, a.xy - c.xy, a.yy - c.yy};
+    answer += of_beads.middleCols<2>(2 * b) * Eigen::Vector2d(change.xx * force_nN.x + change.xy * force_nN.y,
+                                                              change.xy * force_nN.x + change.yy * force_nN.y);
+  }
+  return answer;
+}
+
+std::vector<Index> beads_near(const DisplacementField& beads, const Ellipse& ellipse) {
+  std::vector<Index> near;
+  const double reach_um = kReach * ellipse.semi_major_um;
+  for (std::size_t b = 0; b < beads.size(); ++b) {
+    const Vec2 d = beads[b].position_um - ellipse.centre_um;
+    if (dot(d, d) < reach_um * reach_um) near.push_back(static_cast<Index>(b));
+  }
+  return near;
+}
+
+/// Forces of the first network by adhesion of the cell, as weights by adhesion of the network.
+MatrixXd by_network_adhesion(const BudgetInputs& in, const MatrixXd& by_cell_adhesion) {
+  const std::vector<int>& ids = in.networks.front().adhesion_ids();
+  MatrixXd weights(2 * static_cast<Index>(ids.size()), by_cell_adhesion.rows());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto at = std::find_if(in.cell.adhesions.begin(), in.cell.adhesions.end(),
+                                 [&](const Adhesion& a) { return a.adhesion_id == ids[i]; });
+    weights.middleRows<2>(2 * static_cast<Index>(i)) =
+        by_cell_adhesion.middleCols<2>(2 * (at - in.cell.adhesions.begin())).transpose();
+  }
+  return weights;
+}
+
+/// The variance that free ends of fibres bring: an end further on is a bit more cable with the fibre's tension.
+VectorXd variance_of_ends(const BudgetInputs& in, const network::GeometryGradient& gradient) {
+  const Network& network = in.networks.front().network();
+  const std::vector<int>& fibre_ids = in.fit.fibre_ids;
+  std::vector<std::vector<std::size_t>> links_of(network.vertices_um.size());
+  for (std::size_t k = 0; k < network.links.size(); ++k) {
+    if (network.links[k].fibre_id == 0) continue;
+    links_of[static_cast<std::size_t>(network.links[k].vertex_a)].push_back(k);
+    links_of[static_cast<std::size_t>(network.links[k].vertex_b)].push_back(k);
+  }
+  VectorXd variance = VectorXd::Zero(gradient.by_link.cols());
+  for (std::size_t v = 0; v < links_of.size(); ++v) {
+    if (links_of[v].size() != 1 || network.adhesion_id[v] != 0) continue;
+    const Link& link = network.links[links_of[v].front()];
+    const auto group = std::lower_bound(fibre_ids.begin(), fibre_ids.end(), link.fibre_id) - fibre_ids.begin();
+    const double tension_nN = link.share * in.fit.tensions_nN[static_cast<std::size_t>(group)].value;
+    const double longer_by = in.segmentation.fibre_end_error_um / link.rest_length_um;
+    variance += (longer_by * tension_nN * gradient.by_link.row(static_cast<Index>(links_of[v].front())))
+                    .cwiseAbs2()
+                    .transpose();
+  }
+  return variance;
+}
+
+VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const MatrixXd& of_beads, int threads) {
+  const network::CableNetwork& cables = in.networks.front();
+  const Trial& trial = in.fit.meshes.front().fit.trial;
+  const std::vector<double> tensions(trial.tensions_nN.begin(), trial.tensions_nN.end());
+  const network::GeometryGradient gradient =
+      cables.geometry_gradient(tensions, trial.equilibrium, by_network_adhesion(in, gain.of_model));
+  std::vector<VectorXd> by_adhesion(in.cell.adhesions.size(), VectorXd::Zero(gain.of_model.rows()));
+  parallel_for(static_cast<int>(by_adhesion.size()), threads, [&](int i) {
+    const Adhesion& adhesion = in.cell.adhesions[static_cast<std::size_t>(i)];
+    const Ellipse ellipse = substrate::ellipse_of(adhesion);
+    const std::vector<Index> near = beads_near(in.beads, ellipse);
+    const Vec2 force_nN{in.fit.forces_nN[2 * i], in.fit.forces_nN[2 * i + 1]};
+    for (const Variation& variation : variations_of(ellipse, in.segmentation)) {
+      VectorXd answer = answer_to_other_ellipse(in, of_beads, near, ellipse, variation.ellipse, force_nN);
+      const std::vector<int>& held = cables.held_vertices();
+      for (std::size_t h = 0; h < held.size(); ++h) {
+        if (cables.network().adhesion_id[static_cast<std::size_t>(held[h])] != adhesion.adhesion_id) continue;
+        const Vec2 arm = cables.network().vertices_um[static_cast<std::size_t>(held[h])] - adhesion.position_um;
+        const Vec2 moved = variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
+        answer += gradient.by_held_vertex.middleRows<2>(2 * static_cast<Index>(h)).transpose() *
+                  Eigen::Vector2d(moved.x, moved.y);
+      }
+      by_adhesion[static_cast<std::size_t>(i)] += answer.cwiseAbs2();
+    }
+  });
+  VectorXd variance = variance_of_ends(in, gradient);
+  for (const VectorXd& v : by_adhesion) variance += v;
+  return variance;
+}
+
+/// The displacement by which the base changes the field of these forces: smooth, so that of point forces.
+VectorXd field_of_base_um(const BudgetInputs& in) {
+  const substrate::Layer layer(in.gel);
+  VectorXd field = VectorXd::Zero(2 * static_cast<Index>(in.beads.size()));
+  for (std::size_t b = 0; b < in.beads.size(); ++b) {
+    for (std::size_t a = 0; a < in.cell.adhesions.size(); ++a) {
+      const substrate::Sym2 g =
+          layer.point_correction_um_per_nN(in.beads[b].position_um - in.cell.adhesions[a].position_um);
+      const Eigen::Vector2d f = in.fit.forces_nN.segment<2>(2 * static_cast<Index>(a));
+      field.segment<2>(2 * static_cast<Index>(b)) +=
+          Eigen::Vector2d(g.xx * f.x() + g.xy * f.y(), g.xy * f.x() + g.yy * f.y());
+    }
+  }
+  return field;
+}
+
+/// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
+/// Which of the two it is no model tells: both are counted.
+VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const MatrixXd& of_beads) {
+  const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
+  VectorXd variance = (in.substrate_error * values).cwiseAbs2();
+  for (Index a = 0; a < in.fit.forces_nN.size(); a += 2) {
+    variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces_nN.segment<2>(a)).cwiseAbs2();
+  }
+  if (in.lacks_base) variance += (of_beads * field_of_base_um(in)).cwiseAbs2();
+  return variance;
+}
+
+}  // namespace
+
+void declare(ParameterList& list, SegmentationErrors& p) {
+  list.table("fit");
+  list.add("adhesion_shift_error_um", p.adhesion_shift_error_um, Range::not_negative(),
+           "error budget: standard error of each coordinate of an adhesion's centre (um)");
+  list.add("adhesion_area_error", p.adhesion_area_error, Range::between(0, 1),
+           "error budget: relative standard error of an adhesion's area");
+  list.add("adhesion_angle_error_deg", p.adhesion_angle_error_deg, Range::between(0, 90),
+           "error budget: standard error of an adhesion's orientation (degrees)");
+  list.add("fibre_end_error_um", p.fibre_end_error_um, Range::not_negative(),
+           "error budget: standard error of a fibre's free end, along the fibre (um)");
+}
+
+ErrorBudget error_budget(const BudgetInputs& in, int threads) {
+  const Gain gain = gain_of(in.fit, in.fit.meshes.front());
+  const MatrixXd of_beads = gain_of_beads(in, gain);
+  const MeanVariances mean = mean_variances(in);
+  const VectorXd mesh = mean.mesh + spread_variances(in.fit);
+  const VectorXd segmentation = segmentation_variances(in, gain, of_beads, threads);
+  const VectorXd substrate = substrate_variances(in, gain, of_beads);
+  const auto parts = [&](Index i) {
+    ErrorParts p{.beads = std::sqrt(mean.beads[i]),
+                 .segmentation = std::sqrt(segmentation[i]),
+                 .mesh = {},
+                 .substrate = std::sqrt(substrate[i]),
+                 .solver = std::sqrt(mean.solver[i]),
+                 .model = std::sqrt(mean.model[i])};
+    if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mesh[i]);
+    return p;
+  };
+  ErrorBudget budget;
+  const auto n = static_cast<Index>(in.fit.fibre_ids.size());
+  for (Index i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    budget.tensions.push_back(
+        {.fibre_id = in.fit.fibre_ids[at], .tension_nN = in.fit.tensions_nN[at].value, .parts_nN = parts(i)});
+  }
+  budget.total_force_nN = directions_of(in.fit.forces_nN).dot(in.fit.forces_nN);
+  budget.total_force_parts_nN = parts(n);
+  return budget;
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,36 @@
+/// How much of each tension's standard error comes from what: docs/theory.md, section 3, "Error budget".
+#pragma once
+
+#include "mbtfm/ensemble.h"
+#include "pipeline/contract/files.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::inverse {
+
+/// Standard errors of what the segmentation measures. Found on simulated cells of ordinary image quality, outliers
+/// included (docs/accuracy-and-cost.md). For a segmentation that is known to be exact: zero.
+struct SegmentationErrors {
+  double adhesion_shift_error_um = 0.017;  ///< of each coordinate of a centre
+  double adhesion_area_error = 0.1;        ///< relative
+  double adhesion_angle_error_deg = 1.2;
+  double fibre_end_error_um = 0.2;  ///< of a free end, along the fibre
+};
+void declare(ParameterList& list, SegmentationErrors& errors);
+
+/// What the budget is drawn up of. `substrate_error`: see substrate::stated_error.
+struct BudgetInputs {
+  const EnsembleFit& fit;
+  const LinearData& data;
+  const std::vector<network::CableNetwork>& networks;
+  const Cell& cell;
+  const DisplacementField& beads;
+  Gel gel;
+  double substrate_error = 0;
+  bool lacks_base = false;  ///< the substrate is a half-space
+  SegmentationErrors segmentation;
+};
+
+/// By linear propagation about the solution: costs about as much as one step of the fit on one mesh.
+ErrorBudget error_budget(const BudgetInputs& inputs, int threads);
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,88 @@
+#include "pipeline/cost/accuracy.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/cost/presets.h"
+
+namespace mbtfm::cost {
+
+namespace {
+
+// Where computing could lower the error by no more than this share of it, more of it is in vain.
+constexpr double kWorthwhile = 0.05;
+
+std::string percent(double share) { return fmt::format("{:.2g} %", 100 * share); }
+
+std::string verdict_of(double wanted, const AccuracyOutcome& outcome) {
+  const RelativeError& e = outcome.reached;
+  std::string text =
+      fmt::format("tensions to {} (preset {}), {} asked for", percent(e.total), outcome.preset, percent(wanted));
+  if (outcome.is_met) return text;
+  if (e.unavoidable > wanted) {
+    return text + ": no computing reaches that, as bead noise, segmentation and the model's misfit alone make " +
+           percent(e.unavoidable);
+  }
+  return text + ": the mesh and the gel stand in the way; finer ones than those of the presets may reach it";
+}
+
+}  // namespace
+
+RelativeError relative_error(const ErrorBudget& budget) {
+  double tensions = 0, all = 0, unavoidable = 0;
+  RelativeError error;
+  for (const TensionError& t : budget.tensions) {
+    if (t.fibre_id == 0) continue;
+    const ErrorParts& p = t.parts_nN;
+    tensions += t.tension_nN * t.tension_nN;
+    all += std::pow(total(p), 2);
+    unavoidable += p.beads * p.beads + p.segmentation * p.segmentation + p.model * p.model;
+    error.is_complete = error.is_complete && p.mesh.has_value();
+  }
+  if (tensions <= 0) throw InvalidData("tensions", "a fibre that pulls, to tell a relative error of", "none");
+  error.total = std::sqrt(all / tensions);
+  error.unavoidable = std::sqrt(unavoidable / tensions);
+  return error;
+}
+
+double parse_accuracy(const std::string& text) {
+  try {
+    std::size_t end = 0;
+    const double number = std::stod(text, &end);
+    const std::string unit = text.substr(end);
+    const double share = unit == "%" || unit == " %" ? number / 100 : number;
+    if ((unit.empty() || unit == "%" || unit == " %") && share > 0 && share < 1) return share;
+  } catch (const std::logic_error&) {
+    // said below
+  }
+  throw UsageError("--accuracy: expected a relative error as 1% or 0.01, found '" + text + "'");
+}
+
+AccuracyOutcome reach_accuracy(double wanted, const std::function<ErrorBudget(const std::string& preset)>& run) {
+  AccuracyOutcome outcome;
+  for (const Preset& preset : presets()) {
+    outcome.preset = preset.name;
+    outcome.reached = relative_error(run(preset.name));
+    const RelativeError& e = outcome.reached;
+    outcome.is_met = e.is_complete && e.total <= wanted;
+    const bool is_in_vain = e.is_complete && e.unavoidable > wanted && e.total < (1 + kWorthwhile) * e.unavoidable;
+    if (outcome.is_met || is_in_vain) break;
+  }
+  outcome.verdict = verdict_of(wanted, outcome);
+  return outcome;
+}
+
+void record_accuracy(const std::filesystem::path& cell, double wanted, const AccuracyOutcome& outcome) {
+  const std::filesystem::path file = cell / "run.json";
+  auto run = nlohmann::ordered_json::parse(read_text(file));
+  run["accuracy"] = {
+      {"wanted", wanted},      {"reached", outcome.reached.total}, {"unavoidable", outcome.reached.unavoidable},
+      {"met", outcome.is_met}, {"preset", outcome.preset},         {"verdict", outcome.verdict}};
+  write_whole(file, run.dump(1) + "\n");
+}
+
+}  // namespace mbtfm::cost

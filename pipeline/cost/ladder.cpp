@@ -1,0 +1,89 @@
+#include "pipeline/cost/ladder.h"
+
+#include <map>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/cost/presets.h"
+
+namespace mbtfm::cost {
+
+namespace {
+
+/// The rungs of a knob that is one parameter.
+void add(std::vector<Rung>& rungs, const std::string& table, const std::string& key,
+         const std::vector<std::string>& values, const std::vector<runner::Setting>& with = {}) {
+  for (const std::string& value : values) {
+    std::vector<runner::Setting> settings = with;
+    settings.push_back({table, key, value});
+    rungs.push_back({.knob = key, .value = value, .settings = settings});
+  }
+}
+
+/// The refined finite elements and the methods of the thesis: each takes ten times as long as all the rest of a run.
+void add_slow(std::vector<Rung>& rungs) {
+  const std::vector<runner::Setting> refined = {{"substrate", "model", "refined"},
+                                                {"substrate", "displacement_tolerance", "0"}};
+  add(rungs, "substrate", "elements_across_adhesion", {"1", "1.4", "2"}, refined);
+  add(rungs, "substrate", "element", {"q1-p0"}, refined);
+  rungs.push_back({.knob = "model", .value = "refined", .settings = {{"substrate", "model", "refined"}}});
+  for (const char* evaluations : {"100", "1000"}) {
+    add(rungs, "fit", "method", {"plain-cg", "blockwise-cg"}, {{"fit", "max_evaluations", evaluations}});
+    for (Rung* rung : {&rungs[rungs.size() - 2], &rungs[rungs.size() - 1]})
+      rung->value += std::string(", ") + evaluations + " equilibria";
+  }
+  add(rungs, "fit", "gradients", {"finite-difference"},
+      {{"fit", "method", "blockwise-cg"}, {"fit", "max_evaluations", "1000"}});
+  add(rungs, "fit", "bootstrap", {"1000"});
+  add(rungs, "fit", "n_meshes", {"64"});
+}
+
+}  // namespace
+
+std::vector<Rung> ladder(Extent extent) {
+  // The costly ones come last: where time runs out, they are what lacks.
+  std::vector<Rung> rungs = {{.knob = "as it is", .value = ""}};
+  const auto add_preset = [&](const char* name) {
+    rungs.push_back({.knob = "preset", .value = name, .settings = preset_named(name).settings});
+  };
+  add_preset("fast");
+  add(rungs, "fit", "n_meshes", {"1", "2", "4"});
+  add(rungs, "network", "edge_length_um", {"3", "2"});
+  add(rungs, "substrate", "model", {"half-space", "layer"});
+  for (const double share : {0.125, 0.25, 0.5}) {
+    rungs.push_back({.knob = "beads", .value = shortest(share), .bead_share = share});
+  }
+  add(rungs, "fit", "surface_lines", {"40"});
+  add(rungs, "fit", "tolerance", {"0.1", "0.01", "0.0001"});
+  add(rungs, "cables", "smoothing", {"0.01", "0.001", "1e-07"});
+  add(rungs, "cables", "force_tolerance", {"0.001", "1e-05", "1e-12"});
+  add(rungs, "fit", "model_error", {"none"});
+  add(rungs, "fit", "loss", {"huber"});
+  add(rungs, "substrate", "cells_per_thickness", {"1", "3"});
+  rungs.push_back({.knob = "threads", .value = "1", .threads = 1});
+  add(rungs, "network", "edge_length_um", {"1.2", "1"});
+  add(rungs, "fit", "n_meshes", {"16", "32"});
+  add(rungs, "fit", "bootstrap", {"100"});
+  add_preset("high");
+  if (extent == Extent::whole) add_slow(rungs);
+  return rungs;
+}
+
+std::string group_of(const std::string& knob) {
+  static const std::map<std::string, std::string> groups = {{"model", "gel"},
+                                                            {"cells_per_thickness", "gel"},
+                                                            {"elements_across_adhesion", "gel"},
+                                                            {"element", "gel"},
+                                                            {"surface_lines", "gel"},
+                                                            {"n_meshes", "network and meshes"},
+                                                            {"edge_length_um", "network and meshes"},
+                                                            {"model_error", "network and meshes"},
+                                                            {"beads", "data, presets, threads"},
+                                                            {"loss", "data, presets, threads"},
+                                                            {"preset", "data, presets, threads"},
+                                                            {"threads", "data, presets, threads"},
+                                                            {"bootstrap", "data, presets, threads"}};
+  const auto found = groups.find(knob);
+  return found == groups.end() ? "equilibrium and fit" : found->second;
+}
+
+}  // namespace mbtfm::cost

@@ -1,0 +1,28 @@
+/// The knobs that trade accuracy for time, and the rungs of each.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/runner/settings.h"
+
+namespace mbtfm::cost {
+
+/// One choice of one knob; everything else is as the cell has it.
+struct Rung {
+  std::string knob, value;
+  std::vector<runner::Setting> settings = {};
+  double bead_share = 1;            ///< of the beads that are used
+  std::optional<int> threads = {};  ///< or as many as the study has
+};
+
+enum class Extent { quick, whole };  ///< whole: those that take minutes, too
+
+/// The cell as it is comes first, then knob by knob, rungs from coarse to fine.
+std::vector<Rung> ladder(Extent extent);
+
+/// The group of knobs that are drawn together: "gel", "network and meshes", "solver", "data".
+std::string group_of(const std::string& knob);
+
+}  // namespace mbtfm::cost

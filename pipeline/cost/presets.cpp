@@ -1,0 +1,32 @@
+#include "pipeline/cost/presets.h"
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::cost {
+
+// What each setting gains and costs: docs/accuracy-and-cost.md.
+const std::vector<Preset>& presets() {
+  static const std::vector<Preset> list = {
+      {"fast",
+       "a first look",
+       {{"fit", "n_meshes", "2"},           // the fewest that tell of the mesh at all
+        {"fit", "surface_lines", "40"},     // drawing the gel's surface finely takes longer than such a fit
+        {"substrate", "model", "layer"}}},  // `split` without the sides, which are far away: 0.1 %
+      {"standard", "the defaults", {}},
+      {"high",
+       "for the record",
+       {{"fit", "n_meshes", "24"}, {"network", "edge_length_um", "1"}, {"substrate", "cells_per_thickness", "3"}}},
+  };
+  return list;
+}
+
+const Preset& preset_named(const std::string& name) {
+  std::string names;
+  for (const Preset& preset : presets()) {
+    if (preset.name == name) return preset;
+    names += (names.empty() ? "" : ", ") + preset.name;
+  }
+  throw UsageError("--preset: expected one of " + names + ", found '" + name + "'");
+}
+
+}  // namespace mbtfm::cost

@@ -1,0 +1,203 @@
+#include "pipeline/cost/study_report.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+
+#include "pipeline/charts/chart.h"
+#include "pipeline/contract/csv.h"
+
+namespace mbtfm::cost {
+namespace fs = std::filesystem;
+namespace {
+
+// A default is good where no other choice is better by more than this.
+constexpr double kNear = 0.2;
+
+bool is_measured(const Measurement& m) { return m.n_runs > 0 && m.failure.empty() && m.tension_error > 0; }
+
+std::string name_of(const Rung& rung) { return rung.value.empty() ? rung.knob : rung.knob + " = " + rung.value; }
+
+void write_csv(const fs::path& file, const Study& study) {
+  CsvText csv({"knob", "value", "seconds", "cpu_seconds", "peak_memory_MB", "n_runs", "tension_error", "force_error",
+               "stated_tension_error", "is_on_front", "failure"});
+  const std::vector<int> front = front_of(study.measurements);
+  for (std::size_t i = 0; i < study.measurements.size(); ++i) {
+    const Measurement& m = study.measurements[i];
+    const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(i)) != front.end();
+    csv.add(m.rung.knob).add(m.rung.value);
+    if (is_measured(m)) {
+      csv.add(m.seconds).add(m.cpu_seconds).add(m.peak_memory_MB).add(m.n_runs);
+      csv.add(m.tension_error).add(m.force_error).add(m.stated_error);
+    } else {
+      for (int column = 0; column < 7; ++column) csv.add("");
+    }
+    csv.add(is_on_front ? 1 : 0).add(m.n_runs == 0 ? "no time left" : m.failure).end_row();
+  }
+  write_text(file, csv.str());
+}
+
+std::vector<Vec2> points_of(const std::vector<Measurement>& measurements, const std::vector<int>& indices) {
+  std::vector<Vec2> points;
+  for (const int i : indices) {
+    const Measurement& m = measurements[static_cast<std::size_t>(i)];
+    points.push_back({m.cpu_seconds, m.tension_error});
+  }
+  return points;
+}
+
+/// The knobs of one group, and in every group's frame the same front and default.
+charts::Chart chart_of(const std::string& group, const Study& study, const charts::Axis& x, const charts::Axis& y) {
+  charts::Chart chart(group, x, y);
+  chart.curve(points_of(study.measurements, front_of(study.measurements)), "stroke:#9aa0a6;stroke-width:5;opacity:0.5");
+  std::map<std::string, std::vector<int>> knobs;
+  for (std::size_t i = 1; i < study.measurements.size(); ++i) {
+    const Measurement& m = study.measurements[i];
+    if (is_measured(m) && group_of(m.rung.knob) == group) knobs[m.rung.knob].push_back(static_cast<int>(i));
+  }
+  std::size_t k = 0;
+  for (const auto& [knob, indices] : knobs) {
+    const std::string colour = charts::kColours[k++ % std::size(charts::kColours)];
+    for (const int i : indices) {
+      const Measurement& m = study.measurements[static_cast<std::size_t>(i)];
+      chart.dot({m.cpu_seconds, m.tension_error}, 5, "fill:" + colour + ";stroke:#fff",
+                fmt::format("{}: {:.2g} s, error {:.3g}", name_of(m.rung), m.cpu_seconds, m.tension_error));
+      chart.label({m.cpu_seconds, m.tension_error}, m.rung.value);
+    }
+    chart.key(knob, colour);
+  }
+  const Measurement& own = study.measurements.front();
+  if (is_measured(own)) {
+    chart.dot({own.cpu_seconds, own.tension_error}, 8, "fill:none;stroke:#000;stroke-width:2.5",
+              "the cell's own settings");
+  }
+  return chart;
+}
+
+void draw(const fs::path& file, const Study& study, const std::string& cell_name) {
+  std::vector<double> seconds, errors;
+  for (const Measurement& m : study.measurements) {
+    if (!is_measured(m)) continue;
+    seconds.push_back(m.cpu_seconds);
+    errors.push_back(m.tension_error);
+  }
+  const charts::Axis x =
+      charts::axis_over("processor time of network and fit (s)", seconds, charts::Scale::logarithmic);
+  const charts::Axis y = charts::axis_over("error of the tensions", errors, charts::Scale::logarithmic);
+  std::vector<charts::Chart> list;
+  for (const char* group : {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"}) {
+    list.push_back(chart_of(group, study, x, y));
+  }
+  write_text(file,
+             charts::svg_file(
+                 list, 2,
+                 {cell_name + ": |t − reference| / |reference| over the fibres; reference: " + study.reference + ".",
+                  "Grey: the front, which no other choice beats in both. Circle: the settings of the cell."}));
+}
+
+/// The quickest rung of a knob that errs no more than `error`.
+const Measurement* quickest(const std::vector<Measurement>& measurements, const std::string& knob, double error) {
+  const Measurement* best = nullptr;
+  for (const Measurement& m : measurements) {
+    if (!is_measured(m) || m.rung.knob != knob || m.tension_error > error) continue;
+    if (!best || m.cpu_seconds < best->cpu_seconds) best = &m;
+  }
+  return best;
+}
+
+std::vector<std::string> knobs_of(const std::vector<Measurement>& measurements) {
+  std::vector<std::string> knobs;
+  for (std::size_t i = 1; i < measurements.size(); ++i) {
+    const std::string& knob = measurements[i].rung.knob;
+    if (std::find(knobs.begin(), knobs.end(), knob) == knobs.end()) knobs.push_back(knob);
+  }
+  return knobs;
+}
+
+/// "To halve the error from here": by knob, what it takes, or how far the knob gets.
+std::string table_of_halving(const std::vector<Measurement>& all) {
+  const Measurement& own = all.front();
+  std::string text = "| knob | half the error costs | the least error it reaches | at |\n|---|---|---|---|\n";
+  for (const std::string& knob : knobs_of(all)) {
+    const Measurement* least = nullptr;
+    for (const Measurement& m : all) {
+      if (is_measured(m) && m.rung.knob == knob && (!least || m.tension_error < least->tension_error)) least = &m;
+    }
+    if (!least) continue;
+    const Measurement* half = quickest(all, knob, 0.5 * own.tension_error);
+    text +=
+        fmt::format("| `{}` | {} | × {:.2f} | {}, time × {:.2g} |\n", knob,
+                    half ? fmt::format("time × {:.2g} ({})", half->cpu_seconds / own.cpu_seconds, half->rung.value)
+                         : std::string("not reached"),
+                    least->tension_error / own.tension_error, least->rung.value, least->cpu_seconds / own.cpu_seconds);
+  }
+  return text;
+}
+
+std::string verdict(const std::vector<Measurement>& all) {
+  const double distance = distance_to_front(all, 0);
+  if (distance <= 0) return "The cell's own settings lie on the front.";
+  return fmt::format("The cell's own settings lie {:.0f} % off the front: {}.", 100 * distance,
+                     distance <= kNear ? "near enough" : "another choice is better by more than 20 %");
+}
+
+std::string page(const Study& study, const std::string& cell_name) {
+  const std::vector<Measurement>& all = study.measurements;
+  std::string text = fmt::format("## {}\n\n![error over time](cost.svg)\n\n", cell_name);
+  if (!is_measured(all.front())) return text + "The fit with the cell's own settings failed.\n";
+  text += verdict(all) + fmt::format(" They err by {:.3g} against {} and take {:.2g} s of processor.\n\n",
+                                     all.front().tension_error, study.reference, all.front().cpu_seconds);
+  text += table_of_halving(all) + "\n";
+  text += "| choice | error of tensions | stated | error of total force | processor (s) | passed (s) | memory (MB) |\n";
+  text += "|---|---|---|---|---|---|---|\n";
+  const std::vector<int> front = front_of(all);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Measurement& m = all[i];
+    if (!is_measured(m)) {
+      text += fmt::format("| {} | {} | | | | | |\n", name_of(m.rung), m.n_runs == 0 ? "no time left" : m.failure);
+      continue;
+    }
+    const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(i)) != front.end();
+    text += fmt::format("| {}{} | {:.3g} | {:.3g} | {:.2g} % | {:.2g} | {:.2g} | {:.0f} |\n", name_of(m.rung),
+                        is_on_front ? " (front)" : "", m.tension_error, m.stated_error, 100 * m.force_error,
+                        m.cpu_seconds, m.seconds, m.peak_memory_MB);
+  }
+  return text;
+}
+
+}  // namespace
+
+std::vector<int> front_of(const std::vector<Measurement>& measurements) {
+  std::vector<int> order;
+  for (std::size_t i = 0; i < measurements.size(); ++i) {
+    if (is_measured(measurements[i])) order.push_back(static_cast<int>(i));
+  }
+  const auto at = [&](int i) -> const Measurement& { return measurements[static_cast<std::size_t>(i)]; };
+  std::stable_sort(order.begin(), order.end(), [&](int a, int b) { return at(a).cpu_seconds < at(b).cpu_seconds; });
+  std::vector<int> front;
+  for (const int i : order) {
+    if (front.empty() || at(i).tension_error < at(front.back()).tension_error) front.push_back(i);
+  }
+  return front;
+}
+
+double distance_to_front(const std::vector<Measurement>& measurements, int index) {
+  const Measurement& own = measurements[static_cast<std::size_t>(index)];
+  double distance = 0;
+  for (const Measurement& m : measurements) {
+    if (!is_measured(m)) continue;
+    if (m.cpu_seconds <= own.cpu_seconds) distance = std::max(distance, 1 - m.tension_error / own.tension_error);
+    if (m.tension_error <= own.tension_error) distance = std::max(distance, 1 - m.cpu_seconds / own.cpu_seconds);
+  }
+  return distance;
+}
+
+void write_study(const fs::path& folder, const Study& study, const std::string& cell_name) {
+  fs::create_directories(folder);
+  write_csv(folder / "cost.csv", study);
+  draw(folder / "cost.svg", study, cell_name);
+  write_text(folder / "cost.md", page(study, cell_name));
+}
+
+}  // namespace mbtfm::cost

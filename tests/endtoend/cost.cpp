@@ -1,0 +1,60 @@
+/// Presets, wanted accuracy and the cost study, as a person runs them on a small cell.
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Outcome;
+using test::run_program;
+
+class SmallCell : public testing::Test {
+ protected:
+  void SetUp() override {
+    const Outcome made =
+        run_program("mbtfm-simulate --scenario ring --seed 3 --noise 0.02 --beads 800 --quiet --out " + cell.string());
+    ASSERT_EQ(made.code, 0) << made.output;
+  }
+  Outcome run(const std::string& arguments) const { return run_program("mbtfm " + arguments + " " + cell.string()); }
+  test::TemporaryFolder folder;
+  fs::path cell = folder / "cell";
+};
+
+TEST_F(SmallCell, is_fitted_anew_where_the_preset_changes_and_only_then) {
+  ASSERT_EQ(run("run --preset fast").code, 0);
+  EXPECT_NE(read_text(cell / "run.json").find("\"preset\": \"fast\""), std::string::npos);
+  EXPECT_NE(read_text(cell / "4_fit/fit.json").find("\"n_meshes\": 2"), std::string::npos);
+  EXPECT_NE(run("run --preset fast").output.find("fit      up to date"), std::string::npos);
+  EXPECT_NE(run("run").output.find("fit      "), std::string::npos);
+  EXPECT_NE(read_text(cell / "4_fit/fit.json").find("\"n_meshes\": 8"), std::string::npos);
+  EXPECT_NE(run("run --preset standard").output.find("fit      up to date"), std::string::npos);
+  EXPECT_EQ(run("run --preset quick").code, 2);
+}
+
+TEST_F(SmallCell, is_fitted_as_accurately_as_asked_for_or_says_why_not) {
+  const Outcome easy = run("run --accuracy 90%");
+  EXPECT_EQ(easy.code, 0) << easy.output;
+  EXPECT_NE(read_text(cell / "run.json").find("\"met\": true"), std::string::npos) << easy.output;
+  const Outcome hopeless = run("run --accuracy 0.0001%");
+  EXPECT_EQ(hopeless.code, 0) << hopeless.output;
+  EXPECT_NE(hopeless.output.find("no computing reaches that"), std::string::npos) << hopeless.output;
+  EXPECT_EQ(run("run --accuracy 1% --preset fast").code, 2);
+}
+
+TEST_F(SmallCell, has_a_cost_study_within_its_budget) {
+  ASSERT_EQ(run("run").code, 0);
+  const Outcome study = run("cost --repeats 1 --budget 0.05");
+  ASSERT_EQ(study.code, 0) << study.output;
+  const std::string csv = read_text(cell / "cost/cost.csv");
+  EXPECT_NE(csv.find("as it is,,"), std::string::npos) << csv;
+  EXPECT_TRUE(fs::is_regular_file(cell / "cost/cost.svg"));
+  EXPECT_NE(read_text(cell / "cost/cost.md").find("| knob | half the error costs |"), std::string::npos);
+  EXPECT_FALSE(fs::exists(cell / "cost/scratch"));
+}
+
+}  // namespace
+}  // namespace mbtfm

@@ -1,0 +1,191 @@
+#include "mbtfm/error_budget.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::TensionScene;
+
+const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+constexpr SegmentationErrors kExact{0, 0, 0, 0};
+
+// Of the displacement: the budget is linear about the fit, which is compared with answers about the truth.
+constexpr double kLittleNoise = 0.005;
+
+/// The scene's adhesions, one at each held vertex.
+Cell cell_of(const TensionScene& scene) {
+  Cell cell;
+  for (std::size_t i = 0; i < scene.ellipses.size(); ++i) {
+    const substrate::Ellipse& e = scene.ellipses[i];
+    cell.adhesions.push_back({.adhesion_id = scene.adhesion_ids[i],
+                              .position_um = e.centre_um,
+                              .area_um2 = std::numbers::pi * e.semi_major_um * e.semi_minor_um,
+                              .major_axis_um = 2 * e.semi_major_um,
+                              .minor_axis_um = 2 * e.semi_minor_um,
+                              .angle_rad = e.angle_rad,
+                              .eccentricity = 0,
+                              .mean_intensity = 1});
+  }
+  return cell;
+}
+
+struct Fitted {
+  TensionScene scene;
+  std::vector<network::CableNetwork> networks;
+  EnsembleFit fit;
+  ErrorBudget budget(SegmentationErrors errors, double substrate_error = 0, bool lacks_base = false) const {
+    const Cell cell = cell_of(scene);
+    return error_budget({.fit = fit,
+                         .data = scene.data,
+                         .networks = networks,
+                         .cell = cell,
+                         .beads = scene.beads,
+                         .gel = kGel,
+                         .substrate_error = substrate_error,
+                         .lacks_base = lacks_base,
+                         .segmentation = errors},
+                        2);
+  }
+};
+
+Fitted fitted(TensionScene scene) {
+  Fitted f{std::move(scene), {}, {}};
+  f.networks.emplace_back(f.scene.cables.network());
+  f.fit = fit_ensemble(f.networks, f.scene.data, f.scene.adhesion_ids, {.n_meshes = 1}, 2, {});
+  return f;
+}
+
+/// The fit's answers, in truth, to a change of the displacements.
+Eigen::VectorXd answers(const Fitted& f, const Eigen::VectorXd& displacement_um) {
+  TensionScene other{.cables = network::CableNetwork(f.scene.cables.network()),
+                     .tensions_nN = f.scene.tensions_nN,
+                     .adhesion_ids = f.scene.adhesion_ids,
+                     .ellipses = f.scene.ellipses,
+                     .points_um = f.scene.points_um,
+                     .compliance_um_per_nN = f.scene.compliance_um_per_nN,
+                     .forces_nN = {},
+                     .displacement_um = displacement_um,
+                     .largest_um = 0,
+                     .beads = {},
+                     .data = {}};
+  test::measure(other, 0, 1);
+  for (Bead& bead : other.beads) bead.sigma_um = f.scene.beads.front().sigma_um;
+  other.data = reduce(other.beads, other.compliance_um_per_nN);
+  const EnsembleFit fit = test::fit_own_network(other);
+  return test::values_of(fit) - f.scene.tensions_nN;
+}
+
+TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
+  const Cell cell = [] {
+    Cell round = test::round_cell(14, 16);
+    for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(round, a, b);
+    return round;
+  }();
+  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.05, 7);
+  std::vector<network::CableNetwork> networks;
+  for (std::uint64_t seed = 11; seed < 15; ++seed)
+    networks.emplace_back(network::generate_network(cell, {.seed = seed}).network);
+  const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2, {});
+  const ErrorBudget budget = error_budget({.fit = fit,
+                                           .data = scene.data,
+                                           .networks = networks,
+                                           .cell = cell,
+                                           .beads = scene.beads,
+                                           .gel = kGel,
+                                           .segmentation = kExact},
+                                          2);
+  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+    const ErrorParts& parts = budget.tensions[i].parts_nN;
+    EXPECT_NEAR(parts.beads, fit.tensions_nN[i].noise, 1e-9 * parts.beads) << i;
+    ASSERT_TRUE(parts.mesh);
+    const double stated = fit.tensions_nN[i].standard_error();
+    EXPECT_NEAR(std::hypot(parts.beads, *parts.mesh, parts.model), stated, 1e-6 * stated) << i;
+    EXPECT_EQ(parts.segmentation, 0);
+    EXPECT_EQ(parts.substrate, 0);
+    EXPECT_LT(parts.solver, 0.2 * parts.beads);  // the fit stops where no bead could tell the difference
+  }
+  EXPECT_NEAR(budget.total_force_nN,
+              Eigen::Map<const Eigen::Matrix2Xd>(fit.forces_nN.data(), 2, 16).colwise().norm().sum(), 1e-9);
+}
+
+TEST(ErrorBudget, one_mesh_tells_nothing_of_the_mesh) {
+  const Fitted f = fitted(test::tension_scene("case_21", 600, 0.05, 3));
+  EXPECT_FALSE(f.budget(kExact).tensions.front().parts_nN.mesh);
+}
+
+/// Cells whose adhesions lie elsewhere than the segmentation has them, fitted without bead noise.
+TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
+  const Fitted f = fitted(test::tension_scene("case_21", 2500, kLittleNoise, 3));
+  const SegmentationErrors errors{0.05, 0.2, 8, 0};
+  const ErrorBudget budget = f.budget(errors);
+  constexpr int kDraws = 24;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  const std::size_t n = budget.tensions.size();
+  std::vector<double> squares(n, 0.0);
+  for (int draw = 0; draw < kDraws; ++draw) {
+    TensionScene truth = test::tension_scene("case_21", 2500, kLittleNoise, 3);
+    Network network = truth.cables.network();
+    for (std::size_t a = 0; a < truth.ellipses.size(); ++a) {
+      substrate::Ellipse& e = truth.ellipses[a];
+      const Vec2 shift{errors.adhesion_shift_error_um * normal(random),
+                       errors.adhesion_shift_error_um * normal(random)};
+      const double growth = 1 + errors.adhesion_area_error / 2 * normal(random);
+      e.centre_um += shift;
+      e.semi_major_um *= growth;
+      e.semi_minor_um *= growth;
+      e.angle_rad += errors.adhesion_angle_error_deg * std::numbers::pi / 180 * normal(random);
+      network.vertices_um[static_cast<std::size_t>(truth.adhesion_ids[a]) - 1] += shift;
+    }
+    const Network& old = f.scene.cables.network();
+    for (Link& link : network.links) {
+      const auto length = [&](const Network& of) {
+        return norm(of.vertices_um[link.vertex_b] - of.vertices_um[link.vertex_a]);
+      };
+      link.rest_length_um *= length(network) / length(old);
+    }
+    truth.cables = network::CableNetwork(network);
+    truth.compliance_um_per_nN =
+        substrate::make_greens(kGel, {.model = "layer"}, 2)->compliance_um_per_nN(truth.points_um, truth.ellipses);
+    test::contract(truth, f.scene.tensions_nN);
+    const Eigen::VectorXd error = answers(f, truth.displacement_um);
+    for (std::size_t i = 0; i < n; ++i) squares[i] += std::pow(error[static_cast<Eigen::Index>(i)], 2) / kDraws;
+  }
+  double observed = 0, stated = 0, log_ratio = 0;
+  int n_compared = 0;
+  for (std::size_t i = 1; i < n; ++i) {
+    // the bound t >= 0 cuts off larger errors
+    if (f.scene.tensions_nN[static_cast<Eigen::Index>(i)] < 3 * budget.tensions[i].parts_nN.segmentation) continue;
+    ++n_compared;
+    observed += squares[i];
+    stated += std::pow(budget.tensions[i].parts_nN.segmentation, 2);
+    log_ratio += 0.5 * std::log(squares[i] / std::pow(budget.tensions[i].parts_nN.segmentation, 2));
+  }
+  // each tension's mean square of 24 draws is known to 29 %, their sum and the mean of the logarithms to some 10 %
+  EXPECT_NEAR(std::sqrt(observed / stated), 1, 0.25);
+  ASSERT_GE(n_compared, 7);
+  EXPECT_NEAR(log_ratio / n_compared, 0, 0.25);
+}
+
+TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
+  TensionScene scene = test::tension_scene("case_21", 1500, kLittleNoise, 3);
+  const Eigen::VectorXd on_layer = scene.displacement_um;
+  scene.compliance_um_per_nN =
+      substrate::make_greens(kGel, {.model = "half-space"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
+  test::contract(scene, scene.tensions_nN);
+  test::measure(scene, kLittleNoise, 3);
+  const Fitted f = fitted(std::move(scene));
+  const Eigen::VectorXd bias = answers(f, on_layer);
+  const ErrorBudget budget = f.budget(kExact, 0, true);
+  double difference = 0;
+  for (Eigen::Index i = 1; i < bias.size(); ++i)
+    difference += std::pow(std::abs(bias[i]) - budget.tensions[static_cast<std::size_t>(i)].parts_nN.substrate, 2);
+  // to first order: the network's answer to tensions bends by some per cent over a bias of this size
+  EXPECT_LT(std::sqrt(difference), 0.1 * bias.tail(bias.size() - 1).norm());
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse

@@ -1,0 +1,110 @@
+#include <gtest/gtest.h>
+
+#include <fstream>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/cost/accuracy.h"
+#include "pipeline/cost/presets.h"
+#include "pipeline/cost/study_report.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::cost {
+namespace {
+
+/// Two fibres of 3 and 4 nN; parts of each tension's error in nN.
+ErrorBudget budget(double beads, std::optional<double> mesh) {
+  ErrorBudget b;
+  for (const auto& [id, tension_nN] : {std::pair{0, 0.06}, {1, 3.0}, {2, 4.0}}) {
+    b.tensions.push_back({.fibre_id = id, .tension_nN = tension_nN, .parts_nN = {.beads = beads, .mesh = mesh}});
+  }
+  return b;
+}
+
+TEST(Accuracy, is_relative_to_the_fibres_tensions) {
+  const RelativeError error = relative_error(budget(0.3, 0.4));
+  EXPECT_NEAR(error.total, std::sqrt(2 * (0.09 + 0.16)) / 5, 1e-12);
+  EXPECT_NEAR(error.unavoidable, std::sqrt(2 * 0.09) / 5, 1e-12);
+  EXPECT_TRUE(error.is_complete);
+  EXPECT_FALSE(relative_error(budget(0.3, {})).is_complete);
+}
+
+TEST(Accuracy, is_asked_for_as_a_share_or_in_per_cent) {
+  EXPECT_DOUBLE_EQ(parse_accuracy("1%"), 0.01);
+  EXPECT_DOUBLE_EQ(parse_accuracy("2.5 %"), 0.025);
+  EXPECT_DOUBLE_EQ(parse_accuracy("0.05"), 0.05);
+  for (const char* wrong : {"", "%", "0", "-1%", "100%", "one", "1%%", "1 nN"})
+    EXPECT_THROW(parse_accuracy(wrong), UsageError) << wrong;
+}
+
+TEST(Accuracy, takes_the_cheapest_preset_that_suffices) {
+  std::vector<std::string> tried;
+  const auto run = [&](const std::string& preset) {
+    tried.push_back(preset);
+    return preset == "fast" ? budget(0.1, 0.5) : budget(0.1, 0.1);
+  };
+  const AccuracyOutcome outcome = reach_accuracy(0.05, run);
+  EXPECT_TRUE(outcome.is_met);
+  EXPECT_EQ(outcome.preset, "standard");
+  EXPECT_EQ(tried, (std::vector<std::string>{"fast", "standard"}));
+}
+
+TEST(Accuracy, does_not_believe_a_single_mesh) {
+  const auto run = [&](const std::string& preset) { return preset == "fast" ? budget(0.01, {}) : budget(0.01, 0.01); };
+  EXPECT_EQ(reach_accuracy(0.5, run).preset, "standard");
+}
+
+TEST(Accuracy, stops_where_noise_makes_it_unreachable_and_computing_is_in_vain) {
+  std::vector<std::string> tried;
+  const auto run = [&](const std::string& preset) {
+    tried.push_back(preset);
+    return budget(0.5, preset == "fast" ? 0.4 : 0.05);
+  };
+  const AccuracyOutcome outcome = reach_accuracy(0.01, run);
+  EXPECT_FALSE(outcome.is_met);
+  EXPECT_EQ(tried.size(), 2u);
+  EXPECT_NE(outcome.verdict.find("no computing reaches that"), std::string::npos) << outcome.verdict;
+}
+
+Measurement measured(double cpu_seconds, double error) {
+  return {.rung = {.knob = "knob", .value = "1"},
+          .seconds = cpu_seconds,
+          .cpu_seconds = cpu_seconds,
+          .n_runs = 1,
+          .tension_error = error};
+}
+
+TEST(Front, is_what_no_other_choice_beats_in_both) {
+  std::vector<Measurement> all = {measured(4, 0.2), measured(1, 0.5), measured(2, 0.6), measured(3, 0.2),
+                                  measured(9, 0.1)};
+  Measurement failed = measured(0.1, 0.01);
+  failed.failure = "fit: exit code 3";
+  all.push_back(failed);
+  EXPECT_EQ(front_of(all), (std::vector<int>{1, 3, 4}));
+  EXPECT_DOUBLE_EQ(distance_to_front(all, 0), 0.25);  // a quarter less time for the same error
+  EXPECT_DOUBLE_EQ(distance_to_front(all, 1), 0);
+  EXPECT_DOUBLE_EQ(distance_to_front(all, 2), 0.5);
+}
+
+TEST(Settings, of_the_cell_win) {
+  const test::TemporaryFolder folder;
+  const auto toml = folder.path() / "cell.toml";
+  std::ofstream(toml) << "[fit]\nn_meshes = 5\n";
+  const auto left = runner::unset_in(toml, preset_named("high").settings);
+  EXPECT_EQ(left.size(), preset_named("high").settings.size() - 1);
+  for (const runner::Setting& setting : left) EXPECT_NE(setting.key, "n_meshes");
+}
+
+TEST(Settings, reach_the_stages_that_have_them) {
+  for (const runner::Stage& stage : runner::stages()) {
+    const auto flags = runner::flags_of(stage, {{"network", "edge_length_um", "1"}});
+    EXPECT_EQ(flags.empty(), stage.name == "segment" || stage.name == "track") << stage.name;
+  }
+}
+
+TEST(Presets, the_standard_one_is_the_defaults) {
+  EXPECT_TRUE(preset_named("standard").settings.empty());
+  EXPECT_THROW(preset_named("quick"), UsageError);
+}
+
+}  // namespace
+}  // namespace mbtfm::cost
