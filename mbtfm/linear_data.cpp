@@ -18,6 +18,7 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
   data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
+    data.position_um.push_back(beads[i].position_um);
     data.displacement_um.segment<2>(row) << beads[i].displacement_um.x, beads[i].displacement_um.y;
     if (!is_used.empty() && !is_used[i]) continue;
     data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);

@@ -17,6 +17,7 @@ struct ReducedData {
 };
 
 struct LinearData {
+  std::vector<Vec2> position_um;         ///< of the beads
   Eigen::MatrixXd compliance_um_per_nN;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
   Eigen::VectorXd displacement_um;       ///< u, in the same order
   Eigen::VectorXd weight_per_um;         ///< W, diagonal: 1/sigma; 0 where the bead is not used

@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "pipeline/contract/errors.h"
 
@@ -80,16 +81,35 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
   return fit;
 }
 
+/// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
+bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen::Index row) {
+  const Vec2 place = data.position_um[static_cast<std::size_t>(row / 2)];
+  double nearest = std::numeric_limits<double>::infinity(), along = 0;
+  for (Eigen::Index other = 0; other < residual.size(); other += 2) {
+    if (other == row || data.weight_per_um[other] == 0) continue;
+    const double distance = norm(data.position_um[static_cast<std::size_t>(other / 2)] - place);
+    if (distance >= nearest) continue;
+    nearest = distance;
+    along = residual.segment<2>(other).dot(residual.segment<2>(row));
+  }
+  return along < 0.5 * residual.segment<2>(row).squaredNorm();
+}
+
 }  // namespace
 
 std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual) {
   if (loss != "auto") return loss;
   const double scale = robust_scale(data, weighted_residual);
   if (is_exact(data, scale)) return "squares";
-  const std::vector<double> lengths = used_lengths(data, weighted_residual);
-  const double largest = *std::max_element(lengths.begin(), lengths.end()) / scale;
   constexpr double kChance = 0.05;
-  return static_cast<double>(lengths.size()) * std::exp(-largest * largest / 2) < kChance ? "huber" : "squares";
+  const double limit = scale * std::sqrt(2 * std::log(0.5 * static_cast<double>(data.n_used) / kChance));
+  int n_large = 0, n_alone = 0;
+  for (Eigen::Index i = 0; i < weighted_residual.size(); i += 2) {
+    if (data.weight_per_um[i] == 0 || weighted_residual.segment<2>(i).norm() <= limit) continue;
+    ++n_large;
+    n_alone += stands_alone(data, weighted_residual, i);
+  }
+  return 2 * n_alone > n_large ? "huber" : "squares";
 }
 
 double robust_weight(const std::string& loss, double residual) {

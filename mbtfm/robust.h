@@ -11,9 +11,10 @@
 
 namespace mbtfm::inverse {
 
-/// The loss itself, or what the residuals call for where it is `auto`: huber if the largest one is larger than one case
-/// in twenty of Gaussian noise has it, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni; r in robust standard deviations),
-/// else squares. Few bad beads do the harm, and they stand out; a bead more or less beyond three deviations does none.
+/// The loss itself, or what the residuals call for where it is `auto`: huber where most of those that Gaussian noise
+/// has in less than one case in twenty, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni; r in robust standard deviations),
+/// stand alone: the nearest bead does not go along by half. Else squares: none is that large, or they go together, so
+/// that the model and not the beads are wrong there, and to discount them would explain the still part of the gel only.
 std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual);
 
 /// Weight of a bead whose residual has this size, in robust standard deviations; 1 at zero (l1: large there).

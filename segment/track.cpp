@@ -220,8 +220,12 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   if (parameters_.drift != "auto") return track_as(parameters_.drift, stressed, pixel_size_um, progress);
   try {
     return track_as("auto", stressed, pixel_size_um, progress);
-  } catch (const InvalidData&) {  // turned so far that its beads are not met with again, or the border shows it?
-    return track_as("rotation", stressed, pixel_size_um, progress);
+  } catch (const InvalidData& unturned) {  // turned so far that its beads are not met with again?
+    try {
+      return track_as("rotation", stressed, pixel_size_um, progress);
+    } catch (const InvalidData&) {
+      throw unturned;
+    }
   }
 }
 

@@ -9,9 +9,8 @@ const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
       {"fast",
        "a first look",
-       {{"fit", "n_meshes", "2"},           // the fewest that tell of the mesh at all
-        {"fit", "surface_lines", "40"},     // drawing the gel's surface finely takes longer than such a fit
-        {"substrate", "model", "layer"}}},  // `split` without the sides, which are far away: 0.1 %
+       {{"fit", "n_meshes", "2"},          // the fewest that tell of the mesh at all
+        {"fit", "surface_lines", "40"}}},  // drawing the gel's surface finely takes longer than such a fit
       {"standard", "the defaults", {}},
       {"high",
        "for the record",

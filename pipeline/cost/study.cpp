@@ -103,7 +103,9 @@ class Scratch {
       command.push_back("--" + flag);
       command.push_back(value);
     };
-    for (const runner::PathArgument& argument : stage.arguments) add(argument.flag, (folder_ / argument.path).string());
+    for (const runner::PathArgument& argument : stage.arguments) {
+      if (argument.where.empty()) add(argument.flag, (folder_ / argument.path).string());  // else: of a time series
+    }
     add("config", (folder_ / "cell.toml").string());
     add(stage.output.flag, (folder_ / stage.output.path).string());
     add("threads", std::to_string(rung.threads.value_or(options_.threads)));

@@ -74,7 +74,7 @@ Eigen::VectorXd answers(const Fitted& f, const Eigen::VectorXd& displacement_um)
   test::measure(other, 0, 1);
   for (Bead& bead : other.beads) bead.sigma_um = f.scene.beads.front().sigma_um;
   other.data = reduce(other.beads, other.compliance_um_per_nN);
-  const EnsembleFit fit = test::fit_own_network(other);
+  const EnsembleFit fit = test::fit_own_network(other, {.loss = "squares"});  // the propagation is that of squares
   return test::values_of(fit) - f.scene.tensions_nN;
 }
 

@@ -133,6 +133,8 @@ TEST(TensionFit, the_loss_is_squares_until_a_bead_is_further_off_than_chance_has
   LinearData data;
   data.weight_per_um = Eigen::VectorXd::Constant(2 * n_beads, 1);
   data.displacement_um = Eigen::VectorXd::Constant(2 * n_beads, 1);
+  data.n_used = 2 * n_beads;
+  for (Eigen::Index b = 0; b < n_beads; ++b) data.position_um.push_back({1.0 * static_cast<double>(b), 0});
   std::mt19937_64 random(1);
   std::normal_distribution<double> normal(0, 0.07);
   int n_robust = 0;
@@ -144,6 +146,8 @@ TEST(TensionFit, the_loss_is_squares_until_a_bead_is_further_off_than_chance_has
     residual[100] = 6 * 0.07;  // of 2000 the largest is 4.6 in one case of twenty
     EXPECT_EQ(loss_called_for("auto", data, residual), "huber");
     EXPECT_EQ(loss_called_for("squares", data, residual), "squares");
+    residual.segment<6>(100).setConstant(8 * 0.07);  // three beads go along: the model is wrong there, not a bead
+    EXPECT_EQ(loss_called_for("auto", data, residual), "squares");
   }
   EXPECT_LE(n_robust, 0.05 * kDraws + 3 * std::sqrt(0.05 * kDraws));
   EXPECT_GE(n_robust, 0.05 * kDraws - 3 * std::sqrt(0.05 * kDraws));

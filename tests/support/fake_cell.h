@@ -163,6 +163,7 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
                      .n_meshes = 4,
                      .iterations = 9,
                      .converged = true,
+                     .error_budget = {},
                      .more = {}};
   for (AdhesionForce& force : forces) {
     force.force_nN = force.force_nN - (1.0 / static_cast<double>(forces.size())) * net;

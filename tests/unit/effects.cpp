@@ -52,16 +52,14 @@ TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {
   const test::TemporaryFolder folder;
   const auto settings = [&](const std::string& toml) {
     write_text(folder / "cell.toml", toml);
-    std::vector<std::string> all;
-    for (const runner::Stage& stage : runner::stages()) all.push_back(runner::settings_of(stage, folder / "cell.toml"));
-    return all;
+    return runner::read_settings(folder / "cell.toml");
   };
   const auto changed = [&](const std::string& toml) {
     const auto before = settings("[gel]\nyoungs_modulus_kPa = 8\n");
     const auto after = settings("[gel]\nyoungs_modulus_kPa = 8\n" + toml);
     std::string names;
-    for (std::size_t i = 0; i < before.size(); ++i) {
-      if (before[i] != after[i]) names += runner::stages()[i].name + " ";
+    for (const runner::Stage& stage : runner::stages()) {
+      if (before.at(stage.name) != after.at(stage.name)) names += stage.name + " ";
     }
     return names;
   };
