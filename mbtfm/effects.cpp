@@ -9,10 +9,12 @@ std::string loss_of_switch(const std::string& setting, const std::string& robust
 
 Effect robust_loss_effect(const std::string& setting, const std::string& used_loss) {
   const bool is_robust = used_loss != "squares";
-  return decided("robust loss", setting, is_robust,
-                 is_robust
-                     ? used_loss + ": the first fit leaves a residual that Gaussian noise has in one case of twenty"
-                     : "the first fit leaves no residual that is too large for Gaussian noise");
+  return decided(
+      "robust loss", setting, is_robust,
+      is_robust ? used_loss +
+                      ": the first fit leaves residuals, alone among their neighbours, that Gaussian noise has in one "
+                      "case of twenty"
+                : "the first fit leaves no such residuals alone that are too large for Gaussian noise");
 }
 
 Effect decide_time_coupling(bool has_frame_before, const std::string& setting) {

@@ -147,7 +147,7 @@ inline SceneOutcome run_scene(const RandomScene& scene, const std::filesystem::p
                                        cell.string(),
                                    before);
   if (made.code == exit_code::kUsage) return {.kind = SceneOutcome::Kind::cannot_be_drawn, .faults = {}, .message = made.output};
-  if (made.code != 0) return {.faults = {"a simulation: " + made.output}};
+  if (made.code != 0) return {.faults = {"a simulation"}, .message = made.output};
   write_text(cell / "cell.toml", read_text(cell / "cell.toml") + scene.settings);
   const Outcome run = run_program("mbtfm run " + cell.string(), before);
   if (run.code == exit_code::kInput || run.code == exit_code::kNotSolved) {
