@@ -31,7 +31,7 @@ preset_row() {
 
 study() {
   [ -f "$work/$1/run.json" ] || "$bin/mbtfm" run --quiet "$work/$1"
-  [ -f "$work/$1/cost/cost.md" ] || "$bin/mbtfm" cost --repeats 1 --budget 15 "$work/$1"
+  [ -f "$work/$1/cost/cost.md" ] || "$bin/mbtfm" cost --repeats 1 --budget "${MINUTES:-15}" "$work/$1"
   cp "$work/$1/cost/cost.svg" "docs/images/cost/$1.svg"
   sed -e "s|cost.svg|images/cost/$1.svg|" -e "s|^## .*|## $2|" "$work/$1/cost/cost.md"
 }

@@ -48,7 +48,7 @@ std::vector<Rung> ladder(Extent extent) {
   add_preset("fast");
   add(rungs, "fit", "n_meshes", {"1", "2", "4"});
   add(rungs, "network", "edge_length_um", {"3", "2"});
-  add(rungs, "substrate", "model", {"half-space", "layer"});
+  add(rungs, "substrate", "model", {"half-space", "layer", "split"});
   for (const double share : {0.125, 0.25, 0.5}) {
     rungs.push_back({.knob = "beads", .value = shortest(share), .bead_share = share});
   }
@@ -57,7 +57,8 @@ std::vector<Rung> ladder(Extent extent) {
   add(rungs, "cables", "smoothing", {"0.01", "0.001", "1e-07"});
   add(rungs, "cables", "force_tolerance", {"0.001", "1e-05", "1e-12"});
   add(rungs, "fit", "model_error", {"none"});
-  add(rungs, "fit", "loss", {"huber"});
+  add(rungs, "effects", "robust_loss", {"on", "off"});
+  add(rungs, "effects", "cable_elasticity", {"off"});
   add(rungs, "substrate", "cells_per_thickness", {"1", "3"});
   rungs.push_back({.knob = "threads", .value = "1", .threads = 1});
   add(rungs, "network", "edge_length_um", {"1.2", "1"});
@@ -78,7 +79,7 @@ std::string group_of(const std::string& knob) {
                                                             {"edge_length_um", "network and meshes"},
                                                             {"model_error", "network and meshes"},
                                                             {"beads", "data, presets, threads"},
-                                                            {"loss", "data, presets, threads"},
+                                                            {"robust_loss", "data, presets, threads"},
                                                             {"preset", "data, presets, threads"},
                                                             {"threads", "data, presets, threads"},
                                                             {"bootstrap", "data, presets, threads"}};

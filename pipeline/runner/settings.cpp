@@ -28,7 +28,9 @@ std::vector<Setting> unset_in(const std::filesystem::path& toml_file, const std:
 std::vector<std::string> flags_of(const Stage& stage, const std::vector<Setting>& settings) {
   std::vector<std::string> flags;
   for (const Setting& setting : settings) {
-    if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
+    const bool is_effect = setting.table == "effects";
+    const std::vector<std::string>& known = is_effect ? stage.effects : stage.tables;
+    if (std::find(known.begin(), known.end(), is_effect ? setting.key : setting.table) == known.end()) continue;
     flags.push_back("--" + setting.key);
     flags.push_back(setting.value);
   }

@@ -293,6 +293,8 @@ GelEffects effects_for(double thickness_um, const SubstrateParameters& parameter
 }
 
 TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_that_does_not) {
+  test::hard_case("thick and thin gels, near and far sides, even and graded ones",
+                  "each effect on where its number exceeds the tolerance, else off");
   SubstrateParameters p;
   EXPECT_TRUE(effects_for(60, p).thickness.is_on);
   EXPECT_FALSE(effects_for(20000, p).thickness.is_on);
@@ -311,6 +313,7 @@ TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_tha
 }
 
 TEST(Automatic, obeys_its_switches) {
+  test::hard_case("effects switched on or off against the scene", "what is asked for");
   const auto points = test::scattered_points(100, 10);
   const std::vector<Ellipse> ellipses = {{{1, 2}, 1, 0.5, 0.3}};
   SubstrateParameters p;
@@ -325,6 +328,7 @@ TEST(Automatic, obeys_its_switches) {
 }
 
 TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) {
+  test::hard_case("sides without a distance, a model without what is on", "an error that names both");
   const auto refused = [](const std::string& model, std::string EffectSwitches::*member, const std::string& setting,
                           std::optional<double> side_distance_um = {}) {
     SubstrateParameters p = test::model_named(model);
