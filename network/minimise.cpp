@@ -16,13 +16,11 @@ constexpr double kFirstMu = 1e-2;
 constexpr double kLastMu = 1e-9;
 constexpr double kSharpening = 0.3;
 constexpr double kBoldSharpening = 0.05;
-// A stage is left once no net force exceeds the force scale and the slope at a step's start was below mu for each
-// second cable if the step went (nearly) its full length, for each tenth in any case. More accuracy is lost again when
-// the energy sharpens; with less, slack cables far from the path throw the next steps far off, and the finer the mesh
-// the more such cables share one step length.
+// A stage is left once a step went (nearly) its full length, its slope was below mu for each second cable, and no net
+// force exceeds the force scale. More accuracy is lost again when the energy sharpens; with less, slack cables far from
+// the path throw the next steps far off, and the finer the mesh the more such cables share one step length.
 constexpr double kFullStep = 0.9;
 constexpr double kSlopePerCable = 0.5;
-constexpr double kSlopePerCableOfCutStep = 0.1;
 // A warm start that has not converged by then is far away: the path is shorter.
 constexpr int kWarmSteps = 25;
 // A line search ends where the slope has fallen to this part of the first: finer costs more than it saves.
@@ -315,14 +313,14 @@ Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& c
     minimiser.reset_duals();
     while (rounding.mu_fJ >= kLastMu * unit_mu_fJ) {
       minimiser.set_rounding(rounding);
-      const auto is_near_path = [&](const Newton::Step& taken) {
-        const double slope = taken.length < kFullStep ? kSlopePerCableOfCutStep : kSlopePerCable;
-        return -taken.slope_fJ <= slope * rounding.mu_fJ * static_cast<double>(cables.size()) &&
-               minimiser.residual_nN() <= options.force_nN;
-      };
+      const double flat_fJ = kSlopePerCable * rounding.mu_fJ * static_cast<double>(cables.size());
+      Newton::Step taken;
       int n_steps = 0;
-      for (bool is_near = false; !is_near && may_step(options.max_iterations); ++n_steps)
-        is_near = is_near_path(step());
+      while (may_step(options.max_iterations) &&
+             (taken.length < kFullStep || -taken.slope_fJ > flat_fJ || minimiser.residual_nN() > options.force_nN)) {
+        taken = step();
+        ++n_steps;
+      }
       rounding.mu_fJ *= n_steps == 1 ? kBoldSharpening : kSharpening;
       rounding.eps_um = std::max(kSharpening * rounding.eps_um, options.eps_um);
     }
