@@ -55,9 +55,8 @@ const Comparison* same_pair(const Measure& m, const Comparison& c, const std::st
   return at == m.comparisons.end() ? nullptr : &*at;
 }
 
-/// A sentence for each pair that the mixed model compares.
-std::vector<std::string> differences(const Measure& m) {
-  std::vector<std::string> list;
+/// A sentence for each pair that the mixed model compares, with those that clearly differ or with the others.
+void add_differences(const Measure& m, Findings& findings) {
   for (const Comparison& c : m.comparisons) {
     if (c.test != "mixed model" || c.group_b.empty() || !c.interval) continue;
     const bool is_of_kinds = c.question == "between kinds";
@@ -89,9 +88,8 @@ std::vector<std::string> differences(const Measure& m) {
     text += fmt::format("; {} and {} cells", cells_a, cells_b);
     if (m.sample.each != "cells")
       text += fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, m.sample.each);
-    list.push_back(capitalised(text + ")."));
+    (is_clear ? findings.sentences : findings.unclear).push_back(capitalised(text + ")."));
   }
-  return list;
 }
 
 std::vector<std::string> shares(const Analysis& analysis, const StudyParameters& parameters) {
@@ -145,17 +143,18 @@ void append(std::vector<std::string>& list, const std::vector<std::string>& more
 }  // namespace
 
 std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters) {
-  std::vector<std::string> tensions = means(analysis.tensions), adhesions = means(analysis.adhesion_forces), cells;
-  append(tensions, differences(analysis.tensions));
-  append(tensions, shares(analysis, parameters));
-  append(adhesions, differences(analysis.adhesion_forces));
-  append(adhesions, differences(analysis.adhesion_areas));
+  Findings tensions{"Tensions", means(analysis.tensions), {}}, cells{"Cells", {}, {}};
+  Findings adhesions{"Adhesions", means(analysis.adhesion_forces), {}};
+  add_differences(analysis.tensions, tensions);
+  append(tensions.sentences, shares(analysis, parameters));
+  add_differences(analysis.adhesion_forces, adhesions);
+  add_differences(analysis.adhesion_areas, adhesions);
   for (const Measure& m : analysis.cells) {
-    append(cells, means(m));
-    append(cells, differences(m));
+    append(cells.sentences, means(m));
+    add_differences(m, cells);
   }
-  append(cells, lines(analysis));
-  return {{"Tensions", tensions}, {"Adhesions", adhesions}, {"Cells", cells}, {"Directions", directions(analysis)}};
+  append(cells.sentences, lines(analysis));
+  return {tensions, adhesions, cells, {"Directions", directions(analysis), {}}};
 }
 
 }  // namespace mbtfm::statistics

@@ -27,6 +27,7 @@ std::string svg_of(const Figure& figure);
 struct Findings {
   std::string title;
   std::vector<std::string> sentences;
+  std::vector<std::string> unclear;  ///< pairs that do not demonstrably differ
 };
 std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters);
 

@@ -148,6 +148,9 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   std::string found;
   for (const Findings& f : findings_of(analysis, parameters)) {
     if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
+    if (f.unclear.empty()) continue;
+    found += fmt::format("<details><summary>{} pairs that do not demonstrably differ</summary>\n{}</details>\n",
+                         f.unclear.size(), list_of(f.unclear));
   }
   body += report::section("What was found", found);
   std::string pictures;
