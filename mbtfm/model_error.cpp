@@ -39,8 +39,13 @@ double misfit(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual, 
 
 }  // namespace
 
-ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double noise_variance) {
+ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance) {
   MBTFM_ASSERT(meshes.size() >= 3);
+  // Simulated beads may be exact; but neither a tracked bead nor the model of a gel is right to a thousandth of what
+  // beads move on average. Below that, all weight would be on the few modes that no mesh happens to disagree upon.
+  constexpr double kLeastShare = 1e-3;
+  const double mean_square = (data.target.squaredNorm() + data.floor_squared) / static_cast<double>(data.n_components);
+  const double noise_variance = std::max(beads_variance, kLeastShare * kLeastShare * mean_square);
   const MeshForces mean = mean_of(meshes);
   const Eigen::VectorXd variance = variance_between(meshes, mean.forces_nN);
   // C V Cᵀ = U diag(sizes) Uᵀ: in the coordinates Uᵀ y the errors of the rows are independent for every kappa

@@ -34,7 +34,7 @@ struct MeshForces {
 /// tell no more). kappa is the size at which the meshes' mean leaves the misfit to be expected of n and e, the tensions
 /// following; but not below 1 + 1/meshes, the variance of one further mesh about their mean.
 /// @param meshes  at least three
-/// @param noise_variance  s²
-ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double noise_variance);
+/// @param beads_variance  s²; a floor of (a thousandth of what beads move on average)² is put under it
+ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance);
 
 }  // namespace mbtfm::inverse

@@ -68,6 +68,14 @@ TEST(Chain, tensions_come_back_from_images_alone) {
   EXPECT_TRUE(fs::exists(cell / "report.html"));
 }
 
+/// Without a floor under the beads' noise, the error of the model would put all weight on the few modes of the forces
+/// that no mesh disagrees upon: 0.14.
+TEST(Chain, beads_without_any_noise_are_fitted_no_worse_than_noisy_ones) {
+  const TemporaryFolder folder;
+  const Comparison comparison = simulate_and_run(folder / "cell", "--scenario u2os --seed 1 --noise 0 --beads 5000");
+  EXPECT_LE(comparison.relative_error, 0.1);
+}
+
 TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
