@@ -125,16 +125,6 @@ std::optional<Sides> mean_sides(const std::vector<MeshFit>& meshes, std::size_t 
   return mean;
 }
 
-/// The change of each force along its own direction, for the sum of the magnitudes.
-Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
-  Eigen::VectorXd along = Eigen::VectorXd::Zero(forces_nN.size());
-  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
-    const double size = forces_nN.segment<2>(row).norm();
-    if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
-  }
-  return along;
-}
-
 /// Errors by way of the forces' directions in the mean over meshes.
 Estimate total_force_of(const EnsembleFit& all) {
   const Eigen::VectorXd along = directions_of(all.forces_nN);
@@ -246,6 +236,21 @@ double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd
 }
 
 }  // namespace
+
+Eigen::VectorXd values_of(const EnsembleFit& fit) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions_nN.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
+  return values;
+}
+
+Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(forces_nN.size());
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+    const double size = forces_nN.segment<2>(row).norm();
+    if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
+  }
+  return along;
+}
 
 double total_nN(const Eigen::VectorXd& forces_nN) {
   double sum = 0;

@@ -74,6 +74,13 @@ struct Interval {
 };
 Interval interval_95(const Estimate& estimate, int n_meshes);
 
+/// The tensions alone.
+Eigen::VectorXd values_of(const EnsembleFit& fit);
+
+/// Unit vectors of forces (fx, fy by adhesion), zero where a force is: the change of the sum of their magnitudes is
+/// along them.
+Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN);
+
 /// Sum of the magnitudes of forces (fx, fy by adhesion).
 double total_nN(const Eigen::VectorXd& forces_nN);
 

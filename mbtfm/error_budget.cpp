@@ -23,15 +23,6 @@ struct Gain {
   MatrixXd of_model;     ///< where the model's forces lack these, tensions being what they are, and the beads show them
 };
 
-VectorXd directions_of(const VectorXd& forces_nN) {
-  VectorXd directions = VectorXd::Zero(forces_nN.size());
-  for (Index i = 0; i < forces_nN.size(); i += 2) {
-    const double size = forces_nN.segment<2>(i).norm();
-    if (size > 0) directions.segment<2>(i) = forces_nN.segment<2>(i) / size;
-  }
-  return directions;
-}
-
 /// dt = Cov Jᵀ C e / s² for an error e of the forces; total force: d|R| = eᵀ (dR/dt dt + dR).
 Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
   const Index n = mesh.covariance_nN2.rows();
@@ -303,7 +294,7 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
     budget.tensions.push_back(
         {.fibre_id = in.fit.fibre_ids[at], .tension_nN = in.fit.tensions_nN[at].value, .parts_nN = parts(i)});
   }
-  budget.total_force_nN = directions_of(in.fit.forces_nN).dot(in.fit.forces_nN);
+  budget.total_force_nN = total_nN(in.fit.forces_nN);
   budget.total_force_parts_nN = parts(n);
   return budget;
 }

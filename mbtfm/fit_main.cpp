@@ -220,12 +220,10 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
                        const FitParameters& p, bool is_coupled, StageContext& context) {
   const DisplacementField& beads =
       std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
-  Eigen::VectorXd start(static_cast<Eigen::Index>(first.tensions_nN.size()));
-  for (Eigen::Index i = 0; i < start.size(); ++i) start[i] = first.tensions_nN[static_cast<std::size_t>(i)].value;
   const std::vector<FrameFit> fits = fit_series(
       frames, networks, compliance_of(substrate, beads, cell), beads_in_region(beads, cell, p), adhesion_ids_of(cell),
       p, is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
-      start);
+      values_of(first));
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
   write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));

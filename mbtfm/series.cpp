@@ -196,8 +196,7 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
       LinearData data = reduce(good.beads, std::move(good.compliance_um_per_nN), good.is_used);
       const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, start);
       fits.push_back(described(frame.frame, fit, data));
-      for (Eigen::Index i = 0; is_coupled && i < start.size(); ++i)
-        start[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
+      if (is_coupled) start = values_of(fit);
     } catch (const NotSolved& error) {  // one frame that cannot be fitted does not stop the others
       fits.push_back({.frame = frame.frame, .refused = error.what()});
     } catch (const InvalidData& error) {

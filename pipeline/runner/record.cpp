@@ -1,14 +1,12 @@
 #include "pipeline/runner/record.h"
 
-#define TOML_ENABLE_FORMATTERS 1
-#include <toml++/toml.h>
-
 #include <algorithm>
 #include <nlohmann/json.hpp>
 #include <sstream>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/runner/toml_file.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -87,13 +85,7 @@ void complete_record(const fs::path& record_file, const StageRecord& record, con
 }
 
 Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
-  toml::table whole;
-  try {
-    whole = toml::parse(read_text(toml_file), toml_file.string());
-  } catch (const toml::parse_error& error) {
-    throw InputError(toml_file.string() + ":" + std::to_string(error.source().begin.line), "a TOML file",
-                     std::string(error.description()));
-  }
+  const toml::table whole = read_toml(toml_file);
   Settings settings;
   for (const Stage& stage : stages()) {
     toml::table relevant;

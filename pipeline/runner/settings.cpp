@@ -1,23 +1,14 @@
 #include "pipeline/runner/settings.h"
 
-#include <toml++/toml.h>
-
 #include <algorithm>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/errors.h"
+#include "pipeline/runner/toml_file.h"
 
 namespace mbtfm::runner {
 
 std::vector<Setting> unset_in(const std::filesystem::path& toml_file, const std::vector<Setting>& settings) {
   if (settings.empty()) return {};
-  toml::table whole;
-  try {
-    whole = toml::parse(read_text(toml_file), toml_file.string());
-  } catch (const toml::parse_error& error) {
-    throw InputError(toml_file.string() + ":" + std::to_string(error.source().begin.line), "a TOML file",
-                     std::string(error.description()));
-  }
+  const toml::table whole = read_toml(toml_file);
   std::vector<Setting> unset;
   for (const Setting& setting : settings) {
     if (!whole[setting.table][setting.key]) unset.push_back(setting);

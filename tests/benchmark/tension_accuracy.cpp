@@ -153,16 +153,6 @@ void descent(const Arguments& a) {
   print_conditions(problem, scene.tensions_nN);
 }
 
-/// Sum of the forces' components along the directions of others.
-double total_along(const Eigen::VectorXd& directions, const Eigen::VectorXd& forces_nN) {
-  double sum = 0;
-  for (Eigen::Index i = 0; i < forces_nN.size(); i += 2) {
-    const double size = directions.segment<2>(i).norm();
-    if (size > 0) sum += directions.segment<2>(i).dot(forces_nN.segment<2>(i)) / size;
-  }
-  return sum;
-}
-
 /// Sums over the repeats of one level of noise.
 struct NoiseRow {
   double l2 = 0, total = 0, network = 0, plain_total = 0, plain_network = 0, deviation = 0, implied = 0, squares = 0;
@@ -174,7 +164,7 @@ void add_forces(NoiseRow& row, const TensionScene& scene, const Trial& trial, co
                 const LocalMisfit& local) {
   const double true_total = total_nN(scene.forces_nN), true_network = scene.tensions_nN[0];
   const Eigen::VectorXd past = past_bounds_nN(local, 1);
-  const double unbounded = total_along(trial.forces_nN, trial.forces_nN + derivatives * past);
+  const double unbounded = directions_of(trial.forces_nN).dot(trial.forces_nN + derivatives * past);
   row.plain_total += total_nN(trial.forces_nN) / true_total;
   row.total += (unbounded - magnitude_bias_nN(trial.forces_nN, derivatives, covariance_nN2(local, 1))) / true_total;
   // forces of a network without fibres go with its tension

@@ -167,11 +167,7 @@ inline inverse::EnsembleFit fit_own_network(TensionScene& scene, inverse::FitPar
   return inverse::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
 }
 
-inline Eigen::VectorXd values_of(const inverse::EnsembleFit& fit) {
-  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions_nN.size()));
-  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
-  return values;
-}
+using inverse::values_of;
 
 /// Cramér–Rao limit of each tension's standard error at the truth, for the data's noise; the bound t >= 0 aside.
 inline Eigen::VectorXd cramer_rao_nN(const TensionScene& scene) {
