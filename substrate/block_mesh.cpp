@@ -1,75 +1,32 @@
 #include "substrate/block_mesh.h"
 
-#include <deal.II/base/multithread_info.h>
-#include <deal.II/dofs/dof_handler.h>
-#include <deal.II/dofs/dof_tools.h>
-#include <deal.II/fe/fe_q.h>
-#include <deal.II/fe/fe_tools.h>
-#include <deal.II/fe/mapping_cartesian.h>
-#include <deal.II/grid/grid_generator.h>
-#include <deal.II/grid/tria.h>
-#include <deal.II/lac/affine_constraints.h>
+#include <dlfcn.h>
 
 #include <algorithm>
+#include <cfenv>
 #include <cmath>
+#include <filesystem>
 
 #include "pipeline/contract/errors.h"
+#include "substrate/mesh_maker.h"
 
 namespace mbtfm::substrate {
 
 namespace {
 
-Box box_of(const dealii::Triangulation<3>::cell_iterator& cell) {
-  Box box;
-  for (int axis = 0; axis < 3; ++axis) {
-    box.low_um[axis] = cell->vertex(0)[axis];
-    box.size_um[axis] = cell->vertex(7)[axis] - cell->vertex(0)[axis];
-  }
-  return box;
-}
-
-dealii::Point<3> corner(const GridLines& lines, bool is_first) {
-  const auto end = [&](const std::vector<double>& line) { return is_first ? line.front() : line.back(); };
-  return {end(lines.x_um), end(lines.y_um), end(lines.z_um)};
-}
-
-std::vector<double> steps(const std::vector<double>& line) {
-  std::vector<double> result;
-  for (std::size_t i = 1; i < line.size(); ++i) result.push_back(line[i] - line[i - 1]);
-  return result;
-}
-
-void refine(dealii::Triangulation<3>& triangulation, const std::function<bool(const Box&)>& is_too_large,
-            std::int64_t most_cells) {
-  for (int level = 0; level < static_cast<int>(triangulation.n_levels()); ++level) {
-    // cells of coarser levels that are still whole have been found small enough before
-    bool is_done = true;
-    for (const auto& cell : triangulation.active_cell_iterators_on_level(level)) {
-      if (!is_too_large(box_of(cell))) continue;
-      cell->set_refine_flag();
-      is_done = false;
-    }
-    if (is_done) break;
-    triangulation.execute_coarsening_and_refinement();
-    if (triangulation.n_active_cells() > most_cells) {
-      throw NotSolved(
-          Report{.reason = "the substrate's mesh has more than " + std::to_string(most_cells) +
-                           " elements; one of at most half as many would fit the memory allowed: "
-                           "ask for a coarser one (displacement_tolerance, elements_across_adhesion), allow more "
-                           "(memory_limit_GB), or take the model 'layer'"});
-    }
-  }
-}
-
-std::vector<std::vector<NodeWeight>> hanging_nodes(const dealii::DoFHandler<3>& handler) {
-  dealii::AffineConstraints<double> constraints;
-  dealii::DoFTools::make_hanging_node_constraints(handler, constraints);
-  constraints.close();
-  std::vector<std::vector<NodeWeight>> hanging(handler.n_dofs());
-  for (const auto& line : constraints.get_lines()) {
-    for (const auto& [node, weight] : line.entries) hanging[line.index].push_back({static_cast<int>(node), weight});
-  }
-  return hanging;
+/// deal.II and the 150 libraries that it needs take 0.25 s of each start: they are loaded where a mesh is made, not
+/// with the program. The path is told by the program's, as sanitizers hide the run path from dlopen.
+MakeMesh* load_mesh_maker() {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
+  const std::filesystem::path file = program.parent_path().parent_path() / "lib" / kMeshMakerFile;
+  std::fenv_t environment;
+  std::feholdexcept(&environment);  // the libraries' own initialisation is not ours to trap
+  void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  std::fesetenv(&environment);
+  void* function = library != nullptr ? dlsym(library, "mbtfm_make_mesh") : nullptr;
+  if (function != nullptr) return reinterpret_cast<MakeMesh*>(function);
+  throw InputError(file.string(), "the library that makes finite element meshes", dlerror(),
+                   "build anew, and keep lib/ beside bin/; the models 'half-space' and 'layer' do without it");
 }
 
 /// Index of the interval of `line` that holds x; the last one holds its upper end.
@@ -96,41 +53,17 @@ constexpr int kMostLevels = 20;  // of halving: the key has 29 bits for a positi
 
 BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
                           std::int64_t most_cells, int threads) {
-  dealii::MultithreadInfo::set_thread_limit(threads);
-  dealii::Triangulation<3> triangulation;
-  dealii::GridGenerator::subdivided_hyper_rectangle(triangulation,
-                                                    {steps(lines.x_um), steps(lines.y_um), steps(lines.z_um)},
-                                                    corner(lines, true), corner(lines, false));
-  refine(triangulation, is_too_large, most_cells);
-  MBTFM_ASSERT(static_cast<int>(triangulation.n_levels()) <= kMostLevels);
-  const dealii::FE_Q<3> element(order);
-  dealii::DoFHandler<3> handler(triangulation);
-  handler.distribute_dofs(element);
-
+  static MakeMesh* const make = load_mesh_maker();
   BlockMesh mesh;
   mesh.order = order;
   mesh.lines = lines;
-  mesh.position_um.resize(handler.n_dofs());
-  mesh.hanging = hanging_nodes(handler);
-  mesh.cells.reserve(triangulation.n_active_cells());
-  const auto order_of = dealii::FETools::lexicographic_to_hierarchic_numbering<3>(order);
-  std::vector<dealii::types::global_dof_index> nodes(element.n_dofs_per_cell());
-  for (const auto& cell : handler.active_cell_iterators()) {
-    const Box box = box_of(cell);
-    cell->get_dof_indices(nodes);
-    for (unsigned k = 0; k < nodes.size(); ++k) {
-      const int node = static_cast<int>(nodes[order_of[k]]);
-      const dealii::Point<3> unit = element.unit_support_point(order_of[k]);
-      mesh.cell_nodes.push_back(node);
-      for (int axis = 0; axis < 3; ++axis) {
-        mesh.position_um[node][axis] = box.low_um[axis] + unit[axis] * box.size_um[axis];
-      }
-    }
-    if (cell->face(4)->at_boundary()) {
-      const Vec2 centre = {box.low_um[0] + 0.5 * box.size_um[0], box.low_um[1] + 0.5 * box.size_um[1]};
-      mesh.cell_at_surface[surface_key(lines, cell->level(), centre)] = static_cast<int>(mesh.cells.size());
-    }
-    mesh.cells.push_back(box);
+  make(mesh, is_too_large, most_cells, threads);
+  for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
+    const Box& box = mesh.cells[cell];
+    MBTFM_ASSERT(mesh.cell_levels[cell] < kMostLevels);
+    if (box.low_um[2] > 0) continue;
+    const Vec2 centre = {box.low_um[0] + 0.5 * box.size_um[0], box.low_um[1] + 0.5 * box.size_um[1]};
+    mesh.cell_at_surface[surface_key(lines, mesh.cell_levels[cell], centre)] = static_cast<int>(cell);
   }
   return mesh;
 }

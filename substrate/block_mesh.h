@@ -31,6 +31,7 @@ struct BlockMesh {
   int order = 2;
   GridLines lines;
   std::vector<Box> cells;
+  std::vector<int> cell_levels;                            ///< by cell: how often one of the grid was halved
   std::vector<int> cell_nodes;                             ///< by cell, x fastest, then y, then z
   std::vector<std::array<double, 3>> position_um;          ///< by node
   std::vector<std::vector<NodeWeight>> hanging;            ///< by node: what it hangs on; empty: a node of its own

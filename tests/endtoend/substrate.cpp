@@ -162,5 +162,14 @@ TEST_F(SubstrateProgram, says_what_it_lacks) {
   EXPECT_FALSE(fs::exists(file("u.csv")));
 }
 
+/// Loading them takes longer than many a fit.
+TEST(Programs, load_no_finite_elements_before_they_need_them) {
+  for (const char* program : {"mbtfm-fit", "mbtfm-substrate"}) {
+    const test::Outcome libraries = test::run_program(program, "LD_TRACE_LOADED_OBJECTS=1 ");
+    EXPECT_NE(libraries.output.find("libc.so"), std::string::npos) << libraries.output;
+    EXPECT_EQ(libraries.output.find("deal.ii"), std::string::npos) << libraries.output;
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm
