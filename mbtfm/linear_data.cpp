@@ -6,7 +6,24 @@
 
 #include "pipeline/contract/errors.h"
 
+extern "C" void dsyrk_(const char* triangle, const char* transpose, const int* n, const int* k, const double* alpha,
+                       const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+
 namespace mbtfm::inverse {
+
+namespace {
+
+/// The lower triangle of Aᵀ A. By BLAS, which is several times quicker here than Eigen without AVX: with ten thousand
+/// beads this product is a quarter of a quick fit.
+Eigen::MatrixXd lower_gram(const Eigen::MatrixXd& A) {
+  const auto n = static_cast<int>(A.cols()), k = static_cast<int>(A.rows());
+  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(n, n);
+  const double one = 1, zero = 0;
+  if (n > 0 && k > 0) dsyrk_("L", "T", &n, &k, &one, A.data(), &k, &zero, gram.data(), &n);
+  return gram;
+}
+
+}  // namespace
 
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used) {
@@ -36,8 +53,7 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   // A = (W G)ᵀ W G = V Λ Vᵀ; then C = Λ^½ Vᵀ and y = Λ^−½ Vᵀ (W G)ᵀ W u. Directions that no bead feels drop out.
   const Eigen::MatrixXd weighted = weight.asDiagonal() * data.compliance_um_per_nN;
   const Eigen::VectorXd weighted_u = weight.cwiseProduct(data.displacement_um);
-  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(weighted.cols(), weighted.cols());
-  normal.selfadjointView<Eigen::Lower>().rankUpdate(weighted.transpose());
+  const Eigen::MatrixXd normal = lower_gram(weighted);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
   const double smallest = 1e-13 * eigen.eigenvalues().maxCoeff();  // rounding of the normal matrix
   Eigen::Index n_felt = 0;
