@@ -100,4 +100,31 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
 }
 
+Image binned(Image image, int binning) {
+  MBTFM_ASSERT(binning >= 1);
+  if (binning == 1) return image;
+  Image result{.width = image.width / binning,
+               .height = image.height / binning,
+               .pixels = {},
+               .pixel_size_um = image.pixel_size_um,
+               .full_scale = image.full_scale};
+  if (result.width == 0 || result.height == 0) {
+    throw InvalidData("binning", "blocks that fit into the image",
+                      std::to_string(binning) + " x " + std::to_string(binning) + " pixels of " +
+                          std::to_string(image.width) + " x " + std::to_string(image.height));
+  }
+  if (result.pixel_size_um) *result.pixel_size_um *= binning;
+  result.pixels.reserve(static_cast<std::size_t>(result.width) * result.height);
+  for (int row = 0; row < result.height; ++row) {
+    for (int column = 0; column < result.width; ++column) {
+      double sum = 0;
+      for (int j = 0; j < binning; ++j) {
+        for (int i = 0; i < binning; ++i) sum += image.at(column * binning + i, row * binning + j);
+      }
+      result.pixels.push_back(static_cast<float>(sum / (binning * binning)));
+    }
+  }
+  return result;
+}
+
 }  // namespace mbtfm::segment

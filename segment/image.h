@@ -45,6 +45,18 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = 
 /// A page, from 0, as it lies in the file.
 inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
 
+/// The means of blocks of `binning` x `binning` pixels, and the calibration with them; what fills no block at the right
+/// and at the bottom is left out.
+/// @throws InvalidData where not a single block fits
+Image binned(Image image, int binning);
+
+// Of a side in one: beyond it no bead and no adhesion is left.
+inline constexpr int kLargestBinning = 16;
+/// The means of blocks of `binning` x `binning` pixels, with the calibration that follows; what fills no block at the
+/// right and at the bottom is left out.
+/// @throws InvalidData where not a single block fits
+Image binned(Image image, int binning);
+
 /// 16-bit TIFF, deflate, with ImageJ's calibration. Values are rounded and clamped to 0 … 65535.
 /// @throws OutputError
 void write_tiff(const std::filesystem::path& file, const Image& image);

@@ -113,6 +113,20 @@ Polygon joined(const std::vector<Polygon>& paths) {
 
 }  // namespace
 
+Roi binned(Roi roi, int binning) {
+  const double scale = 1.0 / binning, origin = is_line(roi.shape) ? 0.5 : 0;  // see the top of roi.h
+  const auto shrink = [&](std::vector<Vec2>& points) {
+    for (Vec2& p : points) p = scale * (p + Vec2{origin, origin}) - Vec2{origin, origin};
+  };
+  shrink(roi.points_px);
+  for (Polygon& path : roi.paths_px) shrink(path);
+  roi.corner_px = scale * roi.corner_px;
+  roi.size_px = scale * roi.size_px;
+  roi.corner_diameter_px *= scale;
+  roi.stroke_width_px *= scale;
+  return roi;
+}
+
 Polyline line_px(const Roi& roi) {
   MBTFM_ASSERT(is_line(roi.shape));
   Polyline line = roi.is_spline ? spline_through(roi.points_px, false) : roi.points_px;

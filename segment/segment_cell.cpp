@@ -14,6 +14,8 @@ void declare(ParameterList& list, SegmentParameters& p) {
   list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("segment");
+  list.add("binning", p.binning, Range::between(1, kLargestBinning),
+           "the images are reduced first: means of blocks of so many pixels a side");
   list.add(
       "cell", p.cell, {.low = 0},
       "which cell of the image, by area from 1, the largest; 0: all, each in a folder cell_1, cell_2, … of its own");

@@ -16,6 +16,7 @@ namespace mbtfm::segment {
 
 struct SegmentParameters {
   std::optional<double> pixel_size_um;  ///< no default: it scales every force; the image's own calibration if unset
+  int binning = 1;                      ///< to be quick: everything that is found becomes coarser with the pixels
   int cell = 1;                         ///< most images are of one cell
   PlaneChoice adhesion_plane, actin_plane;
   std::string contact_sheet;  ///< none: it takes a segmentation for each of its pictures

@@ -12,16 +12,19 @@ namespace mbtfm::segment {
 
 namespace {
 
-std::optional<Channel> channel(StageContext& context, const std::string& argument, const PlaneChoice& plane) {
+std::optional<Channel> channel(StageContext& context, const std::string& argument, const PlaneChoice& plane,
+                               int binning) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return Channel{file.string(), read_image(file, plane)};
+  return Channel{file.string(), binned(read_image(file, plane), binning)};
 }
 
-std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument) {
+std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument, int binning) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return RoiSet{file.string(), read_rois(file)};
+  RoiSet set{file.string(), read_rois(file)};
+  for (Roi& roi : set.rois) roi = binned(std::move(roi), binning);
+  return set;
 }
 
 StageReport report_of(const Segmentation& s) {
@@ -78,7 +81,7 @@ StageReport report_of(const std::vector<Segmentation>& cells) {
 }
 
 void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay,
-                const Ground& ground) {
+                const Ground& ground, int binning) {
   const auto out = [&](const char* file) { return context.output("out", folder + file); };
   write_adhesions(out("adhesions.csv"), s.cell.adhesions);
   write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
@@ -89,7 +92,7 @@ void write_cell(StageContext& context, const std::string& folder, const Segmenta
   CsvText place({"x_um", "y_um", "width_um", "height_um"});
   place.add(ground.low_um.x).add(ground.low_um.y).add(ground.size_um.x).add(ground.size_um.y).end_row();
   write_text(out("images.csv"), place.str());
-  write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um));
+  write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um / binning));  // they lie on the image as it is
 }
 
 void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
@@ -102,17 +105,20 @@ void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
   }
 }
 
-StageReport run(const SegmentParameters& parameters, StageContext& context) {
+StageReport run(const SegmentParameters& given, StageContext& context) {
   cv::setNumThreads(context.threads);
-  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_plane);
-  const auto actin = channel(context, "actin-image", parameters.actin_plane);
-  const HandDrawn drawn{roi_set(context, "outline-roi"), roi_set(context, "adhesion-rois"),
-                        roi_set(context, "fibre-rois")};
+  SegmentParameters parameters = given;
+  const int binning = parameters.binning;
+  if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
+  const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_plane, binning);
+  const auto actin = channel(context, "actin-image", parameters.actin_plane, binning);
+  const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
+                        roi_set(context, "fibre-rois", binning)};
   const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
     write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]),
-               draw_ground(adhesion, actin, cells[i]));
+               draw_ground(adhesion, actin, cells[i]), binning);
   }
   if (!parameters.contact_sheet.empty())
     write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));

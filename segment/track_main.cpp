@@ -160,8 +160,8 @@ struct TrackedFrame {
 };
 
 TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
-                     const TrackParameters& parameters, const Progress& progress) {
-  const Channel stressed{frame.name(), read_image(frame.file, frame.plane)};
+                     const TrackParameters& parameters, int binning, const Progress& progress) {
+  const Channel stressed{frame.name(), binned(read_image(frame.file, frame.plane), binning)};
   require_equal_sizes(relaxed, stressed);
   const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
   if (stressed.image.pixels == relaxed.image.pixels) {
@@ -232,14 +232,15 @@ StageReport track_series(const std::vector<Frame>& frames, StageContext& context
   return report;
 }
 
-StageReport track(const TrackParameters& parameters, StageContext& context) {
+StageReport track(TrackParameters parameters, int binning, StageContext& context) {
+  if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
   const std::vector<Frame> frames = frames_of(context, parameters);
   const fs::path relaxed_file = context.input("relaxed");
-  const Channel relaxed{relaxed_file.string(), read_image(relaxed_file, parameters.relaxed_plane)};
+  const Channel relaxed{relaxed_file.string(), binned(read_image(relaxed_file, parameters.relaxed_plane), binning)};
   const RelaxedBeads beads =
       with_names(relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads); });
   const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
-    return tracked(relaxed, beads, frame, parameters, progress);
+    return tracked(relaxed, beads, frame, parameters, binning, progress);
   };
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
@@ -249,11 +250,15 @@ StageReport track(const TrackParameters& parameters, StageContext& context) {
 
 struct TrackStageParameters {
   TrackParameters track;
+  int binning = 1;  ///< to be quick: beads closer than a few pixels of the reduced images are lost
   EffectSwitches effects;
 };
 
 void declare(ParameterList& list, TrackStageParameters& p) {
   declare(list, p.track);
+  list.table("track");
+  list.add("binning", p.binning, Range::between(1, kLargestBinning),
+           "the images are reduced first: means of blocks of so many pixels a side");
   declare(list, p.effects, {"drift_rotation", "effect_tolerance"});
 }
 
@@ -290,7 +295,7 @@ StageReport run(const TrackStageParameters& given, StageContext& context) {
       throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
     }
   }
-  return track(parameters, context);
+  return track(parameters, given.binning, context);
 }
 
 }  // namespace

@@ -55,6 +55,28 @@ class Segment : public testing::Test {
   }
 };
 
+/// 0.2 um pixels still show what is 0.5 um wide; where it lies does not depend on the pixels.
+TEST_F(Segment, binned_images_show_the_same_cell_at_the_same_place) {
+  ASSERT_EQ(segment("whole", both()).code, 0);
+  const test::Outcome binned = segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi"));
+  EXPECT_EQ(binned.code, 3) << binned.output;  // there is none yet
+  const std::vector<Roi> rois = segment::read_rois(folder_ / "whole/RoiSet.zip");
+  write_text(folder_ / "outline.roi", segment::encode_roi(rois.front()));
+  ASSERT_EQ(segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi")).code, 0);
+  const Cell fine = read_cell(folder_ / "whole"), coarse = read_cell(folder_ / "binned");
+  const double step_um = scene_.kPixel_um;  // the outline's corners are stored in pixels, with fractions
+  ASSERT_EQ(coarse.outline_um.size(), fine.outline_um.size());
+  for (std::size_t i = 0; i < fine.outline_um.size(); ++i)
+    EXPECT_LT(norm(coarse.outline_um[i] - fine.outline_um[i]), 0.01 * step_um);
+  int n_there = 0;
+  for (const Adhesion& a : fine.adhesions) {
+    for (const Adhesion& b : coarse.adhesions) n_there += norm(a.position_um - b.position_um) < step_um;
+  }
+  EXPECT_GE(n_there, 0.9 * static_cast<double>(fine.adhesions.size()));
+  const std::vector<Roi> again = segment::read_rois(folder_ / "binned/RoiSet.zip");
+  EXPECT_LT(norm(again.front().points_px[0] - rois.front().points_px[0]), 0.01);
+}
+
 TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
   const std::string ome =
       "<OME><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='2' SizeT='1' PhysicalSizeX='100' "

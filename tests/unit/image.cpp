@@ -46,6 +46,18 @@ TEST(Image, a_written_tiff_comes_back_with_its_calibration) {
   EXPECT_FALSE(read_image(folder / "b.tif").pixel_size_um);
 }
 
+TEST(Image, binned_ones_hold_the_means_of_whole_blocks_and_keep_their_scale) {
+  Image image = ramp(7, 5);
+  image.pixel_size_um = 0.1;
+  const Image half = binned(image, 2);
+  EXPECT_EQ(half.width, 3);
+  EXPECT_EQ(half.height, 2);
+  EXPECT_DOUBLE_EQ(*half.pixel_size_um, 0.2);
+  EXPECT_FLOAT_EQ(half.at(2, 1), (image.at(4, 2) + image.at(5, 2) + image.at(4, 3) + image.at(5, 3)) / 4);
+  EXPECT_EQ(binned(image, 1).pixels, image.pixels);
+  EXPECT_THROW(binned(image, 6), InvalidData);
+}
+
 TEST(Image, values_outside_16_bits_are_clamped_and_fractions_rounded) {
   const TemporaryFolder folder;
   Image image{.width = 4, .height = 1, .pixels = {-3.0f, 1.5f, 70000.0f, 2.4f}, .pixel_size_um = {}, .full_scale = 0};

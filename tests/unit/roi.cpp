@@ -83,6 +83,17 @@ TEST(Roi, lines_count_from_pixel_centres_and_areas_from_their_corners) {
   expect_equal(line_px(roi), {{10.5, 20.5}, {30.5, 20.5}, {30.5, 40.5}}, 0);
 }
 
+TEST(Roi, lies_at_the_same_place_on_a_binned_image) {
+  Roi roi = polygon("", {{10, 20}, {30, 20}, {30, 44}});
+  const Polygon area = area_px(roi), reduced = area_px(binned(roi, 4));
+  roi.shape = RoiShape::polyline;
+  const Polyline line = line_px(roi), reduced_line = line_px(binned(roi, 4));
+  for (std::size_t i = 0; i < 3; ++i) {
+    EXPECT_EQ(4 * reduced[i], area[i]);
+    EXPECT_EQ(4 * reduced_line[i], line[i]);
+  }
+}
+
 TEST(Roi, round_areas_are_those_of_their_formulas) {
   Roi roi;
   roi.shape = RoiShape::oval;
