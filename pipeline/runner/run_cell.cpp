@@ -248,15 +248,13 @@ void CellRun::run_chains(CellOutcome& outcome) {
     return std::any_of(chain.begin(), chain.end(), [&](int i) { return is_asked(all[i], options_.only); });
   };
   const int workers = is_wanted(chains[0]) && is_wanted(chains[1]) ? std::min(options_.threads, 2) : 1;
-  const auto threads_of = [&](int chain) {
-    return workers == 1 ? options_.threads
-                        : (chain == 0 ? options_.threads - options_.threads / 2 : options_.threads / 2);
-  };
+  // Two at least: one chain ends before the other, which then has the processors to itself.
+  const int threads = workers == 1 ? options_.threads : std::max(2, options_.threads / 2);
   // A chain that fails does not stop the other: what is done does not depend on the number of threads.
   std::vector<std::exception_ptr> errors(chains.size());
   parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
     try {
-      for (const int i : chains[chain]) bring_up_to_date(all[i], threads_of(chain), outcome.stages[i]);
+      for (const int i : chains[chain]) bring_up_to_date(all[i], threads, outcome.stages[i]);
     } catch (...) {
       errors[chain] = std::current_exception();
     }
