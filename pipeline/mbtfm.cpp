@@ -7,6 +7,7 @@
 #include <cstdlib>
 #include <map>
 #include <optional>
+#include <utility>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
@@ -39,6 +40,7 @@ struct CommandLine {
   int jobs = 1;
   bool is_quiet = false, only_list = false, only_table = false, is_checked = false, explain = false;
   std::vector<std::string> only, redo, patterns;
+  std::vector<fs::path> more_cells;
   fs::path template_toml, out, inputs;
   std::optional<double> timeout_s;
   std::optional<std::uint64_t> memory_bytes;
@@ -72,21 +74,28 @@ runner::RunOptions run_options(const CommandLine& line) {
           .finish = nullptr};
 }
 
+/// Presets are tried without a report; the last of them is then found up to date, and told of with what it reached.
 runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
   const double wanted = cost::parse_accuracy(line.accuracy);
+  const std::function<void()> write_report = std::exchange(options.finish, nullptr);
   if (!line.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
-  runner::CellOutcome outcome;
   const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
     options.preset = preset;
     options.beneath = cost::preset_named(preset).settings;
-    outcome = runner::run_cell(line.folder, options);
+    runner::run_cell(line.folder, options);
+    options.redo.clear();  // once is enough, whatever preset comes next
     const std::optional<ErrorBudget> budget = read_fit_summary(line.folder / "4_fit/fit.json").error_budget;
     if (budget) return *budget;
     throw InputError((line.folder / "4_fit/fit.json").string(), "an error budget", "none", "run with --redo fit");
   });
-  cost::record_accuracy(line.folder, wanted, reached);
+  options.say = nullptr;
+  options.explain = false;
+  options.finish = [&] {
+    cost::record_accuracy(line.folder, wanted, reached);
+    write_report();
+  };
   say(reached.verdict);
-  return outcome;
+  return runner::run_cell(line.folder, options);
 }
 
 int run(const CommandLine& line) {
@@ -188,15 +197,23 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
 }
 
 int cost_study(const CommandLine& line) {
-  const cost::Study study =
-      cost::measure(line.folder, {.stage_folder = line.stage_folder,
-                                  .threads = line.threads,
-                                  .budget_s = 60 * line.budget_min,
-                                  .repeats = line.repeats,
-                                  .extent = line.is_whole ? cost::Extent::whole : cost::Extent::quick,
-                                  .say = line.is_quiet ? nullptr : say});
-  const fs::path folder = line.folder / "cost";
-  cost::write_study(folder, study, fs::weakly_canonical(line.folder).filename().string());
+  if (!line.more_cells.empty() && line.out.empty())
+    throw UsageError("--out: is needed for the study of several cells: a folder of its own");
+  std::vector<fs::path> cells = line.more_cells;
+  cells.insert(cells.begin(), line.folder);
+  std::vector<cost::Study> studies;
+  std::string names;
+  for (const fs::path& cell : cells) {
+    names += (names.empty() ? "" : ", ") + fs::weakly_canonical(cell).filename().string();
+    studies.push_back(cost::measure(cell, {.stage_folder = line.stage_folder,
+                                           .threads = line.threads,
+                                           .budget_s = 60 * line.budget_min / static_cast<double>(cells.size()),
+                                           .repeats = line.repeats,
+                                           .extent = line.is_whole ? cost::Extent::whole : cost::Extent::quick,
+                                           .say = line.is_quiet ? nullptr : say}));
+  }
+  const fs::path folder = line.out.empty() ? line.folder / "cost" : line.out;
+  cost::write_study(folder, cost::combined(studies), names);
   if (!line.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
   return kDone;
 }
@@ -273,6 +290,8 @@ int start(int argc, char** argv) {
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
   CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", "CELL");
+  cost_command->add_option("MORE", line.more_cells, "further cells, over all of which the errors are taken");
+  cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
   cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
       ->check(CLI::PositiveNumber)
       ->capture_default_str();

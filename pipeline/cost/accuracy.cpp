@@ -24,8 +24,10 @@ std::string verdict_of(double wanted, const AccuracyOutcome& outcome) {
       fmt::format("tensions to {} (preset {}), {} asked for", percent(e.total), outcome.preset, percent(wanted));
   if (outcome.is_met) return text;
   if (e.unavoidable > wanted) {
-    return text + ": no computing reaches that, as bead noise, segmentation and the model's misfit alone make " +
-           percent(e.unavoidable);
+    return text + fmt::format(
+                      ": no computing reaches that, as by the error budget the beads' noise alone makes {}, the "
+                      "segmentation {} and the model's misfit {}, together {}",
+                      percent(e.beads), percent(e.segmentation), percent(e.model), percent(e.unavoidable));
   }
   return text + ": the mesh and the gel stand in the way; finer ones than those of the presets may reach it";
 }
@@ -33,19 +35,24 @@ std::string verdict_of(double wanted, const AccuracyOutcome& outcome) {
 }  // namespace
 
 RelativeError relative_error(const ErrorBudget& budget) {
-  double tensions = 0, all = 0, unavoidable = 0;
+  double tensions = 0, all = 0, beads = 0, segmentation = 0, model = 0;
   RelativeError error;
   for (const TensionError& t : budget.tensions) {
     if (t.fibre_id == 0) continue;
     const ErrorParts& p = t.parts_nN;
     tensions += t.tension_nN * t.tension_nN;
     all += std::pow(total(p), 2);
-    unavoidable += p.beads * p.beads + p.segmentation * p.segmentation + p.model * p.model;
+    beads += p.beads * p.beads;
+    segmentation += p.segmentation * p.segmentation;
+    model += p.model * p.model;
     error.is_complete = error.is_complete && p.mesh.has_value();
   }
   if (tensions <= 0) throw InvalidData("tensions", "a fibre that pulls, to tell a relative error of", "none");
   error.total = std::sqrt(all / tensions);
-  error.unavoidable = std::sqrt(unavoidable / tensions);
+  error.beads = std::sqrt(beads / tensions);
+  error.segmentation = std::sqrt(segmentation / tensions);
+  error.model = std::sqrt(model / tensions);
+  error.unavoidable = std::hypot(error.beads, error.segmentation, error.model);
   return error;
 }
 
@@ -79,9 +86,16 @@ AccuracyOutcome reach_accuracy(double wanted, const std::function<ErrorBudget(co
 void record_accuracy(const std::filesystem::path& cell, double wanted, const AccuracyOutcome& outcome) {
   const std::filesystem::path file = cell / "run.json";
   auto run = nlohmann::ordered_json::parse(read_text(file));
-  run["accuracy"] = {
-      {"wanted", wanted},      {"reached", outcome.reached.total}, {"unavoidable", outcome.reached.unavoidable},
-      {"met", outcome.is_met}, {"preset", outcome.preset},         {"verdict", outcome.verdict}};
+  const RelativeError& e = outcome.reached;
+  run["accuracy"] = {{"wanted", wanted},
+                     {"reached", e.total},
+                     {"unavoidable", e.unavoidable},
+                     {"beads", e.beads},
+                     {"segmentation", e.segmentation},
+                     {"model", e.model},
+                     {"met", outcome.is_met},
+                     {"preset", outcome.preset},
+                     {"verdict", outcome.verdict}};
   write_whole(file, run.dump(1) + "\n");
 }
 

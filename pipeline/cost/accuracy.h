@@ -13,7 +13,8 @@ namespace mbtfm::cost {
 /// Root mean squares over a cell's fibres, relative to that of their tensions.
 struct RelativeError {
   double total = 0;
-  double unavoidable = 0;   ///< beads, segmentation, misfit of the model: no amount of computing lowers it
+  double beads = 0, segmentation = 0, model = 0;
+  double unavoidable = 0;   ///< these three together: no amount of computing lowers it
   bool is_complete = true;  ///< one mesh tells nothing of the mesh's part
 };
 /// @throws InvalidData where no fibre pulls

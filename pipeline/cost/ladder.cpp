@@ -1,5 +1,6 @@
 #include "pipeline/cost/ladder.h"
 
+#include <algorithm>
 #include <map>
 
 #include "pipeline/contract/csv.h"
@@ -39,13 +40,24 @@ void add_slow(std::vector<Rung>& rungs) {
 
 }  // namespace
 
+bool needs_images(const Rung& rung) {
+  return std::any_of(rung.settings.begin(), rung.settings.end(), [](const runner::Setting& setting) {
+    return setting.table == "segment" || setting.table == "track";
+  });
+}
+
 std::vector<Rung> ladder(Extent extent) {
   // The costly ones come last: where time runs out, they are what lacks.
-  std::vector<Rung> rungs = {{.knob = "as it is", .value = ""}};
+  std::vector<Rung> rungs = {{.knob = kAsItIs, .value = ""}};
   const auto add_preset = [&](const char* name) {
     rungs.push_back({.knob = "preset", .value = name, .settings = preset_named(name).settings});
   };
   add_preset("fast");
+  for (const char* binning : {"4", "3", "2"}) {
+    rungs.push_back({.knob = "image_scale",
+                     .value = std::string("1/") + binning,
+                     .settings = {{"segment", "binning", binning}, {"track", "binning", binning}}});
+  }
   add(rungs, "fit", "n_meshes", {"1", "2", "4"});
   add(rungs, "network", "edge_length_um", {"3", "2"});
   add(rungs, "substrate", "model", {"half-space", "layer", "split"});
@@ -59,7 +71,9 @@ std::vector<Rung> ladder(Extent extent) {
   add(rungs, "fit", "model_error", {"none"});
   add(rungs, "effects", "robust_loss", {"on", "off"});
   add(rungs, "effects", "cable_elasticity", {"off"});
-  add(rungs, "substrate", "cells_per_thickness", {"1", "3"});
+  const std::vector<runner::Setting> split = {{"substrate", "model", "split"}};
+  add(rungs, "substrate", "cells_per_thickness", {"1", "3"}, split);
+  add(rungs, "substrate", "margin_thicknesses", {"2", "8"}, split);
   rungs.push_back({.knob = "threads", .value = "1", .threads = 1});
   add(rungs, "network", "edge_length_um", {"1.2", "1"});
   add(rungs, "fit", "n_meshes", {"16", "32"});
@@ -74,11 +88,13 @@ std::string group_of(const std::string& knob) {
                                                             {"cells_per_thickness", "gel"},
                                                             {"elements_across_adhesion", "gel"},
                                                             {"element", "gel"},
+                                                            {"margin_thicknesses", "gel"},
                                                             {"surface_lines", "gel"},
                                                             {"n_meshes", "network and meshes"},
                                                             {"edge_length_um", "network and meshes"},
                                                             {"model_error", "network and meshes"},
                                                             {"beads", "data, presets, threads"},
+                                                            {"image_scale", "data, presets, threads"},
                                                             {"robust_loss", "data, presets, threads"},
                                                             {"preset", "data, presets, threads"},
                                                             {"threads", "data, presets, threads"},

@@ -17,12 +17,17 @@ struct Rung {
   std::optional<int> threads = {};  ///< or as many as the study has
 };
 
+/// Whether it needs the cell's images: it turns a knob of segmentation or tracking.
+bool needs_images(const Rung& rung);
+
 enum class Extent { quick, whole };  ///< whole: those that take minutes, too
+
+inline constexpr const char* kAsItIs = "as it is";
 
 /// The cell as it is comes first, then knob by knob, rungs from coarse to fine.
 std::vector<Rung> ladder(Extent extent);
 
-/// The group of knobs that are drawn together: "gel", "network and meshes", "solver", "data".
+/// The group of knobs that are drawn together: "gel", "network and meshes", "equilibrium and fit", or the rest.
 std::string group_of(const std::string& knob);
 
 }  // namespace mbtfm::cost

@@ -10,7 +10,9 @@
 #include "pipeline/contract/files.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/report/compare.h"
+#include "pipeline/report/match_fibres.h"
 #include "pipeline/runner/process.h"
+#include "pipeline/runner/run_cell.h"
 
 namespace mbtfm::cost {
 namespace fs = std::filesystem;
@@ -22,21 +24,43 @@ double median(std::vector<double> values) {
   return n == 0 ? 0 : 0.5 * (values[(n - 1) / 2] + values[n / 2]);
 }
 
-/// What one run found and took.
+/// What one run took, and how it ended.
 struct Run {
   double seconds = 0, cpu_seconds = 0, peak_memory_MB = 0;
   std::string failure;
+
+  void add(const Run& other) {
+    seconds += other.seconds;
+    cpu_seconds += other.cpu_seconds;
+    peak_memory_MB = std::max(peak_memory_MB, other.peak_memory_MB);
+    failure = other.failure;
+  }
 };
 
 struct Answer {
+  std::vector<Fibre> fibres;
   std::map<int, double> tensions_nN;  ///< of the fibres
   double total_force_nN = 0;
 };
 
-/// A folder that looks like the cell, whose network and fit are made anew by each rung.
+bool is_from_images(const runner::Stage& stage) { return !stage.images.empty(); }
+
+/// All that segmentation and tracking read is there.
+bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
+  for (const runner::Stage& stage : runner::stages()) {
+    for (const runner::ImageInput& image : images_of(stage, names)) {
+      if (runner::match_image(cell, runner::name_of_image(names, image.key)).files.size() != 1) return false;
+    }
+  }
+  return true;
+}
+
+/// A folder that looks like the cell, whose stages are run anew by each rung.
 class Scratch {
  public:
-  Scratch(const fs::path& cell, const StudyOptions& options) : options_(options), folder_(cell / "cost/scratch") {
+  Scratch(const fs::path& cell, const StudyOptions& options)
+      : options_(options), cell_(cell), folder_(cell / "cost/scratch"), images_(runner::read_image_names(cell)) {
+    has_images_ = has_all_images(cell, images_);
     for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
       if (fs::is_regular_file(cell / file)) continue;
       throw InputError((cell / file).string(), "a cell whose images were segmented and tracked", "none",
@@ -44,11 +68,9 @@ class Scratch {
     }
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    for (const char* part : {"1_segment", "2_track", "truth"}) {
-      if (fs::is_directory(cell / part)) fs::copy(cell / part, folder_ / part, fs::copy_options::recursive);
-    }
     fs::copy(cell / "cell.toml", folder_ / "cell.toml");
-    beads_ = read_displacement(folder_ / "2_track/displacement.csv");
+    if (fs::is_directory(cell / "truth")) fs::copy(cell / "truth", folder_ / "truth", fs::copy_options::recursive);
+    take_from_cell();
   }
   ~Scratch() {
     std::error_code ignored;
@@ -58,24 +80,25 @@ class Scratch {
   Scratch& operator=(const Scratch&) = delete;
 
   const fs::path& folder() const { return folder_; }
+  bool has_images() const { return has_images_; }
 
-  Run run(const Rung& rung) const {
-    write_beads(rung.bead_share);
-    Run run;
-    for (const runner::Stage& stage : runner::stages()) {
-      if (!run.failure.empty() || (stage.name != "network" && stage.name != "fit")) continue;
-      const runner::ProcessResult result = runner::run_process(command_of(stage, rung), {}, [](std::string_view) {});
-      run.seconds += result.seconds;
-      run.cpu_seconds += result.cpu_seconds;
-      run.peak_memory_MB = std::max(run.peak_memory_MB, result.peak_memory_MB);
-      const bool is_answer = !result.signal && (result.exit_code == 0 || result.exit_code == exit_code::kNotSolved);
-      if (!is_answer) run.failure = stage.name + ": " + runner::how_it_ended(result);
+  /// Segmentation and tracking run where they are not as the cell has them; else what they took of late counts.
+  Run run(const Rung& rung) {
+    const bool is_own = !has_images_ || !needs_images(rung), is_timed = rung.knob == kAsItIs;
+    Run run = of_images_;
+    if (has_images_ && (!is_own || is_timed || rung.threads)) run = run_stages(rung, true);
+    if (is_timed) of_images_ = run;
+    if (run.failure.empty()) {
+      if (is_own) take_from_cell();  // it may have files that were mended by hand
+      take_share_of_beads(rung.bead_share);
+      run.add(run_stages(rung, false));
     }
     return run;
   }
 
   Answer answer() const {
     Answer answer;
+    answer.fibres = read_cell(folder_ / "1_segment").fibres;
     for (const Tension& t : read_tensions(folder_ / "4_fit/tensions.csv")) {
       if (t.fibre_id != 0) answer.tensions_nN[t.fibre_id] = t.tension_nN;
     }
@@ -84,17 +107,40 @@ class Scratch {
   }
 
  private:
+  void take_from_cell() const {
+    for (const char* part : {"1_segment", "2_track"}) {
+      fs::remove_all(folder_ / part);
+      fs::copy(cell_ / part, folder_ / part, fs::copy_options::recursive);
+    }
+  }
+
   /// Every so-manieth bead, so that they stay evenly spread in whatever order they come.
-  void write_beads(double share) const {
+  void take_share_of_beads(double share) const {
+    if (share >= 1) return;
+    const fs::path file = folder_ / "2_track/displacement.csv";
     DisplacementField some;
     double sum = 0;
-    for (const Bead& bead : beads_) {
+    for (const Bead& bead : read_displacement(file)) {
       sum += share;
       if (sum < 1) continue;
       sum -= 1;
       some.push_back(bead);
     }
-    write_displacement(folder_ / "2_track/displacement.csv", some);
+    write_displacement(file, some);
+  }
+
+  Run run_stages(const Rung& rung, bool from_images) const {
+    Run run;
+    for (const runner::Stage& stage : runner::stages()) {
+      if (!run.failure.empty() || is_from_images(stage) != from_images) continue;
+      const runner::ProcessResult result = runner::run_process(command_of(stage, rung), {}, [](std::string_view) {});
+      const bool is_answer = !result.signal && (result.exit_code == 0 || result.exit_code == exit_code::kNotSolved);
+      run.add({.seconds = result.seconds,
+               .cpu_seconds = result.cpu_seconds,
+               .peak_memory_MB = result.peak_memory_MB,
+               .failure = is_answer ? "" : stage.name + ": " + runner::how_it_ended(result)});
+    }
+    return run;
   }
 
   std::vector<std::string> command_of(const runner::Stage& stage, const Rung& rung) const {
@@ -103,6 +149,11 @@ class Scratch {
       command.push_back("--" + flag);
       command.push_back(value);
     };
+    for (const runner::ImageInput& image : images_of(stage, images_))
+      add(image.flag, resolve_image(cell_, images_, image.key).string());
+    for (const runner::ImageInput& image : stage.optional_images) {
+      if (const auto file = resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
+    }
     for (const runner::PathArgument& argument : stage.arguments) {
       if (argument.where.empty()) add(argument.flag, (folder_ / argument.path).string());  // else: of a time series
     }
@@ -115,8 +166,10 @@ class Scratch {
   }
 
   const StudyOptions& options_;
-  fs::path folder_;
-  DisplacementField beads_;
+  fs::path cell_, folder_;
+  runner::ImageNames images_;
+  bool has_images_ = false;
+  Run of_images_;  ///< segmentation and tracking as the cell has them
 };
 
 void compare(Measurement& m, const Answer& answer, const Answer& reference) {
@@ -124,6 +177,7 @@ void compare(Measurement& m, const Answer& answer, const Answer& reference) {
   for (const auto& [id, tension_nN] : answer.tensions_nN) {
     const auto found = reference.tensions_nN.find(id);
     if (found == reference.tensions_nN.end()) continue;
+    ++m.n_fibres;
     error += std::pow(tension_nN - found->second, 2);
     size += std::pow(found->second, 2);
   }
@@ -133,11 +187,9 @@ void compare(Measurement& m, const Answer& answer, const Answer& reference) {
 
 /// The finest that the ladder's knobs allow, all at once, within reason.
 const Rung& finest() {
-  static const Rung rung = {
-      .knob = "reference",
-      .value = "32 meshes of 1 um",
-      .settings = {
-          {"fit", "n_meshes", "32"}, {"network", "edge_length_um", "1"}, {"substrate", "cells_per_thickness", "3"}}};
+  static const Rung rung = {.knob = "reference",
+                            .value = "32 meshes of 1 um",
+                            .settings = {{"fit", "n_meshes", "32"}, {"network", "edge_length_um", "1"}}};
   return rung;
 }
 
@@ -152,6 +204,23 @@ Answer truth_of(const fs::path& cell) {
   return truth;
 }
 
+/// The reference's tensions by the fibres of another segmentation.
+Answer by_fibres_of(const Answer& answer, const Answer& reference) {
+  Answer result{.fibres = answer.fibres, .tensions_nN = {}, .total_force_nN = reference.total_force_nN};
+  for (const report::FibreMatch& match : report::match_fibres(answer.fibres, reference.fibres)) {
+    const int found_id = answer.fibres[static_cast<std::size_t>(match.found_index)].fibre_id;
+    const int id = reference.fibres[static_cast<std::size_t>(match.true_index)].fibre_id;
+    if (reference.tensions_nN.contains(id)) result.tensions_nN[found_id] = reference.tensions_nN.at(id);
+  }
+  return result;
+}
+
+double median_of(const std::vector<Run>& runs, double Run::*value) {
+  std::vector<double> values;
+  for (const Run& run : runs) values.push_back(run.*value);
+  return median(std::move(values));
+}
+
 }  // namespace
 
 Study measure(const fs::path& cell, const StudyOptions& options) {
@@ -162,18 +231,20 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
   const auto say = [&](const std::string& text) {
     if (options.say) options.say(text);
   };
-  const Scratch scratch(cell, options);
-  Study study;
-  for (Rung& rung : ladder(options.extent)) study.measurements.push_back({.rung = std::move(rung)});
+  Scratch scratch(cell, options);
+  Study study{.reference = "the truth", .has_images = scratch.has_images(), .measurements = {}};
+  for (Rung& rung : ladder(options.extent)) {
+    if (scratch.has_images() || rung.knob == "preset" || !needs_images(rung))
+      study.measurements.push_back({.rung = std::move(rung)});
+  }
   std::vector<std::vector<Run>> runs(study.measurements.size());
-  std::optional<Answer> reference;
-  study.reference = "the truth";
+  std::optional<Answer> finest_answer;
   if (!report::has_truth(cell)) {
     study.reference = finest().value;
     say("reference: " + study.reference);
     const Run run = scratch.run(finest());
     if (!run.failure.empty()) throw NotSolved({.reason = "the reference failed: " + run.failure});
-    reference = scratch.answer();
+    finest_answer = scratch.answer();
   }
   for (int repeat = 0; repeat < options.repeats; ++repeat) {
     for (std::size_t i = 0; i < runs.size() && !is_over(); ++i) {
@@ -184,8 +255,8 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
       m.failure = run.failure;
       runs[i].push_back(run);
       if (repeat > 0 || !run.failure.empty()) continue;
-      if (!reference) reference = truth_of(scratch.folder());
-      compare(m, scratch.answer(), *reference);
+      const Answer answer = scratch.answer();
+      compare(m, answer, finest_answer ? by_fibres_of(answer, *finest_answer) : truth_of(scratch.folder()));
       const auto budget = read_fit_summary(scratch.folder() / "4_fit/fit.json").error_budget;
       if (budget && m.tension_error > 0) m.stated_error = relative_error(*budget).total;
       say(fmt::format("{} of {}: {} {}: {:.1f} s, error {:.3f}", i + 1, runs.size(), m.rung.knob, m.rung.value,
@@ -193,17 +264,41 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
     }
   }
   for (std::size_t i = 0; i < runs.size(); ++i) {
-    std::vector<double> seconds, cpu, memory;
-    for (const Run& run : runs[i]) {
-      seconds.push_back(run.seconds);
-      cpu.push_back(run.cpu_seconds);
-      memory.push_back(run.peak_memory_MB);
-    }
-    study.measurements[i].seconds = median(seconds);
-    study.measurements[i].cpu_seconds = median(cpu);
-    study.measurements[i].peak_memory_MB = median(memory);
+    study.measurements[i].seconds = median_of(runs[i], &Run::seconds);
+    study.measurements[i].cpu_seconds = median_of(runs[i], &Run::cpu_seconds);
+    study.measurements[i].peak_memory_MB = median_of(runs[i], &Run::peak_memory_MB);
   }
   return study;
+}
+
+Study combined(const std::vector<Study>& studies) {
+  Study all = studies.front();
+  const auto n = static_cast<double>(studies.size());
+  for (std::size_t i = 0; i < all.measurements.size(); ++i) {
+    Measurement& m = all.measurements[i];
+    double tensions = 0, forces = 0, stated = 0;
+    m.seconds = m.cpu_seconds = m.peak_memory_MB = 0;
+    m.n_fibres = 0;
+    for (const Study& study : studies) {
+      const auto same = std::find_if(study.measurements.begin(), study.measurements.end(), [&](const Measurement& o) {
+        return o.rung.knob == m.rung.knob && o.rung.value == m.rung.value;
+      });
+      const Measurement of_cell = same == study.measurements.end() ? Measurement{.rung = m.rung} : *same;
+      m.n_runs = std::min(m.n_runs, of_cell.n_runs);
+      if (m.failure.empty()) m.failure = of_cell.failure;
+      m.n_fibres += of_cell.n_fibres;
+      m.seconds += of_cell.seconds / n;
+      m.cpu_seconds += of_cell.cpu_seconds / n;
+      m.peak_memory_MB = std::max(m.peak_memory_MB, of_cell.peak_memory_MB);
+      tensions += std::pow(of_cell.tension_error, 2) / n;
+      forces += std::pow(of_cell.force_error, 2) / n;
+      stated += std::pow(of_cell.stated_error, 2) / n;
+    }
+    m.tension_error = std::sqrt(tensions);
+    m.force_error = std::sqrt(forces);
+    m.stated_error = std::sqrt(stated);
+  }
+  return all;
 }
 
 }  // namespace mbtfm::cost

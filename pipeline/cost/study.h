@@ -1,4 +1,4 @@
-/// What accuracy costs in time, for one cell: the fit again and again, each time with one knob turned.
+/// What accuracy costs in time: the stages again and again, each time with one knob turned, for one cell or several.
 #pragma once
 
 #include <filesystem>
@@ -23,23 +23,30 @@ struct StudyOptions {
 
 struct Measurement {
   Rung rung;
-  double seconds = 0;      ///< from start to end of network and fit, median of the repeats
+  double seconds = 0;      ///< of all stages, one after the other, median of the repeats
   double cpu_seconds = 0;  ///< of all threads, likewise
   double peak_memory_MB = 0;
   int n_runs = 0;            ///< 0: there was no time for it
   std::string failure = {};  ///< how it ended, where not well
-  double tension_error = 0;  ///< |t − reference| / |reference| over the fibres
+  int n_fibres = 0;          ///< that the reference knows, too
+  double tension_error = 0;  ///< |t − reference| / |reference| over these
   double force_error = 0;    ///< of the total force, relative
   double stated_error = 0;   ///< what the error budget says of the tensions
 };
 
 struct Study {
-  std::string reference;  ///< what errors are against: "the truth", or the finest rung
+  std::string reference;    ///< what errors are against: "the truth", or the finest rung
+  bool has_images = false;  ///< times are those of all stages; else of network and fit, and nothing is segmented anew
   std::vector<Measurement> measurements;
 };
 
-/// Runs network and fit in a scratch folder below CELL/cost; segmentation and displacements are taken as they are.
+/// Runs the stages in a scratch folder below CELL/cost. Of a cell without images, or without all of them, segmentation
+/// and displacements are taken as they are.
 /// @throws InputError where the cell was not run yet
 Study measure(const std::filesystem::path& cell, const StudyOptions& options);
+
+/// The same rungs of several cells as one: root mean squares of the errors, means of the rest. One cell's best rung is
+/// the luckiest, too; over several luck levels out. A rung counts where it was measured in all of them.
+Study combined(const std::vector<Study>& studies);
 
 }  // namespace mbtfm::cost

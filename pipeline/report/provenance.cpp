@@ -65,6 +65,11 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
   try {
     const ordered_json run = ordered_json::parse(read_text(run_file));
     provenance.version = run.at("version");
+    provenance.preset = run.value("preset", "");
+    if (run.contains("accuracy")) {
+      const ordered_json& accuracy = run.at("accuracy");
+      provenance.accuracy = WantedAccuracy{.verdict = accuracy.at("verdict"), .is_met = accuracy.at("met")};
+    }
     for (const auto& [name, stage] : run.at("stages").items()) provenance.stages.push_back(stage_of(name, stage));
     for (const ordered_json& effect : run.at("effects")) {
       provenance.effects.push_back({.name = effect.at("name"),

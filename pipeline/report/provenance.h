@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -22,8 +23,16 @@ struct EffectLine {
   bool is_on = false;
 };
 
+/// What came of a run that was asked for an accuracy.
+struct WantedAccuracy {
+  std::string verdict;
+  bool is_met = false;
+};
+
 struct Provenance {
   std::string version;
+  std::string preset;  ///< empty: none was asked for
+  std::optional<WantedAccuracy> accuracy;
   std::vector<StageLine> stages;
   std::vector<EffectLine> effects;
 };

@@ -34,8 +34,13 @@ std::string findings_section(const CellResults& results, const Provenance& prove
   }
   if (!given.empty())
     by_hand.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
+  std::vector<Finding> findings = findings_of(results, not_converged, by_hand);
+  if (const auto& accuracy = provenance.accuracy) {
+    findings.push_back(
+        {accuracy->is_met ? Level::good : Level::caution, "Verified by the error budget: " + accuracy->verdict + "."});
+  }
   std::string html = "<ul class=\"findings\">\n";
-  for (const Finding& finding : findings_of(results, not_converged, by_hand)) {
+  for (const Finding& finding : findings) {
     static constexpr const char* kClass[] = {"fact", "good", "caution", "bad"};
     static constexpr const char* kMark[] = {"", "<b>✓</b>", "<b>Caution:</b>", "<b>Distrust:</b>"};
     const auto level = static_cast<std::size_t>(finding.level);
@@ -163,6 +168,9 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
                            stage.peak_memory_MB, html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
+  if (!provenance.preset.empty())
+    html += fmt::format("<p class=\"sub\">Preset: {}, where cell.toml says nothing.</p>\n",
+                        html_escaped(provenance.preset));
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
   html += folded("Figures of the fit", figure_pairs(results));
   for (const StageLine& stage : provenance.stages) {
@@ -173,7 +181,8 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
   return section("How it was computed", html);
 }
 
-/// Of the program's version and all that the report shows: the outputs of the stages, the truth and cell.toml.
+/// Of the program's version and all that the report shows: the outputs of the stages, the truth, cell.toml, and which
+/// preset or accuracy was asked for.
 std::string fingerprint(const std::filesystem::path& cell) {
   namespace fs = std::filesystem;
   std::vector<fs::path> files = {cell / "cell.toml"};
@@ -184,7 +193,9 @@ std::string fingerprint(const std::filesystem::path& cell) {
     }
   }
   std::sort(files.begin(), files.end());
-  std::string all = kVersion;
+  const Provenance provenance = read_provenance(cell / "run.json");
+  std::string all =
+      std::string(kVersion) + " " + provenance.preset + " " + (provenance.accuracy ? provenance.accuracy->verdict : "");
   for (const fs::path& file : files) {
     all += "\n" + file.lexically_relative(cell).generic_string() + " " + sha256_of_file(file);
   }

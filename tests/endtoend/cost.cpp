@@ -39,9 +39,13 @@ TEST_F(SmallCell, is_fitted_as_accurately_as_asked_for_or_says_why_not) {
   const Outcome easy = run("run --accuracy 90%");
   EXPECT_EQ(easy.code, 0) << easy.output;
   EXPECT_NE(read_text(cell / "run.json").find("\"met\": true"), std::string::npos) << easy.output;
+  EXPECT_NE(read_text(cell / "report.html").find("Verified by the error budget: tensions to"), std::string::npos);
   const Outcome hopeless = run("run --accuracy 0.0001%");
   EXPECT_EQ(hopeless.code, 0) << hopeless.output;
   EXPECT_NE(hopeless.output.find("no computing reaches that"), std::string::npos) << hopeless.output;
+  EXPECT_NE(read_text(cell / "report.html").find("no computing reaches that"), std::string::npos);
+  ASSERT_EQ(run("run").code, 0);
+  EXPECT_EQ(read_text(cell / "report.html").find("Verified by"), std::string::npos);
   EXPECT_EQ(run("run --accuracy 1% --preset fast").code, 2);
 }
 

@@ -63,6 +63,8 @@ TEST(Accuracy, stops_where_noise_makes_it_unreachable_and_computing_is_in_vain) 
   EXPECT_FALSE(outcome.is_met);
   EXPECT_EQ(tried.size(), 2u);
   EXPECT_NE(outcome.verdict.find("no computing reaches that"), std::string::npos) << outcome.verdict;
+  // 0.5 nN of noise in each of two tensions, of 3 and 4 nN
+  EXPECT_NE(outcome.verdict.find("the beads' noise alone makes 14 %"), std::string::npos) << outcome.verdict;
 }
 
 Measurement measured(double cpu_seconds, double error) {
