@@ -152,7 +152,7 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
     }
     const TensionProblem again(problem.cables(), drawn, problem.adhesion_ids());
     deviations.col(d) =
-        fit_gauss_newton(again, parameters, solution.tensions_nN).trial.tensions_nN - solution.tensions_nN;
+        fit_gauss_newton(again, parameters, solution.tensions_nN, &solution).trial.tensions_nN - solution.tensions_nN;
   });
   return deviations;
 }

@@ -63,7 +63,8 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
                          std::optional<double> fixed_scale) {
   constexpr int kMaxRounds = 20;  // each halves the change at least
   for (int round = 0; round < kMaxRounds; ++round) {
-    const Eigen::VectorXd before = fit.trial.tensions_nN;
+    const Trial last = fit.trial;
+    const Eigen::VectorXd& before = last.tensions_nN;
     const Eigen::VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
     const double scale = fixed_scale ? *fixed_scale : robust_scale(data, residual);
     if (is_exact(data, scale)) break;
@@ -73,7 +74,7 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     reweight(data, linear_weights(loss, residual, J, -before, scale));
     const TensionProblem reweighted(network, data.reduced, adhesion_ids);
     const int n_evaluations = fit.n_evaluations;
-    fit = fit_tensions(reweighted, parameters, threads, before);
+    fit = fit_tensions(reweighted, parameters, threads, before, &last);
     fit.n_evaluations += n_evaluations;
     // a thousandth of the largest tension: a tenth of any error bar there is
     if ((fit.trial.tensions_nN - before).cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;

@@ -38,8 +38,8 @@ void declare(ParameterList& list, FitParameters& p) {
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                        const Eigen::VectorXd& start_nN) {
-  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start_nN);
+                        const Eigen::VectorXd& start_nN, const Trial* nearby) {
+  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start_nN, nearby);
   std::vector<int> all(problem.n_tensions());
   std::iota(all.begin(), all.end(), 0);
   if (parameters.method == "plain-cg") {

@@ -47,13 +47,14 @@ struct TensionFit {
   std::vector<Milestone> history;
 };
 
+/// @param nearby  a trial of the same network, from whose equilibrium the first one is soon found; null: none is known
 /// @throws UsageError for a method it does not know
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                        const Eigen::VectorXd& start_nN);
+                        const Eigen::VectorXd& start_nN, const Trial* nearby = nullptr);
 
 /// Levenberg–Marquardt with the exact Jacobian; each step solves the bounded quadratic problem.
 TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters,
-                            const Eigen::VectorXd& start_nN);
+                            const Eigen::VectorXd& start_nN, const Trial* nearby = nullptr);
 
 /// Non-linear conjugate gradients (Polak–Ribière), projected on t >= 0. `blocks` are taken in turn: so many steps on
 /// those tensions, the others held.

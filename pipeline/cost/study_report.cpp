@@ -19,9 +19,11 @@ bool is_measured(const Measurement& m) { return m.n_runs > 0 && m.failure.empty(
 
 std::string name_of(const Rung& rung) { return rung.value.empty() ? rung.knob : rung.knob + " = " + rung.value; }
 
+std::string stages_of(const Study& study) { return study.has_images ? "all stages" : "network and fit"; }
+
 void write_csv(const fs::path& file, const Study& study) {
   CsvText csv({"knob", "value", "seconds", "cpu_seconds", "peak_memory_MB", "n_runs", "tension_error", "force_error",
-               "stated_tension_error", "is_on_front", "failure"});
+               "stated_tension_error", "n_fibres", "is_on_front", "failure"});
   const std::vector<int> front = front_of(study.measurements);
   for (std::size_t i = 0; i < study.measurements.size(); ++i) {
     const Measurement& m = study.measurements[i];
@@ -29,9 +31,9 @@ void write_csv(const fs::path& file, const Study& study) {
     csv.add(m.rung.knob).add(m.rung.value);
     if (is_measured(m)) {
       csv.add(m.seconds).add(m.cpu_seconds).add(m.peak_memory_MB).add(m.n_runs);
-      csv.add(m.tension_error).add(m.force_error).add(m.stated_error);
+      csv.add(m.tension_error).add(m.force_error).add(m.stated_error).add(m.n_fibres);
     } else {
-      for (int column = 0; column < 7; ++column) csv.add("");
+      for (int column = 0; column < 8; ++column) csv.add("");
     }
     csv.add(is_on_front ? 1 : 0).add(m.n_runs == 0 ? "no time left" : m.failure).end_row();
   }
@@ -83,7 +85,7 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
     errors.push_back(m.tension_error);
   }
   const charts::Axis x =
-      charts::axis_over("processor time of network and fit (s)", seconds, charts::Scale::logarithmic);
+      charts::axis_over("processor time of " + stages_of(study) + " (s)", seconds, charts::Scale::logarithmic);
   const charts::Axis y = charts::axis_over("error of the tensions", errors, charts::Scale::logarithmic);
   std::vector<charts::Chart> list;
   for (const char* group : {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"}) {
@@ -146,21 +148,26 @@ std::string page(const Study& study, const std::string& cell_name) {
   const std::vector<Measurement>& all = study.measurements;
   std::string text = fmt::format("## {}\n\n![error over time](cost.svg)\n\n", cell_name);
   if (!is_measured(all.front())) return text + "The fit with the cell's own settings failed.\n";
-  text += verdict(all) + fmt::format(" They err by {:.3g} against {} and take {:.2g} s of processor.\n\n",
-                                     all.front().tension_error, study.reference, all.front().cpu_seconds);
+  text += verdict(all) +
+          fmt::format(" They err by {:.3g} against {} over {} fibres and take {:.2g} s of processor time of {}.\n\n",
+                      all.front().tension_error, study.reference, all.front().n_fibres, all.front().cpu_seconds,
+                      stages_of(study));
   text += table_of_halving(all) + "\n";
-  text += "| choice | error of tensions | stated | error of total force | processor (s) | passed (s) | memory (MB) |\n";
-  text += "|---|---|---|---|---|---|---|\n";
+  text += "Passed: the stages one after the other, whatever else the machine had to do.\n\n";
+  text +=
+      "| choice | error of tensions | stated | error of total force | fibres | processor (s) | passed (s) | memory "
+      "(MB) |\n";
+  text += "|---|---|---|---|---|---|---|---|\n";
   const std::vector<int> front = front_of(all);
   for (std::size_t i = 0; i < all.size(); ++i) {
     const Measurement& m = all[i];
     if (!is_measured(m)) {
-      text += fmt::format("| {} | {} | | | | | |\n", name_of(m.rung), m.n_runs == 0 ? "no time left" : m.failure);
+      text += fmt::format("| {} | {} | | | | | | |\n", name_of(m.rung), m.n_runs == 0 ? "no time left" : m.failure);
       continue;
     }
     const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(i)) != front.end();
-    text += fmt::format("| {}{} | {:.3g} | {:.3g} | {:.2g} % | {:.2g} | {:.2g} | {:.0f} |\n", name_of(m.rung),
-                        is_on_front ? " (front)" : "", m.tension_error, m.stated_error, 100 * m.force_error,
+    text += fmt::format("| {}{} | {:.3g} | {:.3g} | {:.2g} % | {} | {:.2g} | {:.2g} | {:.0f} |\n", name_of(m.rung),
+                        is_on_front ? " (front)" : "", m.tension_error, m.stated_error, 100 * m.force_error, m.n_fibres,
                         m.cpu_seconds, m.seconds, m.peak_memory_MB);
   }
   return text;
