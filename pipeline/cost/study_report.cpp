@@ -7,11 +7,13 @@
 
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/csv.h"
+#include "pipeline/cost/labels.h"
 
 namespace mbtfm::cost {
 namespace fs = std::filesystem;
 namespace {
 
+constexpr double kFrame_px = 340;  // the height of each: room for the names of the rungs
 // A default is good where no other choice is better by more than this.
 constexpr double kNear = 0.2;
 
@@ -58,17 +60,22 @@ charts::Chart chart_of(const std::string& group, const Study& study, const chart
     const Measurement& m = study.measurements[i];
     if (is_measured(m) && group_of(m.rung.knob) == group) knobs[m.rung.knob].push_back(static_cast<int>(i));
   }
+  chart.frame_height(kFrame_px);
   std::size_t k = 0;
+  std::vector<NamedDot> dots;
+  std::vector<std::string> key;
   for (const auto& [knob, indices] : knobs) {
     const std::string colour = charts::kColours[k++ % std::size(charts::kColours)];
     for (const int i : indices) {
       const Measurement& m = study.measurements[static_cast<std::size_t>(i)];
       chart.dot({m.cpu_seconds, m.tension_error}, 5, "fill:" + colour + ";stroke:#fff",
                 fmt::format("{}: {:.2g} s, error {:.3g}", name_of(m.rung), m.cpu_seconds, m.tension_error));
-      chart.label({m.cpu_seconds, m.tension_error}, m.rung.value);
+      dots.push_back({{m.cpu_seconds, m.tension_error}, m.rung.value});
     }
     chart.key(knob, colour);
+    key.push_back(knob);
   }
+  add_names(chart, x, y, kFrame_px, dots, key);
   const Measurement& own = study.measurements.front();
   if (is_measured(own)) {
     chart.dot({own.cpu_seconds, own.tension_error}, 8, "fill:none;stroke:#000;stroke-width:2.5",
@@ -86,7 +93,7 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
   }
   const charts::Axis x =
       charts::axis_over("processor time of " + stages_of(study) + " (s)", seconds, charts::Scale::logarithmic);
-  const charts::Axis y = charts::axis_over("error of the tensions", errors, charts::Scale::logarithmic);
+  const charts::Axis y = charts::axis_over("error of the tensions, relative", errors, charts::Scale::logarithmic);
   std::vector<charts::Chart> list;
   for (const char* group : {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"}) {
     list.push_back(chart_of(group, study, x, y));
