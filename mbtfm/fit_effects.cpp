@@ -35,8 +35,8 @@ std::optional<Change> with_sides(const Effect& e, const FittedCell& c, int threa
   return change_by_gel(e.name, c, parameters, threads);
 }
 
-/// Forces that displace an even gel as far scale with its modulus: the moduli's own spread bounds the change.
-std::optional<Change> with_grading(const Effect& e, const FittedCell& c) {
+/// Where the effect's number bounds the change of the field, and so of the forces that displace the gel as far.
+std::optional<Change> bounded_by_number(const Effect& e, const FittedCell& c) {
   if (!e.number) return {};
   Change change{e.name, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c.fit.tensions_nN.size()))};
   for (std::size_t i = 0; i < c.fit.tensions_nN.size(); ++i) {
@@ -74,7 +74,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   if (e.name == "stress fibres") return with_fibres(e, c, threads);
   if (e.name == "finite thickness") return with_base(e, c, threads);
   if (e.name == "finite sides") return with_sides(e, c, threads);
-  if (e.name == "depth-graded gel") return with_grading(e, c);
+  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e, c);
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
   if (e.name == "robust loss") return with_loss(e, c);
   if (e.name == kTurnLeft) return with_turn(e, c);
