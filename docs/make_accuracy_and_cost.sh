@@ -105,9 +105,11 @@ PAGE
   preset_rows
   cat <<'PAGE'
 
-`fast` tracks the beads on images of half the scale and fits two meshes, `standard` eight, `high` twenty-four: the mean of more
-meshes is the better network. That part of the error falls; the noise of the beads remains, and so does that the cell is one network
-and not the mean of many. What no computing mends is told by asking for too much, here of the demo cell:
+What each preset sets is in `pipeline/cost/presets.cpp`: `fast` tracks the beads on images of half the scale and fits few, coarse
+meshes, `high` many: the mean of more and finer meshes is the better network. The last column shows that part of the error. The noise
+of the beads remains in the others, and so does in all that the cell is one network and not the mean of many: where noise is the larger
+part, a single cell's error may be smaller with a coarser preset, by luck. What no computing mends is told by asking for too much, here
+of the demo cell:
 
 ```
 $ mbtfm run --accuracy 1% demo

@@ -9,9 +9,10 @@ const std::vector<Preset>& presets() {
   static const std::vector<Preset> list = {
       {"fast",
        "a first look",
-       {{"track", "binning", "2"},         // half the time of tracking; beads that are hard to tell apart are lost
-        {"fit", "n_meshes", "2"},          // the fewest that tell of the mesh at all
-        {"fit", "surface_lines", "40"}}},  // drawing the gel's surface finely takes as long as fitting a mesh
+       {{"track", "binning", "2"},             // half the time of tracking; beads that are hard to tell apart are lost
+        {"network", "edge_length_um", "2.5"},  // a third of the links, and of the time of their equilibrium
+        {"fit", "n_meshes", "2"},              // the fewest that tell of the mesh at all
+        {"fit", "surface_lines", "40"}}},      // drawing the gel's surface finely takes as long as fitting a mesh
       {"standard", "the defaults", {}},
       {"high",
        "for the record",
