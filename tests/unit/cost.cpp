@@ -1,6 +1,9 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
 #include <fstream>
+#include <set>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/cost/accuracy.h"
@@ -85,6 +88,38 @@ TEST(Front, is_what_no_other_choice_beats_in_both) {
   EXPECT_DOUBLE_EQ(distance_to_front(all, 0), 0.25);  // a quarter less time for the same error
   EXPECT_DOUBLE_EQ(distance_to_front(all, 1), 0);
   EXPECT_DOUBLE_EQ(distance_to_front(all, 2), 0.5);
+}
+
+TEST(Study, of_several_cells_has_root_mean_squares_of_errors_and_means_of_times) {
+  Study one{.reference = "the truth", .has_images = false, .measurements = {measured(2, 0.3), measured(1, 0.1)}};
+  one.measurements[1].rung.value = "2";
+  Study other = one;
+  other.measurements[0] = measured(4, 0.4);
+  other.measurements[1].n_runs = 0;  // there was no time for it in this cell
+  const Study both = combined({one, other});
+  EXPECT_NEAR(both.measurements[0].tension_error, std::sqrt((0.09 + 0.16) / 2), 1e-12);
+  EXPECT_DOUBLE_EQ(both.measurements[0].cpu_seconds, 3);
+  EXPECT_EQ(front_of(both.measurements), (std::vector<int>{0}));
+}
+
+TEST(Ladder, turns_every_knob_that_trades_accuracy_for_time) {
+  std::set<std::string> knobs;
+  for (const Rung& rung : ladder(Extent::whole)) knobs.insert(rung.knob);
+  for (const char* knob :
+       {"model", "elements_across_adhesion", "element", "margin_thicknesses", "edge_length_um", "n_meshes", "smoothing",
+        "force_tolerance", "method", "gradients", "tolerance", "beads", "image_scale", "bootstrap", "threads"})
+    EXPECT_TRUE(knobs.contains(knob)) << knob;
+}
+
+/// A rung whose settings no stage has would measure the default once more.
+TEST(Ladder, turns_knobs_that_a_stage_has) {
+  for (const Rung& rung : ladder(Extent::whole)) {
+    for (const runner::Setting& setting : rung.settings) {
+      const bool is_known = std::any_of(runner::stages().begin(), runner::stages().end(),
+                                        [&](const auto& stage) { return !runner::flags_of(stage, {setting}).empty(); });
+      EXPECT_TRUE(is_known) << setting.table << "." << setting.key;
+    }
+  }
 }
 
 TEST(Settings, of_the_cell_win) {
