@@ -213,7 +213,9 @@ RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& paramete
   require_numbers(relaxed, "relaxed");
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
   const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
-  side_ = std::make_shared<const Side>(side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads));
+  Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
+  side.around = beads_around(side, threads);
+  side_ = std::make_shared<const Side>(std::move(side));
 }
 
 Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const Progress& progress) const {
