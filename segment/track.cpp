@@ -256,8 +256,7 @@ Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, 
                                threads_);
   tell(0.3, "correlating windows");
   const Plane& moved = scene.stressed.image.plane;
-  const GridField grid =
-      coarse_field(plane, moved, drift_of(plane, moved), search_window(scene, parameters_, pixel_size_um), threads_);
+  const GridField grid = coarse_field(plane, moved, search_window(scene, parameters_, pixel_size_um), threads_);
   tell(0.5, "registering beads");
   std::vector<Track> followed = follow(scene, grid, parameters_);
   tell(0.7, "measuring beads");
