@@ -85,12 +85,17 @@ struct Products {
 /// What a spot of height 1 adds at a place, by the squared distance in px.
 float shape(float squared, double sigma) { return std::exp(-0.5f * squared / static_cast<float>(sigma * sigma)); }
 
-/// Everything of a window that does not change from step to step.
+/// Everything of a pixel of a window that does not change from step to step.
+struct Pixel {
+  float x, y;    ///< from the bead
+  float target;  ///< the target's value there, as moved last
+  float weight;
+  Slope slope;  ///< by u and G, less what gain and offset can do; the value, less the weighted mean; one
+  float value() const { return slope[kValue]; }
+};
+
 struct Patch {
-  std::vector<float> x, y;           ///< of its pixels, from the bead
-  std::vector<float> target;         ///< the target's values under the window, as moved last
-  std::vector<float> weight, value;  ///< value: less the weighted mean
-  std::vector<Slope> slope;          ///< by u and G, less what gain and offset can do
+  std::vector<Pixel> pixels;
   Mat6 normal;
   double total_weight = 0, variance = 0;
 };
@@ -100,76 +105,77 @@ void take_away(Patch& patch, Vec2 place, const Others& others) {
   const float per_square = static_cast<float>(1 / (others.sigma * others.sigma));
   for (const Others::Spot& spot : others.in_reference) {
     const float sx = static_cast<float>(spot.place.x - place.x), sy = static_cast<float>(spot.place.y - place.y);
-    for (std::size_t k = 0; k < patch.value.size(); ++k) {
-      const float x = patch.x[k], y = patch.y[k], dx = x - sx, dy = y - sy;
+    for (Pixel& p : patch.pixels) {
+      const float dx = p.x - sx, dy = p.y - sy;
       const float light = static_cast<float>(spot.height) * shape(dx * dx + dy * dy, others.sigma);
       const float gx = -light * dx * per_square, gy = -light * dy * per_square;
-      patch.value[k] -= light;
-      const Slope own{gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0};
-      for (int a = 0; a < 6; ++a) patch.slope[k][a] -= own[a];
+      const Slope own{gx, gy, gx * p.x, gx * p.y, gy * p.x, gy * p.y, light, 0};
+      for (int a = 0; a < 8; ++a) p.slope[a] -= own[a];
     }
   }
 }
 
 constexpr float kLeastWeight = 0.105f;  // at 2.12 sigmas: nine tenths of a Gaussian's volume lie within
 
-double square(double x) { return x * x; }
+/// exp(−d²/2s²) on the pixels around the middle one.
+std::vector<float> weights_along(double place, int middle, int reach, double sigma) {
+  std::vector<float> result;
+  for (int k = middle - reach; k <= middle + reach; ++k) {
+    const double d = (k - place) / sigma;
+    result.push_back(static_cast<float>(std::exp(-0.5 * d * d)));
+  }
+  return result;
+}
 
 Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& window, const Others& others) {
-  const double sigma = window.sigma;
   Patch patch;
-  const int reach = static_cast<int>(std::ceil(2 * sigma));
+  const int reach = static_cast<int>(std::ceil(2 * window.sigma));
   const int ci = static_cast<int>(std::lround(place.x)), cj = static_cast<int>(std::lround(place.y));
-  const std::size_t side = static_cast<std::size_t>(2 * reach + 1);
-  for (auto* list : {&patch.x, &patch.y, &patch.weight, &patch.value}) list->reserve(side * side);
-  patch.slope.reserve(side * side);
-  const auto weight_along = [&](double apart) { return static_cast<float>(std::exp(-0.5 * square(apart / sigma))); };
-  std::vector<float> weight_x(side);
-  for (std::size_t i = 0; i < side; ++i) weight_x[i] = weight_along(ci - reach + static_cast<double>(i) - place.x);
+  const std::vector<float> along_x = weights_along(place.x, ci, reach, window.sigma);
+  const std::vector<float> along_y = weights_along(place.y, cj, reach, window.sigma);
+  patch.pixels.reserve(along_x.size() * along_y.size() / (window.is_thinned ? 2 : 1) + 1);
+  const int left = std::max(0, ci - reach), right = std::min(reference.plane.width - 1, ci + reach);
   for (int j = std::max(0, cj - reach); j <= std::min(reference.plane.height - 1, cj + reach); ++j) {
-    const float y = static_cast<float>(j - place.y), weight_y = weight_along(y);
-    for (int i = std::max(0, ci - reach); i <= std::min(reference.plane.width - 1, ci + reach); ++i) {
-      const float weight = weight_y * weight_x[i - (ci - reach)];
-      if (weight < kLeastWeight || (window.is_thinned && (i + j + ci + cj) % 2 != 0)) continue;
-      const float x = static_cast<float>(i - place.x);
-      const float gx = reference.slope_x.at(i, j), gy = reference.slope_y.at(i, j);
-      patch.x.push_back(x), patch.y.push_back(y), patch.weight.push_back(weight);
-      patch.value.push_back(reference.plane.at(i, j));
-      patch.slope.push_back({gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0});
-      patch.total_weight += weight;
+    const float *values = reference.plane.row(j), *slope_x = reference.slope_x.row(j),
+                *slope_y = reference.slope_y.row(j);
+    const float y = static_cast<float>(j - place.y), weight_y = along_y[j - cj + reach];
+    const int step = window.is_thinned ? 2 : 1;  // of a chessboard the bead's own pixel is one
+    for (int i = left + (window.is_thinned ? (left + j + ci + cj) & 1 : 0); i <= right; i += step) {
+      const float weight = weight_y * along_x[i - ci + reach];
+      if (weight < kLeastWeight) continue;
+      const float x = static_cast<float>(i - place.x), gx = slope_x[i], gy = slope_y[i];
+      patch.pixels.push_back({x, y, 0, weight, {gx, gy, gx * x, gx * y, gy * x, gy * y, values[i], 1}});
     }
   }
   take_away(patch, place, others);
-  double mean = 0;
-  for (std::size_t k = 0; k < patch.value.size(); ++k) mean += patch.weight[k] * patch.value[k];
-  for (float& value : patch.value) value -= static_cast<float>(mean / patch.total_weight);
   return patch;
 }
 
 /// Project the slopes onto what neither an offset nor a gain can do, and sum their products.
 void complete(Patch& patch) {
   Slope by_one{}, by_value{};
-  double power = 0;
-  const std::size_t n = patch.value.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    const float weight = patch.weight[k], weighted = weight * patch.value[k];
-    power += weighted * patch.value[k];
-    for (int a = 0; a < 8; ++a) {
-      by_one[a] += weight * patch.slope[k][a];
-      by_value[a] += weighted * patch.slope[k][a];
-    }
+  for (const Pixel& p : patch.pixels) {
+    for (int a = 0; a < 8; ++a) by_one[a] += p.weight * p.slope[a];
   }
-  patch.target.resize(n);
+  patch.total_weight = by_one[kOne];
+  const float mean = by_one[kValue] / by_one[kOne];
+  for (Pixel& p : patch.pixels) {
+    p.slope[kValue] -= mean;
+    const float weighted = p.weight * p.value();
+    for (int a = 0; a < 8; ++a) by_value[a] += weighted * p.slope[a];
+  }
+  const float power = by_value[kValue];
   patch.variance = power / patch.total_weight;
-  for (int a = 0; a < 8; ++a) {
-    by_one[a] /= static_cast<float>(patch.total_weight);
-    by_value[a] = power > 0 ? by_value[a] / static_cast<float>(power) : 0.0f;
+  for (int a = 0; a < 6; ++a) {
+    by_one[a] /= by_one[kOne];
+    by_value[a] = power > 0 ? by_value[a] / power : 0.0f;
   }
+  by_one[kValue] = by_one[kOne] = by_value[kValue] = by_value[kOne] = 0;
   Products products;
-  for (std::size_t k = 0; k < n; ++k) {
-    for (int a = 0; a < 8; ++a) patch.slope[k][a] -= by_one[a] + by_value[a] * patch.value[k];
-    products.add(patch.weight[k], patch.slope[k]);
-    patch.slope[k][kValue] = patch.value[k], patch.slope[k][kOne] = 1;
+  for (Pixel& p : patch.pixels) {
+    const float value = p.value();
+    for (int a = 0; a < 8; ++a) p.slope[a] -= by_one[a] + by_value[a] * value;
+    products.add(p.weight, p.slope);
   }
   patch.normal = products.matrix();
 }
@@ -201,18 +207,17 @@ Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& 
   Slope sums{};
   float squares = 0;
   const Warp warp(place, motion);
-  for (std::size_t k = 0; k < patch.value.size(); ++k) {
-    const float x = patch.x[k], y = patch.y[k];
-    const float there_x = warp.x_of(x, y), there_y = warp.y_of(x, y);
+  for (Pixel& p : patch.pixels) {
+    const float there_x = warp.x_of(p.x, p.y), there_y = warp.y_of(p.x, p.y);
     float value = interpolated(target, there_x, there_y);
     for (const Others::Spot& spot : others.in_target) {
       const float dx = there_x - static_cast<float>(spot.place.x), dy = there_y - static_cast<float>(spot.place.y);
       value -= static_cast<float>(spot.height) * shape(dx * dx + dy * dy, others.sigma);
     }
-    patch.target[k] = value;
-    const float weighted = patch.weight[k] * value;
+    p.target = value;
+    const float weighted = p.weight * value;
     squares += weighted * value;
-    for (int a = 0; a < 8; ++a) sums[a] += weighted * patch.slope[k][a];
+    for (int a = 0; a < 8; ++a) sums[a] += weighted * p.slope[a];
   }
   for (int a = 0; a < 6; ++a) result.mismatch[a] = sums[a];
   const double mean = sums[kOne] / patch.total_weight;
@@ -224,9 +229,9 @@ Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& 
   return result;
 }
 
-/// Share of white noise's variance that the spline has left at a fraction t of the way between two pixels: within
-/// 0.002.
-float noise_left(float t) {
+/// Share of white noise's variance that the spline has left at a place between two pixels: within 0.002.
+float noise_left(float place) {
+  const float size = std::abs(place), t = size - static_cast<float>(static_cast<int>(size));
   const float p = t * (1 - t);
   return 1 - p * p * (3 + 3.7f * p);
 }
@@ -244,26 +249,24 @@ double variance_of(const Patch& patch, const Warp& warp, const Mat6& inverse, co
   const float per_weight = static_cast<float>(1 / patch.total_weight);
   const float per_power = static_cast<float>(1 / (patch.variance * patch.total_weight));
   const float mean = static_cast<float>(now.mean), per_gain = static_cast<float>(1 / now.gain);
-  const auto followed = [&](std::size_t k) {
-    const Slope& slope = patch.slope[k];
+  const auto followed = [&](const Pixel& p) {
     Slope solved{};
     for (int a = 0; a < 6; ++a) {
-      for (int b = 0; b < 8; ++b) solved[b] += single[a][b] * slope[a];
+      for (int b = 0; b < 8; ++b) solved[b] += single[a][b] * p.slope[a];
     }
-    float share = per_weight + per_power * patch.value[k] * patch.value[k];
-    for (int a = 0; a < 6; ++a) share += slope[a] * solved[a];
-    return std::min(0.9f, patch.weight[k] * share);
+    float share = per_weight + per_power * p.value() * p.value();
+    for (int a = 0; a < 6; ++a) share += p.slope[a] * solved[a];
+    return std::min(0.9f, p.weight * share);
   };
   double sum = 0;
-  for (std::size_t k = 0; k < patch.value.size(); ++k) {
+  for (const Pixel& p : patch.pixels) {
     float ux = 0, uy = 0;
-    for (int a = 0; a < 6; ++a) ux += single[0][a] * patch.slope[k][a], uy += single[1][a] * patch.slope[k][a];
-    const float own = has_many ? 0 : followed(k);
-    const float weighted = patch.weight[k] * ((patch.target[k] - mean) * per_gain - patch.value[k]);
+    for (int a = 0; a < 6; ++a) ux += single[0][a] * p.slope[a], uy += single[1][a] * p.slope[a];
+    const float own = has_many ? 0 : followed(p);
+    const float weighted = p.weight * ((p.target - mean) * per_gain - p.value());
     // Interpolation takes from the target's noise, but nothing from its slow part, which moves the answer: of equal
     // noise in both images the residual shows (1 + left) / 2.
-    const float x = warp.x_of(patch.x[k], patch.y[k]), y = warp.y_of(patch.x[k], patch.y[k]);
-    const float left = noise_left(x - std::floor(x)) * noise_left(y - std::floor(y));
+    const float left = noise_left(warp.x_of(p.x, p.y)) * noise_left(warp.y_of(p.x, p.y));
     sum += 2 / (1 + left) * weighted * weighted / (1 - own) * (ux * ux + uy * uy);
   }
   for (int a = 2; a < 6; ++a) sum += prior * (inverse(0, a) * inverse(0, a) + inverse(1, a) * inverse(1, a));
@@ -362,8 +365,8 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
   result.similarity = now.similarity;
   result.variance = patch.variance;
   result.gain = now.gain;
-  result.sigma_px = std::sqrt(std::max(
-      0.0, variance_of(patch, Warp(place, result.motion), inverse, now, stiffness * window.noise * window.noise, window.is_thinned)));
+  result.sigma_px = std::sqrt(std::max(0.0, variance_of(patch, Warp(place, result.motion), inverse, now,
+                                                        stiffness * window.noise * window.noise, window.is_thinned)));
   return result;
 }
 
