@@ -190,7 +190,7 @@ GridField coarse_field(const Plane& reference, const Plane& target, int window, 
       field.nx = field.ny = 1;
     }
     // the second pass, at half the size, looks around what the first has found
-    const double spacing = scale == 2 ? window / 2.0 : 0.375 * window;
+    const double spacing = scale == 2 ? 0.75 * window : 0.375 * window;
     GridField finer = grid_over(a, spacing);
     std::vector<std::optional<Vec2>> found(finer.u.size());
     parallel_for(finer.ny, threads, [&](int j) {
