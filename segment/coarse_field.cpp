@@ -29,20 +29,23 @@ double vertex(double before, double here, double after) {
   return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
 }
 
-/// Place of the highest value, to a fraction of a pixel; nothing where it is at the border, or the next peak is nearly
-/// as high.
-std::optional<Vec2> peak_of(const cv::Mat& map, double least_ratio) {
+/// Place of the highest value of a periodic map, to a fraction of a pixel; nothing where it is not within the first
+/// `n` x `n` px, or the next peak, anywhere, is nearly as high.
+std::optional<Vec2> peak_of(const cv::Mat& map, int n, double least_ratio) {
   cv::Point best;
   double highest = 0;
   cv::minMaxLoc(map, nullptr, &highest, nullptr, &best);
-  const bool is_inside = best.x > 0 && best.y > 0 && best.x + 1 < map.cols && best.y + 1 < map.rows;
-  if (!(highest > 0) || !is_inside) return std::nullopt;
+  if (!(highest > 0) || best.x < 1 || best.y < 1 || best.x + 1 >= n || best.y + 1 >= n) return std::nullopt;
+  const float nearly = static_cast<float>(highest / least_ratio);
   constexpr int kOwn = 4;  // px around the peak that belong to it
+  const auto is_own = [](int k, int at, int size) {
+    return std::min(std::abs(k - at), size - std::abs(k - at)) <= kOwn;
+  };
   for (int j = 0; j < map.rows; ++j) {
     const float* row = map.ptr<float>(j);
     for (int i = 0; i < map.cols; ++i) {
-      if (row[i] * least_ratio < highest) continue;
-      if (std::abs(j - best.y) > kOwn || std::abs(i - best.x) > kOwn) return std::nullopt;
+      if (row[i] < nearly) continue;
+      if (!is_own(j, best.y, map.rows) || !is_own(i, best.x, map.cols)) return std::nullopt;
     }
   }
   const auto value = [&](int i, int j) { return map.at<float>(best.y + j, best.x + i); };
@@ -60,9 +63,9 @@ std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Ve
   cv::dft(cut(reference, left, top, window, side), a, 0, window);
   cv::dft(cut(target, left + dx - most, top + dy - most, side, side), b);
   cv::mulSpectrums(b, a, product, 0, true);
-  cv::idft(product, product, cv::DFT_REAL_OUTPUT | cv::DFT_SCALE, window + 1);
+  cv::idft(product, product, cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
   constexpr double kLeastRatio = 1.15;
-  const auto shift = peak_of(product(cv::Rect(0, 0, window + 1, window + 1)), kLeastRatio);  // these do not wrap
+  const auto shift = peak_of(product, window + 1, kLeastRatio);  // these shifts do not wrap
   if (!shift) return std::nullopt;
   return Vec2{shift->x - most + dx, shift->y - most + dy};
 }
