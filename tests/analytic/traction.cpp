@@ -318,7 +318,7 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
         squares += std::pow((norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN, 2) / 8;
       }
       std::printf("%s, noise %g: rms of error/sigma %.2f\n", method, noise, std::sqrt(squares));
-      // the noise alone would give 10, 4 and 2; the root of a mean of eight squares is itself known to a quarter
+      // the noise alone would give 1.6 to 10; the root of a mean of eight squares is itself known to a quarter
       EXPECT_GT(std::sqrt(squares), 0.7) << method << noise;
       EXPECT_LT(std::sqrt(squares), 1.4) << method << noise;
     }
