@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "segment/plane.h"
 
@@ -78,9 +80,10 @@ Typical typical_motion(const std::vector<Vec2>& positions, const std::vector<Vec
     std::vector<double> misfits;
     for (const int k : all) misfits.push_back(misfit(k));
     result.misfit = quantile(std::move(misfits), 0.5);
-    used.clear();
+    const std::vector<int> before = std::exchange(used, {});
     std::copy_if(all.begin(), all.end(), std::back_inserter(used),
                  [&](int k) { return misfit(k) <= 2.5 * result.misfit; });
+    if (used == before) break;
   }
   return result;
 }

@@ -206,6 +206,8 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
   Window window = scene.narrow;
   window.max_steps = 6;
   window.settled_px = 0.02;
+  Window with_error = window;
+  window.states_error = false;
   for_each_bead(scene, [&](int k) {
     Track& track = tracks[k];
     if (!track.is_good()) return;
@@ -222,10 +224,15 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     }
     Others others = track.others.value_or(Others{});
     std::swap(others.in_reference, others.in_target);
-    const Registered returned =
-        registered(scene.stressed.image, scene.relaxed->image.spline, there, *back, window, others);
-    const double missed = norm(returned.motion.u + forward.u);
-    if (missed > 0.5 + 4 * std::hypot(track.found.sigma_px, returned.sigma_px)) track.flag = "ambiguous";
+    const auto returned = [&](const Window& by) {
+      return registered(scene.stressed.image, scene.relaxed->image.spline, there, *back, by, others);
+    };
+    const double missed = norm(returned(window).motion.u + forward.u);
+    const double granted = 0.5 + 4 * track.found.sigma_px;
+    if (missed > granted) {  // then the way back's own error, too, is granted
+      const double sigma = std::hypot(track.found.sigma_px, returned(with_error).sigma_px);
+      if (missed > 0.5 + 4 * sigma) track.flag = "ambiguous";
+    }
     // Both ways see the same noise: what they differ by is what the registration itself is unsure of.
     track.found.sigma_px = std::hypot(track.found.sigma_px, missed / 2);
   });
