@@ -1,8 +1,8 @@
 #include "network/links.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <utility>
 
@@ -11,125 +11,150 @@ namespace {
 
 using Edge = Triangulation::Edge;
 
-// Of the network's material, what the links to second neighbours stand for where there are all of them. With half of
-// it each of the twelve directions of a regular triangulation has the same.
-constexpr double kReachingPart = 0.5;
+// Of its width an edge gives this part to the links across the quadrilaterals that it is a side of. On a regular
+// triangulation each of the twelve directions then has the same.
+constexpr double kGivenPart = 2.0 / 3;
 constexpr double kSmallestShare = 0.02;  // of an edge across from an obtuse angle: a cable cannot push
 
-class Linking {
+/// Width of material that an edge stands for: its length between the circumcentres of its two triangles. With a
+/// tension in proportion to it, the links pull as a sheet of even surface tension does, on any triangulation:
+/// t_ab = sigma (cot alpha + cot beta) l_ab / 2 is minus the gradient of the sheet's area. A triangle that is obtuse
+/// there would count negative.
+/// Source: Pinkall & Polthier, Exp. Math. 2:15 (1993), eq. 2.
+double dual_width_um(const std::vector<Vec2>& points, const Edge& edge) {
+  const Vec2 a = points[edge.vertex_a];
+  const Vec2 b = points[edge.vertex_b];
+  double cotangents = 0;
+  for (const int apex : edge.apexes) {
+    if (apex < 0) continue;
+    const Vec2 to_a = a - points[apex];
+    const Vec2 to_b = b - points[apex];
+    const double doubled_area = std::abs(cross(to_a, to_b));
+    if (doubled_area > 0) cotangents += dot(to_a, to_b) / doubled_area;
+  }
+  return 0.5 * cotangents * norm(b - a);
+}
+
+/// A link across an edge ab, between the apexes c and d of its triangles. Four points in the plane have one state of
+/// self-stress: with a pull of 1 um⁻¹ times its length in cd, the sides of the quadrilateral take the pulls below, and
+/// no point feels a force.
+struct Reaching {
+  int edge = 0;                      ///< that it crosses
+  std::array<int, 4> sides{};        ///< edges ac, bc, ad, bd
+  double of_edge = 0;                ///< pull over length of ab, in that of cd
+  std::array<double, 4> of_sides{};  ///< of the sides, negative: they give way
+  double length_um = 0;
+};
+
+class Shares {
  public:
-  Linking(const Frame& frame, const RelaxedMesh& mesh, const NetworkParameters& parameters)
-      : frame_(frame),
-        points_(mesh.points_um),
-        edges_(mesh.triangulation.edges),
-        has_even_tension_(parameters.link_weights == "width"),
-        // in a regular triangulation an edge of length h has the dual width h / sqrt(3)
-        regular_width_um_(parameters.edge_length_um / std::sqrt(3.0)) {
-    if (parameters.link_reach == "neighbours") return;
+  Shares(const RelaxedMesh& mesh, const NetworkParameters& parameters)
+      : points_(mesh.points_um), edges_(mesh.triangulation.edges) {
+    // in a regular triangulation an edge of length h has the dual width h / sqrt(3)
+    const double regular_width = parameters.edge_length_um / std::sqrt(3.0);
     for (const Edge& e : edges_) {
-      if (!reaches_across(e)) continue;
-      for (const int apex : e.apexes) ++n_reaching_[triangle(e, apex)];
+      of_edge_.push_back(parameters.link_weights == "width" ? dual_width_um(points_, e) / regular_width : 1);
     }
+    of_reaching_.assign(edges_.size(), 0);
+    if (parameters.link_reach == "second-neighbours") hand_on();
+    for (double& share : of_edge_) share = std::max(kSmallestShare, share);
   }
 
-  std::vector<Link> links() const {
-    std::map<std::pair<int, int>, const FrameSegment*> fibres;
-    for (const FrameSegment& s : frame_.segments) {
-      if (!s.fibre_ids.empty()) fibres[{s.vertex_a, s.vertex_b}] = &s;
-    }
-    std::vector<Link> links;
-    for (const Edge& e : edges_) {
-      const auto segment = fibres.find({e.vertex_a, e.vertex_b});
-      if (segment == fibres.end()) {
-        links.push_back(link(e.vertex_a, e.vertex_b, 0, near_share(e)));
-      } else {
-        for (const int id : segment->second->fibre_ids) links.push_back(link(e.vertex_a, e.vertex_b, id, 1));
-        fibres.erase(segment);
-      }
-      if (!n_reaching_.empty() && reaches_across(e)) {
-        links.push_back(link(e.apexes[1], e.apexes[0], 0, reaching_share(e)));
-      }
-    }
-    // a fibre in a neck so thin that no triangle is left there
-    for (const auto& [ends, segment] : fibres) {
-      for (const int id : segment->fibre_ids) links.push_back(link(ends.first, ends.second, id, 1));
-    }
-    return links;
-  }
+  double of_edge(std::size_t k) const { return of_edge_[k]; }
+  /// Of the link across the edge; 0: there is none.
+  double of_reaching(std::size_t k) const { return of_reaching_[k]; }
 
  private:
-  static std::array<int, 3> triangle(const Edge& e, int apex) {
-    std::array<int, 3> corners = {e.vertex_a, e.vertex_b, apex};
-    std::sort(corners.begin(), corners.end());
-    return corners;
+  int edge_of(int a, int b) const {
+    const std::pair<int, int> ends = std::minmax(a, b);
+    return static_cast<int>(std::lower_bound(edges_.begin(), edges_.end(), ends,
+                                             [](const Edge& e, const std::pair<int, int>& sought) {
+                                               return std::pair(e.vertex_a, e.vertex_b) < sought;
+                                             }) -
+                            edges_.begin());
   }
 
-  Link link(int a, int b, int fibre_id, double share) const {
-    return {.vertex_a = std::min(a, b),
-            .vertex_b = std::max(a, b),
-            .fibre_id = fibre_id,
-            .rest_length_um = norm(points_[b] - points_[a]),
-            .share = share};
-  }
-
-  /// A straight cable between the apexes crosses the edge, and nothing else.
-  bool reaches_across(const Edge& e) const {
-    if (e.is_of_frame || e.apexes[0] < 0 || e.apexes[1] < 0) return false;
-    const Vec2 c = points_[e.apexes[0]];
-    const Vec2 along = points_[e.apexes[1]] - c;
-    return cross(along, points_[e.vertex_a] - c) * cross(along, points_[e.vertex_b] - c) < 0;
-  }
-
-  /// Of the material of a triangle, what its edges stand for.
-  double near_part(const Edge& e, int apex) const {
-    const auto found = n_reaching_.find(triangle(e, apex));
-    return found == n_reaching_.end() ? 1 : 1 - kReachingPart * found->second / 3;
-  }
-
-  /// Width of material that an edge stands for: its length between the circumcentres of its two triangles. With a
-  /// tension in proportion to it, the links pull as a sheet of even surface tension does, on any triangulation:
-  /// t_ab = sigma (cot alpha + cot beta) l_ab / 2 is minus the gradient of the sheet's area. A triangle that is obtuse
-  /// there would count negative.
-  /// Source: Pinkall & Polthier, Exp. Math. 2:15 (1993), eq. 2.
-  double near_share(const Edge& e) const {
-    const Vec2 a = points_[e.vertex_a], b = points_[e.vertex_b];
-    double width_um = 0, parts = 0;
-    int n_triangles = 0;
-    for (const int apex : e.apexes) {
-      if (apex < 0) continue;
-      const double part = near_part(e, apex);
-      const Vec2 to_a = a - points_[apex], to_b = b - points_[apex];
-      const double doubled_area_um2 = std::abs(cross(to_a, to_b));
-      if (doubled_area_um2 > 0) width_um += 0.5 * part * norm(b - a) * dot(to_a, to_b) / doubled_area_um2;
-      parts += part;
-      ++n_triangles;
+  /// The links whose straight cable crosses one edge along which nothing runs, and nothing else.
+  std::vector<Reaching> reaching() const {
+    std::vector<Reaching> result;
+    for (int k = 0; k < static_cast<int>(edges_.size()); ++k) {
+      const Edge& e = edges_[k];
+      if (e.is_of_frame || e.apexes[0] < 0 || e.apexes[1] < 0) continue;
+      const Vec2 a = points_[e.vertex_a], b = points_[e.vertex_b], c = points_[e.apexes[0]], d = points_[e.apexes[1]];
+      const double acd = cross(c - a, d - a), bcd = cross(c - b, d - b);
+      const double abc = std::abs(cross(b - a, c - a)), abd = std::abs(cross(b - a, d - a));
+      if (!(acd * bcd < 0) || abc == 0 || abd == 0) continue;
+      const double p = std::abs(acd), q = std::abs(bcd);
+      result.push_back({.edge = k,
+                        .sides = {edge_of(e.vertex_a, e.apexes[0]), edge_of(e.vertex_b, e.apexes[0]),
+                                  edge_of(e.vertex_a, e.apexes[1]), edge_of(e.vertex_b, e.apexes[1])},
+                        .of_edge = p * q / (abc * abd),
+                        .of_sides = {-q / abc, -p / abc, -q / abd, -p / abd},
+                        .length_um = norm(d - c)});
     }
-    if (!has_even_tension_) return n_triangles > 0 ? parts / n_triangles : 1;
-    return std::max(kSmallestShare, width_um / regular_width_um_);
+    return result;
   }
 
-  /// A triangle of area A gives a third of its reaching part to the link across each side. As the stress of links is
-  /// half the sum of t l over the area in its trace, a link with A of both its triangles carries t l = 2 sigma A / 3 of
-  /// that part.
-  double reaching_share(const Edge& e) const {
-    if (!has_even_tension_) return kReachingPart / std::sqrt(3.0);  // as in a regular triangulation
-    const Vec2 along = points_[e.apexes[1]] - points_[e.apexes[0]];
-    const double area_um2 = 0.5 * std::abs(cross(along, points_[e.vertex_b] - points_[e.vertex_a]));
-    return 2 * kReachingPart * area_um2 / (3 * norm(along) * regular_width_um_);
+  /// Superpose the states of self-stress, each as far as the sides that it takes from have something to give: the
+  /// forces on the vertices stay what they are.
+  void hand_on() {
+    const std::vector<Reaching> links = reaching();
+    std::vector<int> n_takers(edges_.size(), 0);
+    for (const Reaching& r : links) {
+      for (const int side : r.sides) ++n_takers[side];
+    }
+    std::vector<double> change(edges_.size(), 0);
+    for (const Reaching& r : links) {
+      double pull_per_um = std::numeric_limits<double>::infinity();
+      for (int i = 0; i < 4; ++i) {
+        const int side = r.sides[i];
+        const double given = kGivenPart * std::max(0.0, of_edge_[side]) / n_takers[side];
+        pull_per_um = std::min(pull_per_um, given / (-r.of_sides[i] * length_um(edges_[side])));
+      }
+      of_reaching_[r.edge] = pull_per_um * r.length_um;
+      change[r.edge] += pull_per_um * r.of_edge * length_um(edges_[r.edge]);
+      for (int i = 0; i < 4; ++i) change[r.sides[i]] += pull_per_um * r.of_sides[i] * length_um(edges_[r.sides[i]]);
+    }
+    for (std::size_t k = 0; k < change.size(); ++k) of_edge_[k] += change[k];
   }
 
-  const Frame& frame_;
+  double length_um(const Edge& e) const { return norm(points_[e.vertex_b] - points_[e.vertex_a]); }
+
   const std::vector<Vec2>& points_;
   const std::vector<Edge>& edges_;
-  bool has_even_tension_;
-  double regular_width_um_;
-  std::map<std::array<int, 3>, int> n_reaching_;  ///< by triangle: links that leave it across a side
+  std::vector<double> of_edge_, of_reaching_;
 };
 
 }  // namespace
 
 std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const NetworkParameters& parameters) {
-  return Linking(frame, mesh, parameters).links();
+  std::map<std::pair<int, int>, const FrameSegment*> fibre_segments;
+  for (const FrameSegment& s : frame.segments) {
+    if (!s.fibre_ids.empty()) fibre_segments[{s.vertex_a, s.vertex_b}] = &s;
+  }
+  const Shares shares(mesh, parameters);
+  std::vector<Link> links;
+  const auto add = [&](int a, int b, int fibre_id, double share) {
+    const auto [low, high] = std::minmax(a, b);
+    const double length_um = norm(mesh.points_um[high] - mesh.points_um[low]);
+    links.push_back({low, high, fibre_id, length_um, share});
+  };
+  for (std::size_t k = 0; k < mesh.triangulation.edges.size(); ++k) {
+    const Edge& e = mesh.triangulation.edges[k];
+    const auto segment = fibre_segments.find({e.vertex_a, e.vertex_b});
+    if (segment == fibre_segments.end()) {
+      add(e.vertex_a, e.vertex_b, 0, shares.of_edge(k));
+    } else {
+      for (const int id : segment->second->fibre_ids) add(e.vertex_a, e.vertex_b, id, 1);
+      fibre_segments.erase(segment);
+    }
+    if (shares.of_reaching(k) > 0) add(e.apexes[0], e.apexes[1], 0, shares.of_reaching(k));
+  }
+  // a fibre in a neck so thin that no triangle is left there
+  for (const auto& [ends, segment] : fibre_segments) {
+    for (const int id : segment->fibre_ids) add(ends.first, ends.second, id, 1);
+  }
+  return links;
 }
 
 }  // namespace mbtfm::network
