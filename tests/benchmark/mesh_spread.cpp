@@ -42,8 +42,7 @@ constexpr Formulation kFormulations[] = {
     {"width, ellipses, regular", "width", "ellipse", "regular", kNear, true, 0},
     {"width, ellipses, Poisson disc", "width", "ellipse", "poisson", kNear, true, 0},
     {"width, rims (dashed)", "width", "rim", "jittered", kNear, true, 0.9},
-    {"second neighbours, ellipses: default (dashed)", "width", "ellipse", "jittered", kFar, true, 0},
-    {"second neighbours, rims (dashed)", "width", "rim", "jittered", kFar, true, 0.9}};
+    {"second neighbours, ellipses: default (dashed)", "width", "ellipse", "jittered", kFar, true, 0}};
 constexpr double kEdges_um[] = {3, 2, 1.5, 1, 0.7, 0.4};
 
 /// What one mesh gives.
