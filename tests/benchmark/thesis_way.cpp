@@ -1,4 +1,4 @@
-/// thesis_way CELL GEL [most]: the tension fit beside the thesis' way to the same misfit, in processor time of one
+/// thesis_way CELL GEL [most] [beads]: the tension fit beside the thesis' way to the same misfit, in processor time of one
 /// thread, both from begin to end in this one run. A table (CSV) on stdout.
 ///
 /// The thesis' way (3.2.5): block-wise conjugate gradients with finite differences, the gel solved for in each
@@ -6,13 +6,12 @@
 /// times our time is over. Our way: the compliance, the reduction of the beads, Gauss–Newton. Both start with all
 /// tensions at 0.06 nN, on the same mesh and beads.
 ///
-/// CELL: full   a U2OS cell, 20 fibres, 170 adhesions, 10 000 beads
+/// CELL: full   a U2OS cell, 20 fibres, 170 adhesions; 10 000 beads, or so many
 ///       small  a ring of 12 adhesions, 6 fibres, 480 beads: the thesis' way ends within seconds on a kept factor
 /// GEL:  anew   finite elements refined at each adhesion, meshed, assembled and solved for in each evaluation, on the
 ///              first mesh: 2 % off where ours is 0.1 % off, and so the cheaper
-///       kept   ours (split), whose factor is kept from one evaluation to the next, as the thesis did not: an
-///       evaluation
-///              is one triangular solution. A lower bound of the thesis' cost.
+///       kept   ours (split), whose factor stays, as the thesis' did not: an evaluation is one triangular solution. A
+///              lower bound of the thesis' cost.
 #include <cstdio>
 #include <cstring>
 #include <ctime>
@@ -51,10 +50,10 @@ TensionScene small_scene() {
   return test::scene_of(cell, tensions_nN(cell), 80 * kFibres, kNoise, 1);
 }
 
-TensionScene full_scene() {
+TensionScene full_scene(int n_beads) {
   const samples::ScenarioParameters p;
   const Cell cell = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1).cell;
-  return test::scene_of(cell, tensions_nN(cell), 10000, kNoise, 1);
+  return test::scene_of(cell, tensions_nN(cell), n_beads, kNoise, 1);
 }
 
 std::unique_ptr<substrate::Substrate> our_gel() { return substrate::make_substrate(kGel, {.model = "split"}, 1); }
@@ -168,11 +167,11 @@ int main(int argc, char** argv) {
   const bool is_full = argc > 1 && std::strcmp(argv[1], "full") == 0;
   const bool is_kept = argc > 2 && std::strcmp(argv[2], "kept") == 0;
   if (argc < 3 || (!is_full && std::strcmp(argv[1], "small") != 0) || (!is_kept && std::strcmp(argv[2], "anew") != 0)) {
-    std::fprintf(stderr, "thesis_way full|small anew|kept [most]\n");
+    std::fprintf(stderr, "thesis_way full|small anew|kept [most] [beads]\n");
     return 2;
   }
   const double most = argc > 3 ? std::atof(argv[3]) : 1000;
-  const TensionScene scene = is_full ? full_scene() : small_scene();
+  const TensionScene scene = is_full ? full_scene(argc > 4 ? std::atoi(argv[4]) : 10000) : small_scene();
   double signal_squared = 0;
   for (const Bead& b : scene.beads)
     signal_squared += dot(b.displacement_um, b.displacement_um) / (b.sigma_um * b.sigma_um);
