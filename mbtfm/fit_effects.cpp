@@ -31,7 +31,8 @@ std::optional<Change> change_by_gel(const std::string& name, const FittedCell& c
   const auto gel = substrate::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.data;
   with.compliance_um_per_nN = gel->compliance_um_per_nN(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
-  return change_between(name, c.fit, fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
+  return change_between(name, c.fit,
+                        fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> with_base(const Effect& e, const FittedCell& c, int threads) {
@@ -50,9 +51,9 @@ std::optional<Change> with_sides(const Effect& e, const FittedCell& c, int threa
   return change_by_gel(e.name, c, parameters, threads);
 }
 
-/// Forces that displace an even gel as far scale with its modulus: the moduli's own spread bounds the change. A solution
-/// of the graded gel has an error of its own of some per cent, more than a grading that is left out.
-std::optional<Change> with_grading(const Effect& e, const FittedCell& c) {
+/// Where the effect's number bounds the change of the field, and so of the forces that displace the gel as far. A
+/// graded gel's own solution is off by some per cent, more than a grading that is left out.
+std::optional<Change> bounded_by_number(const Effect& e, const FittedCell& c) {
   if (!e.number) return {};
   return Change{.effect = e.name, .by_tension_nN = *e.number * values_of(c.fit), .is_bound = true};
 }
@@ -84,7 +85,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   if (e.name == "stress fibres") return with_fibres(e, c, threads);
   if (e.name == "finite thickness") return with_base(e, c, threads);
   if (e.name == "finite sides") return with_sides(e, c, threads);
-  if (e.name == "depth-graded gel") return with_grading(e, c);
+  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e, c);
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
   if (e.name == "robust loss") return with_loss(e, c, threads);
   if (e.name == kTurnLeft) return with_turn(e, c, threads);

@@ -23,6 +23,15 @@ int cells_for(double tolerance) {
   return std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kSplitErrorOfTwoCells / tolerance))));
 }
 
+SceneSize size_of(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) {
+  if (points_um.empty() && ellipses.empty()) return {};
+  const Extent extent = extent_of(points_um, ellipses);
+  SceneSize size{.width_um = norm(extent.high_um - extent.low_um)};
+  const auto n = static_cast<double>(ellipses.size());
+  for (const Ellipse& e : ellipses) size.adhesion_radius_um += std::sqrt(e.semi_major_um * e.semi_minor_um) / n;
+  return size;
+}
+
 std::string model_for(const Gel& gel, const SubstrateParameters& p, const GelEffects& effects) {
   if (effects.grading.is_on) return "refined";
   if (effects.sides.is_on) {
@@ -47,7 +56,7 @@ class Automatic final : public Substrate {
       : gel_(gel), parameters_(parameters), threads_(threads) {
     parameters_.cells_per_thickness =
         std::max(parameters_.cells_per_thickness, cells_for(parameters_.effects.effect_tolerance));
-    decide(gel_, parameters_, 0);  // refuses what the switches get wrong before any file is read
+    decide(gel_, parameters_, {});  // refuses what the switches get wrong before any file is read
   }
 
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
@@ -72,7 +81,7 @@ class Automatic final : public Substrate {
   }
   std::vector<Effect> effects() const override {
     const std::lock_guard lock(mutex_);
-    GelEffects effects = model_ ? effects_ : decide(gel_, parameters_, 0);
+    GelEffects effects = model_ ? effects_ : decide(gel_, parameters_, {});
     // the model's time stands at the effect that called for it
     for (Effect* e : {&effects.grading, &effects.sides, &effects.vertical, &effects.thickness}) {
       if (!e->is_on) continue;
@@ -91,14 +100,9 @@ class Automatic final : public Substrate {
   const Substrate& model_of(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const {
     const std::lock_guard lock(mutex_);
     if (model_) return *model_;
-    double scene_um = 0;
-    if (!points_um.empty() || !ellipses.empty()) {
-      check_points(points_um);
-      check(ellipses);
-      const Extent extent = extent_of(points_um, ellipses);
-      scene_um = norm(extent.high_um - extent.low_um);
-    }
-    effects_ = decide(gel_, parameters_, scene_um);
+    check_points(points_um);
+    check(ellipses);
+    effects_ = decide(gel_, parameters_, size_of(points_um, ellipses));
     SubstrateParameters parameters = without_what_is_off(parameters_, effects_);
     parameters.model = model_for(gel_, parameters, effects_);
     EffectSwitches decided;  // as the model has them: the switches are obeyed by now

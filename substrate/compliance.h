@@ -42,6 +42,8 @@ struct SubstrateParameters {
   double growth = 4;                      ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
 
   std::optional<double> side_distance_um = {};  ///< a gel is centimetres wide: its sides are far away
+  double surface_tilt_deg = 0;                  ///< gels are cast level to a fraction of a degree
+  double surface_roughness_um = 0;              ///< gels are smooth to tens of nanometres
   std::string cache_folder = {};                ///< empty: factors stay in memory
 
   bool stress = false;  ///< of the gel's inside, where it is written

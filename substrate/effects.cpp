@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -16,6 +17,7 @@ constexpr const char* kThickness = "finite thickness";
 constexpr const char* kSides = "finite sides";
 constexpr const char* kGrading = "depth-graded gel";
 constexpr const char* kVertical = "vertical displacement";
+constexpr const char* kSurface = "uneven surface";
 
 void require(bool holds, const std::string& message) {
   if (!holds) throw UsageError("effects." + message);
@@ -78,12 +80,30 @@ Effect decide_vertical(const SubstrateParameters& p) {
                  setting == "on" ? "asked for" : "not asked for, and nothing along the surface depends on it");
 }
 
+double surface_number(const SubstrateParameters& p, double adhesion_radius_um) {
+  const double tilt = 1 - std::cos(p.surface_tilt_deg * std::numbers::pi / 180);
+  const double height = adhesion_radius_um > 0 ? p.surface_roughness_um / adhesion_radius_um : 0;
+  return std::max(tilt, height);
+}
+
+/// No model has it.
+Effect decide_surface(const SubstrateParameters& p, const SceneSize& scene) {
+  if (p.surface_tilt_deg == 0 && p.surface_roughness_um == 0) {
+    return decided(kSurface, "auto", false, "level and smooth: no surface_tilt_deg, no surface_roughness_um");
+  }
+  Effect effect = decided(kSurface, "auto", surface_number(p, scene.adhesion_radius_um), p.effects.effect_tolerance,
+                          "tilt and unevenness change the field by at most");
+  if (effect.is_on) effect.why += "; but no model has it: results are off by as much";
+  effect.is_on = false;
+  return effect;
+}
+
 }  // namespace
 
-GelEffects decide(const Gel& gel, const SubstrateParameters& p, double scene_um) {
+GelEffects decide(const Gel& gel, const SubstrateParameters& p, const SceneSize& scene) {
   check_data(p);
-  GelEffects effects{decide_thickness(gel, p, scene_um), decide_sides(gel, p), decide_grading(gel, p),
-                     decide_vertical(p)};
+  GelEffects effects{decide_thickness(gel, p, scene.width_um), decide_sides(gel, p), decide_grading(gel, p),
+                     decide_vertical(p), decide_surface(p, scene)};
   for (const Effect& needs_block : {effects.sides, effects.grading}) {
     if (!needs_block.is_on || effects.thickness.is_on) continue;
     require(effects.thickness.setting != "off", "finite_thickness = off, yet " + needs_block.name +
@@ -116,7 +136,8 @@ GelEffects effects_of_model(const SubstrateParameters& p) {
       row(kSides, "finite_sides", p.effects.finite_sides, has_sides, true, has_sides && p.side_distance_um, as_model),
       row(kGrading, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
       row(kVertical, "vertical_displacement", p.effects.vertical_displacement, true, true, asks_for_vertical(p),
-          asks_for_vertical(p) ? "asked for" : "not asked for")};
+          asks_for_vertical(p) ? "asked for" : "not asked for"),
+      decided(kSurface, "auto", false, as_model + ": level and smooth")};
 }
 
 SubstrateParameters without_what_is_off(SubstrateParameters p, const GelEffects& effects) {

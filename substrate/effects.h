@@ -7,10 +7,16 @@
 
 namespace mbtfm::substrate {
 
-/// In this order: finite thickness, finite sides, depth-graded gel, vertical displacement.
+/// In this order: finite thickness, finite sides, depth-graded gel, vertical displacement, uneven surface.
 struct GelEffects {
-  Effect thickness, sides, grading, vertical;
-  std::vector<Effect> list() const { return {thickness, sides, grading, vertical}; }
+  Effect thickness, sides, grading, vertical, surface;
+  std::vector<Effect> list() const { return {thickness, sides, grading, vertical, surface}; }
+};
+
+/// What decides beside the gel itself; zero where there is no scene yet.
+struct SceneSize {
+  double width_um = 0;            ///< diagonal of the rectangle around all adhesions and points
+  double adhesion_radius_um = 0;  ///< mean over the adhesions of the radius of a disc of the same area
 };
 
 /// By the switches and, where these are `auto`, by what each would change of the field (theory.md, section 2):
@@ -24,9 +30,12 @@ struct GelEffects {
 /// - depth-graded gel: stiffer everywhere is less compliant, so the true compliance lies between those of the softest
 ///   and the stiffest depth: it differs from the even gel's by E/E_min - 1 or 1 - E/E_max at most.
 /// - vertical displacement: it does not act back on the displacement along the surface: on only where it is asked for.
-/// @param scene_um  diagonal of the rectangle around all adhesions and points
+/// - uneven surface: seen from above, a tilt by alpha shortens what is along it by cos(alpha). A force at a height eta
+///   over the mean surface adds the couple eta F, as two vertical forces would: on a half-space its field along the
+///   surface is (1-2 nu)/(2-2 nu) eta/r of the force's own (Boussinesq), so by the same norm at most eta/a. No model
+///   has it: never on, but its number says whether that matters.
 /// @throws UsageError where a switch is on that the gel has no datum for, or the switches contradict each other
-GelEffects decide(const Gel& gel, const SubstrateParameters& parameters, double scene_um);
+GelEffects decide(const Gel& gel, const SubstrateParameters& parameters, const SceneSize& scene);
 
 /// What the named model takes into account. @throws UsageError where a switch asks for something else
 GelEffects effects_of_model(const SubstrateParameters& parameters);

@@ -35,6 +35,10 @@ void declare(ParameterList& list, SubstrateParameters& p) {
            "refined: largest side of an element over its distance to the nearest adhesion");
   list.add("side_distance_um", p.side_distance_um, Range::positive(),
            "from the adhesions and beads to the gel's own sides (um); unset: they are far away");
+  list.add("surface_tilt_deg", p.surface_tilt_deg, Range{.low = 0, .high = 90, .excludes_high = true},
+           "of the gel's surface against the image plane; no model takes it, auto says how far it matters");
+  list.add("surface_roughness_um", p.surface_roughness_um, Range::not_negative(),
+           "root mean square height of the gel's surface about its plane (um); likewise");
   list.add("cache_folder", p.cache_folder,
            "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
   list.add("stress", p.stress, "write the stress inside the gel, too (refined)");

@@ -289,7 +289,7 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
 GelEffects effects_for(double thickness_um, const SubstrateParameters& parameters) {
   Gel gel = kGel;
   gel.thickness_um = thickness_um;
-  return decide(gel, parameters, 50);
+  return decide(gel, parameters, {.width_um = 50, .adhesion_radius_um = 0.5});
 }
 
 TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_that_does_not) {
@@ -310,6 +310,24 @@ TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_tha
   EXPECT_FALSE(effects_for(60, p).vertical.is_on);
   p.effects.vertical_displacement = "on";
   EXPECT_TRUE(effects_for(60, p).vertical.is_on);
+}
+
+TEST(Automatic, says_where_an_uneven_surface_matters_that_no_model_has) {
+  test::hard_case("gels that are tilted, or rough", "said where it matters; the model is that of a level gel");
+  const auto surface_of = [](double tilt_deg, double roughness_um) {
+    SubstrateParameters p;
+    p.surface_tilt_deg = tilt_deg;
+    p.surface_roughness_um = roughness_um;
+    return effects_for(60, p).surface;
+  };
+  const auto is_said = [](const Effect& e) { return e.why.find("no model has it") != std::string::npos; };
+  EXPECT_FALSE(is_said(surface_of(0, 0)));
+  EXPECT_FALSE(is_said(surface_of(5, 0.004)));
+  EXPECT_TRUE(is_said(surface_of(10, 0)));
+  EXPECT_TRUE(is_said(surface_of(0, 0.1)));
+  EXPECT_FALSE(surface_of(10, 0).is_on);
+  EXPECT_NEAR(surface_of(60, 0).number.value(), 0.5, 1e-12);
+  EXPECT_NEAR(surface_of(0, 0.1).number.value(), 0.2, 1e-12);
 }
 
 TEST(Automatic, obeys_its_switches) {
