@@ -33,6 +33,7 @@ LinearData without_turn(LinearData data) {
 }
 
 double relative(const Change& change, const EnsembleFit& fit) {
+  if (change.at_most) return *change.at_most;
   const Eigen::VectorXd tensions = values_of(fit);
   const Eigen::Index n = tensions.size() > 1 ? tensions.size() - 1 : 1;
   const double size = tensions.tail(n).norm();
@@ -40,11 +41,12 @@ double relative(const Change& change, const EnsembleFit& fit) {
 }
 
 std::string sentence(const Change& change, const EnsembleFit& fit) {
+  const std::string percent = brief(100 * relative(change, fit)) + " %";
+  if (change.at_most) return "would change the tensions by at most " + percent;
   Eigen::Index most = 0;
   const double largest = change.by_tension_nN.cwiseAbs().maxCoeff(&most);
   const int id = fit.fibre_ids[static_cast<std::size_t>(most)];
-  return std::string("would change the tensions by ") + (change.is_bound ? "at most " : "") +
-         brief(100 * relative(change, fit)) + " %, that of " +
+  return "would change the tensions by " + percent + ", that of " +
          (id == 0 ? "the network" : "fibre " + std::to_string(id)) + " by " + brief(largest) + " nN";
 }
 

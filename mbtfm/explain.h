@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -11,8 +12,8 @@ namespace mbtfm::inverse {
 
 struct Change {
   std::string effect;
-  Eigen::VectorXd by_tension_nN;  ///< with the effect, less without
-  bool is_bound = false;          ///< no tension changes by more, but it may by less, either way
+  Eigen::VectorXd by_tension_nN;       ///< with the effect, less without; empty where only a bound is known
+  std::optional<double> at_most = {};  ///< |change| / |t|, where only that is known
 };
 
 Change change_between(const std::string& effect, const EnsembleFit& without, const EnsembleFit& with);
@@ -24,7 +25,7 @@ LinearData without_turn(LinearData data);
 /// |change| / |t| over the fibres, or of the network where there are none.
 double relative(const Change& change, const EnsembleFit& fit);
 
-/// "would change the tensions by 0.8 %, that of fibre 7 by 0.05 nN"; "by at most" where it is a bound
+/// "would change the tensions by 0.8 %, that of fibre 7 by 0.05 nN"; "by at most 3 %"
 std::string sentence(const Change& change, const EnsembleFit& fit);
 
 /// Columns effect, fibre_id, change_nN.

@@ -53,9 +53,9 @@ std::optional<Change> with_sides(const Effect& e, const FittedCell& c, int threa
 
 /// Where the effect's number bounds the change of the field, and so of the forces that displace the gel as far. A
 /// graded gel's own solution is off by some per cent, more than a grading that is left out.
-std::optional<Change> bounded_by_number(const Effect& e, const FittedCell& c) {
+std::optional<Change> bounded_by_number(const Effect& e) {
   if (!e.number) return {};
-  return Change{.effect = e.name, .by_tension_nN = *e.number * values_of(c.fit), .is_bound = true};
+  return Change{.effect = e.name, .by_tension_nN = {}, .at_most = e.number};
 }
 
 std::optional<Change> with_elasticity(const Effect& e, const FittedCell& c, int threads) {
@@ -85,7 +85,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   if (e.name == "stress fibres") return with_fibres(e, c, threads);
   if (e.name == "finite thickness") return with_base(e, c, threads);
   if (e.name == "finite sides") return with_sides(e, c, threads);
-  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e, c);
+  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e);
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
   if (e.name == "robust loss") return with_loss(e, c, threads);
   if (e.name == kTurnLeft) return with_turn(e, c, threads);
