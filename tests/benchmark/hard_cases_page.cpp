@@ -17,8 +17,23 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+/// GoogleTest 1.12 writes each byte beyond ASCII as a character of its own ("\\u00C2\\u00B2" for "²"): the bytes again.
+std::string bytes_of(const std::string& text) {
+  std::string bytes;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    if ((c & 0xFC) != 0xC0) {
+      bytes += text[i];
+      continue;
+    }
+    bytes += static_cast<char>((c & 3) << 6 | (static_cast<unsigned char>(text[++i]) & 0x3F));
+  }
+  return bytes;
+}
+
 /// Of a table's cell, and of a name as people read it.
 std::string cell_text(std::string text) {
+  text = bytes_of(text);
   for (char& c : text)
     if (c == '|' || c == '\n') c = '/';
   return text;
