@@ -13,6 +13,7 @@
 #include "network/frame.h"
 #include "network/grid.h"
 #include "network/links.h"
+#include "network/loose_parts.h"
 #include "network/relax.h"
 #include "pipeline/contract/errors.h"
 
@@ -179,6 +180,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   if (parameters.adhesion_anchor != "centre") hold_adhesions(cell, frame, result.network);
   result.network.links = links_of(frame, mesh, parameters);
   leave_out_loose_vertices(result.network);
+  result.n_loose_parts = leave_out_loose_parts(result.network);
   std::sort(result.network.links.begin(), result.network.links.end(), [](const Link& a, const Link& b) {
     return std::tie(a.vertex_a, a.vertex_b, a.fibre_id) < std::tie(b.vertex_a, b.vertex_b, b.fibre_id);
   });

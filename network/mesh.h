@@ -38,6 +38,7 @@ struct GeneratedNetwork {
   double area_um2 = 0;  ///< of the triangles
   int n_parts = 1;  ///< that no link joins: more than one where a neck is thinner than a tenth of an edge, or holes cut
                     ///< the cell up
+  int n_loose_parts = 0;                    ///< that no adhesion holds: left out
   int n_shared_segments = 0;                ///< where several fibres run along one edge, each with a link of its own
   int n_filled_holes = 0;                   ///< smaller than a triangle
   std::vector<int> clipped_fibre_ids;       ///< cut at the outline, or at a hole they end in

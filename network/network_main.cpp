@@ -41,12 +41,14 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
                    counted(generated.snapped_adhesion_ids.size(), "adhesions outside the cell drawn in") +
                    counted(generated.separated_adhesion_ids.size(), "adhesions at one place moved apart") +
                    counted(generated.n_filled_holes, "holes smaller than a triangle filled") +
+                   counted(generated.n_loose_parts, "parts left out that no adhesion holds") +
                    (generated.n_parts > 1 ? counted(generated.n_parts, "parts that no link joins") : "");
   report.figures = {{"n_vertices", static_cast<std::int64_t>(net.vertices_um.size())},
                     {"n_links", static_cast<std::int64_t>(net.links.size())},
                     {"n_triangles", static_cast<std::int64_t>(generated.n_triangles)},
                     {"n_held_vertices", static_cast<std::int64_t>(n_held)},
                     {"n_parts", static_cast<std::int64_t>(generated.n_parts)},
+                    {"n_loose_parts", static_cast<std::int64_t>(generated.n_loose_parts)},
                     {"n_shared_segments", static_cast<std::int64_t>(generated.n_shared_segments)},
                     {"mean_edge_um", generated.mean_edge_um},
                     {"even_share", generated.even_share},
