@@ -1,12 +1,11 @@
 /// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
-/// descent, noise, beside-fttc, segmentation, directions, types, speed. A table (CSV) on stdout; charts (SVG)
+/// descent, noise, bounds, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts (SVG)
 /// into the folder.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <chrono>
 #include <cstdlib>
 #include <cstring>
-#include <ctime>
 #include <filesystem>
 
 #include "mbtfm/cross_validation.h"
@@ -224,6 +223,37 @@ void noise(const Arguments& a) {
          .x_label = "noise / largest displacement",
          .y_label = "of the fibres' tensions",
          .series = {deviation, implied}}});
+}
+
+// What the bounds t >= 0 do to the network's force, and what the correction leaves of it: on the problem linearised at
+// the truth, where nothing else makes a bias.
+void bounds(const Arguments& a) {
+  std::printf("noise,standard_error,unbounded,bounded,corrected,reported\n");
+  for (const double level : {0.05, 0.25}) {
+    const TensionScene scene = thesis_scene(1, 10000, level);
+    const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+    const Eigen::MatrixXd J = problem.jacobian(problem.evaluate(scene.tensions_nN)), H = J.transpose() * J;
+    const Eigen::MatrixXd covariance = H.inverse();
+    double unbounded = 0, bounded = 0, corrected = 0, reported = 0;
+    std::mt19937_64 random(1);
+    std::normal_distribution<double> normal(0, 1);
+    for (int r = 0; r < a.n_repeats; ++r) {
+      Eigen::VectorXd noise(J.rows());
+      for (double& n : noise) n = normal(random);
+      const Eigen::VectorXd g = -J.transpose() * noise;
+      const Eigen::VectorXd found = scene.tensions_nN + bounded_quadratic_minimum(H, g, -scene.tensions_nN);
+      LocalMisfit local{.tensions_nN = found, .H = H, .g = g + H * (found - scene.tensions_nN)};
+      for (double& t : local.tensions_nN) t = t < 1e-12 ? 0 : t;  // rounding: at the bound
+      const double unbiased = found[0] + past_bounds_nN(local, 1)[0];
+      unbounded += scene.tensions_nN[0] - covariance.row(0).dot(g);
+      bounded += found[0];
+      corrected += unbiased;
+      reported += std::max(0.0, unbiased);
+    }
+    const double size = a.n_repeats * scene.tensions_nN[0];
+    std::printf("%g,%.3f,%.4f,%.4f,%.4f,%.4f\n", level, std::sqrt(covariance(0, 0)) / scene.tensions_nN[0],
+                unbounded / size, bounded / size, corrected / size, reported / size);
+  }
 }
 
 /// Arrows of force, at the adhesions or patches.
@@ -463,41 +493,6 @@ void types(const Arguments& a) {
                     test::histogram("dorsal and ventral exchanged", result.exchanged, *low, *high, 24)}}});
 }
 
-/// Processor time of one fit, the compliance given.
-double fit_seconds(const TensionScene& scene) {
-  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
-  const std::clock_t begin = std::clock();
-  fit_gauss_newton(problem, {}, uniform_start_nN(problem));
-  return double(std::clock() - begin) / CLOCKS_PER_SEC;
-}
-
-// How the time grows, and against the thesis' way to the same misfit.
-void speed(const Arguments&) {
-  std::printf("what,size,cpu_seconds\n");
-  for (const int n_beads : {2500, 5000, 10000}) {
-    TensionScene scene = thesis_scene(1, n_beads, 0.07);
-    const std::clock_t begin = std::clock();
-    scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
-    std::printf("reduce beads,%d,%.3f\n", n_beads, double(std::clock() - begin) / CLOCKS_PER_SEC);
-  }
-  const Cell cell = drawn_cell(1);
-  for (const double edge_um : {2.0, 1.4, 1.0, 0.8}) {
-    TensionScene scene = test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), 1), 2000, 0.07, 1);
-    network::NetworkParameters p;
-    p.edge_length_um = edge_um;
-    scene.cables = network::CableNetwork(network::generate_network(cell, p).network);
-    std::printf("fit by vertices,%zu,%.3f\n", scene.cables.network().vertices_um.size(), fit_seconds(scene));
-  }
-  for (const int n_fibres : {5, 10, 20, 30}) {
-    samples::ScenarioParameters p;
-    p.cell.fibre_spacing_um = 1;  // room for the many
-    p.cell.n_ventral = n_fibres - 2 * (n_fibres / 3), p.cell.n_dorsal = p.cell.n_arc = n_fibres / 3;
-    const Cell other = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1).cell;
-    const TensionScene scene = test::scene_of(other, thesis_tensions_nN(other.fibres.size(), 1), 2000, 0.07, 1);
-    std::printf("fit by fibres,%zu,%.3f\n", other.fibres.size(), fit_seconds(scene));
-  }
-}
-
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -505,13 +500,9 @@ int main(int argc, char** argv) {
   const Arguments a{.n_repeats = argc > 2 ? std::atoi(argv[2]) : 10,
                     .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
                     .folder = argc > 4 ? argv[4] : "."};
-  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {{"descent", descent},
-                                                                        {"noise", noise},
-                                                                        {"beside-fttc", beside_fttc},
-                                                                        {"segmentation", segmentation},
-                                                                        {"directions", directions},
-                                                                        {"types", types},
-                                                                        {"speed", speed}};
+  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {
+      {"descent", descent},           {"noise", noise},           {"bounds", bounds}, {"beside-fttc", beside_fttc},
+      {"segmentation", segmentation}, {"directions", directions}, {"types", types}};
   for (const auto& [name, run] : studies) {
     if (argc > 1 && std::strcmp(argv[1], name) == 0) {
       run(a);
@@ -519,7 +510,7 @@ int main(int argc, char** argv) {
     }
   }
   std::fprintf(stderr,
-               "tension_accuracy descent|noise|beside-fttc|segmentation|directions|types|speed [repeats] "
+               "tension_accuracy descent|noise|bounds|beside-fttc|segmentation|directions|types [repeats] "
                "[cells] [folder]\n");
   return 2;
 }
