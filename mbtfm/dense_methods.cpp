@@ -29,28 +29,40 @@ double beads_per_um2(const DisplacementField& beads) {
   return static_cast<double>(beads.size()) / area;
 }
 
-/// Forces or tractions with their covariance by the noise.
+/// Forces or tractions with what is known of their errors.
 struct Loads {
   Eigen::VectorXd values;
-  Eigen::MatrixXd covariance;
+  Eigen::MatrixXd covariance;  ///< by the noise
+  Eigen::MatrixXd response;    ///< to a force of one on each adhesion
   Vec2 at(std::size_t load) const {
     return {values[2 * static_cast<Index>(load)], values[2 * static_cast<Index>(load) + 1]};
   }
-  Eigen::Matrix2d covariance_of(std::size_t one, std::size_t other) const {
-    return covariance.block<2, 2>(2 * static_cast<Index>(one), 2 * static_cast<Index>(other));
-  }
 };
+
+/// The loads that a method has, and the forces spread evenly over the adhesions which are taken for the truth.
+struct Model {
+  Compliance compliance;
+  std::size_t n_loads = 0;
+  Compliance truth;
+  std::size_t n_adhesions = 0;
+};
+
+Compliance even_forces(const TractionInputs& inputs, const substrate::Substrate& gel) {
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return [&gel, ellipses](const std::vector<Vec2>& at) { return gel.compliance_um_per_nN(at, ellipses); };
+}
 
 /// Choose lambda and solve. `length_at_unit_density_um` is lambda E for lambda = 1 in the problem's own unit and one
 /// bead a um²: what the penalty would be over an area, ∫ |u|² + (lambda/E)² ∫ |t|², in the place of sums over beads and
 /// loads.
-Loads regularised(const TractionInputs& inputs, const TractionParameters& parameters, const Compliance& compliance,
-                  std::size_t n_loads, double length_at_unit_density_um, Reconstruction& r) {
-  const auto n = 2 * static_cast<Index>(n_loads);
-  const DenseProblem problem(inputs.beads, compliance, n);
+Loads regularised(const TractionInputs& inputs, const TractionParameters& parameters, const Model& model,
+                  double length_at_unit_density_um, Reconstruction& r) {
+  const auto n = 2 * static_cast<Index>(model.n_loads), n_true = 2 * static_cast<Index>(model.n_adhesions);
+  const DenseProblem problem(inputs.beads, model.compliance, n, model.truth, n_true);
   if (problem.data_squared() == 0) {
     r.remark = "no bead has moved: there is no traction";
-    return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n)};
+    return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n_true)};
   }
   const double length_um = length_at_unit_density_um / std::sqrt(beads_per_um2(inputs.beads));
   r.scan = problem.scan();
@@ -59,14 +71,26 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
   r.length_um = *r.lambda * length_um;
   const Eigen::VectorXd loads = problem.solve(*r.lambda);
   r.relative_l2 = problem.relative_l2(loads);
-  return {loads, problem.covariance(*r.lambda, r.scan->variance)};
+  return {loads, problem.covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
 }
 
-/// Standard error of the magnitude of a force from the covariance of its components.
-double magnitude_deviation(Vec2 force, const Eigen::Matrix2d& covariance) {
-  const Vec2 along = direction_of(force);
-  const Eigen::Vector2d e(along.x, along.y);
-  return std::sqrt(e.dot(covariance * e));
+/// Standard errors of the forces' magnitudes, which are `sums` (rows 2a, 2a+1 for adhesion a) of the loads: by the
+/// noise, and by what penalty and model make of forces spread over their adhesions. docs/theory.md (17).
+void state_errors(const Loads& loads, const Eigen::MatrixXd& sums, std::vector<AdhesionForce>& forces) {
+  const Eigen::MatrixXd covariance = sums * loads.covariance * sums.transpose();
+  const Eigen::MatrixXd missed = sums * loads.response - Eigen::MatrixXd::Identity(sums.rows(), loads.response.cols());
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    const Vec2 along = direction_of(forces[a].force_nN);
+    const Eigen::RowVector2d e(along.x, along.y);
+    const auto row = 2 * static_cast<Index>(a);
+    double variance = (e * covariance.block<2, 2>(row, row) * e.transpose()).value();
+    for (std::size_t b = 0; b < forces.size(); ++b) {
+      const Eigen::Vector2d force(forces[b].force_nN.x, forces[b].force_nN.y);
+      const double share = (e * missed.block<2, 2>(row, 2 * static_cast<Index>(b)) * force).value();
+      variance += share * share;
+    }
+    forces[a].sigma_nN = std::sqrt(variance);
+  }
 }
 
 std::vector<Vec2> square_centres(const Polygon& outline, double side_um) {
@@ -104,22 +128,25 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
   Reconstruction r;
   r.lambda_unit = "um_per_nN";
   // sum of F² over adhesions of area a stands for a times the integral of t²
-  const Loads loads = regularised(
-      inputs, parameters, [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); },
-      points.size(), inputs.gel.youngs_modulus_kPa * std::sqrt(area), r);
+  const Model model{.compliance = [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); },
+                    .n_loads = points.size(),
+                    .truth = even_forces(inputs, *gel),
+                    .n_adhesions = points.size()};
+  const Loads loads = regularised(inputs, parameters, model, inputs.gel.youngs_modulus_kPa * std::sqrt(area), r);
   std::vector<Vec2> forces;
   for (std::size_t a = 0; a < points.size(); ++a) forces.push_back(loads.at(a));
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const Adhesion& adhesion = inputs.adhesions[a];
     r.forces.push_back({.adhesion_id = adhesion.adhesion_id,
                         .force_nN = forces[a],
-                        .sigma_nN = magnitude_deviation(forces[a], loads.covariance_of(a, a)),
+                        .sigma_nN = {},
                         .connected = false,
                         .moment_nN_um = 0});
     // a point yields without end: the work is that of the force spread over its adhesion, at its centre
     const std::vector<Vec2> u = gel->displacements_um({adhesion.position_um}, ellipses, forces);
     r.patches.push_back({adhesion.position_um, adhesion.area_um2, 1 / adhesion.area_um2 * forces[a], u.front()});
   }
+  state_errors(loads, Eigen::MatrixXd::Identity(loads.values.size(), loads.values.size()), r.forces);
   return r;
 }
 
@@ -146,8 +173,12 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
   Reconstruction r;
   r.lambda_unit = "um_per_kPa";
   // sum of t² over elements of area a stands for the integral of t² over a
-  const Loads loads =
-      regularised(inputs, parameters, compliance, centres.size(), inputs.gel.youngs_modulus_kPa / std::sqrt(area), r);
+  const auto gel = substrate::make_greens(inputs.gel, {.model = parameters.gel_model}, threads);
+  const Model model{.compliance = compliance,
+                    .n_loads = centres.size(),
+                    .truth = even_forces(inputs, *gel),
+                    .n_adhesions = inputs.adhesions.size()};
+  const Loads loads = regularised(inputs, parameters, model, inputs.gel.youngs_modulus_kPa / std::sqrt(area), r);
   const Eigen::VectorXd u = compliance(centres) * loads.values;
   for (std::size_t j = 0; j < centres.size(); ++j) {
     const auto at = 2 * static_cast<Index>(j);
@@ -155,15 +186,11 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
   }
   r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
   const std::vector<int> owner = adhesion_of_patches(centres, inputs.adhesions, parameters.grow_um);
-  for (std::size_t a = 0; a < r.forces.size(); ++a) {
-    Eigen::Matrix2d sum = Eigen::Matrix2d::Zero();
-    for (std::size_t i = 0; i < centres.size(); ++i) {
-      for (std::size_t j = 0; j < centres.size(); ++j) {
-        if (owner[i] == static_cast<int>(a) && owner[j] == owner[i]) sum += loads.covariance_of(i, j);
-      }
-    }
-    r.forces[a].sigma_nN = area * magnitude_deviation(r.forces[a].force_nN, sum);
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2 * static_cast<Index>(r.forces.size()), loads.values.size());
+  for (std::size_t i = 0; i < centres.size(); ++i) {
+    if (owner[i] >= 0) sums.block<2, 2>(2 * owner[i], 2 * static_cast<Index>(i)) = area * Eigen::Matrix2d::Identity();
   }
+  state_errors(loads, sums, r.forces);
   r.figures = {{"n_elements", std::int64_t(centres.size())}};
   return r;
 }

@@ -10,26 +10,38 @@ namespace mbtfm::inverse {
 
 using Eigen::Index;
 
+struct DenseProblem::Range {
+  std::size_t begin, end;
+};
+
+Eigen::MatrixXd DenseProblem::weighted(const Compliance& compliance, const Range& range) const {
+  std::vector<Vec2> points;
+  for (std::size_t i = range.begin; i < range.end; ++i) points.push_back(beads_[i].position_um);
+  Eigen::MatrixXd G = compliance(points);
+  for (std::size_t i = range.begin; i < range.end; ++i) {
+    G.middleRows<2>(2 * static_cast<Index>(i - range.begin)) *= std::sqrt(weights_[i]);
+  }
+  return G;
+}
+
 template <class Use>
 void DenseProblem::for_blocks(const Use& use) const {
   constexpr std::size_t kBlock = 1024;  // beads at a time: G as a whole may be too large for memory
   for (std::size_t begin = 0; begin < beads_.size(); begin += kBlock) {
-    const std::size_t end = std::min(begin + kBlock, beads_.size());
-    std::vector<Vec2> points;
-    for (std::size_t i = begin; i < end; ++i) points.push_back(beads_[i].position_um);
-    Eigen::MatrixXd G = compliance_(points);
+    const Range range{begin, std::min(begin + kBlock, beads_.size())};
+    const Eigen::MatrixXd G = weighted(compliance_, range);
     Eigen::VectorXd u(G.rows());
-    for (std::size_t i = begin; i < end; ++i) {
-      const auto row = 2 * static_cast<Index>(i - begin);
+    for (std::size_t i = begin; i < range.end; ++i) {
       const double root = std::sqrt(weights_[i]);
-      G.middleRows<2>(row) *= root;
-      u.segment<2>(row) << root * beads_[i].displacement_um.x, root * beads_[i].displacement_um.y;
+      u.segment<2>(2 * static_cast<Index>(i - begin)) << root * beads_[i].displacement_um.x,
+          root * beads_[i].displacement_um.y;
     }
-    use(G, u);
+    use(range, G, u);
   }
 }
 
-DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance, Index n_loads)
+DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance, Index n_loads,
+                           const Compliance& truth, Index n_true)
     : beads_(beads), compliance_(std::move(compliance)) {
   check(beads);
   if (2 * static_cast<Index>(beads.size()) < n_loads) {
@@ -50,15 +62,18 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
 
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n_loads, n_loads);
   Eigen::VectorXd pulled = Eigen::VectorXd::Zero(n_loads);
-  for_blocks([&](const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
+  Eigen::MatrixXd pulled_by_truth = Eigen::MatrixXd::Zero(n_loads, n_true);
+  for_blocks([&](const Range& range, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
     normal.selfadjointView<Eigen::Lower>().rankUpdate(G.transpose());
     pulled += G.transpose() * u;
+    if (n_true > 0) pulled_by_truth += G.transpose() * weighted(truth, range);
     data_squared_ += u.squaredNorm();
   });
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
   eigenvalues_ = eigen.eigenvalues().cwiseMax(0);
   eigenvectors_ = eigen.eigenvectors();
   projected_ = eigenvectors_.transpose() * pulled;
+  projected_truth_ = eigenvectors_.transpose() * pulled_by_truth;
 }
 
 LambdaScan DenseProblem::scan() const {
@@ -96,9 +111,15 @@ Eigen::MatrixXd DenseProblem::covariance(double lambda, double variance) const {
   return variance * eigenvectors_ * shares.matrix().asDiagonal() * eigenvectors_.transpose();
 }
 
+Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
+  const Eigen::VectorXd shares = (eigenvalues_.array() + lambda * lambda).inverse().matrix();
+  return eigenvectors_ * (shares.asDiagonal() * projected_truth_);
+}
+
 double DenseProblem::relative_l2(const Eigen::VectorXd& loads) const {
   double sum = 0;
-  for_blocks([&](const Eigen::MatrixXd& G, const Eigen::VectorXd& u) { sum += (u - G * loads).squaredNorm(); });
+  for_blocks(
+      [&](const Range&, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) { sum += (u - G * loads).squaredNorm(); });
   return data_squared_ > 0 ? std::sqrt(sum / data_squared_) : 0;
 }
 

@@ -285,6 +285,8 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   all.fibre_ids = networks.front().fibre_ids();
   for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == all.fibre_ids);
   check_suffice(data.n_used, static_cast<Eigen::Index>(all.fibre_ids.size()));
+  // another fit may have left its weights: bad beads are known by a fit in which all count
+  if ((data.bead_weight.array() != 1).any()) reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
   all.meshes.resize(networks.size());
   std::mutex mutex;
   int n_done = 0;

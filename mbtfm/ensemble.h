@@ -59,7 +59,7 @@ struct EnsembleFit {
 
 /// Fit on the first network; at its answer, see how the networks differ (three of them or more); then fit on each, with
 /// that for the error of the model, in threads.
-/// @param data  its weights by bead are set where the loss is a robust one
+/// @param data  its weights by bead are set anew: 1, or as a robust loss has them
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
 /// @param start_nN  tensions to start from (those of the frame before), or none
 EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, LinearData& data,

@@ -4,19 +4,35 @@
 #include <optional>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/parallel.h"
 
 namespace mbtfm::inverse {
 namespace {
 
 constexpr const char* kTurnLeft = "turn of the displacement";
 
+/// The fit again, with other networks, data or loss. From the same start as a run that has the effect from the first.
+EnsembleFit fit_again(const FittedCell& c, const std::vector<network::CableNetwork>& networks, LinearData data,
+                      const std::string& loss, int threads) {
+  FitParameters parameters = c.parameters.fit;
+  parameters.loss = loss;
+  parameters.bootstrap = 0;
+  return fit_ensemble(networks, data, adhesion_ids_of(c.cell), parameters, threads, {});
+}
+
+/// Without what a robust loss has made of the beads' weights.
+LinearData unweighted(LinearData data) {
+  reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
+  return data;
+}
+
 std::optional<Change> change_by_gel(const std::string& name, const FittedCell& c,
                                     const substrate::SubstrateParameters& parameters, int threads) {
   const auto gel = substrate::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.data;
   with.compliance_um_per_nN = gel->compliance_um_per_nN(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
-  reweight(with, c.data.bead_weight);
-  return change_by_data(name, c.fit, c.data, with);
+  return change_between(name, c.fit,
+                        fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> with_base(const Effect& e, const FittedCell& c, int threads) {
@@ -35,49 +51,44 @@ std::optional<Change> with_sides(const Effect& e, const FittedCell& c, int threa
   return change_by_gel(e.name, c, parameters, threads);
 }
 
-/// Where the effect's number bounds the change of the field, and so of the forces that displace the gel as far.
-std::optional<Change> bounded_by_number(const Effect& e, const FittedCell& c) {
+/// Where the effect's number bounds the change of the field, and so of the forces that displace the gel as far. A
+/// graded gel's own solution is off by some per cent, more than a grading that is left out.
+std::optional<Change> bounded_by_number(const Effect& e) {
   if (!e.number) return {};
-  Change change{e.name, Eigen::VectorXd::Zero(static_cast<Eigen::Index>(c.fit.tensions_nN.size()))};
-  for (std::size_t i = 0; i < c.fit.tensions_nN.size(); ++i) {
-    change.by_tension_nN[static_cast<Eigen::Index>(i)] = *e.number * c.fit.tensions_nN[i].value;
-  }
-  return change;
+  return Change{.effect = e.name, .by_tension_nN = {}, .at_most = e.number};
 }
 
 std::optional<Change> with_elasticity(const Effect& e, const FittedCell& c, int threads) {
-  std::vector<network::CableNetwork> networks;
-  for (const network::CableNetwork& n : c.networks) networks.emplace_back(n.network(), c.parameters.cables);
-  return change_by_networks(e.name, c.fit, c.data, networks, adhesion_ids_of(c.inputs.cell), threads);
+  const auto elastic = of_cables(c.networks, c.parameters.cables);
+  return change_between(e.name, c.fit, fit_again(c, elastic, unweighted(c.data), c.parameters.fit.loss, threads));
 }
 
-std::optional<Change> with_loss(const Effect& e, const FittedCell& c) {
-  return change_by_loss(e.name, c.fit, c.data, c.parameters.fit.robust_kind);
+std::optional<Change> with_loss(const Effect& e, const FittedCell& c, int threads) {
+  return change_between(e.name, c.fit, fit_again(c, c.networks, c.data, c.parameters.fit.robust_kind, threads));
 }
 
-std::optional<Change> with_turn(const Effect& e, const FittedCell& c) {
-  return change_by_turn(e.name, c.fit, c.data, points_of(c.inputs.beads));
+std::optional<Change> with_turn(const Effect& e, const FittedCell& c, int threads) {
+  return change_between(e.name, c.fit,
+                        fit_again(c, c.networks, without_turn(unweighted(c.data)), c.parameters.fit.loss, threads));
 }
 
-/// A fit on one network that has them.
+/// What it changes of the network's tension.
 std::optional<Change> with_fibres(const Effect& e, const FittedCell& c, int threads) {
   if (c.cell.fibres.empty()) return {};
-  std::vector<network::CableNetwork> networks;
-  networks.emplace_back(network::generate_network(c.cell, c.parameters.network).network, c.parameters.cables);
-  LinearData data = c.data;
-  const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids_of(c.cell), c.parameters.fit, threads, {});
-  const double without = c.fit.meshes.front().fit.trial.tensions_nN[0];
-  return Change{e.name, Eigen::VectorXd::Constant(1, fit.tensions_nN[0].value - without)};
+  const auto networks = of_cables(
+      span_ensemble(network::generate_network(c.cell, c.parameters.network).network, c.cell, c.parameters, threads),
+      c.networks.front().parameters());
+  return change_between(e.name, c.fit, fit_again(c, networks, unweighted(c.data), c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> change_with(const Effect& e, const FittedCell& c, int threads) {
   if (e.name == "stress fibres") return with_fibres(e, c, threads);
   if (e.name == "finite thickness") return with_base(e, c, threads);
   if (e.name == "finite sides") return with_sides(e, c, threads);
-  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e, c);
+  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e);
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
-  if (e.name == "robust loss") return with_loss(e, c);
-  if (e.name == kTurnLeft) return with_turn(e, c);
+  if (e.name == "robust loss") return with_loss(e, c, threads);
+  if (e.name == kTurnLeft) return with_turn(e, c, threads);
   return {};
 }
 
@@ -89,6 +100,27 @@ std::string in_words(const std::string& name) {
 }
 
 }  // namespace
+
+std::vector<network::CableNetwork> span_ensemble(const Network& first, const Cell& cell, const FitStageParameters& p,
+                                                 int threads) {
+  std::vector<Network> networks(static_cast<std::size_t>(p.fit.n_meshes));
+  networks.front() = first;
+  parallel_for(p.fit.n_meshes - 1, threads, [&](int m) {
+    network::NetworkParameters parameters = p.network;
+    parameters.seed += static_cast<std::uint64_t>(m) + 1;
+    networks[static_cast<std::size_t>(m) + 1] = network::generate_network(cell, parameters).network;
+  });
+  std::vector<network::CableNetwork> cables;
+  for (Network& network : networks) cables.emplace_back(std::move(network), p.cables);
+  return cables;
+}
+
+std::vector<network::CableNetwork> of_cables(const std::vector<network::CableNetwork>& networks,
+                                             const network::CableParameters& cables) {
+  std::vector<network::CableNetwork> result;
+  for (const network::CableNetwork& n : networks) result.emplace_back(n.network(), cables);
+  return result;
+}
 
 std::vector<Change> explain(std::vector<Effect>& effects, const FittedCell& cell, int threads) {
   effects.push_back(

@@ -17,7 +17,7 @@ struct FitStageParameters {
   FitParameters fit;
   SegmentationErrors segmentation;
   EffectSwitches effects;
-  bool explain = false;  ///< some seconds; what is off is off because it does not matter
+  bool explain = false;  ///< a fit for each effect that is off; what is off is off because it does not matter
 };
 void declare(ParameterList& list, FitStageParameters& parameters);
 
@@ -34,6 +34,13 @@ struct FittedCell {
 std::vector<int> adhesion_ids_of(const Cell& cell);
 std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
 std::vector<Vec2> points_of(const DisplacementField& beads);
+
+/// `first`, then further ones over the same cell from other seeds.
+std::vector<network::CableNetwork> span_ensemble(const Network& first, const Cell& cell, const FitStageParameters& p,
+                                                 int threads);
+/// The same networks of other cables.
+std::vector<network::CableNetwork> of_cables(const std::vector<network::CableNetwork>& networks,
+                                             const network::CableParameters& cables);
 
 /// Say of each effect that is off what it would change, where anything tells: its `change` and `would_change`.
 /// @return the changes by tension

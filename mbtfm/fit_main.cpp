@@ -55,20 +55,6 @@ std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& ce
   return is_used;
 }
 
-/// The given network first, then further ones over the same cell from other seeds.
-std::vector<network::CableNetwork> span_ensemble(const FitInputs& inputs, const FitStageParameters& p, int threads) {
-  std::vector<Network> networks(p.fit.n_meshes);
-  networks[0] = inputs.network;
-  parallel_for(p.fit.n_meshes - 1, threads, [&](int m) {
-    network::NetworkParameters parameters = p.network;
-    parameters.seed += static_cast<std::uint64_t>(m) + 1;
-    networks[m + 1] = network::generate_network(inputs.cell, parameters).network;
-  });
-  std::vector<network::CableNetwork> cables;
-  for (Network& network : networks) cables.emplace_back(std::move(network), p.cables);
-  return cables;
-}
-
 void write_surface(const Path& file, const substrate::Substrate& substrate, const Cell& cell,
                    const std::vector<AdhesionForce>& forces, int n_lines) {
   std::vector<Vec2> forces_nN;
@@ -84,13 +70,9 @@ void check_fibres(const FitInputs& inputs, const Effect& fibres, const Path& fil
                    "span it anew: mbtfm-network with the same cell.toml");
 }
 
-/// The same networks of other cables.
-std::vector<network::CableNetwork> of_cables(const std::vector<network::CableNetwork>& networks,
-                                             network::CableParameters cables, double axial_stiffness_nN) {
-  cables.axial_stiffness_nN = axial_stiffness_nN;
-  std::vector<network::CableNetwork> result;
-  for (const network::CableNetwork& n : networks) result.emplace_back(n.network(), cables);
-  return result;
+network::CableParameters inelastic(network::CableParameters cables) {
+  cables.axial_stiffness_nN = 0;
+  return cables;
 }
 
 /// The tensions found may stretch cables that those of the start did not. @returns whether elasticity was switched on
@@ -249,7 +231,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                            beads_in_region(inputs.beads, inputs.cell, p.fit));
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
-  std::vector<network::CableNetwork> networks = span_ensemble(inputs, p, context.threads);
+  std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
   const Effect coupling =
       decide_time_coupling(context.has_input("start") || series.size() > 1, p.effects.time_coupling);
   const Eigen::VectorXd start =
@@ -258,7 +240,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
           : uniform_start_nN(TensionProblem(networks.front(), data.reduced, adhesion_ids_of(inputs.cell)));
   Effect elasticity =
       network::decide_elasticity(networks.front(), {start.data(), start.data() + start.size()}, p.effects);
-  if (!elasticity.is_on) networks = of_cables(networks, p.cables, 0);
+  if (!elasticity.is_on) networks = of_cables(networks, inelastic(p.cables));
   const auto fit_all = [&] {
     return fit_ensemble(
         networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
@@ -270,7 +252,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   };
   EnsembleFit fit = fit_all();
   if (was_left_out_wrongly(elasticity, networks.front(), fit.meshes.front().fit.trial, p)) {
-    networks = of_cables(networks, p.cables, p.cables.axial_stiffness_nN);
+    networks = of_cables(networks, p.cables);
     fit = fit_all();
   }
 

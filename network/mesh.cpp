@@ -12,69 +12,13 @@
 #include "network/adhesions.h"
 #include "network/frame.h"
 #include "network/grid.h"
+#include "network/links.h"
+#include "network/loose_parts.h"
 #include "network/relax.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::network {
 namespace {
-
-/// Width of material that an edge stands for: its length between the circumcentres of its two triangles. With a
-/// tension in proportion to it, the links pull as a sheet of even surface tension does, on any triangulation:
-/// t_ab = sigma (cot alpha + cot beta) l_ab / 2 is minus the gradient of the sheet's area. A triangle that is obtuse
-/// there would count negative.
-/// Source: Pinkall & Polthier, Exp. Math. 2:15 (1993), eq. 2.
-double dual_width_um(const std::vector<Vec2>& points, const Triangulation::Edge& edge) {
-  const Vec2 a = points[edge.vertex_a];
-  const Vec2 b = points[edge.vertex_b];
-  double cotangents = 0;
-  for (const int apex : edge.apexes) {
-    if (apex < 0) continue;
-    const Vec2 to_a = a - points[apex];
-    const Vec2 to_b = b - points[apex];
-    const double doubled_area = std::abs(cross(to_a, to_b));
-    if (doubled_area > 0) cotangents += dot(to_a, to_b) / doubled_area;
-  }
-  return 0.5 * cotangents * norm(b - a);
-}
-
-/// Links of all edges: one of each fibre that runs along it, else one of the actin network.
-std::vector<Link> links_of(const Frame& frame, const RelaxedMesh& mesh, const NetworkParameters& parameters) {
-  std::map<std::pair<int, int>, const FrameSegment*> fibre_segments;
-  for (const FrameSegment& s : frame.segments) {
-    if (!s.fibre_ids.empty()) fibre_segments[{s.vertex_a, s.vertex_b}] = &s;
-  }
-  // in a regular triangulation an edge of length h has the dual width h / sqrt(3)
-  const double regular_width = parameters.edge_length_um / std::sqrt(3.0);
-  constexpr double kSmallestShare = 0.02;  // of an edge across from an obtuse angle: a cable cannot push
-  std::vector<Link> links;
-  for (const Triangulation::Edge& e : mesh.triangulation.edges) {
-    Link link{.vertex_a = e.vertex_a, .vertex_b = e.vertex_b};
-    link.rest_length_um = norm(mesh.points_um[e.vertex_b] - mesh.points_um[e.vertex_a]);
-    const auto segment = fibre_segments.find({e.vertex_a, e.vertex_b});
-    if (segment != fibre_segments.end()) {
-      for (const int id : segment->second->fibre_ids) {
-        link.fibre_id = id;
-        links.push_back(link);
-      }
-      fibre_segments.erase(segment);
-    } else {
-      if (parameters.link_weights == "width") {
-        link.share = std::max(kSmallestShare, dual_width_um(mesh.points_um, e) / regular_width);
-      }
-      links.push_back(link);
-    }
-  }
-  // a fibre in a neck so thin that no triangle is left there
-  for (const auto& [ends, segment] : fibre_segments) {
-    for (const int id : segment->fibre_ids) {
-      links.push_back({.vertex_a = ends.first,
-                       .vertex_b = ends.second,
-                       .fibre_id = id,
-                       .rest_length_um = norm(mesh.points_um[ends.second] - mesh.points_um[ends.first])});
-    }
-  }
-  return links;
-}
 
 /// Each vertex belongs to the adhesion whose ellipse it lies in, or on whose rim; the nearest where several overlap.
 void hold_adhesions(const Cell& cell, const Frame& frame, Network& network) {
@@ -179,6 +123,8 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
   }
   int n_even = 0;
   for (const auto& e : mesh.triangulation.edges) {
+    result.mean_edge_um += norm(mesh.points_um[e.vertex_b] - mesh.points_um[e.vertex_a]) /
+                           static_cast<double>(mesh.triangulation.edges.size());
     const double wanted = 0.5 * (mesh.size_um[e.vertex_a] + mesh.size_um[e.vertex_b]);
     const double relative = norm(mesh.points_um[e.vertex_b] - mesh.points_um[e.vertex_a]) / wanted;
     n_even += relative >= 0.6 && relative <= 1.5;
@@ -201,6 +147,10 @@ void declare(ParameterList& list, NetworkParameters& parameters) {
            "tension and stiffness of the actin network's links: the same for all, or by the width of material each "
            "stands for",
            {"equal", "width"});
+  list.add("link_reach", parameters.link_reach,
+           "what the actin network's links join: vertices at the two ends of an edge, or also those across from each "
+           "other at one, so that links run in twelve directions rather than six",
+           {"neighbours", "second-neighbours"});
   list.add("adhesion_anchor", parameters.adhesion_anchor,
            "what an adhesion holds: its rim, which the mesh resolves; every vertex that happens to lie in its ellipse; "
            "or the one at its centre",
@@ -230,6 +180,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   if (parameters.adhesion_anchor != "centre") hold_adhesions(cell, frame, result.network);
   result.network.links = links_of(frame, mesh, parameters);
   leave_out_loose_vertices(result.network);
+  result.n_loose_parts = leave_out_loose_parts(result.network);
   std::sort(result.network.links.begin(), result.network.links.end(), [](const Link& a, const Link& b) {
     return std::tie(a.vertex_a, a.vertex_b, a.fibre_id) < std::tie(b.vertex_a, b.vertex_b, b.fibre_id);
   });

@@ -12,20 +12,22 @@
 namespace mbtfm::network {
 
 struct NetworkParameters {
-  double edge_length_um = 1.5;              ///< mean cable length: about the spacing of the bundles one can resolve
-  double edge_growth = 0.3;                 ///< of the edge length with distance from what is resolved finer
-  std::uint64_t seed = 1;                   ///< of the first placement of the vertices
-  std::string seeds = "jittered";           ///< regular | jittered | poisson
-  std::string link_weights = "width";       ///< equal (thesis) | width
-  std::string adhesion_anchor = "ellipse";  ///< rim | ellipse | centre
-  int rim_points = 8;                       ///< round an adhesion, at least: an octagon shows which way it is long
-  std::string free_fibre_ends = "point";    ///< point | width
+  double edge_length_um = 1.5;         ///< mean cable length: about the spacing of the bundles one can resolve
+  double edge_growth = 0.3;            ///< of the edge length with distance from what is resolved finer
+  std::uint64_t seed = 1;              ///< of the first placement of the vertices
+  std::string seeds = "jittered";      ///< regular | jittered | poisson
+  std::string link_weights = "width";  ///< equal (thesis) | width
+  std::string link_reach = "second-neighbours";  ///< neighbours (thesis) | second-neighbours: halves the spread
+  std::string adhesion_anchor = "ellipse";       ///< rim | ellipse | centre
+  int rim_points = 8;                            ///< round an adhesion, at least: an octagon shows which way it is long
+  std::string free_fibre_ends = "point";         ///< point | width
 };
 void declare(ParameterList& list, NetworkParameters& parameters);
 
 struct GeneratedNetwork {
   Network network;
   Report report;
+  double mean_edge_um = 0;  ///< of the triangulation
   double mean_quality = 0;  ///< of the triangles: 2 · inradius / circumradius
   double worst_quality = 0;
   double mean_free_quality = 0;   ///< of those away from fibres, adhesions and outline, whose shape nothing forces
@@ -36,6 +38,7 @@ struct GeneratedNetwork {
   double area_um2 = 0;  ///< of the triangles
   int n_parts = 1;  ///< that no link joins: more than one where a neck is thinner than a tenth of an edge, or holes cut
                     ///< the cell up
+  int n_loose_parts = 0;                    ///< that no adhesion holds: left out
   int n_shared_segments = 0;                ///< where several fibres run along one edge, each with a link of its own
   int n_filled_holes = 0;                   ///< smaller than a triangle
   std::vector<int> clipped_fibre_ids;       ///< cut at the outline, or at a hole they end in

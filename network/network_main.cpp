@@ -32,9 +32,6 @@ void declare(ParameterList& list, NetworkStageParameters& p) {
 
 StageReport report_of(const network::GeneratedNetwork& generated) {
   const Network& net = generated.network;
-  double sum_um = 0;
-  for (const Link& link : net.links) sum_um += link.rest_length_um;
-  const double mean_edge_um = sum_um / static_cast<double>(net.links.size());
   const int n_held = static_cast<int>(net.vertices_um.size()) -
                      static_cast<int>(std::count(net.adhesion_id.begin(), net.adhesion_id.end(), 0));
   StageReport report;
@@ -44,14 +41,16 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
                    counted(generated.snapped_adhesion_ids.size(), "adhesions outside the cell drawn in") +
                    counted(generated.separated_adhesion_ids.size(), "adhesions at one place moved apart") +
                    counted(generated.n_filled_holes, "holes smaller than a triangle filled") +
+                   counted(generated.n_loose_parts, "parts left out that no adhesion holds") +
                    (generated.n_parts > 1 ? counted(generated.n_parts, "parts that no link joins") : "");
   report.figures = {{"n_vertices", static_cast<std::int64_t>(net.vertices_um.size())},
                     {"n_links", static_cast<std::int64_t>(net.links.size())},
                     {"n_triangles", static_cast<std::int64_t>(generated.n_triangles)},
                     {"n_held_vertices", static_cast<std::int64_t>(n_held)},
                     {"n_parts", static_cast<std::int64_t>(generated.n_parts)},
+                    {"n_loose_parts", static_cast<std::int64_t>(generated.n_loose_parts)},
                     {"n_shared_segments", static_cast<std::int64_t>(generated.n_shared_segments)},
-                    {"mean_edge_um", mean_edge_um},
+                    {"mean_edge_um", generated.mean_edge_um},
                     {"even_share", generated.even_share},
                     {"mean_quality", generated.mean_quality},
                     {"worst_quality", generated.worst_quality},

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <numeric>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
@@ -70,9 +71,10 @@ std::vector<DetectedBead> peaks(const Plane& band, double threshold, double heig
 /// exp(−d²/2s²) on the pixels from `first` on.
 std::vector<float> profile(double centre, int first, int n, double sigma) {
   std::vector<float> result(static_cast<std::size_t>(n));
+  const float scale = static_cast<float>(1 / sigma), start = static_cast<float>(first - centre);
   for (int k = 0; k < n; ++k) {
-    const double d = (first + k - centre) / sigma;
-    result[k] = static_cast<float>(std::exp(-0.5 * d * d));
+    const float d = scale * (start + static_cast<float>(k));
+    result[k] = std::exp(-0.5f * d * d);
   }
   return result;
 }
@@ -87,20 +89,18 @@ Box box_around(const Plane& plane, Vec2 centre, int reach) {
           std::min(plane.height - 1, j + reach)};
 }
 
-Plane picture_of(const std::vector<DetectedBead>& beads, const Plane& like, double sigma) {
-  Plane result{like.width, like.height, std::vector<float>(like.values.size(), 0.0f)};
-  const int reach = static_cast<int>(std::ceil(4 * sigma));
-  for (const DetectedBead& bead : beads) {
-    const Box box = box_around(like, bead.position_px, reach);
-    const auto x = profile(bead.position_px.x, box.left, box.right - box.left + 1, sigma);
-    const auto y = profile(bead.position_px.y, box.top, box.bottom - box.top + 1, sigma);
-    for (int j = box.top; j <= box.bottom; ++j) {
-      float* row = result.values.data() + static_cast<std::size_t>(j) * like.width;
-      const float height = static_cast<float>(bead.brightness) * y[j - box.top];
-      for (int i = box.left; i <= box.right; ++i) row[i] += height * x[i - box.left];
-    }
+/// Add `share` times a bead's picture.
+void add_picture(Plane& plane, const DetectedBead& bead, double sigma, double share) {
+  const Box box = box_around(plane, bead.position_px, static_cast<int>(std::ceil(4 * sigma)));  // 3e-4 is left there
+  const int n = box.right - box.left + 1, m = box.bottom - box.top + 1;
+  if (n <= 0 || m <= 0) return;
+  const std::vector<float> x = profile(bead.position_px.x, box.left, n, sigma);
+  const std::vector<float> y = profile(bead.position_px.y, box.top, m, sigma);
+  for (int j = 0; j < m; ++j) {
+    float* row = plane.values.data() + static_cast<std::size_t>(box.top + j) * plane.width + box.left;
+    const float height = static_cast<float>(share * bead.brightness) * y[j];
+    for (int i = 0; i < n; ++i) row[i] += height * x[i];
   }
-  return result;
 }
 
 /// Solve a symmetric positive system of 4 by Cholesky; false where it is singular.
@@ -124,28 +124,41 @@ bool solve(std::array<double, 16>& a, std::array<double, 4>& b) {
   return true;
 }
 
-/// One Gauss–Newton step of height, place and level of a spot on what the other spots leave, weighted by a Gaussian of
-/// 1.5 bead sigmas. Steps are held to half a pixel: touching beads are fitted in turns.
-DetectedBead improved(const DetectedBead& bead, const Plane& plane, const Plane& model, double sigma) {
-  const Box box = box_around(plane, bead.position_px, static_cast<int>(std::ceil(2.5 * sigma)));
-  const auto x = profile(bead.position_px.x, box.left, box.right - box.left + 1, sigma);
-  const auto y = profile(bead.position_px.y, box.top, box.bottom - box.top + 1, sigma);
-  std::array<double, 16> normal{};
-  std::array<double, 4> right{};
-  for (int j = box.top; j <= box.bottom; ++j) {
-    for (int i = box.left; i <= box.right; ++i) {
-      const double shape = x[i - box.left] * y[j - box.top];
-      const double dx = (i - bead.position_px.x) / sigma, dy = (j - bead.position_px.y) / sigma;
-      const double weight = std::exp(-0.5 * (dx * dx + dy * dy) / 2.25);
-      const std::array<double, 4> slope{shape, shape * dx, shape * dy, 1};  // the place in units of sigma/height
-      const double residual = plane.at(i, j) - model.at(i, j);
-      for (int a = 0; a < 4; ++a) {
-        for (int b = 0; b <= a; ++b) normal[4 * a + b] += weight * slope[a] * slope[b];
-        right[a] += weight * slope[a] * residual;
-      }
+/// Along one axis of a spot's box: the spot S, S d (d in bead sigmas) and 1, each times the weight W; and sums of
+/// their products, of which those over the box are products, since the box, the spot and the weight are.
+struct Axis {
+  std::vector<float> spot, slope, one;
+  double w = 0, s = 0, sd = 0, ss = 0, ssd = 0, ssdd = 0;  ///< of W, W S, W S d, W S², W S² d, W S² d²
+  Axis(double centre, int first, int n, double sigma) : spot(n), slope(n), one(profile(centre, first, n, 1.5 * sigma)) {
+    const std::vector<float> shape = profile(centre, first, n, sigma);
+    for (int k = 0; k < n; ++k) {
+      const float d = static_cast<float>((first + k - centre) / sigma);
+      spot[k] = one[k] * shape[k], slope[k] = spot[k] * d;
+      w += one[k], s += spot[k], sd += slope[k];
+      ss += spot[k] * shape[k], ssd += slope[k] * shape[k], ssdd += slope[k] * shape[k] * d;
     }
   }
-  if (!solve(normal, right) || !(bead.brightness > 0)) return bead;
+};
+
+/// One Gauss–Newton step of height, place and level of a spot on what the spots leave of the plane, weighted by a
+/// Gaussian of 1.5 bead sigmas. Steps are held to half a pixel: touching beads are fitted in turns.
+DetectedBead improved(const DetectedBead& bead, const Plane& rest, double sigma) {
+  const Box box = box_around(rest, bead.position_px, static_cast<int>(std::ceil(2.5 * sigma)));
+  const int n = box.right - box.left + 1, m = box.bottom - box.top + 1;
+  if (n <= 0 || m <= 0 || !(bead.brightness > 0)) return bead;
+  const Axis x(bead.position_px.x, box.left, n, sigma), y(bead.position_px.y, box.top, m, sigma);
+  // rows: height, place along x, along y (in units of sigma/height), level
+  std::array<double, 16> normal{x.ss * y.ss, 0, 0, 0, x.ssd * y.ss, x.ssdd * y.ss, 0, 0, x.ss * y.ssd, x.ssd * y.ssd,
+                                x.ss * y.ssdd, 0, x.s * y.s, x.sd * y.s, x.s * y.sd, x.w * y.w};
+  std::array<double, 4> right{};
+  for (int j = 0; j < m; ++j) {
+    const float* row = rest.row(box.top + j) + box.left;
+    float spot = 0, slope = 0, one = 0;
+    for (int i = 0; i < n; ++i) spot += x.spot[i] * row[i], slope += x.slope[i] * row[i], one += x.one[i] * row[i];
+    right[0] += y.spot[j] * spot, right[1] += y.spot[j] * slope, right[2] += y.slope[j] * spot;
+    right[3] += y.one[j] * one;
+  }
+  if (!solve(normal, right)) return bead;
   DetectedBead result = bead;
   const double to_px = sigma / bead.brightness;
   result.position_px.x += std::clamp(right[1] * to_px, -0.5, 0.5);
@@ -158,21 +171,28 @@ DetectedBead improved(const DetectedBead& bead, const Plane& plane, const Plane&
 
 double background_sigma(double bead_sigma) { return std::max(6 * bead_sigma, 8.0); }
 
-std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, double bead_sigma,
-                                       int rounds, int threads) {
-  for (int round = 0; round < rounds; ++round) {
-    const Plane model = picture_of(spots, plane, bead_sigma);
-    std::vector<DetectedBead> next(spots.size());
-    constexpr int kChunk = 256;
-    const int n = static_cast<int>(spots.size());
-    parallel_for((n + kChunk - 1) / kChunk, threads, [&](int chunk) {
-      for (int k = chunk * kChunk; k < std::min(n, (chunk + 1) * kChunk); ++k) {
-        next[k] = improved(spots[k], plane, model, bead_sigma);
-      }
+std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, std::vector<int> wanted,
+                                       double bead_sigma, int rounds, int threads) {
+  Plane rest = plane;
+  for (const DetectedBead& spot : spots) add_picture(rest, spot, bead_sigma, -1);
+  for (int round = 0; round < rounds && !wanted.empty(); ++round) {
+    std::vector<DetectedBead> next(wanted.size());
+    in_strips(static_cast<int>(wanted.size()), threads, [&](int from, int to) {
+      for (int k = from; k < to; ++k) next[k] = improved(spots[wanted[k]], rest, bead_sigma);
     });
-    for (int k = 0; k < n; ++k) {  // a fit that runs away from its maximum is not believed
-      if (norm(next[k].position_px - spots[k].position_px) < bead_sigma) spots[k] = next[k];
+    std::vector<int> unsettled;
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+      DetectedBead& spot = spots[wanted[k]];
+      const double step = norm(next[k].position_px - spot.position_px);
+      const double brighter = std::abs(next[k].brightness - spot.brightness);
+      constexpr double kSettled = 0.01;  // px, and of the brightness: a tenth of what a spot is known to
+      if (!(step < kSettled && brighter < kSettled * spot.brightness)) unsettled.push_back(wanted[k]);
+      if (!(step < bead_sigma)) continue;  // a fit that runs away from its maximum is not believed
+      add_picture(rest, spot, bead_sigma, 1);
+      spot = next[k];
+      add_picture(rest, spot, bead_sigma, -1);
     }
+    wanted = std::move(unsettled);
   }
   return spots;
 }
@@ -189,7 +209,9 @@ std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, doub
   const double dimmest = 0.1 * quantile(heights, 0.9);
   std::erase_if(beads, [&](const DetectedBead& bead) { return bead.brightness < dimmest; });
   constexpr int kRounds = 4;
-  beads = fitted_spots(plane, std::move(beads), bead_sigma, kRounds, threads);
+  std::vector<int> all(beads.size());
+  std::iota(all.begin(), all.end(), 0);
+  beads = fitted_spots(plane, std::move(beads), std::move(all), bead_sigma, kRounds, threads);
   std::erase_if(beads, [&](const DetectedBead& b) {
     return b.position_px.x < 0 || b.position_px.y < 0 || b.position_px.x > plane.width - 1 ||
            b.position_px.y > plane.height - 1;

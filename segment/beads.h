@@ -10,9 +10,10 @@ namespace mbtfm::segment {
 std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, double noise, double detection_snr,
                                      int threads);
 
-/// Places and heights of spots that are about known, fitted `rounds` times, each with the others' pictures taken away.
-std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, double bead_sigma,
-                                       int rounds, int threads);
+/// Spots that are about known, the places and heights of the `wanted` ones (indices) fitted in at most so many rounds,
+/// each with the others' pictures taken away.
+std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, std::vector<int> wanted,
+                                       double bead_sigma, int rounds, int threads);
 
 /// Smoothing width (px) of the background for beads of that size: wide enough to leave a bead 95 % of its height.
 double background_sigma(double bead_sigma);

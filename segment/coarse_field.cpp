@@ -11,27 +11,16 @@
 namespace mbtfm::segment {
 namespace {
 
-/// A square of the plane, zero beyond the border; `margin` px of it on each side are blank.
-cv::Mat cut(const Plane& plane, int left, int top, int side, int margin) {
+/// `n` x `n` px of the plane in the corner of a square of `side`, less their mean; all else is zero.
+cv::Mat cut(const Plane& plane, int left, int top, int n, int side) {
   cv::Mat result = cv::Mat::zeros(side, side, CV_32F);
-  double sum = 0;
-  int n = 0;
-  for (int j = margin; j < side - margin; ++j) {
-    for (int i = margin; i < side - margin; ++i) {
-      const int x = left + i, y = top + j;
-      if (x < 0 || y < 0 || x >= plane.width || y >= plane.height) continue;
-      result.at<float>(j, i) = plane.at(x, y);
-      sum += plane.at(x, y), ++n;
-    }
-  }
-  if (n == 0) return result;
-  const float mean = static_cast<float>(sum / n);
-  for (int j = margin; j < side - margin; ++j) {
-    for (int i = margin; i < side - margin; ++i) {
-      const int x = left + i, y = top + j;
-      if (x >= 0 && y >= 0 && x < plane.width && y < plane.height) result.at<float>(j, i) -= mean;
-    }
-  }
+  const int i0 = std::max(0, -left), i1 = std::min(n, plane.width - left);
+  const int j0 = std::max(0, -top), j1 = std::min(n, plane.height - top);
+  if (i0 >= i1 || j0 >= j1) return result;
+  cv::Mat inside = result(cv::Range(j0, j1), cv::Range(i0, i1));
+  const cv::Mat whole(plane.height, plane.width, CV_32F, const_cast<float*>(plane.values.data()));
+  const cv::Mat source = whole(cv::Range(top + j0, top + j1), cv::Range(left + i0, left + i1));
+  cv::subtract(source, cv::mean(source), inside);
   return result;
 }
 
@@ -40,46 +29,45 @@ double vertex(double before, double here, double after) {
   return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
 }
 
-/// Place of the highest value, to a fraction of a pixel, counted from the origin of a periodic picture; nothing where
-/// the next peak is nearly as high.
-std::optional<Vec2> peak_of(const cv::Mat& map, double least_ratio) {
+/// Place of the highest value of a periodic map, to a fraction of a pixel; nothing where it is not within the first
+/// `n` x `n` px, or the next peak, anywhere, is nearly as high.
+std::optional<Vec2> peak_of(const cv::Mat& map, int n, double least_ratio) {
   cv::Point best;
   double highest = 0;
   cv::minMaxLoc(map, nullptr, &highest, nullptr, &best);
-  if (!(highest > 0)) return std::nullopt;
-  const int n = map.cols, m = map.rows;
-  const auto value = [&](int i, int j) { return map.at<float>((best.y + j + m) % m, (best.x + i + n) % n); };
-  const Vec2 fraction{vertex(value(-1, 0), value(0, 0), value(1, 0)), vertex(value(0, -1), value(0, 0), value(0, 1))};
-  const auto from_origin = [](int k, int size) { return k > size / 2 ? k - size : k; };
-  if (least_ratio > 1) {
-    constexpr int kOwn = 4;  // px around the peak that belong to it
-    for (int j = 0; j < m; ++j) {
-      const bool is_own_row = std::min(std::abs(j - best.y), m - std::abs(j - best.y)) <= kOwn;
-      const float* row = map.ptr<float>(j);
-      for (int i = 0; i < n; ++i) {
-        if (row[i] * least_ratio < highest) continue;
-        if (!is_own_row || std::min(std::abs(i - best.x), n - std::abs(i - best.x)) > kOwn) return std::nullopt;
-      }
+  if (!(highest > 0) || best.x < 1 || best.y < 1 || best.x + 1 >= n || best.y + 1 >= n) return std::nullopt;
+  const float nearly = static_cast<float>(highest / least_ratio);
+  constexpr int kOwn = 4;  // px around the peak that belong to it
+  const auto is_own = [](int k, int at, int size) {
+    return std::min(std::abs(k - at), size - std::abs(k - at)) <= kOwn;
+  };
+  for (int j = 0; j < map.rows; ++j) {
+    const float* row = map.ptr<float>(j);
+    for (int i = 0; i < map.cols; ++i) {
+      if (row[i] < nearly) continue;
+      if (!is_own(j, best.y, map.rows) || !is_own(i, best.x, map.cols)) return std::nullopt;
     }
   }
-  return Vec2{from_origin(best.x, n) + fraction.x, from_origin(best.y, m) + fraction.y};
+  const auto value = [&](int i, int j) { return map.at<float>(best.y + j, best.x + i); };
+  return Vec2{best.x + vertex(value(-1, 0), value(0, 0), value(1, 0)),
+              best.y + vertex(value(0, -1), value(0, 0), value(0, 1))};
 }
 
-/// Shift between a window of the reference and the place in the target where it is expected.
+/// Shift, of up to half a window, between a window of the reference and the place in the target where it is expected.
 std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Vec2 centre, Vec2 expected, int window) {
-  const int side = 2 * window;
-  const int left = static_cast<int>(std::lround(centre.x)) - window;
-  const int top = static_cast<int>(std::lround(centre.y)) - window;
+  const int side = 2 * window, most = window / 2;
+  const int left = static_cast<int>(std::lround(centre.x)) - most;
+  const int top = static_cast<int>(std::lround(centre.y)) - most;
   const int dx = static_cast<int>(std::lround(expected.x)), dy = static_cast<int>(std::lround(expected.y));
   cv::Mat a, b, product;
-  cv::dft(cut(reference, left, top, side, window / 2), a);  // blank around: no wrap for shifts up to half a window
-  cv::dft(cut(target, left + dx, top + dy, side, 0), b);
+  cv::dft(cut(reference, left, top, window, side), a, 0, window);
+  cv::dft(cut(target, left + dx - most, top + dy - most, side, side), b);
   cv::mulSpectrums(b, a, product, 0, true);
   cv::idft(product, product, cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
   constexpr double kLeastRatio = 1.15;
-  const auto shift = peak_of(product, kLeastRatio);
-  if (!shift || std::max(std::abs(shift->x), std::abs(shift->y)) > window / 2) return std::nullopt;
-  return Vec2{shift->x + dx, shift->y + dy};
+  const auto shift = peak_of(product, window + 1, kLeastRatio);  // these shifts do not wrap
+  if (!shift) return std::nullopt;
+  return Vec2{shift->x - most + dx, shift->y - most + dy};
 }
 
 Vec2 median_of(const std::vector<Vec2>& values) {
@@ -152,6 +140,17 @@ GridField grid_over(const Plane& plane, double spacing) {
   return field;
 }
 
+/// Shift of the target as a whole: phase correlation.
+Vec2 drift_of(const Plane& reference, const Plane& target) {
+  const auto as_mat = [](const Plane& p) {
+    return cv::Mat(p.height, p.width, CV_32F, const_cast<float*>(p.values.data()));
+  };
+  cv::Mat window;
+  cv::createHanningWindow(window, {reference.width, reference.height}, CV_32F);
+  const cv::Point2d shift = cv::phaseCorrelate(as_mat(reference), as_mat(target), window);
+  return {shift.x, shift.y};
+}
+
 }  // namespace
 
 Plane compressed(const Plane& plane) {
@@ -182,26 +181,19 @@ Motion GridField::at(Vec2 place) const {
   return {(1 - t) * above + t * below, along_x.x, along_y.x, along_x.y, along_y.y};
 }
 
-Vec2 drift_of(const Plane& reference, const Plane& target) {
+GridField coarse_field(const Plane& reference, const Plane& target, int window, int threads) {
   const Plane a = compressed(reference), b = compressed(target);
-  const auto as_mat = [](const Plane& p) {
-    return cv::Mat(p.height, p.width, CV_32F, const_cast<float*>(p.values.data()));
-  };
-  cv::Mat window;
-  cv::createHanningWindow(window, {a.width, a.height}, CV_32F);
-  const cv::Point2d shift = cv::phaseCorrelate(as_mat(a), as_mat(b), window);
-  return {shift.x, shift.y};
-}
-
-GridField coarse_field(const Plane& reference, const Plane& target, Vec2 drift, int window, int threads) {
-  const Plane a = compressed(reference), b = compressed(target);
+  Vec2 drift;
   GridField field;
-  field.u = {drift};
-  field.nx = field.ny = 1;
   for (const int scale : {2, 1}) {
     const Plane from = reduced(a, scale), to = reduced(b, scale);
+    if (scale == 2) {
+      drift = 2.0 * drift_of(from, to);
+      field.u = {drift};
+      field.nx = field.ny = 1;
+    }
     // the second pass, at half the size, looks around what the first has found
-    const double spacing = scale == 2 ? window / 2.0 : 0.375 * window;
+    const double spacing = scale == 2 ? 0.75 * window : 0.375 * window;
     GridField finer = grid_over(a, spacing);
     std::vector<std::optional<Vec2>> found(finer.u.size());
     parallel_for(finer.ny, threads, [&](int j) {

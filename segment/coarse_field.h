@@ -19,12 +19,9 @@ struct GridField {
 /// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
 Plane compressed(const Plane& plane);
 
-/// Shift of the target as a whole: phase correlation.
-Vec2 drift_of(const Plane& reference, const Plane& target);
-
-/// Cross-correlate windows of `window` px (a power of two) in the picture at half its resolution, then windows of half
-/// that size at full resolution around what the first found; points whose peak is ambiguous or differs from their
-/// neighbours' take their neighbours' median.
-GridField coarse_field(const Plane& reference, const Plane& target, Vec2 drift, int window, int threads);
+/// Shift of the target as a whole by phase correlation at half the resolution; then windows of `window` px (a power of
+/// two) are cross-correlated at that resolution, and windows of half that size at full resolution around what the first
+/// found; points whose peak is ambiguous or differs from their neighbours' take their neighbours' median.
+GridField coarse_field(const Plane& reference, const Plane& target, int window, int threads);
 
 }  // namespace mbtfm::segment

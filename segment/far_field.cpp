@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <utility>
 
 #include "segment/plane.h"
 
@@ -59,6 +61,31 @@ double rms_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& u,
     squares += dot(rest, rest);
   }
   return std::sqrt(0.5 * squares / static_cast<double>(used.size()));
+}
+
+struct Typical {
+  GlobalMotion motion;
+  double misfit = 0;  ///< median length, px
+};
+
+/// What most of these beads do: least squares without those that miss it by more than 2.5 medians, again and again. Of
+/// beads that are followed a way they may not go, up to a half are followed to another's place.
+Typical typical_motion(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, const std::vector<int>& all,
+                       Vec2 centre, double scale, Drift kind) {
+  Typical result;
+  std::vector<int> used = all;
+  for (int round = 0; round < 8; ++round) {
+    result.motion = fitted_motion(positions, u, used, centre, scale, kind);
+    const auto misfit = [&](int k) { return norm(u[k] - result.motion.at(positions[k])); };
+    std::vector<double> misfits;
+    for (const int k : all) misfits.push_back(misfit(k));
+    result.misfit = quantile(std::move(misfits), 0.5);
+    const std::vector<int> before = std::exchange(used, {});
+    std::copy_if(all.begin(), all.end(), std::back_inserter(used),
+                 [&](int k) { return misfit(k) <= 2.5 * result.misfit; });
+    if (used == before) break;
+  }
+  return result;
 }
 
 /// Sources on a grid inside the frame.
@@ -151,13 +178,12 @@ FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& 
   const double everywhere = about_own_motion(all);
   result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;
   const std::vector<int>& far = result.is_at_rest ? frame : all;
-  const auto rms_of = [&](Drift what) {
-    const GlobalMotion motion = fitted_motion(positions, displacements, far, result.drift.centre, scale, what);
-    result.turn_rad = motion.turn_rad;
-    return rms_about(positions, displacements, far, motion);
+  const auto typical = [&](Drift what) {
+    return typical_motion(positions, displacements, far, result.drift.centre, scale, what);
   };
-  const double shifted = rms_of(Drift::translation), turned = rms_of(Drift::rotation);
-  result.is_turned = turned < 0.5 * shifted && std::abs(result.turn_rad) * scale > 1;
+  const Typical shifted = typical(Drift::translation), turned = typical(Drift::rotation);
+  result.turn_rad = turned.motion.turn_rad;
+  result.is_turned = turned.misfit < 0.5 * shifted.misfit && std::abs(result.turn_rad) * scale > 1;
   if (!result.is_at_rest) {
     result.drift = fitted_motion(positions, displacements, all, result.drift.centre, scale, kind);
     result.rms = result.noise = everywhere;

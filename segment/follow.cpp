@@ -4,12 +4,65 @@
 #include <cmath>
 #include <functional>
 #include <optional>
+#include <utility>
 
 #include "pipeline/contract/errors.h"
 #include "segment/local_motion.h"
 
 namespace mbtfm::segment {
 namespace {
+
+constexpr int kAround = 12;
+
+/// What the good tracks around say of each good one, kept while tracks are found and rejected.
+struct Surroundings {
+  std::vector<Motion> motions;
+  std::vector<char> was_good, is_changed;  ///< changed: a track around is another than at the update before
+  std::vector<std::optional<LocalMotion>> around;
+};
+
+void update(const Scene& scene, const std::vector<Track>& tracks, Surroundings& s) {
+  const std::vector<Motion> before = std::exchange(s.motions, motions_of(tracks));
+  std::vector<char> is_good, is_other(tracks.size(), 1);
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    is_good.push_back(tracks[k].is_good());
+    if (before.empty() || is_good[k] != s.was_good[k]) continue;
+    is_other[k] = is_good[k] && !(before[k].u.x == s.motions[k].u.x && before[k].u.y == s.motions[k].u.y);
+  }
+  s.was_good = std::move(is_good);
+  s.is_changed.assign(tracks.size(), 0);
+  s.around.resize(tracks.size());
+  for_each_bead(scene, [&](int k) {
+    const std::vector<int>& near = scene.relaxed->around[k];
+    const std::size_t n = std::min<std::size_t>(3 * kAround, near.size());  // those that good_around() looks at
+    s.is_changed[k] = is_other[k];
+    for (std::size_t at = 0; at < n && !s.is_changed[k]; ++at) s.is_changed[k] = is_other[near[at]];
+    if (!s.is_changed[k]) return;
+    s.around[k].reset();
+    if (!tracks[k].is_good()) return;
+    const std::vector<int> others = good_around(scene, tracks, k, kAround);
+    s.around[k] = local_motion(scene.position(k), others, scene.relaxed->positions, s.motions);
+  });
+}
+
+int flag_outliers(const std::vector<std::optional<LocalMotion>>& around, double threshold, std::vector<Track>& tracks) {
+  // Twelve neighbours know their spread to a third: it is no smaller than the picture's.
+  const double typical = typical_spread(around);
+  int n_outliers = 0;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (!tracks[k].is_good()) continue;
+    const auto& local = around[k];
+    if (local && local->n_beads >= 3) {
+      const double spread = std::max(local->spread_px, typical);
+      const double misfit = norm(tracks[k].found.motion.u - local->motion.u);
+      // The floor is what a field's curvature within the reach may do without being wrong.
+      if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + 0.3) continue;
+    }
+    tracks[k].flag = "neighbours disagree";
+    ++n_outliers;
+  }
+  return n_outliers;
+}
 
 /// First round: from the grid.
 void follow_grid(const Scene& scene, const GridField& grid, double least_similarity, std::vector<Track>& tracks) {
@@ -50,15 +103,15 @@ std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& 
   return best;
 }
 
-void follow_neighbours(const Scene& scene, const TrackParameters& parameters, std::vector<Track>& tracks) {
+void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Surroundings& surroundings,
+                       std::vector<Track>& tracks) {
   constexpr int kMaxRounds = 12;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const std::vector<Motion> motions = motions_of(tracks);
     std::vector<std::optional<Registered>> found(tracks.size());
     for_each_bead(scene, [&](int k) {
-      if (tracks[k].is_good()) return;
+      if (tracks[k].is_good() || !surroundings.is_changed[k]) return;
       // a narrow window may take a stranger for the bead: more is asked of it
-      found[k] = retried(scene, tracks, motions, k, 0.5 * (1 + parameters.least_similarity));
+      found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity));
     });
     int n_found = 0;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -66,7 +119,8 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, st
       tracks[k] = {.found = *found[k], .flag = {}};
       ++n_found;
     }
-    const int n_rejected = flag_outliers(scene, parameters.outlier_threshold, tracks);
+    update(scene, tracks, surroundings);
+    const int n_rejected = flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
     if (n_found <= n_rejected) break;
   }
 }
@@ -83,21 +137,19 @@ void require_common_beads(int n_found, int n_beads) {
 std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
   std::vector<Track> tracks(scene.relaxed->beads.size());
   follow_grid(scene, grid, parameters.least_similarity, tracks);
-  flag_outliers(scene, parameters.outlier_threshold, tracks);
+  Surroundings surroundings;
+  update(scene, tracks, surroundings);
+  flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
   require_common_beads(static_cast<int>(std::count_if(tracks.begin(), tracks.end(), std::mem_fn(&Track::is_good))),
                        scene.n_beads());
-  follow_neighbours(scene, parameters, tracks);
+  follow_neighbours(scene, parameters, surroundings, tracks);
   return tracks;
 }
 
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks) {
-  const std::vector<Motion> motions = motions_of(tracks);
-  std::vector<std::optional<LocalMotion>> around(tracks.size());
-  for_each_bead(scene, [&](int k) {
-    if (!tracks[k].is_good()) return;
-    around[k] = local_motion(scene.position(k), good_around(scene, tracks, k, 12), scene.relaxed->positions, motions);
-  });
-  return around;
+  Surroundings surroundings;
+  update(scene, tracks, surroundings);
+  return std::move(surroundings.around);
 }
 
 double typical_spread(const std::vector<std::optional<LocalMotion>>& around) {
@@ -109,23 +161,7 @@ double typical_spread(const std::vector<std::optional<LocalMotion>>& around) {
 }
 
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks) {
-  const auto around = motions_around(scene, tracks);
-  // Twelve neighbours know their spread to a third: it is no smaller than the picture's.
-  const double typical = typical_spread(around);
-  int n_outliers = 0;
-  for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (!tracks[k].is_good()) continue;
-    const auto& local = around[k];
-    if (local && local->n_beads >= 3) {
-      const double spread = std::max(local->spread_px, typical);
-      const double misfit = norm(tracks[k].found.motion.u - local->motion.u);
-      // The floor is what a field's curvature within the reach may do without being wrong.
-      if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + 0.3) continue;
-    }
-    tracks[k].flag = "neighbours disagree";
-    ++n_outliers;
-  }
-  return n_outliers;
+  return flag_outliers(motions_around(scene, tracks), threshold, tracks);
 }
 
 }  // namespace mbtfm::segment

@@ -117,8 +117,10 @@ Leftover leftover(const Matching& all, int bead, const std::vector<char>& is_fre
   const Scene& scene = all.scene;
   const Vec2 place = scene.position(bead);
   Leftover result{.bead = bead, .candidates = {}, .around = {}};
-  for (const int j : scene.relaxed->neighbours.within(place, 3.5 * scene.spacing(), kAround + 1)) {
-    if (j == bead || (!all.tracks[j].is_good() && all.leftover_of[j] < 0)) continue;
+  const std::vector<int>& near = scene.relaxed->around[bead];
+  for (std::size_t at = 0; at < std::min<std::size_t>(kAround, near.size()); ++at) {
+    const int j = near[at];
+    if (!all.tracks[j].is_good() && all.leftover_of[j] < 0) continue;
     const double distance = norm(scene.position(j) - place);
     const double weight = std::exp(-0.5 * std::pow(distance / scene.spacing(), 2));
     result.around.push_back({.bead = j, .weight = weight, .distance_px = distance});

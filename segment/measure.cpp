@@ -21,10 +21,40 @@ bool is_inside(const Plane& plane, Vec2 place, double margin) {
          place.y <= plane.height - 1 - margin;
 }
 
-/// The beads in the stressed image as the tracks expect them, fitted together: that two lie in one blot is known from
-/// the relaxed image. Those of untracked beads have no height; the beads that no track leads to come last.
-std::vector<DetectedBead> expected_spots(const Scene& scene, const std::vector<Track>& tracks,
-                                         const std::vector<Motion>& motions) {
+struct Spots {
+  std::vector<DetectedBead> beads;
+  Neighbours near;
+};
+
+Neighbours sorted_places(const Scene& scene, const std::vector<DetectedBead>& beads) {
+  std::vector<Vec2> places;
+  for (const DetectedBead& bead : beads) places.push_back(bead.position_px);
+  return {std::move(places), std::max(4.0, scene.spacing())};
+}
+
+/// How far off a bead's picture reaches into the narrow window: a spot ends at three sigmas.
+double reach_of_others(const Scene& scene) { return 2 * scene.narrow.sigma + 3 * scene.bead_sigma(); }
+
+/// The spots of these beads and all whose pictures reach into their windows.
+std::vector<int> spots_around(const Scene& scene, const std::vector<DetectedBead>& spots, const Neighbours& near,
+                              const std::vector<int>& beads) {
+  std::vector<char> is_wanted(spots.size(), 0);
+  for (const int bead : beads) {
+    constexpr int kMost = 30;
+    for (const int k : near.within(spots[bead].position_px, reach_of_others(scene), kMost)) is_wanted[k] = 1;
+  }
+  std::vector<int> result;
+  for (std::size_t k = 0; k < spots.size(); ++k) {
+    if (is_wanted[k]) result.push_back(static_cast<int>(k));
+  }
+  return result;
+}
+
+/// The beads in the stressed image as the tracks expect them, fitted together around the `wanted` ones: that two lie in
+/// one blot is known from the relaxed image. Those of untracked beads have no height; the beads that no track leads to
+/// come last.
+Spots expected_spots(const Scene& scene, const std::vector<Track>& tracks, const std::vector<Motion>& motions,
+                     const std::vector<int>& wanted) {
   std::vector<DetectedBead> spots;
   std::vector<Vec2> ends;
   for (int k = 0; k < scene.n_beads(); ++k) {
@@ -38,24 +68,17 @@ std::vector<DetectedBead> expected_spots(const Scene& scene, const std::vector<T
     if (std::none_of(expected.begin(), expected.end(), [&](int k) { return tracks[k].is_good(); }))
       spots.push_back(bead);
   }
+  std::vector<int> around = spots_around(scene, spots, sorted_places(scene, spots), wanted);
   constexpr int kRounds = 8;  // of half a pixel at most: from a loose bead's guess
-  return fitted_spots(scene.stressed.image.plane, std::move(spots), scene.bead_sigma(), kRounds, scene.threads);
-}
-
-struct Spots {
-  std::vector<DetectedBead> beads;
-  Neighbours near;
-};
-
-Spots sorted(std::vector<DetectedBead> beads, double cell) {
-  std::vector<Vec2> places;
-  for (const DetectedBead& bead : beads) places.push_back(bead.position_px);
-  return {std::move(beads), Neighbours(std::move(places), cell)};
+  spots = fitted_spots(scene.stressed.image.plane, std::move(spots), std::move(around), scene.bead_sigma(), kRounds,
+                       scene.threads);
+  Neighbours places = sorted_places(scene, spots);
+  return {std::move(spots), std::move(places)};
 }
 
 /// The beads around both ends of a track, less the bead itself.
 Others others_around(const Scene& scene, int bead, const Spots& stressed) {
-  const double reach = 2 * scene.narrow.sigma + 3 * scene.bead_sigma();  // a spot ends at three sigmas
+  const double reach = reach_of_others(scene);
   Others others{.in_reference = {}, .in_target = {}, .sigma = scene.bead_sigma()};
   const auto add = [&](const std::vector<DetectedBead>& beads, const Neighbours& near,
                        std::vector<Others::Spot>& spots) {
@@ -130,10 +153,13 @@ void look_again(const Scene& scene, const Dissimilarity& allowed, const std::vec
   };
   if (typical_spread(motions_around(scene, tracks)) < kLoose * scene.bead_sigma()) return;
   std::vector<Motion> starts = motions_of(tracks);
-  for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (is_spoilt(tracks[k])) starts[k] = guesses[k];
+  std::vector<int> spoilt;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    if (!is_spoilt(tracks[k])) continue;
+    starts[k] = guesses[k];
+    spoilt.push_back(k);
   }
-  const Spots stressed = sorted(expected_spots(scene, tracks, starts), std::max(4.0, scene.spacing()));
+  const Spots stressed = expected_spots(scene, tracks, starts, spoilt);
   for_each_bead(scene, [&](int k) {
     if (!is_spoilt(tracks[k])) return;
     auto alone = measured_alone(scene, k, guesses[k], stressed);
@@ -180,6 +206,8 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
   Window window = scene.narrow;
   window.max_steps = 6;
   window.settled_px = 0.02;
+  Window with_error = window;
+  window.states_error = false;
   for_each_bead(scene, [&](int k) {
     Track& track = tracks[k];
     if (!track.is_good()) return;
@@ -196,10 +224,15 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     }
     Others others = track.others.value_or(Others{});
     std::swap(others.in_reference, others.in_target);
-    const Registered returned =
-        registered(scene.stressed.image, scene.relaxed->image.spline, there, *back, window, others);
-    const double missed = norm(returned.motion.u + forward.u);
-    if (missed > 0.5 + 4 * std::hypot(track.found.sigma_px, returned.sigma_px)) track.flag = "ambiguous";
+    const auto returned = [&](const Window& by) {
+      return registered(scene.stressed.image, scene.relaxed->image.spline, there, *back, by, others);
+    };
+    const double missed = norm(returned(window).motion.u + forward.u);
+    const double granted = 0.5 + 4 * track.found.sigma_px;
+    if (missed > granted) {  // then the way back's own error, too, is granted
+      const double sigma = std::hypot(track.found.sigma_px, returned(with_error).sigma_px);
+      if (missed > 0.5 + 4 * sigma) track.flag = "ambiguous";
+    }
     // Both ways see the same noise: what they differ by is what the registration itself is unsure of.
     track.found.sigma_px = std::hypot(track.found.sigma_px, missed / 2);
   });
@@ -247,13 +280,15 @@ void recover(const Scene& scene, double least_similarity, std::vector<Track>& tr
   const auto spots = matched_spots(scene, tracks, scatter);
   std::vector<Track> all = tracks;
   std::vector<Motion> starts = motions_of(tracks);
-  for (std::size_t k = 0; k < tracks.size(); ++k) {
+  std::vector<int> matched;
+  for (int k = 0; k < scene.n_beads(); ++k) {
     if (!spots[k]) continue;
     // a bead keeps its shape, however steep the field
-    starts[k] = {.u = scene.stressed.positions[*spots[k]] - scene.position(static_cast<int>(k))};
+    starts[k] = {.u = scene.stressed.positions[*spots[k]] - scene.position(k)};
     all[k].flag.clear();
+    matched.push_back(k);
   }
-  const Spots stressed = sorted(expected_spots(scene, all, starts), std::max(4.0, scene.spacing()));
+  const Spots stressed = expected_spots(scene, all, starts, matched);
   const Dissimilarity allowed = dissimilarity(scene, least_similarity, tracks);
   std::vector<Track> found(tracks.size());
   for_each_bead(scene, [&](int k) {

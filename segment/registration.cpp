@@ -9,33 +9,40 @@
 namespace mbtfm::segment {
 namespace {
 
+/// Compiled a second time for processors that add eight floats at once: the same sums in the same order, since nothing
+/// is multiplied and added in one step, so the same bytes. (A sanitizer of threads is not up yet when such a choice is
+/// made.)
+#if defined(__x86_64__) && defined(__GNUC__) && !defined(__clang__) && !defined(__SANITIZE_THREAD__)
+#define MBTFM_EIGHT_AT_ONCE __attribute__((target_clones("avx2", "default")))
+#else
+#define MBTFM_EIGHT_AT_ONCE
+#endif
+
 using Vec6 = cv::Vec<double, 6>;
 using Mat6 = cv::Matx<double, 6, 6>;
 
 /// Weights of the cubic B-spline's four coefficients at a fraction of the way between the middle two
-/// (Unser, IEEE Signal Process Mag 16(6):22, 1999).
-struct Weights {
-  float w[4];
-  explicit Weights(float t) {
-    const float rest = 1 - t, t2 = t * t, rest2 = rest * rest;
-    w[0] = rest2 * rest * (1.0f / 6);
-    w[1] = (2.0f / 3) - t2 * (1 - 0.5f * t);
-    w[2] = (2.0f / 3) - rest2 * (1 - 0.5f * rest);
-    w[3] = t2 * t * (1.0f / 6);
-  }
-};
+/// (Unser, IEEE Signal Process Mag 16(6):22, 1999), as polynomials of it.
+cv::v_float32x4 spline_weights(float t) {
+  constexpr float k0[4] = {1.0f / 6, 2.0f / 3, 1.0f / 6, 0}, k1[4] = {-0.5f, 0, 0.5f, 0}, k2[4] = {0.5f, -1, 0.5f, 0},
+                  k3[4] = {-1.0f / 6, 0.5f, -0.5f, 1.0f / 6};
+  const cv::v_float32x4 at = cv::v_setall_f32(t);
+  return cv::v_load(k0) + at * (cv::v_load(k1) + at * (cv::v_load(k2) + at * cv::v_load(k3)));
+}
 
 /// Beyond the border the last pixel goes on.
 float interpolated(const Spline& spline, float x, float y) {
   x = std::clamp(x, 0.0f, spline.last_x);
   y = std::clamp(y, 0.0f, spline.last_y);
   const int i = static_cast<int>(x), j = static_cast<int>(y);
-  const Weights wx(x - static_cast<float>(i)), wy(y - static_cast<float>(j));
-  const float* row = spline.coefficients.row(j) + i;  // one pixel before: the margin
+  const cv::v_float32x4 wx = spline_weights(x - static_cast<float>(i)), wy = spline_weights(y - static_cast<float>(j));
   const int width = spline.coefficients.width;
-  cv::v_float32x4 column = cv::v_load(row) * cv::v_setall_f32(wy.w[0]);
-  for (int b = 1; b < 4; ++b) column = cv::v_muladd(cv::v_load(row + b * width), cv::v_setall_f32(wy.w[b]), column);
-  return cv::v_reduce_sum(column * cv::v_load(wx.w));
+  const float* row = spline.coefficients.row(j) + i;  // one pixel before: the margin
+  const cv::v_float32x4 column = cv::v_load(row) * cv::v_broadcast_element<0>(wy) +
+                                 cv::v_load(row + width) * cv::v_broadcast_element<1>(wy) +
+                                 cv::v_load(row + 2 * width) * cv::v_broadcast_element<2>(wy) +
+                                 cv::v_load(row + 3 * width) * cv::v_broadcast_element<3>(wy);
+  return cv::v_reduce_sum(column * wx);
 }
 
 /// Turns a line of values into the coefficients of the cubic spline through them, mirrored at its ends
@@ -61,8 +68,10 @@ void to_coefficients(float* values, std::ptrdiff_t step, int n, int lanes) {
   }
 }
 
-/// Of the value at a pixel by u and G; two zeros fill it up to what the processor adds at once.
+/// Of the value at a pixel by u and G; the two places left, up to what the processor adds at once, take the value and
+/// one where sums with them are needed, too.
 using Slope = std::array<float, 8>;
+constexpr int kValue = 6, kOne = 7;
 
 /// Σ factor s sᵀ, in single precision: a window has at most some 1 500 pixels.
 struct Products {
@@ -85,14 +94,19 @@ struct Products {
 /// What a spot of height 1 adds at a place, by the squared distance in px.
 float shape(float squared, double sigma) { return std::exp(-0.5f * squared / static_cast<float>(sigma * sigma)); }
 
-/// Everything of a window that does not change from step to step.
+/// Everything of a pixel of a window that does not change from step to step.
+struct Pixel {
+  float x, y;    ///< from the bead
+  float target;  ///< the target's value there, as moved last
+  float weight;
+  Slope slope;  ///< by u and G, less what gain and offset can do; the value, less the weighted mean; one
+  float value() const { return slope[kValue]; }
+};
+
 struct Patch {
-  std::vector<float> x, y;           ///< of its pixels, from the bead
-  std::vector<float> target;         ///< the target's values under the window, as moved last
-  std::vector<float> weight, value;  ///< value: less the weighted mean
-  std::vector<Slope> slope;          ///< by u and G, less what gain and offset can do
+  std::vector<Pixel> pixels;
   Mat6 normal;
-  double total_weight = 0, total_squared = 0, variance = 0;
+  double total_weight = 0, variance = 0;
 };
 
 /// Take the other beads of the reference away from values and slopes.
@@ -100,68 +114,77 @@ void take_away(Patch& patch, Vec2 place, const Others& others) {
   const float per_square = static_cast<float>(1 / (others.sigma * others.sigma));
   for (const Others::Spot& spot : others.in_reference) {
     const float sx = static_cast<float>(spot.place.x - place.x), sy = static_cast<float>(spot.place.y - place.y);
-    for (std::size_t k = 0; k < patch.value.size(); ++k) {
-      const float x = patch.x[k], y = patch.y[k], dx = x - sx, dy = y - sy;
+    for (Pixel& p : patch.pixels) {
+      const float dx = p.x - sx, dy = p.y - sy;
       const float light = static_cast<float>(spot.height) * shape(dx * dx + dy * dy, others.sigma);
       const float gx = -light * dx * per_square, gy = -light * dy * per_square;
-      patch.value[k] -= light;
-      const Slope own{gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0};
-      for (int a = 0; a < 6; ++a) patch.slope[k][a] -= own[a];
+      const Slope own{gx, gy, gx * p.x, gx * p.y, gy * p.x, gy * p.y, light, 0};
+      for (int a = 0; a < 8; ++a) p.slope[a] -= own[a];
     }
   }
 }
 
+constexpr float kLeastWeight = 0.105f;  // at 2.12 sigmas: nine tenths of a Gaussian's volume lie within
+
+/// exp(−d²/2s²) on the pixels around the middle one.
+std::vector<float> weights_along(double place, int middle, int reach, double sigma) {
+  std::vector<float> result;
+  for (int k = middle - reach; k <= middle + reach; ++k) {
+    const double d = (k - place) / sigma;
+    result.push_back(static_cast<float>(std::exp(-0.5 * d * d)));
+  }
+  return result;
+}
+
 Patch patch_around(const SmoothImage& reference, Vec2 place, const Window& window, const Others& others) {
-  const double sigma = window.sigma;
   Patch patch;
-  const int reach = static_cast<int>(std::ceil(2 * sigma));
+  const int reach = static_cast<int>(std::ceil(2 * window.sigma));
   const int ci = static_cast<int>(std::lround(place.x)), cj = static_cast<int>(std::lround(place.y));
-  const std::size_t most = static_cast<std::size_t>(2 * reach + 1) * (2 * reach + 1);
-  for (auto* list : {&patch.x, &patch.y, &patch.weight, &patch.value}) list->reserve(most);
-  patch.slope.reserve(most);
+  const std::vector<float> along_x = weights_along(place.x, ci, reach, window.sigma);
+  const std::vector<float> along_y = weights_along(place.y, cj, reach, window.sigma);
+  patch.pixels.reserve(along_x.size() * along_y.size() / (window.is_thinned ? 2 : 1) + 1);
+  const int left = std::max(0, ci - reach), right = std::min(reference.plane.width - 1, ci + reach);
   for (int j = std::max(0, cj - reach); j <= std::min(reference.plane.height - 1, cj + reach); ++j) {
-    for (int i = std::max(0, ci - reach); i <= std::min(reference.plane.width - 1, ci + reach); ++i) {
-      const float x = static_cast<float>(i - place.x), y = static_cast<float>(j - place.y);
-      const float squared = (x * x + y * y) / static_cast<float>(sigma * sigma);
-      if (squared > 4.5f || (window.is_thinned && (i + j + ci + cj) % 2 != 0)) continue;
-      const float weight = std::exp(-0.5f * squared);
-      const float gx = reference.slope_x.at(i, j), gy = reference.slope_y.at(i, j);
-      patch.x.push_back(x), patch.y.push_back(y), patch.weight.push_back(weight);
-      patch.value.push_back(reference.plane.at(i, j));
-      patch.slope.push_back({gx, gy, gx * x, gx * y, gy * x, gy * y, 0, 0});
-      patch.total_weight += weight, patch.total_squared += weight * weight;
+    const float *values = reference.plane.row(j), *slope_x = reference.slope_x.row(j),
+                *slope_y = reference.slope_y.row(j);
+    const float y = static_cast<float>(j - place.y), weight_y = along_y[j - cj + reach];
+    const int step = window.is_thinned ? 2 : 1;  // of a chessboard the bead's own pixel is one
+    for (int i = left + (window.is_thinned ? (left + j + ci + cj) & 1 : 0); i <= right; i += step) {
+      const float weight = weight_y * along_x[i - ci + reach];
+      if (weight < kLeastWeight) continue;
+      const float x = static_cast<float>(i - place.x), gx = slope_x[i], gy = slope_y[i];
+      patch.pixels.push_back({x, y, 0, weight, {gx, gy, gx * x, gx * y, gy * x, gy * y, values[i], 1}});
     }
   }
   take_away(patch, place, others);
-  double mean = 0;
-  for (std::size_t k = 0; k < patch.value.size(); ++k) mean += patch.weight[k] * patch.value[k];
-  for (float& value : patch.value) value -= static_cast<float>(mean / patch.total_weight);
   return patch;
 }
 
 /// Project the slopes onto what neither an offset nor a gain can do, and sum their products.
-void complete(Patch& patch) {
+MBTFM_EIGHT_AT_ONCE void complete(Patch& patch) {
   Slope by_one{}, by_value{};
-  double power = 0;
-  const std::size_t n = patch.value.size();
-  for (std::size_t k = 0; k < n; ++k) {
-    const float weight = patch.weight[k], weighted = weight * patch.value[k];
-    power += weighted * patch.value[k];
-    for (int a = 0; a < 8; ++a) {
-      by_one[a] += weight * patch.slope[k][a];
-      by_value[a] += weighted * patch.slope[k][a];
-    }
+  for (const Pixel& p : patch.pixels) {
+    for (int a = 0; a < 8; ++a) by_one[a] += p.weight * p.slope[a];
   }
-  patch.target.resize(n);
+  patch.total_weight = by_one[kOne];
+  const float mean = by_one[kValue] / by_one[kOne];
+  for (Pixel& p : patch.pixels) {
+    p.slope[kValue] -= mean;
+    const float weighted = p.weight * p.value();
+    for (int a = 0; a < 8; ++a) by_value[a] += weighted * p.slope[a];
+  }
+  const float power = by_value[kValue];
   patch.variance = power / patch.total_weight;
-  for (int a = 0; a < 8; ++a) {
-    by_one[a] /= static_cast<float>(patch.total_weight);
-    by_value[a] = power > 0 ? by_value[a] / static_cast<float>(power) : 0.0f;
+  for (int a = 0; a < 6; ++a) {
+    by_one[a] /= by_one[kOne];
+    by_value[a] = power > 0 ? by_value[a] / power : 0.0f;
   }
+  by_one[kValue] = by_one[kOne] = by_value[kValue] = by_value[kOne] = 0;
   Products products;
-  for (std::size_t k = 0; k < n; ++k) {
-    for (int a = 0; a < 8; ++a) patch.slope[k][a] -= by_one[a] + by_value[a] * patch.value[k];
-    products.add(patch.weight[k], patch.slope[k]);
+  for (Pixel& p : patch.pixels) {
+    const float value = p.value();
+    for (int a = 0; a < 8; ++a) p.slope[a] -= by_one[a] + by_value[a] * value;
+    products.add(p.weight, p.slope);
   }
   patch.normal = products.matrix();
 }
@@ -188,47 +211,47 @@ struct Compared {
   double mean = 0;  ///< of the target
 };
 
-Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& motion, const Others& others) {
+MBTFM_EIGHT_AT_ONCE Compared compared(Patch& patch, const Spline& target, Vec2 place, const Motion& motion,
+                                      const Others& others) {
   Compared result;
-  Slope mismatch{};
-  double sum = 0, squares = 0, products = 0;
+  Slope sums{};
+  float squares = 0;
   const Warp warp(place, motion);
-  for (std::size_t k = 0; k < patch.value.size(); ++k) {
-    const float x = patch.x[k], y = patch.y[k];
-    const float there_x = warp.x_of(x, y), there_y = warp.y_of(x, y);
+  for (Pixel& p : patch.pixels) {
+    const float there_x = warp.x_of(p.x, p.y), there_y = warp.y_of(p.x, p.y);
     float value = interpolated(target, there_x, there_y);
     for (const Others::Spot& spot : others.in_target) {
       const float dx = there_x - static_cast<float>(spot.place.x), dy = there_y - static_cast<float>(spot.place.y);
       value -= static_cast<float>(spot.height) * shape(dx * dx + dy * dy, others.sigma);
     }
-    patch.target[k] = value;
-    const float weighted = patch.weight[k] * value;
-    sum += weighted;
+    p.target = value;
+    const float weighted = p.weight * value;
     squares += weighted * value;
-    products += weighted * patch.value[k];
-    for (int a = 0; a < 8; ++a) mismatch[a] += weighted * patch.slope[k][a];
+    for (int a = 0; a < 8; ++a) sums[a] += weighted * p.slope[a];
   }
-  for (int a = 0; a < 6; ++a) result.mismatch[a] = mismatch[a];
-  const double mean = sum / patch.total_weight;
+  for (int a = 0; a < 6; ++a) result.mismatch[a] = sums[a];
+  const double mean = sums[kOne] / patch.total_weight;
   const double variance = squares / patch.total_weight - mean * mean;
-  const double covariance = products / patch.total_weight;
+  const double covariance = sums[kValue] / patch.total_weight;
   result.gain = covariance / patch.variance;
   result.similarity = variance > 0 ? covariance / std::sqrt(patch.variance * variance) : 0;
   result.mean = mean;
   return result;
 }
 
-/// Share of white noise's variance that the spline has left at a fraction t of the way between two pixels: within
-/// 0.002.
-float noise_left(float t) {
+/// Share of white noise's variance that the spline has left at a place between two pixels: within 0.002.
+float noise_left(float place) {
+  const float size = std::abs(place), t = size - static_cast<float>(static_cast<int>(size));
   const float p = t * (1 - t);
   return 1 - p * p * (3 + 3.7f * p);
 }
 
 /// Variance of a component of u, mean of both: H⁻¹ (Σ w² s sᵀ r² / (1 − h) + prior) H⁻¹. The residual's scatter r²
 /// counts pixel by pixel as it is (shot noise is largest on the beads, where the slopes are); h is the share of a
-/// pixel's own noise that the fit follows (MacKinnon & White, J Econometrics 29:305, 1985, estimator HC2).
-double variance_of(const Patch& patch, const Warp& warp, const Mat6& inverse, const Compared& now, double prior) {
+/// pixel's own noise that the fit follows (MacKinnon & White, J Econometrics 29:305, 1985, estimator HC2), left out
+/// where `has_many` pixels share it.
+MBTFM_EIGHT_AT_ONCE double variance_of(const Patch& patch, const Warp& warp, const Mat6& inverse, const Compared& now,
+                                       double prior, bool has_many) {
   std::array<Slope, 6> single{};
   for (int a = 0; a < 6; ++a) {
     for (int b = 0; b < 6; ++b) single[a][b] = static_cast<float>(inverse(a, b));
@@ -236,22 +259,25 @@ double variance_of(const Patch& patch, const Warp& warp, const Mat6& inverse, co
   const float per_weight = static_cast<float>(1 / patch.total_weight);
   const float per_power = static_cast<float>(1 / (patch.variance * patch.total_weight));
   const float mean = static_cast<float>(now.mean), per_gain = static_cast<float>(1 / now.gain);
-  double sum = 0;
-  for (std::size_t k = 0; k < patch.value.size(); ++k) {
-    const Slope& slope = patch.slope[k];
+  const auto followed = [&](const Pixel& p) {
     Slope solved{};
     for (int a = 0; a < 6; ++a) {
-      for (int b = 0; b < 8; ++b) solved[b] += single[a][b] * slope[a];
+      for (int b = 0; b < 8; ++b) solved[b] += single[a][b] * p.slope[a];
     }
-    float followed = per_weight + per_power * patch.value[k] * patch.value[k];
-    for (int a = 0; a < 6; ++a) followed += slope[a] * solved[a];
-    const float own = std::min(0.9f, patch.weight[k] * followed);
-    const float weighted = patch.weight[k] * ((patch.target[k] - mean) * per_gain - patch.value[k]);
+    float share = per_weight + per_power * p.value() * p.value();
+    for (int a = 0; a < 6; ++a) share += p.slope[a] * solved[a];
+    return std::min(0.9f, p.weight * share);
+  };
+  double sum = 0;
+  for (const Pixel& p : patch.pixels) {
+    float ux = 0, uy = 0;
+    for (int a = 0; a < 6; ++a) ux += single[0][a] * p.slope[a], uy += single[1][a] * p.slope[a];
+    const float own = has_many ? 0 : followed(p);
+    const float weighted = p.weight * ((p.target - mean) * per_gain - p.value());
     // Interpolation takes from the target's noise, but nothing from its slow part, which moves the answer: of equal
     // noise in both images the residual shows (1 + left) / 2.
-    const float x = warp.x_of(patch.x[k], patch.y[k]), y = warp.y_of(patch.x[k], patch.y[k]);
-    const float left = noise_left(x - std::floor(x)) * noise_left(y - std::floor(y));
-    sum += 2 / (1 + left) * weighted * weighted / (1 - own) * (solved[0] * solved[0] + solved[1] * solved[1]);
+    const float left = noise_left(warp.x_of(p.x, p.y)) * noise_left(warp.y_of(p.x, p.y));
+    sum += 2 / (1 + left) * weighted * weighted / (1 - own) * (ux * ux + uy * uy);
   }
   for (int a = 2; a < 6; ++a) sum += prior * (inverse(0, a) * inverse(0, a) + inverse(1, a) * inverse(1, a));
   return 0.5 * sum;
@@ -349,8 +375,9 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
   result.similarity = now.similarity;
   result.variance = patch.variance;
   result.gain = now.gain;
-  result.sigma_px = std::sqrt(std::max(
-      0.0, variance_of(patch, Warp(place, result.motion), inverse, now, stiffness * window.noise * window.noise)));
+  if (!window.states_error) return result;
+  result.sigma_px = std::sqrt(std::max(0.0, variance_of(patch, Warp(place, result.motion), inverse, now,
+                                                        stiffness * window.noise * window.noise, window.is_thinned)));
   return result;
 }
 

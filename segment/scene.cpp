@@ -29,6 +29,18 @@ Side side_of(const Image& image, double bead_sigma, double detection_snr, const 
   return side;
 }
 
+std::vector<std::vector<int>> beads_around(const Side& side, int threads) {
+  constexpr int kMost = 60;
+  std::vector<std::vector<int>> around(side.beads.size());
+  in_strips(static_cast<int>(around.size()), threads, [&](int from, int to) {
+    for (int k = from; k < to; ++k) {
+      around[k] = side.neighbours.within(side.positions[k], 3.5 * side.spacing, kMost);
+      std::erase(around[k], k);
+    }
+  });
+  return around;
+}
+
 Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads) {
   Scene scene{.relaxed = std::move(relaxed), .stressed = std::move(stressed), .wide = {}, .narrow = {}};
   scene.threads = threads;
@@ -49,10 +61,13 @@ Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads) 
 
 std::vector<int> good_around(const Scene& scene, const std::vector<Track>& tracks, int bead, int n, double gap) {
   const Vec2 place = scene.position(bead);
+  const std::vector<int>& near = scene.relaxed->around[bead];
   std::vector<int> result;
-  for (const int k : scene.relaxed->neighbours.within(place, 3.5 * scene.spacing(), 3 * n)) {
-    if (k == bead || !tracks[k].is_good() || static_cast<int>(result.size()) >= n) continue;
-    if (gap > 0 && norm(scene.position(k) - place) < gap) continue;
+  result.reserve(static_cast<std::size_t>(n));
+  const int n_looked_at = std::min(3 * n, static_cast<int>(near.size()));
+  for (int at = 0; at < n_looked_at && static_cast<int>(result.size()) < n; ++at) {
+    const int k = near[at];
+    if (!tracks[k].is_good() || (gap > 0 && norm(scene.position(k) - place) < gap)) continue;
     result.push_back(k);
   }
   return result;

@@ -213,7 +213,9 @@ RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& paramete
   require_numbers(relaxed, "relaxed");
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
   const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
-  side_ = std::make_shared<const Side>(side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads));
+  Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
+  side.around = beads_around(side, threads);
+  side_ = std::make_shared<const Side>(std::move(side));
 }
 
 Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const Progress& progress) const {
@@ -254,8 +256,7 @@ Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, 
                                threads_);
   tell(0.3, "correlating windows");
   const Plane& moved = scene.stressed.image.plane;
-  const GridField grid =
-      coarse_field(plane, moved, drift_of(plane, moved), search_window(scene, parameters_, pixel_size_um), threads_);
+  const GridField grid = coarse_field(plane, moved, search_window(scene, parameters_, pixel_size_um), threads_);
   tell(0.5, "registering beads");
   std::vector<Track> followed = follow(scene, grid, parameters_);
   tell(0.7, "measuring beads");

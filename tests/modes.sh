@@ -9,7 +9,7 @@ modes=("$@")
 
 build() {
   cmake --preset "$1" >/dev/null
-  cmake --build --preset "$1"
+  cmake --build --preset "$1" --target stability_tests
 }
 
 hard_cases() {

@@ -26,6 +26,16 @@ std::vector<double> log_ticks(double low, double high) {
   return list;
 }
 
+/// A power of ten with many zeros, as 10⁻⁸.
+std::string tick_text(double value) {
+  const double power = std::log10(std::abs(value));
+  if (value <= 0 || std::abs(power) < 3.5 || std::abs(power - std::round(power)) > 1e-9) return readable(value);
+  static constexpr const char* kRaised[] = {"⁰", "¹", "²", "³", "⁴", "⁵", "⁶", "⁷", "⁸", "⁹"};
+  std::string text = power < 0 ? "10⁻" : "10";
+  for (const char digit : std::to_string(std::abs(std::lround(power)))) text += kRaised[digit - '0'];
+  return text;
+}
+
 /// value, text
 std::vector<std::pair<double, std::string>> ticks_of(const Axis& axis) {
   if (!axis.names.empty()) return axis.names;
@@ -33,7 +43,8 @@ std::vector<std::pair<double, std::string>> ticks_of(const Axis& axis) {
   std::vector<double> values = axis.scale == Scale::logarithmic ? log_ticks(low, high) : std::vector<double>();
   if (values.size() < 3) values = ticks(low, high);  // within less than a decade a logarithm is hardly bent
   std::vector<std::pair<double, std::string>> list;
-  for (const double value : values) list.emplace_back(value, readable(value));
+  for (const double value : values)
+    list.emplace_back(value, axis.scale == Scale::logarithmic ? tick_text(value) : readable(value));
   return list;
 }
 

@@ -34,18 +34,21 @@ TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
   for (const int frame : {1, 2}) {
     SCOPED_TRACE(frame);
     const auto image = [&](int k) { return read_image(folder / "forPIV" / ("000" + std::to_string(k) + ".tif")); };
-    const Tracking tracking = track_beads(image(2 * frame - 2), image(2 * frame - 1), 1.0, {}, 2);
-    const auto piv = rows_of_four(folder / "reference" / ("PIV" + std::to_string(frame) + ".txt"));
-    std::vector<Vec2> ours, theirs;
-    for (const auto& row : piv) {
-      ours.push_back(test::as_correlation_sees(test::moved_beads(tracking), {row[0], row[1]}, tracking.bead_sigma_um));
+    const Image relaxed = image(2 * frame - 2);
+    const Tracking tracking = track_beads(relaxed, image(2 * frame - 1), 1.0, {}, 2);
+    test::PivGrid grid;
+    std::vector<Vec2> theirs;
+    for (const auto& row : rows_of_four(folder / "reference" / ("PIV" + std::to_string(frame) + ".txt"))) {
+      grid.middles.push_back({row[0] - test::kPivOrigin_px, row[1] - test::kPivOrigin_px});
       theirs.push_back({row[2], row[3]});
     }
-    const test::Agreement found = test::agreement(ours, theirs);
+    const test::BeadPair pair = test::redrawn(relaxed, tracking);
+    const test::Agreement found = test::agreement(piv_in_two_passes(pair.relaxed, pair.stressed, grid, 32), theirs);
     RecordProperty("median_px_" + std::to_string(frame), std::to_string(found.median_px));
-    // What a field means over a window is a matter of the window where it turns within it: another correlation of the
-    // same images in the same windows differs from this reference by 0.17 and 0.14 px.
-    EXPECT_LE(found.median_px, 0.18);
+    // The bar of the data set. How the published correlation was done (windows, passes, origin) is not told with it:
+    // the model of it was chosen with the pair in view, by what it makes of the images themselves (0.12 and 0.11 px,
+    // which two correlations of one pair differ by); the tracking was not.
+    EXPECT_LE(found.median_px, 0.15);
     EXPECT_GE(found.correlation, 0.95);
   }
 }

@@ -301,6 +301,30 @@ TEST(DenseMethods, point_forces_find_those_of_the_scene) {
   }
 }
 
+TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
+  Polygon outline;
+  for (int k = 0; k < 24; ++k) {
+    const double angle = k * std::numbers::pi / 12;
+    outline.push_back(Vec2{32, 32} + 26 * Vec2{std::cos(angle), std::sin(angle)});
+  }
+  for (const char* method : {"trpf", "bem"}) {
+    for (const double noise : {0.01, 0.05, 0.1}) {
+      const EllipseScene scene = ellipse_scene(64, noise, 401);
+      TractionInputs inputs = inputs_of(scene);
+      inputs.outline_um = outline;
+      const Reconstruction r = reconstruct(inputs, half_space(method), 2);
+      double squares = 0;
+      for (std::size_t a = 0; a < r.forces.size(); ++a) {
+        squares += std::pow((norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN, 2) / 8;
+      }
+      std::printf("%s, noise %g: rms of error/sigma %.2f\n", method, noise, std::sqrt(squares));
+      // the noise alone would give 1.6 to 10; the root of a mean of eight squares is itself known to a quarter
+      EXPECT_GT(std::sqrt(squares), 0.7) << method << noise;
+      EXPECT_LT(std::sqrt(squares), 1.4) << method << noise;
+    }
+  }
+}
+
 TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
   const Gel gel{.youngs_modulus_kPa = 8, .poisson_ratio = 0.45, .thickness_um = 20};
   const substrate::Layer layer(gel);

@@ -1,12 +1,7 @@
-/// Time of the tension fit, the compliance given: growth with vertices, beads and fibres; one mesh and eight; and
-/// against the thesis' way to the same misfit. CPU time of one thread where nothing else is said.
+/// Time of the tension fit, the compliance given: growth with vertices, beads and fibres; one mesh and eight.
+/// CPU time of one thread where nothing else is said.
 #include <benchmark/benchmark.h>
 
-#include <atomic>
-#include <ctime>
-#include <map>
-
-#include "mbtfm/solved_misfit.h"
 #include "samples/experiment.h"
 #include "tests/support/tension_scene.h"
 
@@ -97,72 +92,5 @@ void meshes(benchmark::State& state) {
   }
 }
 BENCHMARK(meshes)->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond)->UseRealTime();
-
-/// Ends a minimisation that knows no such end.
-struct Reached {};
-
-double seconds_since(std::clock_t begin) { return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC; }
-
-/// Both ways from the same start on the same beads and mesh, measured from begin to end in processor time of one
-/// thread: block-wise conjugate gradients with finite differences, the gel solved in each evaluation, until a trial is
-/// within one standard error of Gauss–Newton's minimum (2 Phi above it by one variance). Our time includes the
-/// compliance and the reduction of the beads; `ratio_compliance_given` leaves out the former. The gel's factor is kept
-/// between evaluations, as the thesis did not: the ratio is the smaller for it. So that the thesis' way ends within
-/// minutes the cells are small: a ring of two adhesions for each fibre, 80 beads for each. The ratio grows with the
-/// cell.
-void thesis_way(benchmark::State& state) {
-  const auto n_fibres = static_cast<int>(state.range(0));
-  Cell cell = test::round_cell(2.0 * n_fibres, 2 * n_fibres);
-  for (int i = 1; i <= n_fibres; ++i) test::add_ventral(cell, i, i + n_fibres - i % 2);
-  const Eigen::VectorXd truth = tensions_nN(cell);
-  const TensionScene scene = test::scene_of(cell, truth, 80 * n_fibres, kNoise, 1);
-  const auto gel = substrate::make_substrate({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-                                             {.model = "split"}, 1);
-  for (auto _ : state) {
-    std::clock_t begin = std::clock();
-    const LinearData data = reduce(scene.beads, gel->compliance_um_per_nN(scene.points_um, scene.ellipses));
-    const double compliance_s = seconds_since(begin);
-    const TensionProblem problem(scene.cables, data.reduced, scene.adhesion_ids);
-    const Eigen::VectorXd start = Eigen::VectorXd::Constant(truth.size(), 0.06);  // thesis: all at the network's
-    const TensionFit ours = fit_gauss_newton(problem, {}, start);
-    const double ours_s = seconds_since(begin);
-
-    const double target = 2 * ours.trial.objective + data.reduced.floor_squared + 1;
-    std::atomic<int> n_evaluations = 0;
-    double least = 1e300;
-    const SolvedMisfit solved = solved_misfit(*gel, scene.points_um, scene.ellipses, data);
-    const SolvedMisfit until_reached = [&](const Eigen::VectorXd& forces_nN) {
-      ++n_evaluations;
-      const double misfit = solved(forces_nN);
-      least = std::min(least, misfit);  // one thread
-      if (misfit <= target) throw Reached();
-      return misfit;
-    };
-    FitParameters parameters;
-    parameters.method = "blockwise-cg";
-    parameters.gradients = "finite-difference";
-    parameters.max_evaluations = 1000000;
-    parameters.tolerance = 1e-300;  // its steps are short long before the minimum
-    const TensionProblem by_solution(scene.cables, data.reduced, scene.adhesion_ids, until_reached);
-    begin = std::clock();
-    try {
-      fit_tensions(by_solution, parameters, 1, start);
-      const std::string how_far = "the thesis' way stopped " + std::to_string(least - target) +
-                                  " above the misfit after " + std::to_string(n_evaluations) + " evaluations";
-      state.SkipWithError(how_far.c_str());
-    } catch (const Reached&) {
-    }
-    const double thesis_s = seconds_since(begin);
-    state.SetIterationTime(ours_s);
-    state.counters["compliance_s"] = compliance_s;
-    state.counters["ours_s"] = ours_s;
-    state.counters["our_equilibria"] = ours.n_evaluations;
-    state.counters["thesis_s"] = thesis_s;
-    state.counters["thesis_evaluations"] = n_evaluations.load();
-    state.counters["ratio"] = thesis_s / ours_s;
-    state.counters["ratio_compliance_given"] = thesis_s / (ours_s - compliance_s);
-  }
-}
-BENCHMARK(thesis_way)->Arg(6)->Arg(10)->Iterations(1)->UseManualTime()->Unit(benchmark::kMillisecond);
 
 }  // namespace

@@ -1,12 +1,14 @@
 /// Runs the stability tests and writes what they state and measure into the tables of docs/hard-cases.md:
-///   hard_cases_page docs/hard-cases.md
-/// A table of tests/stability/NAME.cpp stands between the lines <!-- NAME --> and <!-- end -->.
+///   hard_cases_page docs/hard-cases.md [NAME]...
+/// All tables or those named. A table of tests/stability/NAME.cpp stands between the lines <!-- NAME --> and <!-- end
+/// -->.
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
 #include <iostream>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <sstream>
 #include <string>
 
@@ -17,8 +19,23 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
+/// GoogleTest 1.12 writes each byte beyond ASCII as a character of its own ("\\u00C2\\u00B2" for "²"): the bytes again.
+std::string bytes_of(const std::string& text) {
+  std::string bytes;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const auto c = static_cast<unsigned char>(text[i]);
+    if ((c & 0xFC) != 0xC0) {
+      bytes += text[i];
+      continue;
+    }
+    bytes += static_cast<char>((c & 3) << 6 | (static_cast<unsigned char>(text[++i]) & 0x3F));
+  }
+  return bytes;
+}
+
 /// Of a table's cell, and of a name as people read it.
 std::string cell_text(std::string text) {
+  text = bytes_of(text);
   for (char& c : text)
     if (c == '|' || c == '\n') c = '/';
   return text;
@@ -64,10 +81,11 @@ std::string table_of(const std::string& name) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  if (argc != 2) {
-    std::cerr << "usage: hard_cases_page docs/hard-cases.md\n";
+  if (argc < 2) {
+    std::cerr << "usage: hard_cases_page docs/hard-cases.md [NAME]...\n";
     return 2;
   }
+  const std::set<std::string> asked(argv + 2, argv + argc);
   std::istringstream page(mbtfm::read_text(argv[1]));
   std::ostringstream written;
   bool is_kept = true;
@@ -75,9 +93,10 @@ int main(int argc, char** argv) {
     if (line == "<!-- end -->") is_kept = true;
     if (is_kept) written << line << "\n";
     const bool is_marker = line.starts_with("<!-- ") && line.ends_with(" -->") && line != "<!-- end -->";
-    if (!is_marker) continue;
+    const std::string name = is_marker ? line.substr(5, line.size() - 9) : "";
+    if (!is_marker || (!asked.empty() && !asked.contains(name))) continue;
     is_kept = false;
-    written << "\n" << table_of(line.substr(5, line.size() - 9)) << "\n";
+    written << "\n" << table_of(name) << "\n";
   }
   mbtfm::write_text(argv[1], written.str());
 }

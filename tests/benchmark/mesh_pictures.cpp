@@ -60,6 +60,7 @@ int main() {
     network::NetworkParameters p;
     p.adhesion_anchor = "rim";
     p.free_fibre_ends = "width";
+    p.link_reach = "neighbours";  // links are the triangulation's edges
     const network::GeneratedNetwork generated = network::generate_network(cells[i].cell, p);
     std::string title = cells[i].name;
     std::replace(title.begin(), title.end(), '_', ' ');

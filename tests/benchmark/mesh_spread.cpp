@@ -1,10 +1,14 @@
-/// mesh_spread OUT [cell] [meshes] [finest edge, um]: how far the adhesion forces of one simulated cell with given
-/// tensions, and their derivatives by tension, differ from mesh to mesh, by formulation and edge length.
-/// Writes OUT/mesh_spread.csv and OUT/mesh_spread.svg.
-#include <chrono>
+/// mesh_spread OUT [cell] [meshes] [finest edge, um] [coarsest edge, um]: how far the adhesion forces of one cell with
+/// given tensions, and their derivatives by tension, differ from mesh to mesh, by formulation and edge length. The cell
+/// is drawn as of the scenario u2os by a number, or any outline, adhesions and fibres as tests draw them by r and a
+/// number. Writes OUT/mesh_spread.csv and OUT/mesh_spread.svg; rows that the table has already are not measured again.
+#include <ctime>
+
+#include <algorithm>
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <sstream>
 #include <string>
 
 #include "network/cables.h"
@@ -13,6 +17,7 @@
 #include "pipeline/contract/parallel.h"
 #include "samples/draw.h"
 #include "samples/experiment.h"
+#include "tests/support/random_cell.h"
 
 namespace {
 
@@ -23,16 +28,21 @@ struct Formulation {
   const char* link_weights;
   const char* adhesion_anchor;
   const char* seeds;
+  const char* link_reach;
   bool keeps_surface_tension;  ///< links pull in proportion to the edge; the thesis' are the same at any edge
   double finest_um;            ///< edge length below which it is left out: the rim has small ones of its own
 };
-constexpr Formulation kFormulations[] = {{"thesis: link values, points", "equal", "centre", "jittered", false, 0},
-                                         {"link values per edge, points", "equal", "centre", "jittered", true, 0},
-                                         {"width, points", "width", "centre", "jittered", true, 0},
-                                         {"width, ellipses", "width", "ellipse", "jittered", true, 0},
-                                         {"width, ellipses, regular", "width", "ellipse", "regular", true, 0},
-                                         {"width, ellipses, Poisson disc", "width", "ellipse", "poisson", true, 0},
-                                         {"width, rims (dashed)", "width", "rim", "jittered", true, 0.9}};
+constexpr const char* kNear = "neighbours";
+constexpr const char* kFar = "second-neighbours";
+constexpr Formulation kFormulations[] = {
+    {"thesis: link values, points", "equal", "centre", "jittered", kNear, false, 0},
+    {"link values per edge, points", "equal", "centre", "jittered", kNear, true, 0},
+    {"width, points", "width", "centre", "jittered", kNear, true, 0},
+    {"width, ellipses", "width", "ellipse", "jittered", kNear, true, 0},
+    {"width, ellipses, regular", "width", "ellipse", "regular", kNear, true, 0},
+    {"width, ellipses, Poisson disc", "width", "ellipse", "poisson", kNear, true, 0},
+    {"width, rims (dashed)", "width", "rim", "jittered", kNear, true, 0.9},
+    {"second neighbours, ellipses: default (dashed)", "width", "ellipse", "jittered", kFar, true, 0}};
 constexpr double kEdges_um[] = {3, 2, 1.5, 1, 0.7, 0.4};
 
 /// What one mesh gives.
@@ -43,7 +53,25 @@ struct Sample {
   double seconds = 0;
 };
 
-double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
+/// Of the processor, by this thread.
+double now_s() {
+  timespec t{};
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return static_cast<double>(t.tv_sec) + 1e-9 * static_cast<double>(t.tv_nsec);
+}
+
+samples::DrawnCell scene(const std::string& name) {
+  if (name.starts_with('r')) {
+    const auto seed = static_cast<std::uint64_t>(std::atoi(name.c_str() + 1));
+    samples::DrawnCell drawn{.cell = testing::random_cell(seed, {.least_distance_um = 1}), .tensions_nN = {}};
+    std::mt19937_64 engine(seed);
+    for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i)
+      drawn.tensions_nN.push_back(testing::uniform(engine, 0.3, 6));
+    return drawn;
+  }
+  const samples::ScenarioParameters p;
+  return draw_cell(p.cell, p.tension, samples::field_um(p.microscope), static_cast<std::uint64_t>(std::stoi(name)));
+}
 
 Sample sample(const samples::DrawnCell& drawn, const Formulation& f, double edge_um, std::uint64_t seed) {
   const double begin = now_s();
@@ -52,6 +80,7 @@ Sample sample(const samples::DrawnCell& drawn, const Formulation& f, double edge
   p.seed = seed;
   p.seeds = f.seeds;
   p.link_weights = f.link_weights;
+  p.link_reach = f.link_reach;
   p.adhesion_anchor = f.adhesion_anchor;
   Network network = network::generate_network(drawn.cell, p).network;
   for (Link& link : network.links)
@@ -116,13 +145,37 @@ Row measure(const samples::DrawnCell& drawn, const Formulation& f, double edge_u
   return row;
 }
 
-void write_table(std::ostream& out, const std::vector<Row>& rows) {
-  out << "formulation,edge_um,vertices,seconds,forces,d_network,d_dorsal,d_arc,d_ventral\n";
+constexpr const char* kHeader = "formulation,edge_um,vertices,seconds,forces,d_network,d_dorsal,d_arc,d_ventral";
+
+void write_table(const std::string& folder, const std::vector<Row>& rows) {
+  std::ofstream out(folder + "/mesh_spread.csv");
+  out << kHeader << '\n';
   for (const Row& r : rows) {
     out << '"' << r.formulation->name << "\"," << r.edge_um << ',' << std::lround(r.n_vertices) << ',' << r.seconds;
     for (const double s : r.spread) out << ',' << s;
     out << '\n';
   }
+}
+
+/// The rows of a table as write_table makes it; of others none.
+std::vector<Row> read_table(std::istream& in) {
+  std::vector<Row> rows;
+  std::string line;
+  if (!std::getline(in, line) || line != kHeader) return rows;
+  while (std::getline(in, line)) {
+    const std::size_t end = line.rfind('"');
+    const auto f = std::ranges::find_if(kFormulations, [&](const Formulation& formulation) {
+      return end != std::string::npos && line.substr(1, end - 1) == formulation.name;
+    });
+    if (f == std::end(kFormulations)) continue;
+    std::replace(line.begin(), line.end(), ',', ' ');
+    std::istringstream values(line.substr(end + 1));
+    Row row{.formulation = &*f};
+    values >> row.edge_um >> row.n_vertices >> row.seconds;
+    for (double& s : row.spread) values >> s;
+    if (values) rows.push_back(row);
+  }
+  return rows;
 }
 
 /// Spread against edge length: a chart by quantity, a curve by formulation.
@@ -170,21 +223,25 @@ int main(int argc, char** argv) {
     return 2;
   }
   const std::string out = argv[1];
-  const auto cell = static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 1);
+  const samples::DrawnCell drawn = scene(argc > 2 ? argv[2] : "1");
   const int n_meshes = argc > 3 ? std::atoi(argv[3]) : 20;
   const double finest_um = argc > 4 ? std::atof(argv[4]) : 0;
-  const samples::ScenarioParameters p;
-  const samples::DrawnCell drawn = draw_cell(p.cell, p.tension, samples::field_um(p.microscope), cell);
-  std::vector<Row> rows;
+  const double coarsest_um = argc > 5 ? std::atof(argv[5]) : kEdges_um[0];
+  std::ifstream earlier(out + "/mesh_spread.csv");
+  std::vector<Row> known = read_table(earlier), rows;
   for (const Formulation& f : kFormulations) {
     for (const double edge_um : kEdges_um) {
-      if (edge_um < std::max(f.finest_um, finest_um)) continue;
-      rows.push_back(measure(drawn, f, edge_um, n_meshes));
+      if (edge_um < std::max(f.finest_um, finest_um) || edge_um > coarsest_um) continue;
+      const auto is_this = [&](const Row& r) { return r.formulation == &f && std::abs(r.edge_um - edge_um) < 1e-6; };
+      if (std::ranges::none_of(known, is_this)) {
+        known.push_back(measure(drawn, f, edge_um, n_meshes));
+        write_table(out, known);
+      }
+      rows.push_back(*std::ranges::find_if(known, is_this));
       std::fprintf(stderr, "%s, %g um: forces %.3f, %.2f s a mesh\n", f.name, edge_um, rows.back().spread[0],
                    rows.back().seconds);
     }
   }
-  std::ofstream table(out + "/mesh_spread.csv");
-  write_table(table, rows);
+  write_table(out, rows);
   std::ofstream(out + "/mesh_spread.svg") << drawn_table(rows, n_meshes);
 }

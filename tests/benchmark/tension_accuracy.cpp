@@ -1,5 +1,5 @@
 /// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
-/// descent, noise, beside-fttc, segmentation, directions, types, meshes, speed. A table (CSV) on stdout; charts (SVG)
+/// descent, noise, beside-fttc, segmentation, directions, types, speed. A table (CSV) on stdout; charts (SVG)
 /// into the folder.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
@@ -55,39 +55,6 @@ TensionScene thesis_scene(std::uint64_t seed, int n_beads, double noise) {
   return test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), seed), n_beads, noise,
                         static_cast<unsigned>(seed));
 }
-
-/// Measurements at will: white noise on the beads is white on the reduced data, and what it leaves unexplained is
-/// chi² distributed.
-struct Repeats {
-  Eigen::MatrixXd compliance;  ///< for a noise of 1 um
-  Eigen::VectorXd forces_nN;
-  double signal_um = 0;  ///< |u|
-  Eigen::Index n_components = 0;
-
-  explicit Repeats(TensionScene& scene) {
-    for (Bead& b : scene.beads) b.sigma_um = 1;
-    const LinearData data = reduce(scene.beads, scene.compliance_um_per_nN);
-    compliance = data.reduced.compliance;
-    forces_nN = scene.forces_nN;
-    signal_um = scene.displacement_um.norm();
-    n_components = data.n_used;
-  }
-  ReducedData draw(double sigma_um, std::uint64_t seed) const {
-    std::mt19937_64 random(seed);
-    std::normal_distribution<double> normal(0, 1);
-    ReducedData data{
-        .compliance = compliance / sigma_um, .target = {}, .floor_squared = 0, .n_components = n_components};
-    data.target = data.compliance * forces_nN;
-    for (double& y : data.target) y += normal(random);
-    const auto n_left = static_cast<double>(n_components - compliance.rows());
-    data.floor_squared = n_left + std::sqrt(2 * n_left) * normal(random);
-    return data;
-  }
-  double relative_l2(const Trial& trial, const ReducedData& data, double sigma_um) const {
-    const double measured = std::hypot(signal_um, sigma_um * std::sqrt(static_cast<double>(n_components)));
-    return sigma_um * std::sqrt(2 * trial.objective + data.floor_squared) / measured;
-  }
-};
 
 double condition_of(const Eigen::MatrixXd& H) {
   const Eigen::VectorXd values = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>(H).eigenvalues();
@@ -156,29 +123,27 @@ void descent(const Arguments& a) {
 /// Sums over the repeats of one level of noise.
 struct NoiseRow {
   double l2 = 0, total = 0, network = 0, plain_total = 0, plain_network = 0, deviation = 0, implied = 0, squares = 0;
-  int n_repeats = 0, n = 0, n_deviations = 0, n_intervals = 0, n_covered = 0;
+  int n_repeats = 0, n_robust = 0, n = 0, n_deviations = 0, n_intervals = 0, n_covered = 0;
   int n_weak = 0, n_weak_covered = 0;  // true tensions below two standard errors: near the bound
 };
 
-void add_forces(NoiseRow& row, const TensionScene& scene, const Trial& trial, const Eigen::MatrixXd& derivatives,
-                const LocalMisfit& local) {
-  const double true_total = total_nN(scene.forces_nN), true_network = scene.tensions_nN[0];
-  const Eigen::VectorXd past = past_bounds_nN(local, 1);
-  const double unbounded = directions_of(trial.forces_nN).dot(trial.forces_nN + derivatives * past);
-  row.plain_total += total_nN(trial.forces_nN) / true_total;
-  row.total += (unbounded - magnitude_bias_nN(trial.forces_nN, derivatives, covariance_nN2(local, 1))) / true_total;
-  // forces of a network without fibres go with its tension
-  row.plain_network += trial.tensions_nN[0] / true_network;
-  row.network += std::max(0.0, trial.tensions_nN[0] + past[0]) / true_network;
+/// @param true_network_nN  force with every fibre at the network's tension
+void add_forces(NoiseRow& row, const TensionScene& scene, const EnsembleFit& fit, double true_network_nN) {
+  const double true_total_nN = total_nN(scene.forces_nN);
+  row.plain_total += total_nN(fit.forces_nN) / true_total_nN;
+  row.total += fit.total_force_nN.value / true_total_nN;
+  row.plain_network += total_nN(fit.network_forces_nN) / true_network_nN;
+  row.network += fit.network_force_nN.value / true_network_nN;
 }
 
 /// @param limit_nN  Cramér–Rao, by tension
 void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::VectorXd& limit_nN,
-                  const LocalMisfit& local) {
+                  const EnsembleFit& fit) {
   for (Eigen::Index i = 0; i < limit_nN.size(); ++i) {
-    const double t = true_nN[i], error = local.tensions_nN[i] - t;
-    const Sides sides = profile_95(local, 1, static_cast<int>(i));
-    const int is_covered = -sides.above <= error && error <= sides.below ? 1 : 0;
+    const Estimate& estimate = fit.tensions_nN[static_cast<std::size_t>(i)];
+    const double t = true_nN[i], error = estimate.value - t;
+    const Interval interval = interval_95(estimate, 1);
+    const int is_covered = interval.low <= t && t <= interval.high ? 1 : 0;
     row.n_covered += is_covered;
     ++row.n_intervals;
     row.n_weak_covered += t < 2 * limit_nN[i] ? is_covered : 0;
@@ -191,58 +156,63 @@ void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::Ve
   }
 }
 
-void add_repeats(NoiseRow& row, const TensionScene& scene, const Repeats& repeats, double sigma_um, int n_repeats,
-                 std::uint64_t first_seed) {
-  const ReducedData exact = repeats.draw(sigma_um, 0);
-  const TensionProblem truth(scene.cables, exact, scene.adhesion_ids);
-  const Trial at_truth = truth.evaluate(scene.tensions_nN);
-  const Eigen::VectorXd limit =
-      covariance_nN2(local_misfit(at_truth, truth.jacobian(at_truth)), 1).diagonal().cwiseSqrt();
-  std::vector<Trial> trials(static_cast<std::size_t>(n_repeats));
-  std::vector<Eigen::MatrixXd> derivatives(trials.size());
-  parallel_for(n_repeats, 2, [&](int r) {
-    const ReducedData data = repeats.draw(sigma_um, first_seed + static_cast<std::uint64_t>(r));
-    const TensionProblem problem(scene.cables, data, scene.adhesion_ids);
-    const auto i = static_cast<std::size_t>(r);
-    trials[i] = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
-    derivatives[i] = problem.force_derivatives(trials[i]);
-  });
-  for (std::size_t i = 0; i < trials.size(); ++i) {
-    const ReducedData data = repeats.draw(sigma_um, first_seed + i);
-    const LocalMisfit local = local_misfit(trials[i], data.compliance * derivatives[i]);
-    row.l2 += repeats.relative_l2(trials[i], data, sigma_um);
+/// Noise of the same size anew: of the data reduced (see reweight) only the target changes.
+void measure_again(TensionScene& scene, double noise, unsigned seed) {
+  LinearData& data = scene.data;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, noise * scene.largest_um);
+  for (Eigen::Index row = 0; row < data.displacement_um.size(); ++row)
+    data.displacement_um[row] = scene.displacement_um[row] + normal(random);
+  if ((data.bead_weight.array() != 1).any()) return reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
+  const Eigen::VectorXd weighted_u = data.weight_per_um.cwiseProduct(data.displacement_um);
+  const Eigen::MatrixXd& C = data.reduced.compliance;
+  data.reduced.target = (C * (data.compliance_um_per_nN.transpose() * data.weight_per_um.cwiseProduct(weighted_u)))
+                            .cwiseQuotient(C.rowwise().squaredNorm());
+  data.reduced.floor_squared = weighted_u.squaredNorm() - data.reduced.target.squaredNorm();
+}
+
+void add_repeats(NoiseRow& row, TensionScene& scene, double noise, int n_repeats, unsigned first_seed) {
+  test::measure(scene, noise, first_seed);
+  const Eigen::VectorXd limit = test::cramer_rao_nN(scene);
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const double true_network_nN =
+      total_nN(problem.evaluate(Eigen::VectorXd::Constant(scene.tensions_nN.size(), scene.tensions_nN[0])).forces_nN);
+  for (int r = 0; r < n_repeats; ++r) {
+    measure_again(scene, noise, first_seed + static_cast<unsigned>(r));
+    const EnsembleFit fit = test::fit_own_network(scene);
+    row.l2 += relative_l2(scene.data, fit.forces_nN);
+    row.n_robust += fit.loss == "squares" ? 0 : 1;
     ++row.n_repeats;
-    add_forces(row, scene, trials[i], derivatives[i], local);
-    add_tensions(row, scene.tensions_nN, limit, local);
+    add_forces(row, scene, fit, true_network_nN);
+    add_tensions(row, scene.tensions_nN, limit, fit);
   }
 }
 
 // Fig. 3.6, and how large errors are and are said to be.
 void noise(const Arguments& a) {
   const std::vector<double> levels = {0.01, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.25};
-  std::vector<NoiseRow> rows(levels.size());
-  for (int c = 0; c < a.n_cells; ++c) {
-    TensionScene scene = thesis_scene(static_cast<std::uint64_t>(c) + 1, 10000, 0);
-    const Repeats repeats(scene);
-    for (std::size_t l = 0; l < levels.size(); ++l)
-      add_repeats(rows[l], scene, repeats, levels[l] * scene.largest_um, a.n_repeats,
-                  1000 * static_cast<std::uint64_t>(c) + 1);
-  }
   test::Series l2{.name = "L2", .x = levels, .y = {}}, total{.name = "total", .x = levels, .y = {}},
       network{.name = "network", .x = levels, .y = {}}, deviation{.name = "found", .x = levels, .y = {}},
       implied{.name = "Cramér–Rao", .x = levels, .y = {}};
   std::printf(
       "noise,relative_l2,total_force,network_force,uncorrected_total,uncorrected_network,mean_relative_deviation,"
-      "implied_by_limit,rms_over_limit,coverage,near_zero,coverage_near_zero\n");
-  for (std::size_t l = 0; l < levels.size(); ++l) {
-    const NoiseRow& r = rows[l];
+      "implied_by_limit,rms_over_limit,coverage,near_zero,coverage_near_zero,robust\n");
+  std::vector<TensionScene> scenes;
+  for (int c = 1; c <= a.n_cells; ++c) scenes.push_back(thesis_scene(static_cast<std::uint64_t>(c), 10000, 0));
+  unsigned seed = 1;
+  for (const double level : levels) {
+    NoiseRow r;
+    for (TensionScene& scene : scenes) {
+      add_repeats(r, scene, level, a.n_repeats, seed);
+      seed += static_cast<unsigned>(a.n_repeats);
+    }
     const double n = r.n_repeats;
     l2.y.push_back(r.l2 / n), total.y.push_back(r.total / n), network.y.push_back(r.network / n);
     deviation.y.push_back(r.deviation / r.n_deviations), implied.y.push_back(r.implied / r.n_deviations);
-    std::printf("%g,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f,%d,%.4f\n", levels[l], r.l2 / n, r.total / n,
+    std::printf("%g,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.4f,%.3f,%.4f,%d,%.4f,%d\n", level, r.l2 / n, r.total / n,
                 r.network / n, r.plain_total / n, r.plain_network / n, deviation.y.back(), implied.y.back(),
                 std::sqrt(r.squares / std::max(1, r.n)), double(r.n_covered) / r.n_intervals, r.n_weak,
-                double(r.n_weak_covered) / std::max(1, r.n_weak));
+                double(r.n_weak_covered) / std::max(1, r.n_weak), r.n_robust);
   }
   save(a, "noise",
        {{.title = "misfit", .x_label = "noise / largest displacement", .y_label = "relative L2", .series = {l2}},
@@ -366,6 +336,7 @@ void segmentation(const Arguments& a) {
     std::vector<int> without_dorsal = extras, without_ventral = extras;
     without_dorsal.insert(without_dorsal.end(), dorsal.begin(), dorsal.begin() + 2);
     without_ventral.push_back(ventral.front());
+    double place = -1.5;
     for (const auto& [name, removed] : {std::pair<const char*, std::vector<int>>{"right", extras},
                                         {"three too many", {}},
                                         {"two dorsal missing", without_dorsal},
@@ -391,9 +362,11 @@ void segmentation(const Arguments& a) {
            {std::pair{&misfits, relative_l2(scene.data, fit.forces_nN) / std::sqrt(expected / measured)},
             std::pair{&changes, std::sqrt(change / m)}}) {
         (*series)[name].name = name;
-        (*series)[name].x.push_back(c);
+        (*series)[name].is_line = false;
+        (*series)[name].x.push_back(c + 0.1 * place);  // side by side
         (*series)[name].y.push_back(value);
       }
+      ++place;
     }
   }
   const auto values_of = [](const std::map<std::string, test::Series>& map) {
@@ -401,10 +374,17 @@ void segmentation(const Arguments& a) {
     for (const auto& [name, series] : map) list.push_back(series);
     return list;
   };
-  save(
-      a, "segmentation",
-      {{.title = "misfit", .x_label = "cell", .y_label = "relative L2 over the noise's", .series = values_of(misfits)},
-       {.title = "the other tensions", .x_label = "cell", .y_label = "rms change (nN)", .series = values_of(changes)}});
+  save(a, "segmentation",
+       {{.title = "misfit",
+         .x_label = "cell",
+         .y_label = "relative L2 over the noise's",
+         .series = values_of(misfits),
+         .is_x_counted = true},
+        {.title = "the other tensions",
+         .x_label = "cell",
+         .y_label = "rms change (nN)",
+         .series = values_of(changes),
+         .is_x_counted = true}});
 }
 
 // Fig. 3.10: directions of the model's forces against those found without it.
@@ -483,59 +463,6 @@ void types(const Arguments& a) {
                     test::histogram("dorsal and ventral exchanged", result.exchanged, *low, *high, 24)}}});
 }
 
-// Another network than the truth's: the default ensemble beside one mesh in the thesis' formulation.
-void meshes(const Arguments& a) {
-  std::printf("cell,formulation,meshes,relative_error,rms_error_over_stated,coverage\n");
-  for (int c = 1; c <= a.n_cells; ++c) {
-    samples::ScenarioParameters p;
-    p.seed = static_cast<std::uint64_t>(c);
-    samples::Experiment e = samples::simulate(p, 2);
-    constexpr double kNoise_um = 0.02;
-    std::mt19937_64 random(p.seed);
-    std::normal_distribution<double> normal(0, kNoise_um);
-    std::vector<Vec2> points;
-    for (std::size_t i = 0; i < e.measured.size(); ++i) {
-      const double x = normal(random), y = normal(random);
-      e.measured[i].displacement_um = e.displacement[i].displacement_um + Vec2{x, y};
-      e.measured[i].sigma_um = kNoise_um;
-      points.push_back(e.measured[i].position_um);
-    }
-    std::vector<substrate::Ellipse> ellipses;
-    std::vector<int> ids;
-    for (const Adhesion& adhesion : e.cell.adhesions) {
-      ellipses.push_back(substrate::ellipse_of(adhesion));
-      ids.push_back(adhesion.adhesion_id);
-    }
-    LinearData data = reduce(
-        e.measured, substrate::make_greens(p.gel, {.model = "layer"}, 2)->compliance_um_per_nN(points, ellipses));
-    for (const bool is_thesis : {false, true}) {
-      FitParameters parameters;
-      parameters.n_meshes = is_thesis ? 1 : a.n_repeats;
-      std::vector<network::CableNetwork> networks;
-      for (int m = 0; m < parameters.n_meshes; ++m) {
-        network::NetworkParameters of_network;
-        of_network.seed = static_cast<std::uint64_t>(m) + 1;
-        if (is_thesis) of_network.link_weights = "equal", of_network.adhesion_anchor = "centre";
-        networks.emplace_back(network::generate_network(e.cell, of_network).network);
-      }
-      const EnsembleFit fit = fit_ensemble(networks, data, ids, parameters, 2, {});
-      double error = 0, size = 0, squares = 0;
-      int n_covered = 0, n = 0;
-      for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
-        const double t = e.tensions[i].tension_nN, d = fit.tensions_nN[i].value - t;
-        const Interval interval = interval_95(fit.tensions_nN[i], parameters.n_meshes);
-        error += d * d, size += t * t;
-        squares += fit.tensions_nN[i].standard_error() > 0 ? std::pow(d / fit.tensions_nN[i].standard_error(), 2) : 0;
-        n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
-        ++n;
-      }
-      std::printf("%d,%s,%d,%.4f,%.3f,%.3f\n", c, is_thesis ? "thesis" : "default", parameters.n_meshes,
-                  std::sqrt(error / size), std::sqrt(squares / n), double(n_covered) / n);
-      std::fflush(stdout);
-    }
-  }
-}
-
 /// Processor time of one fit, the compliance given.
 double fit_seconds(const TensionScene& scene) {
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
@@ -578,9 +505,13 @@ int main(int argc, char** argv) {
   const Arguments a{.n_repeats = argc > 2 ? std::atoi(argv[2]) : 10,
                     .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
                     .folder = argc > 4 ? argv[4] : "."};
-  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {
-      {"descent", descent},       {"noise", noise}, {"beside-fttc", beside_fttc}, {"segmentation", segmentation},
-      {"directions", directions}, {"types", types}, {"meshes", meshes},           {"speed", speed}};
+  const std::pair<const char*, void (*)(const Arguments&)> studies[] = {{"descent", descent},
+                                                                        {"noise", noise},
+                                                                        {"beside-fttc", beside_fttc},
+                                                                        {"segmentation", segmentation},
+                                                                        {"directions", directions},
+                                                                        {"types", types},
+                                                                        {"speed", speed}};
   for (const auto& [name, run] : studies) {
     if (argc > 1 && std::strcmp(argv[1], name) == 0) {
       run(a);
@@ -588,7 +519,7 @@ int main(int argc, char** argv) {
     }
   }
   std::fprintf(stderr,
-               "tension_accuracy descent|noise|beside-fttc|segmentation|directions|types|meshes|speed [repeats] "
+               "tension_accuracy descent|noise|beside-fttc|segmentation|directions|types|speed [repeats] "
                "[cells] [folder]\n");
   return 2;
 }

@@ -210,6 +210,23 @@ TEST(HardMesh, outlines_with_sharp_corners_and_thin_necks) {
   expect_valid(generate_network(star, {}), star, 1.5);
 }
 
+TEST(HardMesh, tip_beyond_a_neck_thinner_than_the_mesh_is_left_out_where_nothing_holds_it) {
+  test::hard_case("a neck of 0.05 um, with and without an adhesion beyond",
+                  "the part without one is left out; else two parts, which is said");
+  Cell cell;
+  cell.outline_um = {{0, 4},   {8, 4},   {8, 9.975},   {14, 9.975}, {14, 4}, {22, 4},
+                     {22, 16}, {14, 16}, {14, 10.025}, {8, 10.025}, {8, 16}, {0, 16}};
+  cell.adhesions = {adhesion_at(1, {2, 6}), adhesion_at(2, {2, 14})};
+  const GeneratedNetwork held_on_one_side = generate_network(cell, {});
+  EXPECT_EQ(held_on_one_side.n_loose_parts, 1);
+  expect_valid(held_on_one_side, cell, 1.5);
+  for (const Vec2 p : held_on_one_side.network.vertices_um) EXPECT_LE(p.x, 14);
+  cell.adhesions.push_back(adhesion_at(3, {20, 10}));
+  const GeneratedNetwork held_on_both = generate_network(cell, {});
+  EXPECT_EQ(held_on_both.n_loose_parts, 0);
+  EXPECT_EQ(held_on_both.n_parts, 2);
+}
+
 TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
   test::hard_case("4 000 steps of pixels of 0.05 to 0.3 um", "the smooth outline's area, mean quality >= 0.9");
   const Cell smooth = testing::random_cell(11, {.n_outline_points = 300});

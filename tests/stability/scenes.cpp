@@ -67,5 +67,32 @@ TEST(RandomScenes, are_answered_in_balance_with_intervals_that_hold_or_refused_w
   EXPECT_LE(n_refused, 0.2 * n);
 }
 
+struct KnownScene {
+  std::uint64_t seed;
+  const char* name;
+  const char* was_wrong;
+};
+
+/// Every scene that ever failed.
+class FailedOnce : public ::testing::TestWithParam<KnownScene> {};
+
+TEST_P(FailedOnce, is_answered) {
+  test::hard_case(std::string("a random scene; what was wrong: ") + GetParam().was_wrong, "an answer as above");
+  const KnownScene known = GetParam();
+  const SceneOutcome outcome = run(test::random_scene(known.seed));
+  tell(known.seed, outcome);
+  expect_no_faults(known.seed, outcome);
+  EXPECT_EQ(outcome.kind, SceneOutcome::Kind::answered) << outcome.message;
+  EXPECT_EQ(outcome.n_within, outcome.n_tensions);
+  test::came_out(std::to_string(outcome.n_within) + " of " + std::to_string(outcome.n_tensions) +
+                 " tensions within three stated standard errors");
+}
+
+INSTANTIATE_TEST_SUITE_P(Scenes, FailedOnce,
+                         ::testing::Values(KnownScene{
+                             1213, "tip_without_adhesions_beyond_a_thin_neck",
+                             "the tip was a second part of the network, which did not count as solved"}),
+                         [](const auto& info) { return std::string(info.param.name); });
+
 }  // namespace
 }  // namespace mbtfm

@@ -21,7 +21,11 @@ struct Panel {
   std::string title, x_label, y_label;
   std::vector<Series> series;
   bool is_log_x = false, is_log_y = false;
+  bool is_x_counted = false;  ///< x is a number of something: whole
 };
+
+/// px. A frame grows with the lines of its key beyond two; they stand above the data.
+inline double frame_height(std::size_t n_keys) { return 236 + 18 * std::max(0.0, static_cast<double>(n_keys) - 2); }
 
 inline std::string format(const char* pattern, auto... values) {
   char text[512];
@@ -47,12 +51,16 @@ inline charts::Axis axis_of(const Panel& panel, bool is_x) {
   const bool is_log = is_x ? panel.is_log_x : panel.is_log_y;
   charts::Axis axis = charts::axis_over(is_x ? panel.x_label : panel.y_label, values,
                                         is_log ? charts::Scale::logarithmic : charts::Scale::linear);
+  for (double n = std::ceil(axis.low); is_x && panel.is_x_counted && n <= axis.high; ++n)
+    axis.names.emplace_back(n, charts::readable(n));
   if (is_x) return axis;
-  const double room = panel.series.size() > 1 ? 0.13 * static_cast<double>(panel.series.size()) : 0;
+  const std::size_t n = panel.series.size();
+  const double key_px = n > 1 ? 18 * static_cast<double>(n) + 10 : 0, room = key_px / (frame_height(n) - key_px);
   if (is_log) {
     axis.high *= std::pow(axis.high / axis.low, room);
   } else {
-    if (!values.empty() && *std::min_element(values.begin(), values.end()) >= 0) axis.low = 0;
+    const double least = values.empty() ? -1 : *std::min_element(values.begin(), values.end());
+    if (least >= 0) axis.low = least > 0 ? 0 : -0.02 * axis.high;  // a point at zero is seen whole
     axis.high += room * (axis.high - axis.low);
   }
   return axis;
@@ -63,6 +71,7 @@ inline std::string chart(const std::vector<Panel>& panels) {
   for (const Panel& panel : panels) {
     charts::Chart one(panel.title, axis_of(panel, true), axis_of(panel, false));
     one.put_key(charts::Chart::KeySide::left);
+    one.frame_height(frame_height(panel.series.size()));
     for (std::size_t k = 0; k < panel.series.size(); ++k) {
       const Series& s = panel.series[k];
       const std::string colour = charts::kColours[k % std::size(charts::kColours)];
