@@ -114,7 +114,7 @@ of the demo cell:
 ```
 $ mbtfm run --accuracy 1% demo
 PAGE
-  "$bin/mbtfm" run --threads 2 --accuracy 1% "$work/demo" 2>&1 | grep 'asked for' | fold -s -w 120
+  "$bin/mbtfm" run --threads 2 --accuracy 1% "$work/demo" 2>&1 | grep '^mbtfm: tensions to' | fold -s -w 120
   echo '```'
   echo
   study clean "Beads without noise, true segmentation" clean1 clean2 clean3
