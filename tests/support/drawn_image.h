@@ -49,8 +49,8 @@ inline void draw_line(segment::Image& image, const Polyline& line, double height
 
 inline void add_noise(segment::Image& image, double sigma, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, sigma);
-  for (float& value : image.pixels) value += static_cast<float>(normal(random));
+  std::normal_distribution<double> normal;  // of its own sigma none may be 0
+  for (float& value : image.pixels) value += static_cast<float>(sigma * normal(random));
 }
 
 inline Adhesion ellipse(int id, Vec2 position_um, double major_um, double minor_um, double angle_rad) {
