@@ -59,8 +59,9 @@ class TensionProblem {
 };
 
 /// The multiple of these tensions that fits best. Forces grow in proportion to the tensions (but for cables beyond
-/// their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps.
-Eigen::VectorXd scaled_to_data_nN(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN);
+/// their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps. And the
+/// vertices hardly move, so the second equilibrium starts where the first one is.
+Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN);
 
 /// Tensions all equal, of the size that fits best: where the fit starts.
 Eigen::VectorXd uniform_start_nN(const TensionProblem& problem);
