@@ -209,8 +209,7 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
 TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters,
                             const Eigen::VectorXd& start_nN, const Trial* nearby) {
   TensionFit fit;
-  const Trial first = problem.evaluate(start_nN, nearby);
-  fit.trial = problem.evaluate(scaled_to_data_nN(problem, first), &first);
+  fit.trial = scaled_to_data(problem, start_nN, nearby);
   fit.n_evaluations = 2;
   descend(problem, parameters, fit);
   // A slack fibre may be a minimum of its own beside that of the taut one: try the other side as long as it pays.

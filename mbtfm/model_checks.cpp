@@ -28,7 +28,7 @@ ModelScore score(const std::string& name, int n_parameters, double misfit, doubl
 /// The one tension of all cables that fits best: Gauss–Newton in one variable.
 Trial best_uniform(const TensionProblem& problem) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(problem.n_tensions());
-  Trial trial = problem.evaluate(uniform_start_nN(problem));
+  Trial trial = scaled_to_data(problem, ones);
   constexpr int kMaxSteps = 20;  // forces are all but proportional to the tension: three do
   for (int i = 0; i < kMaxSteps; ++i) {
     const double tension = trial.tensions_nN[0];

@@ -80,15 +80,23 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
   return gradient;
 }
 
-Eigen::VectorXd scaled_to_data_nN(const TensionProblem& problem, const Trial& trial) {
+namespace {
+/// The multiple of a trial's tensions that fits best.
+Eigen::VectorXd scaled_nN(const TensionProblem& problem, const Trial& trial) {
   const Eigen::VectorXd response = problem.data().compliance * trial.forces_nN;
   const double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
   // Where the cell seems to push, as noise alone may look, any small positive size serves.
   return (factor > 0 ? factor : 1e-3 / std::max(trial.tensions_nN.maxCoeff(), 1e-300)) * trial.tensions_nN;
 }
+}  // namespace
+
+Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby) {
+  const Trial trial = problem.evaluate(tensions_nN, nearby);
+  return problem.evaluate(scaled_nN(problem, trial), &trial);
+}
 
 Eigen::VectorXd uniform_start_nN(const TensionProblem& problem) {
-  return scaled_to_data_nN(problem, problem.evaluate(Eigen::VectorXd::Ones(problem.n_tensions())));
+  return scaled_nN(problem, problem.evaluate(Eigen::VectorXd::Ones(problem.n_tensions())));
 }
 
 }  // namespace mbtfm::inverse

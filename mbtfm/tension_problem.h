@@ -58,9 +58,11 @@ class TensionProblem {
   std::vector<Eigen::Index> pair_of_;  ///< of the network's i-th adhesion in the data
 };
 
-/// The multiple of this trial's tensions that fits best. Forces grow in proportion to the tensions (but for cables
-/// beyond their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps.
-Eigen::VectorXd scaled_to_data_nN(const TensionProblem& problem, const Trial& trial);
+/// The multiple of these tensions that fits best. Forces grow in proportion to the tensions (but for cables beyond
+/// their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps. And the
+/// vertices hardly move, so the second equilibrium starts where the first one is.
+/// @param nearby  a trial of tensions like these, to start the first one from
+Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr);
 
 /// Tensions all equal, of the size that fits best: where the fit starts.
 Eigen::VectorXd uniform_start_nN(const TensionProblem& problem);

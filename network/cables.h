@@ -20,7 +20,7 @@
 namespace mbtfm::network {
 
 struct CableParameters {
-  static constexpr int kNewtonSteps = 500;           ///< ordinary cells take 20 to 30, EA / t of 1e6 some 70
+  static constexpr int kNewtonSteps = 500;           ///< ordinary cells take 20 to 40, only fibres pulling some 70
   static constexpr int kConjugateSteps = 1'000'000;  ///< ordinary cells take 7 000 to 200 000
   /// EA: force at 100 % strain beyond the rest length (thesis 3.2.3); 0: cables are never longer than they like
   double axial_stiffness_nN = 50;

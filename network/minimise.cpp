@@ -7,14 +7,15 @@
 namespace mbtfm::network {
 namespace {
 
-// The path of a cold start. Lengths are rounded off over a tenth of an edge at first, the stretch by mu = a hundredth
+// The path of a cold start. Lengths are rounded off over a fifth of an edge at first, the stretch by mu = a hundredth
 // of force times edge: a network at rest, all of whose cables stand at the kink, is smooth then. Each stage sharpens
-// threefold; where one step did for it the path is straight, and mu falls twentyfold. At the last mu what rounding adds
-// to a force is below the effect of the tensions that stand for zero.
-constexpr double kFirstEps = 0.1;
+// twofold, for on fine meshes wider strides leave too many cables on the wrong side of the kink; where one step did for
+// a stage the path is straight, and mu falls twentyfold. At the last mu so few cables are still undecided that the
+// exact energy settles them as fast.
+constexpr double kFirstEps = 0.2;
 constexpr double kFirstMu = 1e-2;
-constexpr double kLastMu = 1e-9;
-constexpr double kSharpening = 0.3;
+constexpr double kLastMu = 1e-8;
+constexpr double kSharpening = 0.5;
 constexpr double kBoldSharpening = 0.05;
 // A stage is left once a step went (nearly) its full length, its slope was below mu for each second cable, and no net
 // force exceeds the force scale. More accuracy is lost again when the energy sharpens; with less, slack cables far from
@@ -53,22 +54,35 @@ double stiffness_along(const Cable& cable, const Dual& dual, double stretch_um) 
   return rise + gap > 0 ? dual.stretch_force_nN / (rise + gap) : cable.stiffness_nN_per_um;
 }
 
-/// The dual after a step that changes the span by length · change, to first order.
-Dual advanced(const Cable& cable, const Dual& dual, const Pull& pull, Vec2 span, Vec2 change, double length,
-              double mu) {
+/// The dual after a step that changes the span by `change`, to first order.
+Dual advanced(const Cable& cable, const Dual& dual, const Pull& pull, Vec2 span, Vec2 change, double mu) {
   const Vec2 n = (1 / pull.length_um) * span;
   const Vec2 turn = n - dual.direction + (1 / pull.length_um) * (change - dot(n, change) * dual.direction);
-  if (cable.stiffness_nN_per_um == 0) return {unit_or_less(dual.direction + length * turn), 0};
+  if (cable.stiffness_nN_per_um == 0) return {unit_or_less(dual.direction + turn), 0};
   const double q = dual.stretch_force_nN, rise = q / cable.stiffness_nN_per_um;
   const double denominator = 2 * rise - pull.stretch_um;
   const double growth = q * dot(n, change) - (q * (rise - pull.stretch_um) - mu);
-  return {unit_or_less(dual.direction + length * turn), denominator > 0 ? q + length * growth / denominator : q};
+  return {unit_or_less(dual.direction + turn), denominator > 0 ? q + growth / denominator : q};
 }
 
-/// Keep q above k max(0, e), by a tenth at least of what the curve of mu is above it.
+/// q of the exact energy, k max(0, e): the curves of all mu are above it.
+double least_stretch_force_nN(const Cable& cable, const Pull& pull) {
+  return cable.stiffness_nN_per_um * std::max(0.0, pull.stretch_um);
+}
+
+/// Keep q above its least, by a tenth at least of what the curve of mu is above it.
 double inside(double q, const Cable& cable, const Pull& pull) {
-  const double bound = cable.stiffness_nN_per_um * std::max(0.0, pull.stretch_um);
-  return std::max(q, bound + 0.1 * (pull.stretch_force_nN - bound));
+  const double least = least_stretch_force_nN(cable, pull);
+  return std::max(q, least + 0.1 * (pull.stretch_force_nN - least));
+}
+
+/// q nearer to its least, where a step of the exact energy left `excess_before` down to what is now above it. Near the
+/// kink both roots of q (q/k − e) = 0 are close, and Newton's method only halves the excess; with the part that is left
+/// cubed it falls by eight. Away from the kink it falls to nothing anyway.
+double settled(double q, double excess_before, const Cable& cable, const Pull& pull) {
+  const double least = least_stretch_force_nN(cable, pull);
+  const double left = excess_before > 0 ? std::min(1.0, (q - least) / excess_before) : 1;
+  return least + left * left * (q - least);
 }
 
 /// Where the vertices are, and how the energy changes along a line from there.
@@ -231,19 +245,29 @@ class Newton : public Descent {
     return start;
   }
 
+  /// The duals take the whole step, whatever part of it the positions take: a few cables shorten it for all, and the
+  /// others' duals are nearer to the end of it all the same.
   void advance(double length) {
+    std::vector<double>& excess = excess_nN_;
+    excess.clear();
     for (std::size_t k = 0; k < cables_.size(); ++k) {
       const Pull before = pull(cables_[k], span_[k], rounding_);
-      dual_[k] = advanced(cables_[k], dual_[k], before, span_[k], change_[k], length, rounding_.mu_fJ);
+      excess.push_back(dual_[k].stretch_force_nN - least_stretch_force_nN(cables_[k], before));
+      dual_[k] = advanced(cables_[k], dual_[k], before, span_[k], change_[k], rounding_.mu_fJ);
     }
     move(length);
-    for (std::size_t k = 0; k < cables_.size(); ++k)
-      dual_[k].stretch_force_nN = inside(dual_[k].stretch_force_nN, cables_[k], pull(cables_[k], span_[k], rounding_));
+    for (std::size_t k = 0; k < cables_.size(); ++k) {
+      const Pull after = pull(cables_[k], span_[k], rounding_);
+      double& q = dual_[k].stretch_force_nN;
+      q = inside(q, cables_[k], after);
+      if (rounding_.mu_fJ == 0 && length >= kFullStep) q = settled(q, excess[k], cables_[k], after);
+    }
   }
 
   BlockCholesky matrix_;
   BlockCholesky::Columns columns_;
-  std::vector<Dual> dual_;  // by cable
+  std::vector<Dual> dual_;         // by cable
+  std::vector<double> excess_nN_;  // by cable, of the stretch force above its least
 };
 
 /// Non-linear conjugate gradients after Polak and Ribière (Nocedal & Wright, Numerical Optimization, 2006, 5.2).
