@@ -58,8 +58,9 @@ double Random::poisson(double mean) {
     const double k = std::floor((2 * a / us + b) * u + mean + 0.43);
     if (us >= 0.07 && v <= v_r) return k;
     if (k < 0 || (us < 0.013 && v > us)) continue;
+    int sign = 0;  // std::lgamma writes that to a variable that all threads share
     if (std::log(v) + std::log(inverse_alpha) - std::log(a / (us * us) + b) <=
-        k * log_mean - mean - std::lgamma(k + 1)) {
+        k * log_mean - mean - lgamma_r(k + 1, &sign)) {
       return k;
     }
   }
