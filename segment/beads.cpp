@@ -148,8 +148,9 @@ DetectedBead improved(const DetectedBead& bead, const Plane& rest, double sigma)
   if (n <= 0 || m <= 0 || !(bead.brightness > 0)) return bead;
   const Axis x(bead.position_px.x, box.left, n, sigma), y(bead.position_px.y, box.top, m, sigma);
   // rows: height, place along x, along y (in units of sigma/height), level
-  std::array<double, 16> normal{x.ss * y.ss, 0, 0, 0, x.ssd * y.ss, x.ssdd * y.ss, 0, 0, x.ss * y.ssd, x.ssd * y.ssd,
-                                x.ss * y.ssdd, 0, x.s * y.s, x.sd * y.s, x.s * y.sd, x.w * y.w};
+  std::array<double, 16> normal{
+      x.ss * y.ss,   0, 0,         0,          x.ssd * y.ss, x.ssdd * y.ss, 0, 0, x.ss * y.ssd, x.ssd * y.ssd,
+      x.ss * y.ssdd, 0, x.s * y.s, x.sd * y.s, x.s * y.sd,   x.w * y.w};
   std::array<double, 4> right{};
   for (int j = 0; j < m; ++j) {
     const float* row = rest.row(box.top + j) + box.left;

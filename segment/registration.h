@@ -38,7 +38,7 @@ struct Window {
   int max_steps = 15;
   bool is_thinned = false;   ///< every other pixel, as on a chessboard: enough to find what is measured later
   double settled_px = 2e-3;  ///< the last step: a tenth of the best standard errors
-  bool states_error = true;
+  bool states_error = true;  ///< sigma_px is found
 };
 
 /// Pictures of other beads that a registration takes away from both images: Gaussians of one width.
