@@ -77,6 +77,7 @@ double relative_error(const EnsembleFit& fit, const OtherNetwork& o) {
 void formulations(int n_cells) {
   network::NetworkParameters thesis;
   thesis.link_weights = "equal";
+  thesis.link_reach = "neighbours";
   thesis.adhesion_anchor = "centre";
   std::printf("cell,formulation,meshes,relative_error,rms_error_over_stated,coverage\n");
   for (int c = 1; c <= n_cells; ++c) {
