@@ -8,8 +8,8 @@ namespace mbtfm::report {
 
 /// The page, from the files of a cell folder whose stages are done. @throws InputError
 std::string report_html(const std::filesystem::path& cell);
-/// Write it as report.html into the cell folder, beside view_in_paraview.py, unless the one there was made by this version of the program from the
-/// same files. @throws InputError, OutputError
+/// Write it as report.html into the cell folder, beside view_in_paraview.py, unless the one there was made by this
+/// version of the program from the same files. @throws InputError, OutputError
 void update_report(const std::filesystem::path& cell);
 
 }  // namespace mbtfm::report

@@ -26,8 +26,8 @@ struct Stage {
   std::vector<ImageInput> optional_images;  ///< used where they are there
   std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
   PathArgument output;
-  std::vector<std::string> reads;   ///< files behind `arguments`, relative to the cell folder
-  std::vector<std::string> writes;  ///< files without which the stage is not done
+  std::vector<std::string> reads;    ///< files behind `arguments`, relative to the cell folder
+  std::vector<std::string> writes;   ///< files without which the stage is not done
   std::vector<std::string> tables;   ///< of cell.toml that its result depends on; empty: above the first table
   std::vector<std::string> effects;  ///< keys of [effects] that it depends on
 };

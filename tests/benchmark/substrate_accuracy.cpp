@@ -47,7 +47,8 @@ double peak_GB() {
 double now_s() { return std::chrono::duration<double>(std::chrono::steady_clock::now().time_since_epoch()).count(); }
 
 int run(const std::vector<std::string>& arguments) {
-  if (arguments.empty()) throw UsageError("expected MODEL [NAME=VALUE ...], e.g. refined poisson_ratio=0.4 thickness_um=60");
+  if (arguments.empty())
+    throw UsageError("expected MODEL [NAME=VALUE ...], e.g. refined poisson_ratio=0.4 thickness_um=60");
   Study study;
   ParameterList list;
   declare(list, study);

@@ -1,5 +1,5 @@
-/// thesis_way CELL GEL [most] [beads]: the tension fit beside the thesis' way to the same misfit, in processor time of one
-/// thread, both from begin to end in this one run. A table (CSV) on stdout.
+/// thesis_way CELL GEL [most] [beads]: the tension fit beside the thesis' way to the same misfit, in processor time of
+/// one thread, both from begin to end in this one run. A table (CSV) on stdout.
 ///
 /// The thesis' way (3.2.5): block-wise conjugate gradients with finite differences, the gel solved for in each
 /// evaluation, until a trial is within one standard error of the minimum (2 Phi above it by one variance), or `most`

@@ -70,7 +70,9 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
 }
 
 TEST_F(SubstrateProgram, writes_the_vertical_part_where_asked_for) {
-  ASSERT_EQ(run(forces() + "--model split --vertical_displacement on --points " + file("points.csv") + " --out " + file("u.csv")).code,
+  ASSERT_EQ(run(forces() + "--model split --vertical_displacement on --points " + file("points.csv") + " --out " +
+                file("u.csv"))
+                .code,
             0);
   const CsvTable table{fs::path(file("u.csv"))};
   // a point ahead of the force is pressed into the gel, and one above it keeps still but for its other component

@@ -123,9 +123,9 @@ TEST(ModelError, brings_the_tensions_of_a_cell_with_another_network_nearer) {
     tensions << 0.06, 3, 4, 2, 3, 2;
     std::map<int, substrate::Ellipse> ellipses;
     for (const Adhesion& a : cell.adhesions) ellipses[a.adhesion_id] = substrate::ellipse_of(a);
-    // Links along edges only, where the model's error is large. With links to second neighbours, as by default, it has a
-    // third of that variance, and weighing by what eight meshes tell of it costs more here than it gains (squared error
-    // 0.55 with, 0.33 without); what it is worth then is told in docs/validation.md.
+    // Links along edges only, where the model's error is large. With links to second neighbours, as by default, it has
+    // a third of that variance, and weighing by what eight meshes tell of it costs more here than it gains (squared
+    // error 0.55 with, 0.33 without); what it is worth then is told in docs/validation.md.
     const auto network = [&](std::uint64_t mesh) {
       return network::generate_network(cell, {.seed = mesh, .link_reach = "neighbours"}).network;
     };
