@@ -14,7 +14,7 @@ simulate() { # name, seed, more
 }
 
 budget_table() { # first and last seed, more
-  [ -s "$work/budget$1$3.csv" ] || (cd "$work" && "$OLDPWD/build/tests/error_budget" "$@" >"budget$1$3.part" && mv "budget$1$3.part" "budget$1$3.csv")
+  [ -s "$work/budget$1$3.csv" ] || (cd "$work" && "$OLDPWD/build/tests/error_budget" "$1" "$2" ${3:+"$3"} >"budget$1$3.part" && mv "budget$1$3.part" "budget$1$3.csv")
   awk -F, -v what="$3" '/^(tensions|total forces),/ {
     printf "| %s, %s | %.2f | %.2f | %.2f |", $1, what == "" ? "true segmentation" : "from images", $2, $3, $4
     for (i = 6; i <= NF; ++i) printf " %.2f |", $i; print "" }' "$work/budget$1$3.csv"

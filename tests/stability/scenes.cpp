@@ -92,7 +92,7 @@ INSTANTIATE_TEST_SUITE_P(Scenes, FailedOnce,
                          ::testing::Values(KnownScene{
                              1213, "tip_without_adhesions_beyond_a_thin_neck",
                              "the tip was a second part of the network, which did not count as solved"}),
-                         [](const auto& info) { return std::string(info.param.name); });
+                         [](const auto& test) { return std::string(test.param.name); });
 
 }  // namespace
 }  // namespace mbtfm
