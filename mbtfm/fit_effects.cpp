@@ -60,7 +60,7 @@ std::optional<Change> bounded_by_number(const Effect& e) {
 
 std::optional<Change> with_elasticity(const Effect& e, const FittedCell& c, int threads) {
   const auto elastic = of_cables(c.networks, c.parameters.cables);
-  return change_between(e.name, c.fit, fit_again(c, elastic, unweighted(c.data), c.parameters.fit.loss, threads));
+  return change_between(e.name, c.fit, fit_again(c, elastic, c.data, c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> with_loss(const Effect& e, const FittedCell& c, int threads) {
@@ -78,7 +78,7 @@ std::optional<Change> with_fibres(const Effect& e, const FittedCell& c, int thre
   const auto networks = of_cables(
       span_ensemble(network::generate_network(c.cell, c.parameters.network).network, c.cell, c.parameters, threads),
       c.networks.front().parameters());
-  return change_between(e.name, c.fit, fit_again(c, networks, unweighted(c.data), c.parameters.fit.loss, threads));
+  return change_between(e.name, c.fit, fit_again(c, networks, c.data, c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> change_with(const Effect& e, const FittedCell& c, int threads) {

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
 #include <set>
 #include <string>
 #include <tuple>
@@ -13,7 +12,7 @@
 #include "network/frame.h"
 #include "network/grid.h"
 #include "network/links.h"
-#include "network/loose_parts.h"
+#include "network/parts.h"
 #include "network/relax.h"
 #include "pipeline/contract/errors.h"
 
@@ -70,38 +69,7 @@ void leave_out_loose_vertices(Network& network) {
     network.links.push_back(link);
     is_joined[v] = 1;
   }
-  std::vector<int> number(n, -1);
-  int next = 0;
-  for (std::size_t v = 0; v < n; ++v) {
-    if (!is_joined[v]) continue;
-    network.vertices_um[next] = network.vertices_um[v];
-    network.adhesion_id[next] = network.adhesion_id[v];
-    number[v] = next++;
-  }
-  network.vertices_um.resize(next);
-  network.adhesion_id.resize(next);
-  for (Link& link : network.links) {
-    link.vertex_a = number[link.vertex_a];
-    link.vertex_b = number[link.vertex_b];
-  }
-}
-
-int count_parts(const Network& network) {
-  std::vector<int> root(network.vertices_um.size());
-  std::iota(root.begin(), root.end(), 0);
-  const auto find = [&](int v) {
-    while (root[v] != v) v = root[v] = root[root[v]];
-    return v;
-  };
-  int n_parts = static_cast<int>(root.size());
-  for (const Link& link : network.links) {
-    const int a = find(link.vertex_a);
-    const int b = find(link.vertex_b);
-    if (a == b) continue;
-    root[a] = b;
-    --n_parts;
-  }
-  return n_parts;
+  keep_vertices(network, is_joined);
 }
 
 void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& result) {

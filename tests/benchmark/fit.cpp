@@ -21,14 +21,6 @@ Cell cell_with(int n_fibres) {
   return samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1).cell;
 }
 
-Eigen::VectorXd tensions_nN(const Cell& cell) {
-  std::mt19937_64 random(1);
-  Eigen::VectorXd tensions(static_cast<Eigen::Index>(cell.fibres.size()) + 1);
-  tensions[0] = 0.06;
-  for (Eigen::Index i = 1; i < tensions.size(); ++i) tensions[i] = 10 * std::generate_canonical<double, 53>(random);
-  return tensions;
-}
-
 network::CableNetwork network_of(const Cell& cell, double edge_um, std::uint64_t seed = 1) {
   network::NetworkParameters p;
   p.edge_length_um = edge_um;
@@ -50,7 +42,7 @@ void fit_once(benchmark::State& state, const network::CableNetwork& cables, cons
 /// Ten times the edge length in, vertices out.
 void vertices(benchmark::State& state) {
   const Cell cell = cell_with(20);
-  const TensionScene scene = test::scene_of(cell, tensions_nN(cell), 2000, kNoise, 1);
+  const TensionScene scene = test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), 2000, kNoise, 1);
   const network::CableNetwork cables = network_of(cell, 0.1 * static_cast<double>(state.range(0)));
   const auto n = static_cast<benchmark::IterationCount>(cables.network().vertices_um.size());
   state.SetComplexityN(n);
@@ -62,7 +54,8 @@ BENCHMARK(vertices)->Arg(20)->Arg(17)->Arg(14)->Arg(12)->Arg(10)->Unit(benchmark
 /// From the beads on: reducing them is the only part that grows with their number.
 void beads(benchmark::State& state) {
   const Cell cell = cell_with(20);
-  const TensionScene scene = test::scene_of(cell, tensions_nN(cell), static_cast<int>(state.range(0)), kNoise, 1);
+  const TensionScene scene = test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1),
+                                            static_cast<int>(state.range(0)), kNoise, 1);
   for (auto _ : state) benchmark::DoNotOptimize(reduce(scene.beads, scene.compliance_um_per_nN));
   state.SetComplexityN(state.range(0));
 }
@@ -70,7 +63,7 @@ BENCHMARK(beads)->RangeMultiplier(2)->Range(2500, 20000)->Unit(benchmark::kMilli
 
 void fibres(benchmark::State& state) {
   const Cell cell = cell_with(static_cast<int>(state.range(0)));
-  const TensionScene scene = test::scene_of(cell, tensions_nN(cell), 2000, kNoise, 1);
+  const TensionScene scene = test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), 2000, kNoise, 1);
   fit_once(state, scene.cables, scene);
   state.SetComplexityN(static_cast<benchmark::IterationCount>(cell.fibres.size()));
 }
@@ -79,7 +72,7 @@ BENCHMARK(fibres)->Arg(5)->Arg(10)->Arg(20)->Arg(30)->Unit(benchmark::kMilliseco
 /// Everything behind the compliance, two threads, real time: 10 000 beads, default meshes.
 void meshes(benchmark::State& state) {
   const Cell cell = cell_with(20);
-  const TensionScene scene = test::scene_of(cell, tensions_nN(cell), 10000, kNoise, 1);
+  const TensionScene scene = test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), 10000, kNoise, 1);
   std::vector<network::CableNetwork> networks;
   for (int m = 0; m < state.range(0); ++m)
     networks.push_back(

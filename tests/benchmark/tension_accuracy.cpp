@@ -40,18 +40,9 @@ Cell drawn_cell(std::uint64_t seed) {
   return samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), seed).cell;
 }
 
-/// thesis 3.3: t_AN = 0.06 nN, fibres uniform in [0, 10] nN
-Eigen::VectorXd thesis_tensions_nN(std::size_t n_fibres, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  Eigen::VectorXd tensions(static_cast<Eigen::Index>(n_fibres) + 1);
-  tensions[0] = 0.06;
-  for (Eigen::Index i = 1; i < tensions.size(); ++i) tensions[i] = 10 * std::generate_canonical<double, 53>(random);
-  return tensions;
-}
-
 TensionScene thesis_scene(std::uint64_t seed, int n_beads, double noise) {
   const Cell cell = drawn_cell(seed);
-  return test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), seed), n_beads, noise,
+  return test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), seed), n_beads, noise,
                         static_cast<unsigned>(seed));
 }
 
@@ -301,7 +292,7 @@ std::vector<std::pair<Vec2, Vec2>> at_adhesions(const Cell& cell, const Eigen::V
 // Fig. 3.5: a quarter of noise, beside FTTC.
 void beside_fttc(const Arguments& a) {
   const Cell cell = drawn_cell(1);
-  TensionScene scene = test::scene_of(cell, thesis_tensions_nN(cell.fibres.size(), 1), 10000, 0.25, 1);
+  TensionScene scene = test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), 10000, 0.25, 1);
   const EnsembleFit fit = test::fit_own_network(scene);
   const TractionInputs inputs{.beads = scene.beads,
                               .gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
@@ -350,7 +341,7 @@ void segmentation(const Arguments& a) {
       while (end == start) end = 1 + static_cast<int>(random() % cell.adhesions.size());
       test::add_ventral(cell, start, end);
     }
-    const Eigen::VectorXd true_tensions = thesis_tensions_nN(n_true, static_cast<std::uint64_t>(c));
+    const Eigen::VectorXd true_tensions = test::thesis_tensions_nN(n_true, static_cast<std::uint64_t>(c));
     Eigen::VectorXd with_extra = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(n_true) + 4, true_tensions[0]);
     with_extra.head(true_tensions.size()) = true_tensions;  // the extra ones are plain network
     TensionScene scene = test::scene_of(cell, with_extra, 5000, 0, static_cast<unsigned>(c));

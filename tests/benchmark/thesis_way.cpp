@@ -34,26 +34,17 @@ struct Stop {};
 
 double seconds_since(std::clock_t begin) { return static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC; }
 
-/// thesis 3.3: uniform in [0, 10] nN in the fibres
-Eigen::VectorXd tensions_nN(const Cell& cell) {
-  std::mt19937_64 random(1);
-  Eigen::VectorXd tensions(static_cast<Eigen::Index>(cell.fibres.size()) + 1);
-  tensions[0] = 0.06;
-  for (Eigen::Index i = 1; i < tensions.size(); ++i) tensions[i] = 10 * std::generate_canonical<double, 53>(random);
-  return tensions;
-}
-
 TensionScene small_scene() {
   constexpr int kFibres = 6;
   Cell cell = test::round_cell(2.0 * kFibres, 2 * kFibres);
   for (int i = 1; i <= kFibres; ++i) test::add_ventral(cell, i, i + kFibres - i % 2);
-  return test::scene_of(cell, tensions_nN(cell), 80 * kFibres, kNoise, 1);
+  return test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), 80 * kFibres, kNoise, 1);
 }
 
 TensionScene full_scene(int n_beads) {
   const samples::ScenarioParameters p;
   const Cell cell = samples::draw_cell(p.cell, p.tension, samples::field_um(p.microscope), 1).cell;
-  return test::scene_of(cell, tensions_nN(cell), n_beads, kNoise, 1);
+  return test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), n_beads, kNoise, 1);
 }
 
 std::unique_ptr<substrate::Substrate> our_gel() { return substrate::make_substrate(kGel, {.model = "split"}, 1); }

@@ -72,12 +72,7 @@ TEST(TensionFit, tensions_up_to_10_nN_deviate_as_the_Cramer_Rao_limit_implies) {
   // thesis 3.3: t uniform in [0, 10] nN, 10 000 beads. Its mean relative deviation depends on the cell and on the
   // weakest fibre drawn; docs/validation.md has it for whole cells.
   TensionScene scene = tension_scene("case_22", 10000, 0.05, 3);
-  std::mt19937_64 random(4);
-  Eigen::VectorXd tensions = scene.tensions_nN;
-  tensions[0] = 0.06;
-  for (Eigen::Index i = 1; i < tensions.size(); ++i) {
-    tensions[i] = 10 * std::generate_canonical<double, 53>(random);
-  }
+  const Eigen::VectorXd tensions = test::thesis_tensions_nN(static_cast<std::size_t>(scene.tensions_nN.size()) - 1, 4);
   test::contract(scene, tensions);
   for (const double noise : {0.05, 0.07, 0.1}) {
     double deviation = 0, implied = 0;

@@ -169,6 +169,15 @@ inline inverse::EnsembleFit fit_own_network(TensionScene& scene, inverse::FitPar
 
 using inverse::values_of;
 
+/// Thesis 3.3: 0.06 nN in the network, uniform in [0, 10] nN in the fibres.
+inline Eigen::VectorXd thesis_tensions_nN(std::size_t n_fibres, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  Eigen::VectorXd tensions(static_cast<Eigen::Index>(n_fibres) + 1);
+  tensions[0] = 0.06;
+  for (Eigen::Index i = 1; i < tensions.size(); ++i) tensions[i] = 10 * std::generate_canonical<double, 53>(random);
+  return tensions;
+}
+
 /// Cramér–Rao limit of each tension's standard error at the truth, for the data's noise; the bound t >= 0 aside.
 inline Eigen::VectorXd cramer_rao_nN(const TensionScene& scene) {
   const inverse::TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);

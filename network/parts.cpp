@@ -1,8 +1,7 @@
-#include "network/loose_parts.h"
+#include "network/parts.h"
 
 #include <algorithm>
 #include <numeric>
-#include <vector>
 
 namespace mbtfm::network {
 namespace {
@@ -18,6 +17,15 @@ std::vector<int> parts_of(const Network& network) {
   for (const Link& link : network.links) part[find(link.vertex_a)] = find(link.vertex_b);
   for (int& p : part) p = find(p);
   return part;
+}
+
+}  // namespace
+
+int count_parts(const Network& network) {
+  const std::vector<int> part = parts_of(network);
+  int n_parts = 0;
+  for (std::size_t v = 0; v < part.size(); ++v) n_parts += part[v] == static_cast<int>(v);
+  return n_parts;
 }
 
 void keep_vertices(Network& network, const std::vector<char>& is_kept) {
@@ -37,8 +45,6 @@ void keep_vertices(Network& network, const std::vector<char>& is_kept) {
     link.vertex_b = number[link.vertex_b];
   }
 }
-
-}  // namespace
 
 int leave_out_loose_parts(Network& network) {
   const std::vector<int> part = parts_of(network);
