@@ -94,10 +94,12 @@ class Descent {
         rounding_(rounding),
         x_(std::move(start)),
         change_(cables.size()),
+        pull_(cables.size()),
+        trial_(cables.size()),
         gradient_(x_.size()),
         step_(x_.size()) {
     for (const Cable& cable : cables_) span_.push_back(x_[cable.vertex_b] - x_[cable.vertex_a]);
-    find_gradient();
+    find_pulls();
   }
 
   double residual_nN() const {
@@ -109,11 +111,15 @@ class Descent {
   Minimum result(Report report) && { return {std::move(x_), std::move(span_), std::move(report)}; }
 
  protected:
+  void find_pulls() {
+    for (std::size_t k = 0; k < cables_.size(); ++k) pull_[k] = pull(cables_[k], span_[k], rounding_);
+    find_gradient();
+  }
+
   void find_gradient() {
     std::fill(gradient_.begin(), gradient_.end(), Vec2{});
     for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Pull p = pull(cables_[k], span_[k], rounding_);
-      const Vec2 force = (p.force_nN / p.length_um) * span_[k];
+      const Vec2 force = (pull_[k].force_nN / pull_[k].length_um) * span_[k];
       gradient_[cables_[k].vertex_b] += force;
       gradient_[cables_[k].vertex_a] += -1.0 * force;
     }
@@ -121,56 +127,57 @@ class Descent {
       if (free_.unknown[v] < 0) gradient_[v] = {};
   }
 
-  /// What step_ changes of each span.
-  void find_change() {
+  /// What step_ changes of each span. @returns the slope of the energy along it (fJ per full step)
+  double face_step() {
     for (std::size_t k = 0; k < cables_.size(); ++k)
       change_[k] = step_[cables_[k].vertex_b] - step_[cables_[k].vertex_a];
+    double slope = 0;
+    for (std::size_t v = 0; v < x_.size(); ++v) slope += dot(gradient_[v], step_[v]);
+    return slope;
   }
 
-  struct OnLine {
-    double energy = 0, slope = 0, curvature = 0;
-  };
-  OnLine on_line(double length) const {
-    OnLine result;
+  /// d²U along step_.
+  double curvature() const {
+    double sum = 0;
     for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Vec2 span = span_[k] + length * change_[k];
-      const Pull p = pull(cables_[k], span, rounding_);
-      const double longer = dot(span, change_[k]) / p.length_um;  // dl / d length
-      result.energy += energy_fJ(cables_[k], p, rounding_);
-      result.slope += p.force_nN * longer;
-      result.curvature += p.stiffness_nN_per_um * longer * longer +
-                          p.force_nN / p.length_um * (dot(change_[k], change_[k]) - longer * longer);
+      const Pull& p = pull_[k];
+      const double longer = dot(span_[k], change_[k]) / p.length_um;  // dl / d length
+      sum += p.stiffness_nN_per_um * longer * longer +
+             p.force_nN / p.length_um * (dot(change_[k], change_[k]) - longer * longer);
     }
-    return result;
+    return sum;
   }
 
   /// Convex along the line: the slope rises through one zero. Bracket it, close in by secants and bisection, until
-  /// it has fallen to `reduction` of what it was.
-  double line_search(const OnLine& start, double first_length, double reduction) const {
-    const double flat = -reduction * start.slope;
-    const double no_more = start.energy + 1e-13 * std::abs(start.energy);  // rounding of a sum of ~1e4 terms
-    double low = 0, slope_low = start.slope, slope_high = 0, length = first_length;
+  /// it has fallen to `reduction` of what it was. The pulls there are in trial_.
+  double line_search(double slope, double first_length, double reduction) {
+    const double flat = -reduction * slope;
+    double low = 0, slope_low = slope, slope_high = 0, length = first_length;
     std::optional<double> high;
     for (int i = 0; i < kLineTrials; ++i) {
-      const OnLine at = on_line(length);
-      if (std::abs(at.slope) <= flat && at.energy <= no_more) return length;
-      if (at.slope < 0) {
+      const double slope_there = try_at(length);
+      if (std::abs(slope_there) <= flat && (slope_there <= 0 || !has_risen())) return length;
+      if (slope_there < 0) {
         low = length;
-        slope_low = at.slope;
+        slope_low = slope_there;
       } else {
         high = length;
-        slope_high = at.slope;
+        slope_high = slope_there;
       }
       if (!high && length >= kLongestStep * first_length) return length;
       const double part = !high || i % 3 == 2 ? 0.5 : std::clamp(slope_low / (slope_low - slope_high), 0.05, 0.95);
       length = high ? low + part * (*high - low) : 2 * length;
     }
+    try_at(low);
     return low;
   }
 
+  /// To where trial_ was made.
   void move(double length) {
     for (std::size_t k = 0; k < cables_.size(); ++k) span_[k] += length * change_[k];
     for (std::size_t v = 0; v < x_.size(); ++v) x_[v] += length * step_[v];
+    pull_.swap(trial_);
+    find_gradient();
   }
 
   const FreeVertices& free_;
@@ -179,7 +186,31 @@ class Descent {
   // Spans are state beside the positions: a collapsed cable is a millionth of an edge long, and its force depends on
   // its direction, which the difference of two rounded positions does not tell.
   std::vector<Vec2> x_, span_, change_;
+  std::vector<Pull> pull_, trial_;     // by cable, here and where the line search last tried
   std::vector<Vec2> gradient_, step_;  // by vertex, zero where it is held
+
+ private:
+  /// @returns the slope there
+  double try_at(double length) {
+    double slope = 0;
+    for (std::size_t k = 0; k < cables_.size(); ++k) {
+      const Vec2 span = span_[k] + length * change_[k];
+      trial_[k] = pull(cables_[k], span, rounding_);
+      slope += trial_[k].force_nN / trial_[k].length_um * dot(span, change_[k]);
+    }
+    return slope;
+  }
+
+  bool has_risen() const {
+    const double here = energy_of(pull_), there = energy_of(trial_);
+    return there > here + 1e-13 * std::abs(here);  // rounding of a sum of ~1e4 terms
+  }
+
+  double energy_of(const std::vector<Pull>& pulls) const {
+    double sum = 0;
+    for (std::size_t k = 0; k < cables_.size(); ++k) sum += energy_fJ(cables_[k], pulls[k], rounding_);
+    return sum;
+  }
 };
 
 class Newton : public Descent {
@@ -191,16 +222,14 @@ class Newton : public Descent {
 
   void set_rounding(Rounding rounding) {
     rounding_ = rounding;
-    find_gradient();
+    find_pulls();
   }
 
   /// Put the duals where the positions imply them.
   void reset_duals() {
     dual_.clear();
-    for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Pull p = pull(cables_[k], span_[k], rounding_);
-      dual_.push_back({(1 / p.length_um) * span_[k], p.stretch_force_nN});
-    }
+    for (std::size_t k = 0; k < cables_.size(); ++k)
+      dual_.push_back({(1 / pull_[k].length_um) * span_[k], pull_[k].stretch_force_nN});
   }
 
   struct Step {
@@ -210,26 +239,26 @@ class Newton : public Descent {
   /// One step of Newton's method for positions and duals, the duals eliminated.
   Step step() {
     find_stiffness();
-    const OnLine start = find_direction();
-    const double length = line_search(start, 1, kNewtonReduction);
-    advance(length);
-    find_gradient();
-    return {length, start.slope};
+    const double slope = find_direction();
+    const double length = line_search(slope, 1, kNewtonReduction);
+    advance_duals(length);
+    move(length);
+    return {length, slope};
   }
 
  private:
   void find_stiffness() {
     matrix_.set_zero();
     for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Pull p = pull(cables_[k], span_[k], rounding_);
-      const double along = stiffness_along(cables_[k], dual_[k], p.stretch_um);
-      free_.add(matrix_, k, cables_[k], stiffness(p, span_[k], along, dual_[k].direction));
+      const double along = stiffness_along(cables_[k], dual_[k], pull_[k].stretch_um);
+      free_.add(matrix_, k, cables_[k], stiffness(pull_[k], span_[k], along, dual_[k].direction));
     }
   }
 
   /// Solve for a direction of descent; Levenberg's shift only where rounding spoils the unshifted one.
-  OnLine find_direction() {
-    OnLine start;
+  /// @returns the slope along it
+  double find_direction() {
+    double slope = 0;
     for (double shift = 0; shift <= 1; shift = std::max(1e-10, 100 * shift)) {
       matrix_.factorise(shift);
       columns_.resize(2 * matrix_.n_blocks(), 1);
@@ -238,36 +267,29 @@ class Newton : public Descent {
       matrix_.solve(columns_);
       for (std::size_t v = 0; v < x_.size(); ++v)
         if (const int i = free_.unknown[v]; i >= 0) step_[v] = {columns_(2 * i, 0), columns_(2 * i + 1, 0)};
-      find_change();
-      start = on_line(0);
-      if (start.slope < 0) break;  // false for NaN too
+      slope = face_step();
+      if (slope < 0) break;  // false for NaN too
     }
-    return start;
+    return slope;
   }
 
   /// The duals take the whole step, whatever part of it the positions take: a few cables shorten it for all, and the
   /// others' duals are nearer to the end of it all the same.
-  void advance(double length) {
-    std::vector<double>& excess = excess_nN_;
-    excess.clear();
+  void advance_duals(double length) {
+    const bool settles = rounding_.mu_fJ == 0 && length >= kFullStep;
     for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Pull before = pull(cables_[k], span_[k], rounding_);
-      excess.push_back(dual_[k].stretch_force_nN - least_stretch_force_nN(cables_[k], before));
+      const Pull &before = pull_[k], &after = trial_[k];
+      const double excess_nN = dual_[k].stretch_force_nN - least_stretch_force_nN(cables_[k], before);
       dual_[k] = advanced(cables_[k], dual_[k], before, span_[k], change_[k], rounding_.mu_fJ);
-    }
-    move(length);
-    for (std::size_t k = 0; k < cables_.size(); ++k) {
-      const Pull after = pull(cables_[k], span_[k], rounding_);
       double& q = dual_[k].stretch_force_nN;
       q = inside(q, cables_[k], after);
-      if (rounding_.mu_fJ == 0 && length >= kFullStep) q = settled(q, excess[k], cables_[k], after);
+      if (settles) q = settled(q, excess_nN, cables_[k], after);
     }
   }
 
   BlockCholesky matrix_;
   BlockCholesky::Columns columns_;
-  std::vector<Dual> dual_;         // by cable
-  std::vector<double> excess_nN_;  // by cable, of the stretch force above its least
+  std::vector<Dual> dual_;  // by cable
 };
 
 /// Non-linear conjugate gradients after Polak and Ribière (Nocedal & Wright, Numerical Optimization, 2006, 5.2).
@@ -283,22 +305,20 @@ class ConjugateGradients : public Descent {
       if (last_squares_ > 0) product += dot(gradient_[v], gradient_[v] - last_gradient_[v]);
     }
     const double keep = last_squares_ > 0 ? std::max(0.0, product / last_squares_) : 0;
-    OnLine start = turn(keep);
-    if (!(start.slope < 0)) start = turn(0);
+    double slope = turn(keep);
+    if (!(slope < 0)) slope = turn(0);
     last_gradient_ = gradient_;
-    const double length = line_search(start, -start.slope / start.curvature, kConjugateReduction);
+    const double length = line_search(slope, -slope / curvature(), kConjugateReduction);
     move(length);
-    find_gradient();
     last_squares_ = length > 0 ? squares : 0;  // 0: begin anew along the gradient
     n_stuck_ = length > 0 ? 0 : n_stuck_ + 1;
     return n_stuck_ < 2;
   }
 
  private:
-  OnLine turn(double keep) {
+  double turn(double keep) {
     for (std::size_t v = 0; v < x_.size(); ++v) step_[v] = keep * step_[v] + -1.0 * gradient_[v];
-    find_change();
-    return on_line(0);
+    return face_step();
   }
   std::vector<Vec2> last_gradient_;
   double last_squares_ = 0;
