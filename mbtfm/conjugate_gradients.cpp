@@ -12,11 +12,9 @@ namespace {
 /// The state of a minimisation, and its account of evaluations.
 class Minimisation {
  public:
-  Minimisation(const TensionProblem& problem, const FitParameters& parameters, int threads,
-               const Eigen::VectorXd& start)
+  Minimisation(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start)
       : problem_(problem), parameters_(parameters), threads_(threads) {
-    fit_.trial = problem.evaluate(start);
-    fit_.n_evaluations = 1;
+    fit_.trial = start;
   }
 
   TensionFit& fit() { return fit_; }
@@ -84,8 +82,8 @@ Eigen::VectorXd projected(const Eigen::VectorXd& gradient, const Eigen::VectorXd
 }  // namespace
 
 TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                                   const Eigen::VectorXd& start_nN, const std::vector<Block>& blocks) {
-  Minimisation minimisation(problem, parameters, threads, start_nN);
+                                   const Trial& start, const std::vector<Block>& blocks) {
+  Minimisation minimisation(problem, parameters, threads, start);
   TensionFit& fit = minimisation.fit();
   std::vector<double> first_step(blocks.size(), 0);
   while (!minimisation.is_exhausted() && !fit.report.converged) {

@@ -206,9 +206,10 @@ struct FirstFit {
 
 FirstFit fit_first(const network::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
                    const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
-                   const std::optional<Eigen::VectorXd>& start_nN) {
+                   const Trial* start) {
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit);
-  TensionFit fit = fit_tensions(problem, parameters, threads, start_nN ? *start_nN : uniform_start_nN(problem));
+  TensionFit fit = fit_tensions(problem, parameters, threads,
+                                start ? scaled_to_data(problem, start->tensions_nN, start) : uniform_start(problem));
   const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
   if (loss == "squares") return {std::move(fit), loss};
   return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
@@ -241,6 +242,12 @@ Eigen::VectorXd values_of(const EnsembleFit& fit) {
   Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions_nN.size()));
   for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
   return values;
+}
+
+Trial next_start(const EnsembleFit& fit) {
+  Trial start = fit.meshes.front().fit.trial;
+  start.tensions_nN = values_of(fit);
+  return start;
 }
 
 Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
@@ -277,8 +284,7 @@ Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
 
 EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, LinearData& data,
                          const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
-                         const Progress& progress, const SolvedMisfit& solved_misfit,
-                         const std::optional<Eigen::VectorXd>& start_nN) {
+                         const Progress& progress, const SolvedMisfit& solved_misfit, const Trial* start) {
   const int n_meshes = static_cast<int>(networks.size());
   MBTFM_ASSERT(n_meshes >= 1);
   EnsembleFit all;
@@ -295,7 +301,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
     if (progress)
       progress(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
   };
-  FirstFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start_nN);
+  FirstFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start);
   all.loss = first.loss;
   tell();
   all.data = data.reduced;
@@ -311,7 +317,8 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
     const auto i = static_cast<std::size_t>(m);
     const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit);
     const bool is_done = m == 0 && !all.model_error;
-    all.meshes[i] = describe(problem, is_done ? std::move(first.fit) : fit_tensions(problem, parameters, 1, answer));
+    all.meshes[i] = describe(problem, is_done ? std::move(first.fit)
+                                              : fit_tensions(problem, parameters, 1, scaled_to_data(problem, answer)));
     tell();
   });
   add_means(all);

@@ -61,11 +61,11 @@ struct EnsembleFit {
 /// that for the error of the model, in threads.
 /// @param data  its weights by bead are set anew: 1, or as a robust loss has them
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
-/// @param start_nN  tensions to start from (those of the frame before), or none
+/// @param start  tensions to start from, and an equilibrium of the first network near by; null: all equal
 EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, LinearData& data,
                          const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
                          const Progress& progress, const SolvedMisfit& solved_misfit = {},
-                         const std::optional<Eigen::VectorXd>& start_nN = {});
+                         const Trial* start = nullptr);
 
 /// 95 % interval of a positive quantity: both parts of the error combined to either side. Student's t with the degrees
 /// of freedom that they have together (Welch–Satterthwaite): many for the noise, meshes − 1 for what meshes tell.
@@ -73,6 +73,9 @@ struct Interval {
   double low = 0, high = 0;
 };
 Interval interval_95(const Estimate& estimate, int n_meshes);
+
+/// A trial of the first network at these tensions, but for its equilibrium, which is near: where the next frame starts.
+Trial next_start(const EnsembleFit& fit);
 
 /// The tensions alone.
 Eigen::VectorXd values_of(const EnsembleFit& fit);

@@ -205,7 +205,7 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
   const std::vector<FrameFit> fits = fit_series(
       frames, networks, compliance_of(substrate, beads, cell), beads_in_region(beads, cell, p), adhesion_ids_of(cell),
       p, is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
-      values_of(first));
+      next_start(first));
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
   write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
@@ -234,21 +234,22 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
   const Effect coupling =
       decide_time_coupling(context.has_input("start") || series.size() > 1, p.effects.time_coupling);
-  const Eigen::VectorXd start =
-      coupling.is_on && context.has_input("start")
-          ? start_of(context, networks.front().fibre_ids())
-          : uniform_start_nN(TensionProblem(networks.front(), data.reduced, adhesion_ids_of(inputs.cell)));
-  Effect elasticity =
-      network::decide_elasticity(networks.front(), {start.data(), start.data() + start.size()}, p.effects);
+  const std::vector<int> adhesion_ids = adhesion_ids_of(inputs.cell);
+  const TensionProblem problem(networks.front(), data.reduced, adhesion_ids);
+  const Trial start = coupling.is_on && context.has_input("start")
+                          ? scaled_to_data(problem, start_of(context, networks.front().fibre_ids()))
+                          : uniform_start(problem);
+  Effect elasticity = network::decide_elasticity(
+      networks.front(), {start.tensions_nN.data(), start.tensions_nN.data() + start.tensions_nN.size()}, p.effects);
   if (!elasticity.is_on) networks = of_cables(networks, inelastic(p.cables));
   const auto fit_all = [&] {
     return fit_ensemble(
-        networks, data, adhesion_ids_of(inputs.cell), p.fit, context.threads,
+        networks, data, adhesion_ids, p.fit, context.threads,
         [&](double f, std::string_view what) { context.progress(0.4 + (series.empty() ? 0.5 : 0.2) * f, what); },
         p.fit.substrate == "per-evaluation"
             ? solved_misfit(*substrate, points_of(inputs.beads), ellipses_of(inputs.cell), data)
             : SolvedMisfit{},
-        start);
+        &start);
   };
   EnsembleFit fit = fit_all();
   if (was_left_out_wrongly(elasticity, networks.front(), fit.meshes.front().fit.trial, p)) {

@@ -26,9 +26,13 @@ std::vector<int> indices_where(const std::vector<bool>& is_held, bool wanted) {
 constexpr double kLargestDrop = 0.7;
 // Of the largest tension: below this a fibre may go to zero.
 constexpr double kLetGo = 0.01;
+// Of the largest tension: a fibre below this may hang loose in a minimum that the taut one's is lower than.
+constexpr double kSlack = 0.05;
 
-// Of the variance of one component, in 2 Phi: 0.01 is a tenth of a standard error, along one direction of them all.
-constexpr double kNegligible = 1e-2;
+// Of the variance of one component, in 2 Phi: a thirtieth of a standard error, along one direction of them all.
+constexpr double kNegligible = 1e-3;
+// Steps that together must lower Phi by more than that.
+constexpr std::size_t kLastSteps = 3;
 // A refused step is damped by no less: at a smaller part of the diagonal the next one would be the same again.
 constexpr double kFirstRefusal = 0.3;
 
@@ -56,13 +60,22 @@ Eigen::VectorXd lowest_step(const Eigen::VectorXd& tensions_nN) {
 }
 
 /// None where these tensions have no equilibrium that can be found: a step too far, to be shortened.
-std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, TensionFit& fit) {
+std::optional<Trial> try_evaluate(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, TensionFit& fit,
+                                  double force_tolerance) {
   ++fit.n_evaluations;
   try {
-    return problem.evaluate(tensions_nN, &fit.trial);
+    return problem.evaluate(tensions_nN, &fit.trial, force_tolerance);
   } catch (const NotSolved&) {
     return std::nullopt;
   }
+}
+
+/// Of an equilibrium, so that what is left of its net forces moves Phi by no more than a hundredth of the gain that is
+/// at stake: |r| |C dR| for forces that are off by that part of themselves.
+double force_tolerance(const Trial& trial, const TensionProblem& problem, double at_stake) {
+  constexpr double kRoughest = 1e-3, kFinest = 1e-9;
+  const double size = trial.residual.norm() * (trial.residual + problem.data().target).norm();
+  return std::clamp(0.01 * at_stake / std::max(size, 1e-300), kFinest, kRoughest);
 }
 
 struct Step {
@@ -82,6 +95,12 @@ Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, double dam
   return {.change_nN = step, .predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step))};
 }
 
+/// By how much the last steps lowered Phi.
+double gained_of_late(const TensionFit& fit) {
+  if (fit.report.iterations < static_cast<int>(kLastSteps)) return std::numeric_limits<double>::infinity();
+  return fit.history[fit.history.size() - kLastSteps].objective - fit.trial.objective;
+}
+
 /// Whether a descent may end before its time.
 using Enough = std::function<bool(const Trial&)>;
 
@@ -89,7 +108,6 @@ using Enough = std::function<bool(const Trial&)>;
 void descend(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit,
              const Enough& is_enough = {}) {
   fit.report = {};
-  double gain_of_late = 0;
   double damping = 1e-3;  // relative to the diagonal; small, as forces are nearly linear in the tensions
   const auto has_ended = [&](const char* reason) {
     fit.report.converged = true;
@@ -106,15 +124,16 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
     if (predicted <= 1e-15 * fit.trial.objective || step.cwiseAbs().maxCoeff() == 0)
       return has_ended("no step lowers the misfit any further");
 
-    const std::optional<Trial> next = try_evaluate(problem, (fit.trial.tensions_nN + step).cwiseMax(0.0), fit);
+    const std::optional<Trial> next = try_evaluate(problem, (fit.trial.tensions_nN + step).cwiseMax(0.0), fit,
+                                                   force_tolerance(fit.trial, problem, predicted));
     const double gain = next ? (fit.trial.objective - next->objective) / predicted : -1;
     if (gain > 0) fit.trial = *next;
     // A step that is short because it is damped says nothing of convergence.
     if (fit.report.last_change < parameters.tolerance && damping <= 1e-2)
       return has_ended("the tensions change by less than the tolerance");
     // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
-    gain_of_late = 0.5 * gain_of_late + std::max(0.0, gain) * predicted;
-    if (i >= 5 && gain > 0 && gain_of_late < negligible(problem, fit.trial.objective))
+    const double told = negligible(problem, fit.trial.objective);
+    if ((predicted < told && damping <= 1e-2) || (gain > 0 && gained_of_late(fit) < told))
       return has_ended("the last steps lower the misfit by less than any bead could tell");
     if (gain > 0) jacobian = problem.jacobian(fit.trial);
     if (gain > 0.75) damping = std::max(1e-12, damping / 10);
@@ -124,9 +143,8 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
                       std::to_string(fit.report.iterations) + " steps";
 }
 
-/// Whether tension i is as good as zero.
 bool is_slack(const Eigen::VectorXd& tensions_nN, Eigen::Index i) {
-  return tensions_nN[i] <= kLetGo * tensions_nN.maxCoeff();
+  return tensions_nN[i] <= kSlack * tensions_nN.maxCoeff();
 }
 
 /// Whether a trial has come back to where the minimum was: the same fibres slack, and no further than a standard error.
@@ -141,7 +159,7 @@ Enough is_back_at(const TensionProblem& problem, const Trial& minimum) {
   };
 }
 
-/// Tensions that came out as good as zero, set to the median of the others; none where there are none.
+/// Tensions that came out slack, set to the median of the others; none where there are none.
 std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions_nN) {
   std::vector<double> taut;
   for (Eigen::Index i = 1; i < tensions_nN.size(); ++i) {
@@ -206,11 +224,9 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
   return x.cwiseMax(low);
 }
 
-TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters,
-                            const Eigen::VectorXd& start_nN, const Trial* nearby) {
+TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start) {
   TensionFit fit;
-  fit.trial = scaled_to_data(problem, start_nN, nearby);
-  fit.n_evaluations = 2;
+  fit.trial = start;
   descend(problem, parameters, fit);
   // A slack fibre may be a minimum of its own beside that of the taut one: try the other side as long as it pays.
   constexpr int kMaxRounds = 3;
@@ -218,14 +234,16 @@ TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& 
     const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
     if (!raised) break;
     TensionFit other = fit;
-    const std::optional<Trial> start = try_evaluate(problem, *raised, other);
-    if (!start) break;
-    other.trial = *start;
+    const std::optional<Trial> raised_trial =
+        try_evaluate(problem, *raised, other, force_tolerance(fit.trial, problem, fit.trial.objective));
+    if (!raised_trial) break;
+    other.trial = *raised_trial;
     descend(problem, parameters, other, is_back_at(problem, fit.trial));
     fit.n_evaluations = other.n_evaluations;
     if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
     fit = std::move(other);
   }
+  fit.trial = problem.evaluate(fit.trial.tensions_nN, &fit.trial);  // to the last digit
   return fit;
 }
 

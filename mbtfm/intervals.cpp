@@ -151,8 +151,8 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
       drawn.target[k] += solution.residual[k] + std::sqrt(variance) * normal;
     }
     const TensionProblem again(problem.cables(), drawn, problem.adhesion_ids());
-    deviations.col(d) =
-        fit_gauss_newton(again, parameters, solution.tensions_nN, &solution).trial.tensions_nN - solution.tensions_nN;
+    const Trial start = again.evaluate(solution.tensions_nN, &solution);
+    deviations.col(d) = fit_gauss_newton(again, parameters, start).trial.tensions_nN - solution.tensions_nN;
   });
   return deviations;
 }

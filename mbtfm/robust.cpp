@@ -74,7 +74,7 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     reweight(data, linear_weights(loss, residual, J, -before, scale));
     const TensionProblem reweighted(network, data.reduced, adhesion_ids);
     const int n_evaluations = fit.n_evaluations;
-    fit = fit_tensions(reweighted, parameters, threads, before, &last);
+    fit = fit_tensions(reweighted, parameters, threads, scaled_to_data(reweighted, before, &last));
     fit.n_evaluations += n_evaluations;
     // a thousandth of the largest tension: a tenth of any error bar there is
     if ((fit.trial.tensions_nN - before).cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;

@@ -179,9 +179,8 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
-                                 int threads, const Progress& progress, const Eigen::VectorXd& start_nN) {
+                                 int threads, const Progress& progress, Trial start) {
   std::vector<FrameFit> fits;
-  Eigen::VectorXd start = start_nN;
   for (const SeriesFrame& frame : frames) {
     if (progress) {
       progress(static_cast<double>(fits.size()) / static_cast<double>(frames.size()),
@@ -194,9 +193,9 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
     try {
       FrameData good = good_beads_of(frame, compliance_um_per_nN, is_used);
       LinearData data = reduce(good.beads, std::move(good.compliance_um_per_nN), good.is_used);
-      const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, start);
+      const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start);
       fits.push_back(described(frame.frame, fit, data));
-      if (is_coupled) start = values_of(fit);
+      if (is_coupled) start = next_start(fit);
     } catch (const NotSolved& error) {  // one frame that cannot be fitted does not stop the others
       fits.push_back({.frame = frame.frame, .refused = error.what()});
     } catch (const InvalidData& error) {

@@ -37,13 +37,13 @@ struct FrameFit {
 
 /// @param compliance_um_per_nN  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
-/// @param is_coupled  each frame starts from the tensions of the one before; else all from start_nN
-/// @param start_nN  for the first frame
+/// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
+/// @param start  of the first frame, on the first network
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
-                                 int threads, const Progress& progress, const Eigen::VectorXd& start_nN);
+                                 int threads, const Progress& progress, Trial start);
 
 /// By frame and fibre. @param interval_s  between frames, if known
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

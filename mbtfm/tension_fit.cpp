@@ -38,18 +38,18 @@ void declare(ParameterList& list, FitParameters& p) {
 }
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                        const Eigen::VectorXd& start_nN, const Trial* nearby) {
-  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start_nN, nearby);
+                        const Trial& start) {
+  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start);
   std::vector<int> all(problem.n_tensions());
   std::iota(all.begin(), all.end(), 0);
   if (parameters.method == "plain-cg") {
-    return fit_conjugate_gradients(problem, parameters, threads, start_nN, {{.tensions = all, .n_steps = 10}});
+    return fit_conjugate_gradients(problem, parameters, threads, start, {{.tensions = all, .n_steps = 10}});
   }
   if (parameters.method == "blockwise-cg") {  // thesis 3.2.5: one step on the network, ten on the fibres
     const std::vector<int> fibres(all.begin() + 1, all.end());
     std::vector<Block> blocks = {{.tensions = {0}, .n_steps = 1}};
     if (!fibres.empty()) blocks.push_back({.tensions = fibres, .n_steps = 10});
-    return fit_conjugate_gradients(problem, parameters, threads, start_nN, blocks);
+    return fit_conjugate_gradients(problem, parameters, threads, start, blocks);
   }
   throw UsageError("fit: unknown method '" + parameters.method + "'");
 }

@@ -43,18 +43,17 @@ struct Milestone {
 struct TensionFit {
   Trial trial;  ///< the best one
   Report report;
-  int n_evaluations = 0;  ///< equilibria solved, those of finite differences included
+  int n_evaluations = 0;  ///< equilibria solved from the start on, those of finite differences included
   std::vector<Milestone> history;
 };
 
-/// @param nearby  a trial of the same network, from whose equilibrium the first one is soon found; null: none is known
+/// @param start  a trial of this problem: see scaled_to_data(), uniform_start()
 /// @throws UsageError for a method it does not know
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                        const Eigen::VectorXd& start_nN, const Trial* nearby = nullptr);
+                        const Trial& start);
 
 /// Levenberg–Marquardt with the exact Jacobian; each step solves the bounded quadratic problem.
-TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters,
-                            const Eigen::VectorXd& start_nN, const Trial* nearby = nullptr);
+TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start);
 
 /// Non-linear conjugate gradients (Polak–Ribière), projected on t >= 0. `blocks` are taken in turn: so many steps on
 /// those tensions, the others held.
@@ -63,7 +62,7 @@ struct Block {
   int n_steps = 1;
 };
 TensionFit fit_conjugate_gradients(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                                   const Eigen::VectorXd& start_nN, const std::vector<Block>& blocks);
+                                   const Trial& start, const std::vector<Block>& blocks);
 
 /// The minimiser of ½ xᵀ H x + gᵀ x over x >= low, for symmetric positive definite H, by an active set.
 Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,

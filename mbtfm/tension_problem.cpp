@@ -34,10 +34,12 @@ Eigen::MatrixXd TensionProblem::to_data_rows(const Eigen::MatrixXd& by_network_a
   return rows;
 }
 
-Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby) const {
+Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby,
+                               std::optional<double> force_tolerance) const {
   const std::vector<double> tensions = to_vector(tensions_nN);
   Trial trial{.tensions_nN = tensions_nN, .equilibrium = {}, .forces_nN = {}, .residual = {}};
-  trial.equilibrium = cables_.equilibrium(tensions, nearby ? nearby->equilibrium.positions_um : std::vector<Vec2>{});
+  trial.equilibrium =
+      cables_.equilibrium(tensions, nearby ? nearby->equilibrium.positions_um : std::vector<Vec2>{}, force_tolerance);
   if (!trial.equilibrium.report.converged) throw NotSolved(trial.equilibrium.report);
   trial.forces_nN = to_data_rows(cables_.adhesion_forces_nN(tensions, trial.equilibrium));
   trial.residual = data_.compliance * trial.forces_nN - data_.target;
@@ -80,23 +82,17 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
   return gradient;
 }
 
-namespace {
-/// The multiple of a trial's tensions that fits best.
-Eigen::VectorXd scaled_nN(const TensionProblem& problem, const Trial& trial) {
-  const Eigen::VectorXd response = problem.data().compliance * trial.forces_nN;
-  const double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
-  // Where the cell seems to push, as noise alone may look, any small positive size serves.
-  return (factor > 0 ? factor : 1e-3 / std::max(trial.tensions_nN.maxCoeff(), 1e-300)) * trial.tensions_nN;
-}
-}  // namespace
-
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby) {
   const Trial trial = problem.evaluate(tensions_nN, nearby);
-  return problem.evaluate(scaled_nN(problem, trial), &trial);
+  const Eigen::VectorXd response = problem.data().compliance * trial.forces_nN;
+  double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
+  // Where the cell seems to push, as noise alone may look, any small positive size serves.
+  if (factor <= 0) factor = 1e-3 / std::max(tensions_nN.maxCoeff(), 1e-300);
+  return problem.evaluate(factor * tensions_nN, &trial);
 }
 
-Eigen::VectorXd uniform_start_nN(const TensionProblem& problem) {
-  return scaled_nN(problem, problem.evaluate(Eigen::VectorXd::Ones(problem.n_tensions())));
+Trial uniform_start(const TensionProblem& problem) {
+  return scaled_to_data(problem, Eigen::VectorXd::Ones(problem.n_tensions()));
 }
 
 }  // namespace mbtfm::inverse

@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <functional>
+#include <optional>
 #include <vector>
 
 #include "mbtfm/linear_data.h"
@@ -37,7 +38,9 @@ class TensionProblem {
   const std::vector<int>& adhesion_ids() const { return adhesion_ids_; }
 
   /// @param nearby  a trial whose equilibrium is a good place to start, or none
-  Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr) const;
+  /// @param force_tolerance  of the equilibrium, where rougher than usual will do: see CableNetwork::equilibrium
+  Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr,
+                 std::optional<double> force_tolerance = {}) const;
   /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
   Eigen::VectorXd torques_nN_um(const Trial& trial) const;
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
@@ -65,6 +68,6 @@ class TensionProblem {
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr);
 
 /// Tensions all equal, of the size that fits best: where the fit starts.
-Eigen::VectorXd uniform_start_nN(const TensionProblem& problem);
+Trial uniform_start(const TensionProblem& problem);
 
 }  // namespace mbtfm::inverse

@@ -142,9 +142,13 @@ struct BlockCholesky::Panel {
   std::vector<int> rows;         // below its columns, rising
   double filled = 0;             // of its blocks on and below the diagonal: those that are not zero
 
-  int parent = -1;                   // the panel that takes its update
-  std::vector<int> place_in_parent;  // of each row, among the columns and rows of the parent
-  std::size_t values = 0;            // its place in the factor: (columns + rows) × columns, column-major
+  int parent = -1;  // the panel that takes its update
+  int stack = 0;    // that its update waits on; its children's are on the other
+  struct Run {
+    int row, place, length;
+  };
+  std::vector<Run> runs;   // rows that are also in a row among the columns and rows of the parent
+  std::size_t values = 0;  // its place in the factor: (columns + rows) × columns, column-major
   struct Entry {
     int row, column, slot;
   };
@@ -165,7 +169,8 @@ struct BlockCholesky::Pattern {
   };
   std::vector<Spring> springs;  // by pair, in the order of elimination
   std::vector<Panel> panels;    // children before parents
-  std::size_t n_values = 0, n_update_values = 0, n_slots = 0;
+  std::size_t n_values = 0, n_slots = 0;
+  std::array<std::size_t, 2> n_update_values{};
 
   void find_panels(Lists below);
   void tie_panels();
@@ -202,18 +207,29 @@ std::vector<int> BlockCholesky::Pattern::panel_of_column() const {
 
 void BlockCholesky::Pattern::tie_panels() {
   const std::vector<int> panel_of = panel_of_column();
+  for (std::size_t s = panels.size(); s-- > 0;) {  // parents first
+    Panel& panel = panels[s];
+    if (panel.rows.empty()) continue;
+    panel.parent = panel_of[panel.rows.front()];
+    const Panel& parent = panels[panel.parent];
+    panel.stack = 1 - parent.stack;
+    for (int a = 0; a < static_cast<int>(panel.rows.size()); ++a) {
+      const int in_parent = parent.place_of(panel.rows[a]);
+      if (a == 0 || in_parent != panel.runs.back().place + panel.runs.back().length || in_parent == parent.n_columns)
+        panel.runs.push_back({a, in_parent, 0});
+      ++panel.runs.back().length;
+    }
+  }
   std::vector<std::size_t> waiting(panels.size(), 0);  // values of the children's updates
-  std::size_t stacked = 0;
+  std::array<std::size_t, 2> stacked{};
   for (std::size_t s = 0; s < panels.size(); ++s) {
     Panel& panel = panels[s];
     panel.values = n_values;
     n_values += 4 * static_cast<std::size_t>(panel.height()) * panel.n_columns;
-    n_update_values = std::max(n_update_values, stacked + panel.update_size());
-    stacked += panel.update_size() - waiting[s];
-    if (panel.rows.empty()) continue;
-    panel.parent = panel_of[panel.rows.front()];
-    waiting[panel.parent] += panel.update_size();
-    for (const int row : panel.rows) panel.place_in_parent.push_back(panels[panel.parent].place_of(row));
+    stacked[panel.stack] += panel.update_size();
+    stacked[1 - panel.stack] -= waiting[s];
+    n_update_values[panel.stack] = std::max(n_update_values[panel.stack], stacked[panel.stack]);
+    if (panel.parent >= 0) waiting[panel.parent] += panel.update_size();
   }
 }
 
@@ -247,7 +263,7 @@ BlockCholesky::BlockCholesky(int n_blocks, const std::vector<std::array<int, 2>>
   pattern->store_pairs(pairs);
   off_diagonal_.resize(pattern->n_slots);
   factor_.resize(pattern->n_values);
-  updates_.resize(pattern->n_update_values);
+  for (int i = 0; i < 2; ++i) updates_[i].resize(pattern->n_update_values[i]);
   pattern_ = std::move(pattern);
 }
 
@@ -277,20 +293,25 @@ void BlockCholesky::assemble(const Panel& panel, double shift) {
 }
 
 // Of the update only what lies on and below the diagonal counts.
-void BlockCholesky::add_update(const Panel& child, const double* update, const Panel& panel, double* own_update) {
-  const std::vector<int>& place = child.place_in_parent;
-  const std::size_t n_rows = place.size(), height = panel.height(), n_columns = panel.n_columns;
-  for (std::size_t b = 0; b < n_rows; ++b)
-    for (int side = 0; side < 2; ++side, update += 2 * n_rows) {
-      const std::size_t column = 2 * place[b] + side;
-      double* to = static_cast<std::size_t>(place[b]) < n_columns
-                       ? factor_.data() + panel.values + column * 2 * height
-                       : own_update + (column - 2 * n_columns) * 2 * (height - n_columns) - 2 * n_columns;
-      for (std::size_t a = b; a < n_rows; ++a) {
-        to[2 * place[a]] += update[2 * a];
-        to[2 * place[a] + 1] += update[2 * a + 1];
+void BlockCholesky::add_update(const Panel& child, const double* update, const Panel& panel, Part part,
+                               double* own_update) {
+  const std::size_t n_rows = child.rows.size(), height = panel.height(), n_columns = panel.n_columns;
+  for (const Panel::Run& columns : child.runs) {
+    const bool is_column = static_cast<std::size_t>(columns.place) < n_columns;
+    if (is_column != (part == Part::columns)) continue;
+    for (int side = 0; side < 2 * columns.length; ++side) {
+      const std::size_t column = 2 * columns.place + side;
+      const double* from = update + (2 * columns.row + side) * 2 * n_rows;
+      double* to = is_column ? factor_.data() + panel.values + column * 2 * height
+                             : own_update + (column - 2 * n_columns) * 2 * (height - n_columns) - 2 * n_columns;
+      for (const Panel::Run* rows = &columns; rows != child.runs.data() + child.runs.size(); ++rows) {
+        const int first = rows == &columns ? side / 2 : 0;
+        const double* f = from + 2 * (rows->row + first);
+        double* t = to + 2 * (rows->place + first);
+        for (int i = 0; i < 2 * (rows->length - first); ++i) t[i] += f[i];
       }
     }
+  }
 }
 
 void BlockCholesky::eliminate(const Panel& panel, double* update, double shift) {
@@ -303,28 +324,34 @@ void BlockCholesky::eliminate(const Panel& panel, double* update, double shift) 
                    least_pivot.data(), update);
 }
 
+bool BlockCholesky::is_parent(const Panel& panel, const Panel& child) const {
+  return child.parent == static_cast<int>(&panel - pattern_->panels.data());
+}
+
 void BlockCholesky::factorise(double shift) {
   double mean_diagonal = 0;
   for (const Block& block : diagonal_) mean_diagonal += block.trace() / (2 * n_blocks());
-  std::vector<int> waiting;  // panels with an update on the stack
-  std::size_t top = 0;
+  std::vector<const Panel*> waiting;  // with an update on a stack
+  std::array<double*, 2> top{updates_[0].data(), updates_[1].data()};
   for (const Panel& panel : pattern_->panels) {
-    double* update = updates_.data() + top;
-    for (std::size_t j = 0, n = 2 * panel.rows.size(); j < n; ++j) std::fill_n(update + j * n + j, n - j, 0.0);
+    double*& childrens = top[1 - panel.stack];
+    double* own = top[panel.stack];
+    const auto each_child = [&](auto use) {
+      const double* update = childrens;
+      for (auto child = waiting.rbegin(); child != waiting.rend() && is_parent(panel, **child); ++child)
+        use(**child, update -= (*child)->update_size());
+    };
     assemble(panel, shift * mean_diagonal);
-    while (!waiting.empty() && &pattern_->panels[pattern_->panels[waiting.back()].parent] == &panel) {
-      const Panel& child = pattern_->panels[waiting.back()];
-      top -= child.update_size();
-      add_update(child, updates_.data() + top, panel, update);
+    each_child([&](const Panel& child, const double* update) { add_update(child, update, panel, Part::columns, own); });
+    eliminate(panel, own, shift * mean_diagonal);
+    each_child([&](const Panel& child, const double* update) { add_update(child, update, panel, Part::rest, own); });
+    while (!waiting.empty() && is_parent(panel, *waiting.back())) {
+      childrens -= waiting.back()->update_size();
       waiting.pop_back();
     }
-    eliminate(panel, update, shift * mean_diagonal);
-    if (update != updates_.data() + top)  // down to where the children's began
-      for (std::size_t j = 0, n = 2 * panel.rows.size(); j < n; ++j)
-        std::copy_n(update + j * n + j, n - j, updates_.data() + top + j * n + j);
     if (panel.rows.empty()) continue;
-    top += panel.update_size();
-    waiting.push_back(static_cast<int>(&panel - pattern_->panels.data()));
+    top[panel.stack] += panel.update_size();
+    waiting.push_back(&panel);
   }
 }
 

@@ -40,8 +40,10 @@ class BlockCholesky {
  private:
   struct Pattern;
   struct Panel;
+  bool is_parent(const Panel& panel, const Panel& child) const;
   void assemble(const Panel& panel, double shift);
-  void add_update(const Panel& child, const double* update, const Panel& panel, double* own_update);
+  enum class Part { columns, rest };
+  void add_update(const Panel& child, const double* update, const Panel& panel, Part part, double* own_update);
   void eliminate(const Panel& panel, double* update, double shift);
   template <class X>
   void solve_permuted(X& x) const;
@@ -49,7 +51,9 @@ class BlockCholesky {
   std::shared_ptr<const Pattern> pattern_;
   std::vector<Block> diagonal_, off_diagonal_;  // the matrix, in the order of elimination
   std::vector<double> factor_;                  // the panels, one after the other
-  std::vector<double> updates_;                 // a stack of what panels still have to hand on
+  // Two stacks of what panels still have to hand on: a panel takes its children's from one and leaves its own on the
+  // other.
+  std::array<std::vector<double>, 2> updates_;
 };
 
 }  // namespace mbtfm::network

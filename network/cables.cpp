@@ -135,7 +135,8 @@ const std::vector<int>& CableNetwork::fibre_ids() const { return impl_->fibre_id
 const std::vector<int>& CableNetwork::adhesion_ids() const { return impl_->adhesion_ids; }
 const std::vector<int>& CableNetwork::held_vertices() const { return impl_->held_vertices; }
 
-Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start) const {
+Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start,
+                                      std::optional<double> force_tolerance) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
   std::vector<Vec2> positions = start.empty() ? impl_->network.vertices_um : start;
   if (positions.size() != impl_->network.vertices_um.size())
@@ -149,15 +150,17 @@ Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, co
   for (const Link& link : impl_->network.links) largest_share = std::max(largest_share, link.share);
   const auto method = impl_->parameters.contraction == "newton" ? Contraction::newton : Contraction::conjugate_gradient;
   const double axial_stiffness = largest_share * impl_->parameters.axial_stiffness_nN;
-  Minimum minimum = minimise(
-      impl_->free, cables, std::move(positions), start.empty() ? Start::cold : Start::warm,
-      {.method = method,
-       .eps_um = impl_->rounding().eps_um,
-       .edge_length_um = impl_->mean_rest_length_um,
-       .force_nN = force > 0 ? force : axial_stiffness,
-       .force_tolerance_nN = std::max(impl_->parameters.force_tolerance * force, kStretchRounding * axial_stiffness),
-       .max_iterations = impl_->parameters.max_iterations.value_or(
-           method == Contraction::newton ? CableParameters::kNewtonSteps : CableParameters::kConjugateSteps)});
+  Minimum minimum =
+      minimise(impl_->free, cables, std::move(positions), start.empty() ? Start::cold : Start::warm,
+               {.method = method,
+                .eps_um = impl_->rounding().eps_um,
+                .edge_length_um = impl_->mean_rest_length_um,
+                .force_nN = force > 0 ? force : axial_stiffness,
+                .force_tolerance_nN = std::max(force_tolerance.value_or(impl_->parameters.force_tolerance) * force,
+                                               kStretchRounding * axial_stiffness),
+                .is_polished = !force_tolerance,
+                .max_iterations = impl_->parameters.max_iterations.value_or(
+                    method == Contraction::newton ? CableParameters::kNewtonSteps : CableParameters::kConjugateSteps)});
   Equilibrium result;
   for (std::size_t k = 0; k < cables.size(); ++k) {
     const Pull p = pull(cables[k], minimum.spans_um[k], impl_->rounding());

@@ -70,8 +70,10 @@ class CableNetwork {
   /// Not converged: the report says so, nothing is thrown. A part of the network that nothing holds collapses to a
   /// point; without any tension nothing moves. May be called from several threads at once.
   /// @param start  vertex positions to start from (a previous equilibrium), or empty: the network's own
+  /// @param force_tolerance  instead of the parameters'; and without the last step, which leaves nothing but rounding
   /// @throws InvalidData where a tension is negative, not finite or missing
-  Equilibrium equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start = {}) const;
+  Equilibrium equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start = {},
+                          std::optional<double> force_tolerance = {}) const;
 
   /// Force of the network on each held vertex, by vertex (zero for the free ones).
   std::vector<Vec2> reactions_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;

@@ -374,7 +374,8 @@ Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& c
     while (!has_converged() && may_step(options.max_iterations)) step();
   };
   converge();
-  if (minimiser.residual_nN() > kPolished * options.force_nN && may_step(options.max_iterations)) {
+  if (options.is_polished && minimiser.residual_nN() > kPolished * options.force_nN &&
+      may_step(options.max_iterations)) {
     step();
     converge();  // where a cable was still to begin or to cease to stretch, that step showed it
   }

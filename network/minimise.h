@@ -32,6 +32,7 @@ struct MinimiseOptions {
   double edge_length_um = 0;      ///< what lengths compare with
   double force_nN = 0;            ///< what forces compare with
   double force_tolerance_nN = 0;  ///< largest net force on a free vertex at the end
+  bool is_polished = true;        ///< a step more, to rounding
   int max_iterations = 0;
 };
 

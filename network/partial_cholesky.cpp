@@ -49,11 +49,11 @@ auto version_for_this_processor() { return baseline::partial_cholesky; }
 
 }  // namespace
 
-void partial_cholesky(const DenseColumns& columns, const double* least_pivot, double* rest) {
+void partial_cholesky(const DenseColumns& columns, const double* least_pivot, double* change) {
   static const auto version = version_for_this_processor();
   thread_local std::vector<double> strips;
   strips.resize((columns.height + kMostRows) * kDepth);
-  version(columns, least_pivot, rest, strips.data());
+  version(columns, least_pivot, change, strips.data());
 }
 
 }  // namespace mbtfm::network

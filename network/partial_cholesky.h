@@ -13,9 +13,9 @@ struct DenseColumns {
 
 /// The first `width` steps of Cholesky's factorisation, in place. A pivot not above least_pivot[column] is replaced by
 /// an infinite one. What is above the diagonal is overwritten.
-/// @param rest  the matrix of the height − width rows and columns that remain, column-major; on and below its diagonal
-///              the product of the new columns' lower rows with their transpose is subtracted from it
+/// @param change  out: what the height − width rows and columns that remain change by, column-major, on and below
+///                their diagonal: minus the product of the new columns' lower rows with their transpose
 /// Compiled for several instruction sets: the last bits depend on the processor, not on anything else.
-void partial_cholesky(const DenseColumns& columns, const double* least_pivot, double* rest);
+void partial_cholesky(const DenseColumns& columns, const double* least_pivot, double* change);
 
 }  // namespace mbtfm::network

@@ -23,28 +23,29 @@ TEST(PartialCholesky, is_the_factor_and_the_schur_complement) {
       const Eigen::MatrixXd root = Eigen::MatrixXd::Random(height, height);
       const Eigen::MatrixXd a = Eigen::MatrixXd::Identity(height, height) + root * root.transpose() / height;
       const Eigen::MatrixXd whole = a.llt().matrixL();
-      Eigen::MatrixXd columns = a.leftCols(width), rest = a.bottomRightCorner(below, below);
+      Eigen::MatrixXd columns = a.leftCols(width);
+      Eigen::MatrixXd change = Eigen::MatrixXd::Constant(below, below, std::numeric_limits<double>::quiet_NaN());
       const std::vector<double> least_pivot(width, 0);
       partial_cholesky({columns.data(), static_cast<std::size_t>(height), static_cast<std::size_t>(width)},
-                       least_pivot.data(), rest.data());
+                       least_pivot.data(), change.data());
       const Eigen::MatrixXd lower = columns.triangularView<Eigen::Lower>();
       EXPECT_LT((lower - whole.leftCols(width)).norm(), 1e-11);
       const Eigen::MatrixXd corner = whole.bottomRightCorner(below, below);
-      const Eigen::MatrixXd difference = rest - corner * corner.transpose();
+      const Eigen::MatrixXd difference = a.bottomRightCorner(below, below) + change - corner * corner.transpose();
       EXPECT_LT(difference.triangularView<Eigen::Lower>().toDenseMatrix().norm(), 1e-11);
     }
 }
 
 TEST(PartialCholesky, a_lost_pivot_holds_its_direction_still) {
   Eigen::Matrix3d a;
-  a << 4, 2, 2, 2, 1, 1, 2, 1, 5;  // the second column is half the first
-  double rest = a(2, 2);
+  a << 4, 2, 2, 2, 1, 1, 2, 1, 5;                            // the second column is half the first
+  double change = std::numeric_limits<double>::quiet_NaN();  // what is there before does not count
   Eigen::MatrixXd columns = a.leftCols(2);
   const double least_pivot[] = {1e-14, 1e-14};
-  partial_cholesky({columns.data(), 3, 2}, least_pivot, &rest);
+  partial_cholesky({columns.data(), 3, 2}, least_pivot, &change);
   EXPECT_EQ(columns(1, 1), std::numeric_limits<double>::infinity());
   EXPECT_EQ(columns(2, 1), 0);
-  EXPECT_DOUBLE_EQ(rest, 4);
+  EXPECT_DOUBLE_EQ(a(2, 2) + change, 4);
 }
 
 }  // namespace

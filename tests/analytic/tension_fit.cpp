@@ -13,7 +13,7 @@ using test::TensionScene;
 
 TensionFit fit(const TensionScene& scene, const FitParameters& parameters) {
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
-  return fit_tensions(problem, parameters, 2, uniform_start_nN(problem));
+  return fit_tensions(problem, parameters, 2, uniform_start(problem));
 }
 
 double relative_error(const TensionFit& fit, const TensionScene& scene) {

@@ -32,7 +32,7 @@ void fit_once(benchmark::State& state, const network::CableNetwork& cables, cons
   const TensionProblem problem(cables, scene.data.reduced, scene.adhesion_ids);
   int n_evaluations = 0;
   for (auto _ : state) {
-    const TensionFit fit = fit_gauss_newton(problem, {}, uniform_start_nN(problem));
+    const TensionFit fit = fit_gauss_newton(problem, {}, uniform_start(problem));
     n_evaluations = fit.n_evaluations;
     if (!fit.report.converged) state.SkipWithError(fit.report.reason.c_str());
   }

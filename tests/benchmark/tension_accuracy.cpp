@@ -95,7 +95,7 @@ void descent(const Arguments& a) {
     panel.series.push_back(std::move(series));
   };
   // thesis: from all tensions at the network's
-  const Eigen::VectorXd start = Eigen::VectorXd::Constant(n, 0.06);
+  const Trial start = problem.evaluate(Eigen::VectorXd::Constant(n, 0.06));
   for (const std::string method : {"plain-cg", "blockwise-cg"}) {
     for (const std::string gradients : {"exact", "finite-difference"}) {
       parameters.method = method;
@@ -418,7 +418,7 @@ void directions(const Arguments& a) {
     const Eigen::VectorXd free =
         d.compliance.transpose() * (d.compliance * d.compliance.transpose()).ldlt().solve(d.target);
     const TensionProblem problem(scene.cables, d, scene.adhesion_ids);
-    const Eigen::VectorXd equal = problem.evaluate(uniform_start_nN(problem)).forces_nN;
+    const Eigen::VectorXd equal = uniform_start(problem).forces_nN;
     for (Eigen::Index row = 0; row < free.size(); row += 2) {
       const Eigen::Vector2d f = free.segment<2>(row);
       if (f.norm() < 1) continue;  // nN: below the noise its direction is chance

@@ -85,7 +85,7 @@ Ours run_ours(const TensionScene& scene, double signal_squared) {
   const LinearData data = reduce(scene.beads, gel->compliance_um_per_nN(scene.points_um, scene.ellipses));
   ours.compliance_s = seconds_since(begin);
   const TensionProblem problem(scene.cables, data.reduced, scene.adhesion_ids);
-  const TensionFit fit = fit_gauss_newton(problem, {}, thesis_start_nN(problem));
+  const TensionFit fit = fit_gauss_newton(problem, {}, scaled_to_data(problem, thesis_start_nN(problem)));
   ours.total_s = seconds_since(begin);
   const double misfit = 2 * fit.trial.objective + data.reduced.floor_squared;
   Trace(signal_squared, misfit).add("ours", ours.total_s, fit.n_evaluations, misfit, true);
@@ -126,7 +126,7 @@ Thesis minimise(const TensionProblem& compliance_given, const SolvedMisfit& misf
   const TensionProblem problem(compliance_given.cables(), compliance_given.data(), compliance_given.adhesion_ids(),
                                until_there);
   try {
-    fit_tensions(problem, parameters, 1, thesis_start_nN(problem));
+    fit_tensions(problem, parameters, 1, problem.evaluate(thesis_start_nN(problem)));
   } catch (const Stop&) {
   }
   thesis.left_above = least - minimum;
@@ -139,7 +139,7 @@ Thesis run_thesis(const TensionScene& scene, bool is_kept, double signal_squared
   const auto gel = thesis_gel(is_kept);
   const LinearData data = reduce(scene.beads, gel->compliance_um_per_nN(scene.points_um, scene.ellipses));
   const TensionProblem problem(scene.cables, data.reduced, scene.adhesion_ids);
-  const TensionFit end = fit_gauss_newton(problem, {}, thesis_start_nN(problem));
+  const TensionFit end = fit_gauss_newton(problem, {}, scaled_to_data(problem, thesis_start_nN(problem)));
   const double minimum = 2 * end.trial.objective + data.reduced.floor_squared;
   constexpr int kMostEvaluations = 50000;
   const SolvedMisfit by_compliance = [&](const Eigen::VectorXd& forces_nN) {

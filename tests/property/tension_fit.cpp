@@ -260,7 +260,7 @@ TEST(TensionFit, a_mirrored_and_turned_experiment_gives_the_same_tensions) {
 TEST(TensionFit, bootstrap_draws_are_the_same_for_any_threads_and_agree_with_the_covariance) {
   const TensionScene scene = tension_scene("case_21", 1000, 0.05, 8);
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
-  const TensionFit fit = fit_gauss_newton(problem, {}, uniform_start_nN(problem));
+  const TensionFit fit = fit_gauss_newton(problem, {}, uniform_start(problem));
   std::vector<std::uint64_t> draws;
   for (std::uint64_t d = 1; d <= 60; ++d) draws.push_back(d);
   const Eigen::MatrixXd one = bootstrap_deviations_nN(problem, {}, fit.trial, 1, draws, 1);

@@ -32,11 +32,12 @@ TEST(TensionFitHard, starts_from_1e_6_to_1e3_nN_end_at_the_same_tensions) {
   test::hard_case("starts over nine decades", "the same tensions to 0.2 standard errors");
   const TensionScene scene = tension_scene("case_22", 1000, 0.07, 5);
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
-  const Trial first = fit_gauss_newton(problem, {}, uniform_start_nN(problem)).trial;
+  const Trial first = fit_gauss_newton(problem, {}, uniform_start(problem)).trial;
   const Eigen::MatrixXd covariance = covariance_nN2(local_misfit(first, problem.jacobian(first)), 1);
   double worst = 0;
   for (const double start : {1e-6, 1e-3, 1.0, 1e3}) {
-    const Trial other = fit_gauss_newton(problem, {}, Eigen::VectorXd::Constant(problem.n_tensions(), start)).trial;
+    const Eigen::VectorXd tensions_nN = Eigen::VectorXd::Constant(problem.n_tensions(), start);
+    const Trial other = fit_gauss_newton(problem, {}, scaled_to_data(problem, tensions_nN)).trial;
     for (Eigen::Index i = 0; i < first.tensions_nN.size(); ++i) {
       // the fit stops where the last steps tell less than a thirtieth of a standard error; there may be a few
       EXPECT_NEAR(other.tensions_nN[i], first.tensions_nN[i], 0.2 * std::sqrt(covariance(i, i)))
