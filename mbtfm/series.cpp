@@ -25,6 +25,19 @@ void check_same_beads(const Path& file, const DisplacementField& beads, const Di
   }
 }
 
+/// Rows of a compliance of `all` that are those of `beads`; nothing where not all of them are there, in that order.
+std::optional<std::vector<Eigen::Index>> rows_among(const DisplacementField& all, const DisplacementField& beads) {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0, next = 0; next < beads.size(); ++i) {
+    if (i == all.size()) return std::nullopt;
+    if (all[i].position_um != beads[next].position_um) continue;
+    ++next;
+    rows.push_back(2 * static_cast<Eigen::Index>(i));
+    rows.push_back(rows.back() + 1);
+  }
+  return rows;
+}
+
 struct FrameData {
   DisplacementField beads;
   std::vector<bool> is_used;
@@ -173,6 +186,20 @@ std::vector<SeriesFrame> read_series(const Path& folder) {
   }
   if (!first) throw InputError((folder / "frames.csv").string(), "a frame that was tracked", "none");
   return frames;
+}
+
+const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames) {
+  return std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
+}
+
+Compliances compliances_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                           const std::function<Eigen::MatrixXd(const DisplacementField&)>& compliance_um_per_nN) {
+  if (frames.empty()) return {compliance_um_per_nN(beads), {}};
+  const DisplacementField& all = beads_of(frames);
+  Compliances result{{}, compliance_um_per_nN(all)};
+  const auto rows = rows_among(all, beads);
+  result.of_beads = rows ? Eigen::MatrixXd(result.of_series(*rows, Eigen::all)) : compliance_um_per_nN(beads);
+  return result;
 }
 
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,

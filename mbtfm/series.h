@@ -2,6 +2,7 @@
 /// frame is a fit of its own, with its own errors, that starts from the tensions of the frame before.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -23,6 +24,19 @@ std::string file_of_frame(int frame);
 /// frames.csv and displacement_0001.csv … of mbtfm-track.
 /// @throws InputError where a frame has other beads than the first
 std::vector<SeriesFrame> read_series(const Path& folder);
+
+/// The beads of the first frame that was tracked, and so of all. @param frames  one at least is not refused
+const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames);
+
+/// Compliance of displacement.csv's good beads, and of all beads of a series.
+struct Compliances {
+  Eigen::MatrixXd of_beads, of_series;
+};
+/// displacement.csv is a frame of the series, as a rule, and so found with it; of another origin it is found apart.
+/// @param frames  may be none
+/// @param compliance_um_per_nN  by beads
+Compliances compliances_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                           const std::function<Eigen::MatrixXd(const DisplacementField&)>& compliance_um_per_nN);
 
 /// What came of a frame.
 struct FrameFit {
