@@ -190,7 +190,7 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
   std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
   std::vector<std::string> names;
   for (const SeriesFrame& frame : frames) {
-    if (frame.refused.empty()) names.push_back(file_of_frame(frame.frame));
+    if (frame.refused.empty()) names.push_back(displacement_of_frame(frame.frame));
   }
   context.input("frames", names);
   return frames;
@@ -203,7 +203,7 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const Eigen::Matr
   const std::vector<FrameFit> fits = fit_series(
       frames, networks, compliance_um_per_nN, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p,
       is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
-      values_of(first));
+      values_of(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
   write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
@@ -339,6 +339,8 @@ int main(int argc, char** argv) {
                  {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
                  {"frames", FileArgument::Kind::optional_input,
                   "folder with frames.csv and displacement_0001.csv ... of a time series, each of which is fitted"},
+                 {"kept", FileArgument::Kind::optional_input,
+                  "output folder of a run that was alike but for single frames: the others' fits are kept"},
                  {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
       argc, argv, fit);
 }
