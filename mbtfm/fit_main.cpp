@@ -190,22 +190,20 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
   std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
   std::vector<std::string> names;
   for (const SeriesFrame& frame : frames) {
-    if (frame.refused.empty()) names.push_back(file_of_frame(frame.frame));
+    if (frame.refused.empty()) names.push_back(displacement_of_frame(frame.frame));
   }
   context.input("frames", names);
   return frames;
 }
 
 /// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
-std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::Substrate& substrate, const Cell& cell,
-                       const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
+std::string fit_frames(const std::vector<SeriesFrame>& frames, const Eigen::MatrixXd& compliance_um_per_nN,
+                       const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
                        const FitParameters& p, bool is_coupled, StageContext& context) {
-  const DisplacementField& beads =
-      std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
   const std::vector<FrameFit> fits = fit_series(
-      frames, networks, compliance_of(substrate, beads, cell), beads_in_region(beads, cell, p), adhesion_ids_of(cell),
-      p, is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
-      next_start(first));
+      frames, networks, compliance_um_per_nN, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p,
+      is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
+      next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
   write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
@@ -227,8 +225,10 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   check_fibres(inputs, fibres, context.inputs_.at("network"));
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  LinearData data = reduce(inputs.beads, compliance_of(*substrate, inputs.beads, inputs.cell),
-                           beads_in_region(inputs.beads, inputs.cell, p.fit));
+  Compliances compliances = compliances_of(
+      inputs.beads, series, [&](const DisplacementField& b) { return compliance_of(*substrate, b, inputs.cell); });
+  LinearData data =
+      reduce(inputs.beads, std::move(compliances.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit));
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -285,8 +285,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(fit, influence), weight_array(data)});
-  const std::string of_series =
-      series.empty() ? "" : fit_frames(series, *substrate, inputs.cell, networks, fit, p.fit, coupling.is_on, context);
+  const std::string of_series = series.empty() ? ""
+                                               : fit_frames(series, compliances.of_series, inputs.cell, networks, fit,
+                                                            p.fit, coupling.is_on, context);
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces, p.fit.surface_lines);
   context.progress(1, "done");
@@ -339,6 +340,8 @@ int main(int argc, char** argv) {
                  {"start", FileArgument::Kind::optional_input, "tensions.csv to start from: of the frame before"},
                  {"frames", FileArgument::Kind::optional_input,
                   "folder with frames.csv and displacement_0001.csv ... of a time series, each of which is fitted"},
+                 {"kept", FileArgument::Kind::optional_input,
+                  "output folder of a run that was alike but for single frames: the others' fits are kept"},
                  {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
       argc, argv, fit);
 }

@@ -1,13 +1,13 @@
 #include "mbtfm/series.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <map>
 
 #include "mbtfm/fit_results.h"
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/hash.h"
 
 namespace mbtfm::inverse {
 
@@ -23,6 +23,19 @@ void check_same_beads(const Path& file, const DisplacementField& beads, const Di
     throw InputError(file.string() + ": bead " + std::to_string(i + 1), "the place of the same bead in the first frame",
                      "another", "track all frames of a series together, against one relaxed image");
   }
+}
+
+/// Rows of a compliance of `all` that are those of `beads`; nothing where not all of them are there, in that order.
+std::optional<std::vector<Eigen::Index>> rows_among(const DisplacementField& all, const DisplacementField& beads) {
+  std::vector<Eigen::Index> rows;
+  for (std::size_t i = 0, next = 0; next < beads.size(); ++i) {
+    if (i == all.size()) return std::nullopt;
+    if (all[i].position_um != beads[next].position_um) continue;
+    ++next;
+    rows.push_back(2 * static_cast<Eigen::Index>(i));
+    rows.push_back(rows.back() + 1);
+  }
+  return rows;
 }
 
 struct FrameData {
@@ -47,9 +60,10 @@ FrameData good_beads_of(const SeriesFrame& frame, const Eigen::MatrixXd& complia
   return data;
 }
 
-FrameFit described(int frame, const EnsembleFit& fit, const LinearData& data) {
-  FrameFit result{.frame = frame,
+FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit, const LinearData& data) {
+  FrameFit result{.frame = frame.frame,
                   .refused = {},
+                  .displacement_sha256 = frame.sha256,
                   .tensions = tensions_of(fit),
                   .sigmas_nN = {},
                   .total_force_nN = fit.total_force_nN,
@@ -59,6 +73,18 @@ FrameFit described(int frame, const EnsembleFit& fit, const LinearData& data) {
                   .converged = fit.report.converged};
   for (const Estimate& e : fit.tensions_nN) result.sigmas_nN.push_back(e.standard_error());
   return result;
+}
+
+Eigen::VectorXd values_of(const FrameFit& fit) {
+  Eigen::VectorXd values_nN(static_cast<Eigen::Index>(fit.tensions.size()));
+  for (Eigen::Index i = 0; i < values_nN.size(); ++i)
+    values_nN[i] = fit.tensions[static_cast<std::size_t>(i)].tension_nN;
+  return values_nN;
+}
+
+/// Of a force that a table holds: value and standard error, whatever that is made of.
+Estimate estimate(const CsvTable& table, int row, const std::string& name) {
+  return {.value = table.number(row, name + "_nN"), .fitted = table.number(row, name + "_sigma_nN")};
 }
 
 std::string type_name(const Tension& tension, const std::vector<Fibre>& fibres) {
@@ -150,12 +176,6 @@ charts::Chart force_chart(const std::vector<FrameFit>& fits, std::optional<doubl
 
 }  // namespace
 
-std::string file_of_frame(int frame) {
-  char name[32];
-  std::snprintf(name, sizeof name, "displacement_%04d.csv", frame);
-  return name;
-}
-
 std::vector<SeriesFrame> read_series(const Path& folder) {
   const CsvTable table(folder / "frames.csv");
   table.require({"frame", "refused"});
@@ -166,8 +186,9 @@ std::vector<SeriesFrame> read_series(const Path& folder) {
   }
   for (SeriesFrame& frame : frames) {
     if (!frame.refused.empty()) continue;
-    const Path file = folder / file_of_frame(frame.frame);
+    const Path file = folder / displacement_of_frame(frame.frame);
     frame.beads = read_displacement(file);
+    frame.sha256 = sha256_of_file(file);
     if (first) check_same_beads(file, frame.beads, *first);
     if (!first) first = &frame.beads;
   }
@@ -175,31 +196,50 @@ std::vector<SeriesFrame> read_series(const Path& folder) {
   return frames;
 }
 
+const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames) {
+  return std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
+}
+
+Compliances compliances_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                           const std::function<Eigen::MatrixXd(const DisplacementField&)>& compliance_um_per_nN) {
+  if (frames.empty()) return {compliance_um_per_nN(beads), {}};
+  const DisplacementField& all = beads_of(frames);
+  Compliances result{{}, compliance_um_per_nN(all)};
+  const auto rows = rows_among(all, beads);
+  result.of_beads = rows ? Eigen::MatrixXd(result.of_series(*rows, Eigen::all)) : compliance_um_per_nN(beads);
+  return result;
+}
+
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
-                                 int threads, const Progress& progress, Trial start) {
+                                 int threads, const Progress& progress, Trial start,
+                                 const std::vector<FrameFit>& kept) {
   std::vector<FrameFit> fits;
+  const auto fitted = [&](const SeriesFrame& frame) {
+    FrameData good = good_beads_of(frame, compliance_um_per_nN, is_used);
+    LinearData data = reduce(good.beads, std::move(good.compliance_um_per_nN), good.is_used);
+    return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start), data);
+  };
   for (const SeriesFrame& frame : frames) {
     if (progress) {
       progress(static_cast<double>(fits.size()) / static_cast<double>(frames.size()),
                "frame " + std::to_string(frame.frame));
     }
-    if (!frame.refused.empty()) {
-      fits.push_back({.frame = frame.frame, .refused = frame.refused});
-      continue;
-    }
+    const FrameFit not_fitted{.frame = frame.frame, .refused = frame.refused, .displacement_sha256 = frame.sha256};
+    fits.push_back(not_fitted);
+    if (!frame.refused.empty()) continue;
+    const auto known = std::find_if(kept.begin(), kept.end(), [&](const FrameFit& fit) {
+      return fit.frame == frame.frame && !frame.sha256.empty() && fit.displacement_sha256 == frame.sha256;
+    });
     try {
-      FrameData good = good_beads_of(frame, compliance_um_per_nN, is_used);
-      LinearData data = reduce(good.beads, std::move(good.compliance_um_per_nN), good.is_used);
-      const EnsembleFit fit = fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start);
-      fits.push_back(described(frame.frame, fit, data));
-      if (is_coupled) start = next_start(fit);
+      fits.back() = known != kept.end() ? *known : fitted(frame);
+      if (is_coupled && fits.back().refused.empty()) start.tensions_nN = values_of(fits.back());
     } catch (const NotSolved& error) {  // one frame that cannot be fitted does not stop the others
-      fits.push_back({.frame = frame.frame, .refused = error.what()});
+      fits.back().refused = error.what();
     } catch (const InvalidData& error) {
-      fits.push_back({.frame = frame.frame, .refused = error.what()});
+      fits.back().refused = error.what();
     }
   }
   return fits;
@@ -221,7 +261,7 @@ void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std
 void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::optional<double> interval_s) {
   CsvText csv({"frame", "time_s", "total_force_nN", "total_force_sigma_nN", "network_force_nN",
                "network_force_sigma_nN", "fibre_force_nN", "relative_l2", "chi_squared_per_degree", "converged",
-               "refused"});
+               "refused", "displacement_sha256"});
   for (const FrameFit& f : fits) {
     csv.add(f.frame).add(time_s(f.frame, interval_s));
     if (f.refused.empty()) {
@@ -232,9 +272,41 @@ void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::opti
     } else {
       for (int column = 0; column < 8; ++column) csv.add("");
     }
-    csv.add(f.refused).end_row();
+    csv.add(f.refused).add(f.displacement_sha256).end_row();
   }
   write_text(file, csv.str());
+}
+
+std::vector<FrameFit> read_fits(const Path& folder) {
+  if (!std::filesystem::is_regular_file(folder / "frames.csv")) return {};
+  if (!std::filesystem::is_regular_file(folder / "tracks.csv")) return {};
+  const CsvTable frames(folder / "frames.csv"), tracks(folder / "tracks.csv");
+  if (!frames.has("displacement_sha256")) return {};  // of a version that did not tell
+  std::map<int, FrameFit> fits;
+  for (int row = 0; row < frames.n_rows(); ++row) {
+    FrameFit& fit = fits[frames.integer(row, "frame", 1)];
+    fit.frame = frames.integer(row, "frame", 1);
+    fit.refused = frames.text(row, "refused");
+    fit.displacement_sha256 = frames.text(row, "displacement_sha256");
+    if (!fit.refused.empty()) continue;
+    fit.total_force_nN = estimate(frames, row, "total_force");
+    fit.network_force_nN = estimate(frames, row, "network_force");
+    fit.relative_l2 = frames.number(row, "relative_l2");
+    fit.chi_squared_per_degree = frames.number(row, "chi_squared_per_degree");
+    fit.converged = frames.text(row, "converged") == "true";
+  }
+  for (int row = 0; row < tracks.n_rows(); ++row) {
+    FrameFit& fit = fits[tracks.integer(row, "frame", 1)];
+    fit.tensions.push_back({.fibre_id = tracks.integer(row, "fibre_id", 0),
+                            .tension_nN = tracks.number(row, "tension_nN"),
+                            .low_nN = tracks.optional_number(row, "low_nN"),
+                            .high_nN = tracks.optional_number(row, "high_nN"),
+                            .identifiable = tracks.text(row, "identifiable") == "true"});
+    fit.sigmas_nN.push_back(tracks.number(row, "sigma_nN"));
+  }
+  std::vector<FrameFit> result;
+  for (auto& [frame, fit] : fits) result.push_back(std::move(fit));
+  return result;
 }
 
 std::string series_picture(const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

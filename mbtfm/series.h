@@ -2,6 +2,7 @@
 /// frame is a fit of its own, with its own errors, that starts from the tensions of the frame before.
 #pragma once
 
+#include <functional>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,19 +16,32 @@ namespace mbtfm::inverse {
 struct SeriesFrame {
   int frame = 0;
   std::string refused;      ///< why it has no displacements
+  std::string sha256 = {};  ///< of its file
   DisplacementField beads;  ///< empty where refused
 };
-
-std::string file_of_frame(int frame);
 
 /// frames.csv and displacement_0001.csv … of mbtfm-track.
 /// @throws InputError where a frame has other beads than the first
 std::vector<SeriesFrame> read_series(const Path& folder);
 
+/// The beads of the first frame that was tracked, and so of all. @param frames  one at least is not refused
+const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames);
+
+/// Compliance of displacement.csv's good beads, and of all beads of a series.
+struct Compliances {
+  Eigen::MatrixXd of_beads, of_series;
+};
+/// displacement.csv is a frame of the series, as a rule, and so found with it; of another origin it is found apart.
+/// @param frames  may be none
+/// @param compliance_um_per_nN  by beads
+Compliances compliances_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                           const std::function<Eigen::MatrixXd(const DisplacementField&)>& compliance_um_per_nN);
+
 /// What came of a frame.
 struct FrameFit {
   int frame = 0;
-  std::string refused;  ///< why it has no fit
+  std::string refused;                   ///< why it has no fit
+  std::string displacement_sha256 = {};  ///< of the file that it was fitted to
   std::vector<Tension> tensions = {};
   std::vector<double> sigmas_nN = {};  ///< standard errors of the tensions
   Estimate total_force_nN = {}, network_force_nN = {};
@@ -35,15 +49,20 @@ struct FrameFit {
   bool converged = false;
 };
 
+/// The fits that write_tracks and write_frames put into a folder; none where not both files are there.
+std::vector<FrameFit> read_fits(const Path& folder);
+
 /// @param compliance_um_per_nN  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
 /// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
 /// @param start  of the first frame, on the first network
+/// @param kept  fits of the same networks, compliance and parameters: taken for frames whose file is still the same
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
-                                 int threads, const Progress& progress, Trial start);
+                                 int threads, const Progress& progress, Trial start,
+                                 const std::vector<FrameFit>& kept = {});
 
 /// By frame and fibre. @param interval_s  between frames, if known
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <numeric>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <utility>
 
 #include "segment/plane.h"
@@ -100,13 +101,10 @@ std::vector<Vec2> sources(double width, double height, double margin) {
   return result;
 }
 
-/// The two rows of a bead: the columns of the drift, then each source's force, less the first source's (so that they
-/// balance).
-void fill_rows(cv::Mat& rows, Vec2 place, const cv::Matx<double, 2, 4>& global, int n_global,
-               const std::vector<Vec2>& at, double softening) {
-  for (int a = 0; a < 2; ++a) {
-    for (int b = 0; b < n_global; ++b) rows.at<double>(a, b) = global(a, b);
-  }
+/// The two rows of a bead: its shift, each source's force less the first source's (so that they balance), turn and
+/// growth.
+void fill_rows(cv::Mat& rows, Vec2 place, const cv::Matx<double, 2, 4>& global, const std::vector<Vec2>& at,
+               double softening) {
   cv::Matx22d first;
   for (std::size_t k = 0; k < at.size(); ++k) {
     const Vec2 d = place - at[k];
@@ -117,86 +115,144 @@ void fill_rows(cv::Mat& rows, Vec2 place, const cv::Matx<double, 2, 4>& global, 
       first = kernel;
       continue;
     }
-    const int column = n_global + 2 * static_cast<int>(k - 1);
+    const int column = 2 * static_cast<int>(k);
     for (int a = 0; a < 2; ++a) {
       for (int b = 0; b < 2; ++b) rows.at<double>(a, column + b) = kernel(a, b) - first(a, b);
     }
   }
+  const int after_forces = 2 * static_cast<int>(at.size());
+  for (int a = 0; a < 2; ++a) {
+    for (int b = 0; b < 2; ++b) rows.at<double>(a, b) = global(a, b);
+    for (int b = after_forces; b < rows.cols; ++b) rows.at<double>(a, b) = global(a, 2 + b - after_forces);
+  }
 }
 
-/// What the drift and the forces inside the frame leave of the beads' motion.
-void fit_frame(FarField& result, const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
-               const std::vector<int>& used, const std::vector<Vec2>& at, double softening, double scale, Drift kind) {
-  const int n_global = n_of(kind), n = n_global + 2 * static_cast<int>(at.size() - 1);
+/// The frame's least squares, solved for shift and forces alone; what turn and growth add is told from that by the
+/// Schur complement S = C − Bᵀ A⁻¹ B of the normal matrix [A B; Bᵀ C]: asking after them costs a column each.
+struct FrameFit {
+  cv::Mat design, u;
+  cv::Mat still;     ///< A⁻¹ r: shift and forces where nothing turns or grows
+  cv::Mat response;  ///< A⁻¹ B: what they lose to a unit of turn, of growth
+  cv::Mat schur;     ///< S
+  cv::Mat right;     ///< r of turn and growth less Bᵀ A⁻¹ r
+};
+
+FrameFit fit_frame(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
+                   const std::vector<int>& used, const std::vector<Vec2>& at, double softening, Vec2 centre,
+                   double scale, Drift kind) {
+  FrameFit fit;
+  const int n = 2 * static_cast<int>(at.size()), n_all = n + n_of(kind) - 2;
   const int n_rows = 2 * static_cast<int>(used.size());
-  cv::Mat design = cv::Mat::zeros(n_rows, n, CV_64F), u(n_rows, 1, CV_64F);
+  fit.design = cv::Mat::zeros(n_rows, n_all, CV_64F);
+  fit.u = cv::Mat(n_rows, 1, CV_64F);
   for (int k = 0; k < n_rows / 2; ++k) {
-    cv::Mat rows = design.rowRange(2 * k, 2 * k + 2);
+    cv::Mat rows = fit.design.rowRange(2 * k, 2 * k + 2);
     const Vec2 place = positions[used[k]];
-    fill_rows(rows, place, global_columns(place, result.drift.centre, scale), n_global, at, softening);
-    u.at<double>(2 * k) = displacements[used[k]].x;
-    u.at<double>(2 * k + 1) = displacements[used[k]].y;
+    fill_rows(rows, place, global_columns(place, centre, scale), at, softening);
+    fit.u.at<double>(2 * k) = displacements[used[k]].x;
+    fit.u.at<double>(2 * k + 1) = displacements[used[k]].y;
   }
-  cv::Mat normal, solution;
-  cv::mulTransposed(design, normal, true);
-  const double ridge = kRidge * cv::trace(normal)[0] / n;
-  for (int k = n_global; k < n; ++k) normal.at<double>(k, k) += ridge;
-  cv::solve(normal, design.t() * u, solution, cv::DECOMP_CHOLESKY);
-  result.drift = global_motion(solution, n_global, result.drift.centre, scale);
-  const cv::Mat rest = u - design * solution;
-  result.rms = cv::norm(rest) / std::sqrt(n_rows);
-  if (kind != Drift::translation) {
-    cv::Mat unit = cv::Mat::zeros(n, 1, CV_64F), column;
-    unit.at<double>(2) = 1;
-    cv::solve(normal, unit, column, cv::DECOMP_CHOLESKY);
-    result.turn_sigma_rad = result.rms * std::sqrt(column.at<double>(2)) / scale;
+  cv::Mat normal, both, solved;
+  cv::mulTransposed(fit.design, normal, true);
+  const cv::Range shift_and_forces(0, n), turn_and_growth(n, n_all);
+  const cv::Mat right = fit.design.t() * fit.u, beside = normal(shift_and_forces, turn_and_growth);
+  cv::Mat alone = normal(shift_and_forces, shift_and_forces);
+  const double ridge = kRidge * cv::trace(alone)[0] / n;
+  for (int k = 2; k < n; ++k) alone.at<double>(k, k) += ridge;
+  both = right.rowRange(shift_and_forces);
+  if (n_all > n) cv::hconcat(both, beside, both);
+  cv::solve(alone, both, solved, cv::DECOMP_CHOLESKY);
+  fit.still = solved.col(0).clone();
+  if (n_all == n) return fit;
+  fit.response = solved.colRange(1, solved.cols);
+  fit.schur = normal(turn_and_growth, turn_and_growth) - beside.t() * fit.response;
+  fit.right = right.rowRange(turn_and_growth) - beside.t() * fit.still;
+  return fit;
+}
+
+/// What the drift and the forces inside the frame leave of the beads' motion. @param kind  at most that of the fit
+void take_drift(FarField& result, const FrameFit& fit, double scale, Drift kind) {
+  const int n = fit.still.rows, n_asked = n_of(kind) - 2;
+  cv::Mat solution = cv::Mat::zeros(fit.design.cols, 1, CV_64F), inverse;
+  cv::Mat shift_and_forces = solution.rowRange(0, n), asked = solution.rowRange(n, n + n_asked);
+  fit.still.copyTo(shift_and_forces);
+  if (n_asked > 0) {
+    const cv::Range some(0, n_asked);
+    inverse = cv::Mat(fit.schur(some, some)).inv(cv::DECOMP_CHOLESKY);
+    asked = inverse * fit.right.rowRange(some);
+    shift_and_forces -= fit.response.colRange(some) * asked;
   }
+  const cv::Mat rest = fit.u - fit.design * solution;
+  const auto global = [&](int k) { return k < n_asked ? asked.at<double>(k) / scale : 0.0; };
+  result.drift = {{solution.at<double>(0), solution.at<double>(1)}, global(0), global(1), result.drift.centre};
+  result.rms = cv::norm(rest) / std::sqrt(rest.rows);
+  if (n_asked > 0) result.turn_sigma_rad = result.rms * std::sqrt(inverse.at<double>(0, 0)) / scale;
   std::vector<double> sizes;
-  for (int k = 0; k < n_rows; ++k) sizes.push_back(std::abs(rest.at<double>(k)));
+  for (int k = 0; k < rest.rows; ++k) sizes.push_back(std::abs(rest.at<double>(k)));
   result.noise = quantile(std::move(sizes), 0.5) / 0.6745;
+}
+
+struct WholeTurn {
+  double turn_rad = 0;
+  bool is_turned = false;
+};
+
+/// @param scale  half the picture, px
+WholeTurn whole_turn(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, const std::vector<int>& far,
+                     Vec2 centre, double scale) {
+  const Typical shifted = typical_motion(positions, u, far, centre, scale, Drift::translation);
+  const Typical turned = typical_motion(positions, u, far, centre, scale, Drift::rotation);
+  const double turn_rad = turned.motion.turn_rad;
+  return {turn_rad, turned.misfit < 0.5 * shifted.misfit && std::abs(turn_rad) * scale > 1};
 }
 
 }  // namespace
 
-FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
-                   double height, double margin, Drift kind, double noise) {
-  FarField result;
+std::vector<FarField> far_fields(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
+                                 double width, double height, double margin, const std::vector<Drift>& kinds,
+                                 double noise) {
   const double scale = 0.5 * std::min(width, height);
-  result.drift.centre = {0.5 * (width - 1), 0.5 * (height - 1)};
-  if (positions.empty()) return result;
-  std::vector<int> all(positions.size()), frame;
+  const Vec2 centre{0.5 * (width - 1), 0.5 * (height - 1)};
+  std::vector<FarField> results(kinds.size(), FarField{.drift = {.shift = {}, .centre = centre}});
+  if (positions.empty()) return results;
+  std::vector<int> all(positions.size()), frame, used;
   std::iota(all.begin(), all.end(), 0);
   for (const int k : all) {
     const Vec2 p = positions[k];
     if (std::min({p.x, p.y, width - 1 - p.x, height - 1 - p.y}) < margin) frame.push_back(k);
   }
-  const auto about_own_motion = [&](const std::vector<int>& used) {
-    const double rms = rms_about(positions, displacements, used,
-                                 fitted_motion(positions, displacements, used, result.drift.centre, scale, kind));
-    return std::sqrt(std::max(0.0, rms * rms - noise * noise));
-  };
-  const double everywhere = about_own_motion(all);
-  result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;
-  const std::vector<int>& far = result.is_at_rest ? frame : all;
-  const auto typical = [&](Drift what) {
-    return typical_motion(positions, displacements, far, result.drift.centre, scale, what);
-  };
-  const Typical shifted = typical(Drift::translation), turned = typical(Drift::rotation);
-  result.turn_rad = turned.motion.turn_rad;
-  result.is_turned = turned.misfit < 0.5 * shifted.misfit && std::abs(result.turn_rad) * scale > 1;
-  if (!result.is_at_rest) {
-    result.drift = fitted_motion(positions, displacements, all, result.drift.centre, scale, kind);
-    result.rms = result.noise = everywhere;
-    result.n_beads = static_cast<int>(all.size());
-    return result;
-  }
   const std::size_t stride = 1 + frame.size() / kMostBeads;
-  std::vector<int> used;
   for (std::size_t k = 0; k < frame.size(); k += stride) used.push_back(frame[k]);
-  result.n_beads = static_cast<int>(used.size());
-  const double softening = kSoftening * std::min(width - 2 * margin, height - 2 * margin) / kSide;
-  fit_frame(result, positions, displacements, used, sources(width, height, margin), softening, scale, kind);
-  return result;
+  std::optional<FrameFit> fit;  // made once, for all kinds
+  std::optional<WholeTurn> turn_of_all, turn_of_frame;
+  for (std::size_t i = 0; i < kinds.size(); ++i) {
+    FarField& result = results[i];
+    const auto about_own_motion = [&](const std::vector<int>& some) {
+      const double rms = rms_about(positions, displacements, some,
+                                   fitted_motion(positions, displacements, some, centre, scale, kinds[i]));
+      return std::sqrt(std::max(0.0, rms * rms - noise * noise));
+    };
+    const double everywhere = about_own_motion(all);
+    result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;
+    std::optional<WholeTurn>& turn = result.is_at_rest ? turn_of_frame : turn_of_all;
+    if (!turn) turn = whole_turn(positions, displacements, result.is_at_rest ? frame : all, centre, scale);
+    result.turn_rad = turn->turn_rad;
+    result.is_turned = turn->is_turned;
+    if (!result.is_at_rest) {
+      result.drift = fitted_motion(positions, displacements, all, centre, scale, kinds[i]);
+      result.rms = result.noise = everywhere;
+      result.n_beads = static_cast<int>(all.size());
+      continue;
+    }
+    result.n_beads = static_cast<int>(used.size());
+    if (!fit) {
+      const double softening = kSoftening * std::min(width - 2 * margin, height - 2 * margin) / kSide;
+      fit = fit_frame(positions, displacements, used, sources(width, height, margin), softening, centre, scale,
+                      *std::max_element(kinds.begin(), kinds.end()));
+    }
+    take_drift(result, *fit, scale, kinds[i]);
+  }
+  return results;
 }
 
 }  // namespace mbtfm::segment

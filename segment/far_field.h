@@ -7,7 +7,7 @@
 
 namespace mbtfm::segment {
 
-/// What may have moved an image as a whole.
+/// What may have moved an image as a whole; each includes those before it.
 enum class Drift { translation, rotation, similarity };
 
 /// A small motion of the whole: shift, turn and growth about the image's centre.
@@ -44,7 +44,11 @@ struct FarField {
 /// Whether it moves less than the rest is asked beyond `noise` (px), the standard deviation of a bead's component.
 /// Where the frame moves as much as the rest (a layer of cells fills the picture) no place is at rest: the forces in
 /// the picture balance, more or less, and the drift is fitted to all beads alike.
-FarField far_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, double width,
-                   double height, double margin, Drift kind, double noise);
+/// @returns one for each of the kinds. The turn and the growth are the last unknowns of one elimination: to ask for
+/// them
+///   beside the shift costs next to nothing.
+std::vector<FarField> far_fields(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
+                                 double width, double height, double margin, const std::vector<Drift>& kinds,
+                                 double noise);
 
 }  // namespace mbtfm::segment

@@ -51,8 +51,15 @@ void require_no_turn(const FarField& far, Drift kind) {
                     "one turned by " + brief(far.turn_rad * 180 / std::numbers::pi) + " degrees");
 }
 
-FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, const Pooling& pooling,
-                      const TrackParameters& parameters, Drift kind) {
+struct Measured {
+  std::vector<Track> tracks;
+  Pooling pooling;
+};
+
+/// As of each of these kinds.
+std::vector<FarField> far_fields_of(const Scene& scene, const Measured& measured, const TrackParameters& parameters,
+                                    const std::vector<Drift>& kinds) {
+  const auto& [tracks, pooling] = measured;
   std::vector<Vec2> positions, displacements;
   double squares = 0;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
@@ -63,8 +70,8 @@ FarField far_field_of(const Scene& scene, const std::vector<Track>& tracks, cons
   }
   const Plane& plane = scene.relaxed->image.plane;
   const double noise = std::sqrt(squares / std::max<double>(1, static_cast<double>(positions.size())));
-  return far_field(positions, displacements, plane.width, plane.height,
-                   parameters.far_field_share * std::min(plane.width, plane.height), kind, noise);
+  return far_fields(positions, displacements, plane.width, plane.height,
+                    parameters.far_field_share * std::min(plane.width, plane.height), kinds, noise);
 }
 
 constexpr const char* kRotation = "drift rotation";
@@ -102,11 +109,6 @@ void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& t
     if (inside < margin) tracks[k].flag = "edge";
   }
 }
-
-struct Measured {
-  std::vector<Track> tracks;
-  Pooling pooling;
-};
 
 /// Measured in the narrow window, even where beads are loose or not resolved and single ones scatter: a wider window
 /// would hide the scatter and flatten the peaks.
@@ -151,18 +153,17 @@ struct DriftOfAll {
 /// What the whole image did, with a turn or without. @param turn  by which it was turned back before, if any
 DriftOfAll drift_of_all(const Scene& scene, const Measured& measured, const TrackParameters& parameters,
                         const std::string& kind, const std::optional<Turn>& turn) {
-  const auto far_as = [&](Drift what) {
-    return far_field_of(scene, measured.tracks, measured.pooling, parameters, what);
-  };
   const Drift first = kind == "auto" ? Drift::translation : drift_kind(kind);
-  DriftOfAll result{far_as(first), decided(kRotation, first == Drift::translation ? "off" : "on", true, "as asked")};
+  std::vector<Drift> kinds = {first};
+  if (kind == "auto") kinds.push_back(Drift::rotation);
+  const std::vector<FarField> far = far_fields_of(scene, measured, parameters, kinds);
+  DriftOfAll result{far.front(), decided(kRotation, first == Drift::translation ? "off" : "on", true, "as asked")};
   require_no_turn(result.far, first);
   if (kind == "auto") {
     const Stopwatch watch;
-    const FarField turned = far_as(Drift::rotation);
     const double largest_px = largest_displacement_px(measured.tracks, measured.pooling, result.far, scene);
-    result.rotation = decide_rotation(turned, largest_px, scene.relaxed->image.plane, parameters.effect_tolerance);
-    if (result.rotation.is_on) result.far = turned;
+    result.rotation = decide_rotation(far[1], largest_px, scene.relaxed->image.plane, parameters.effect_tolerance);
+    if (result.rotation.is_on) result.far = far[1];
     result.rotation.seconds = watch.seconds();
   } else if (parameters.drift == "auto") {
     const double all_rad = turn->angle_rad + result.far.drift.turn_rad;

@@ -1,6 +1,5 @@
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 #include <functional>
 #include <numbers>
 #include <opencv2/core/utility.hpp>
@@ -21,8 +20,7 @@ namespace fs = std::filesystem;
 
 constexpr double kRadian_deg = 180 / std::numbers::pi;
 
-void write_field(StageContext& context, const DisplacementField& field, const std::string& name) {
-  write_displacement(context.output("out", name + ".csv"), field);
+void write_field_vtp(StageContext& context, const DisplacementField& field, const std::string& name) {
   std::vector<Vec2> points;
   PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
   PointArray sigma{.name = "sigma_um", .scalars = {}, .vectors = {}};
@@ -34,6 +32,11 @@ void write_field(StageContext& context, const DisplacementField& field, const st
     is_good.scalars.push_back(bead.flag.empty() ? 1 : 0);
   }
   write_points_vtp(context.output("out", name + ".vtp"), points, {displacement, sigma, is_good});
+}
+
+void write_field(StageContext& context, const DisplacementField& field, const std::string& name) {
+  write_displacement(context.output("out", name + ".csv"), field);
+  write_field_vtp(context, field, name);
 }
 
 struct FieldFigures {
@@ -206,9 +209,8 @@ StageReport track_series(const std::vector<Frame>& frames, StageContext& context
     };
     try {
       const auto [tracking, pixel_size_um] = tracked_frame(frames[k], progress);
-      char number[16];
-      std::snprintf(number, sizeof number, "_%04zu", k + 1);
-      write_field(context, tracking.field, "displacement" + std::string(number));
+      const fs::path name = displacement_of_frame(static_cast<int>(k) + 1);
+      write_field(context, tracking.field, name.stem().string());
       list.add(frames[k], tracking);
       if (first) continue;
       write_field(context, tracking.field, "displacement");
@@ -232,6 +234,48 @@ StageReport track_series(const std::vector<Frame>& frames, StageContext& context
   return report;
 }
 
+/// The folder of an earlier run with the same images and parameters, where its list, record and first frame are there.
+std::optional<fs::path> earlier_run(const StageContext& context) {
+  if (!context.has_input("kept")) return std::nullopt;
+  const fs::path folder = context.inputs_.at("kept");
+  for (const char* name : {"frames.csv", "displacement.csv", "record.json"}) {
+    if (!fs::is_regular_file(folder / name)) return std::nullopt;
+  }
+  return folder;
+}
+
+/// The bytes as they are.
+void keep_field(StageContext& context, const fs::path& folder, const std::string& name) {
+  fs::copy_file(folder / name, context.output("out", name));
+  write_field_vtp(context, read_displacement(folder / name), fs::path(name).stem().string());
+}
+
+/// Track the frames whose files are gone once more. All else, list and report included, is what the earlier run found:
+/// from the same images it is the same again.
+StageReport complete_series(const std::vector<Frame>& frames, StageContext& context, const fs::path& earlier,
+                            const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
+  const CsvTable list(earlier / "frames.csv");
+  keep_field(context, earlier, "displacement.csv");
+  std::int64_t n_kept = 0;
+  for (int row = 0; row < list.n_rows(); ++row) {
+    if (!list.text(row, "refused").empty()) continue;
+    const int frame = list.integer(row, "frame", 1);
+    const std::string name = displacement_of_frame(frame);
+    if (fs::is_regular_file(earlier / name)) {
+      keep_field(context, earlier, name);
+      ++n_kept;
+      continue;
+    }
+    const TrackedFrame again = tracked_frame(frames.at(static_cast<std::size_t>(frame) - 1), context.progress);
+    write_field(context, again.tracking.field, fs::path(name).stem().string());
+  }
+  fs::copy_file(earlier / "frames.csv", context.output("out", "frames.csv"));
+  StageReport report = read_report(earlier / "record.json");
+  std::erase_if(report.figures, [](const auto& figure) { return figure.first == "n_frames_kept"; });
+  report.figures.emplace_back("n_frames_kept", n_kept);
+  return report;
+}
+
 StageReport track(TrackParameters parameters, int binning, StageContext& context) {
   if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
   const std::vector<Frame> frames = frames_of(context, parameters);
@@ -242,6 +286,10 @@ StageReport track(TrackParameters parameters, int binning, StageContext& context
   const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
     return tracked(relaxed, beads, frame, parameters, binning, progress);
   };
+  const std::optional<fs::path> earlier = earlier_run(context);
+  if (earlier && CsvTable(*earlier / "frames.csv").n_rows() == static_cast<int>(frames.size())) {
+    return complete_series(frames, context, *earlier, tracked_frame);
+  }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
   write_field(context, tracking.field, "displacement");
@@ -307,10 +355,13 @@ int main(int argc, char** argv) {
   return mbtfm::run_stage<mbtfm::segment::TrackStageParameters>(
       {.name = "track",
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
-       .files = {{"stressed", Kind::optional_input,
-                  "beads while the cell pulls (TIFF or PNG); a folder of them: a time series"},
-                 {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF or PNG)"},
-                 {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
-                 {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
+       .files =
+           {{"stressed", Kind::optional_input,
+             "beads while the cell pulls (TIFF or PNG); a folder of them: a time series"},
+            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF or PNG)"},
+            {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
+            {"kept", Kind::optional_input,
+             "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
+            {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
       argc, argv, mbtfm::segment::run);
 }

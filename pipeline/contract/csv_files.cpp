@@ -1,3 +1,4 @@
+#include <cstdio>
 #include <map>
 #include <numbers>
 
@@ -190,6 +191,12 @@ void write_displacement(const Path& file, const DisplacementField& field) {
     csv.add(b.sigma_um).add(b.flag).end_row();
   }
   write_text(file, csv.str());
+}
+
+std::string displacement_of_frame(int frame) {
+  char name[32];
+  std::snprintf(name, sizeof name, "displacement_%04d.csv", frame);
+  return name;
 }
 
 std::vector<Tension> read_tensions(const Path& file) {

@@ -34,6 +34,8 @@ Cell read_cell(const Path& folder);
 
 DisplacementField read_displacement(const Path& file);
 void write_displacement(const Path& file, const DisplacementField& field);
+/// displacement_0001.csv of a time series.
+std::string displacement_of_frame(int frame);
 
 /// Columns x_um, y_um.
 std::vector<Vec2> read_points(const Path& file);

@@ -30,4 +30,19 @@ nlohmann::ordered_json json_of(const Effect& e) {
   return json;
 }
 
+Effect effect_of(const nlohmann::ordered_json& json) {
+  const auto number = [&](const char* key) -> std::optional<double> {
+    return json.contains(key) ? std::optional<double>(json.at(key).get<double>()) : std::nullopt;
+  };
+  return {.name = json.at("name"),
+          .setting = json.at("switch"),
+          .is_on = json.at("on"),
+          .number = number("number"),
+          .threshold = number("threshold"),
+          .why = json.at("why"),
+          .seconds = json.at("seconds"),
+          .change = number("change"),
+          .would_change = json.value("would_change", "")};
+}
+
 }  // namespace mbtfm

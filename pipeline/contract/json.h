@@ -12,5 +12,6 @@ nlohmann::ordered_json json_of(const Figures& figures);
 nlohmann::ordered_json json_of(const Effect& effect);
 /// @throws nlohmann::json::exception where it is not a boolean, number or string
 Value value_of(const nlohmann::ordered_json& json);
+Effect effect_of(const nlohmann::ordered_json& json);
 
 }  // namespace mbtfm

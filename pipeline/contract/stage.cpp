@@ -228,6 +228,19 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
 
 }  // namespace
 
+StageReport read_report(const fs::path& record_file) {
+  try {
+    const auto record = nlohmann::ordered_json::parse(read_text(record_file));
+    StageReport report{
+        .converged = record.at("converged"), .summary = record.at("summary"), .figures = {}, .effects = {}};
+    for (const auto& [name, value] : record.at("figures").items()) report.figures.emplace_back(name, value_of(value));
+    for (const auto& effect : record.at("effects")) report.effects.push_back(effect_of(effect));
+    return report;
+  } catch (const nlohmann::json::exception& error) {
+    throw InputError(record_file.string(), "a stage's record", error.what());
+  }
+}
+
 fs::path StageContext::input(const std::string& name) {
   MBTFM_ASSERT(inputs_.contains(name));
   read_.push_back(inputs_.at(name));

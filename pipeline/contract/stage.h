@@ -57,6 +57,9 @@ class StageContext {
   std::vector<Pending> pending_;
 };
 
+/// What a stage reported when it wrote this record. @throws InputError where it is no record of a stage
+StageReport read_report(const std::filesystem::path& record_file);
+
 /// Parse the arguments, read the parameters, call `body`, put the outputs in place, write the record, return the exit
 /// code. Flags of every stage: --help --version --threads --quiet --config (or --gel)
 /// --record --check --parameters.

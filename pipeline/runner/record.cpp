@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/files.h"
 #include "pipeline/runner/toml_file.h"
 
 namespace mbtfm::runner {
@@ -22,16 +23,42 @@ json parse_json(const fs::path& file) {
   }
 }
 
-std::string first_difference(const Hashes& before, const Hashes& now) {
+struct Difference {
+  std::string name, what;
+};
+
+std::vector<Difference> differences(const Hashes& before, const Hashes& now) {
+  std::vector<Difference> result;
   for (const auto& [name, hash] : now) {
     const auto found = before.find(name);
-    if (found == before.end()) return name + " is new";
-    if (found->second != hash) return name + " has changed";
+    if (found == before.end()) result.push_back({name, " is new"});
+    if (found != before.end() && found->second != hash) result.push_back({name, " has changed"});
   }
   for (const auto& [name, hash] : before) {
-    if (!now.contains(name)) return name + " is gone";
+    if (!now.contains(name)) result.push_back({name, " is gone"});
   }
-  return {};
+  return result;
+}
+
+/// Nothing differs but, maybe, files that an earlier stage wrote of single frames.
+bool are_of_series(const std::vector<Difference>& differences) {
+  return std::all_of(differences.begin(), differences.end(), [](const Difference& difference) {
+    return std::any_of(stages().begin(), stages().end(),
+                       [&](const Stage& stage) { return is_of_series(stage, difference.name); });
+  });
+}
+
+/// Those of a time series that the tracker wrote, one for each frame that it did not refuse.
+std::vector<std::string> frames_read(const fs::path& cell, const std::string& list) {
+  const CsvTable table(cell / list);
+  table.require({"frame", "refused"});
+  std::vector<std::string> names;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    if (!table.text(row, "refused").empty()) continue;
+    const fs::path file = fs::path(list).parent_path() / displacement_of_frame(table.integer(row, "frame", 1));
+    names.push_back(file.generic_string());
+  }
+  return names;
 }
 
 }  // namespace
@@ -55,9 +82,22 @@ std::optional<StageRecord> read_record(const fs::path& record_file) {
   return record;
 }
 
-void write_begun(const fs::path& record_file, const Stage& stage) {
+void write_begun(const fs::path& record_file, const Stage& stage, const std::string& record_before) {
   fs::create_directories(record_file.parent_path());
-  write_whole(record_file, json{{"stage", stage.name}, {"run", {{"finished", false}}}}.dump(1) + "\n");
+  nlohmann::ordered_json begun = {{"stage", stage.name}};
+  if (!record_before.empty()) begun = nlohmann::ordered_json::parse(record_before);
+  begun["run"] = {{"finished", false}};
+  write_whole(record_file, begun.dump(1) + "\n");
+}
+
+std::vector<std::string> series_outputs(const fs::path& cell, const Stage& stage) {
+  std::vector<std::string> names;
+  const json record = parse_json(cell / stage.folder / "record.json");
+  for (const json& output : record.value("outputs", json::array())) {
+    const fs::path file = fs::path(stage.folder) / output.value("file", "");
+    if (is_of_series(stage, file.generic_string())) names.push_back(file.generic_string());
+  }
+  return names;
 }
 
 void forget_begun(const fs::path& record_file) {
@@ -131,7 +171,9 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
   for (const PathArgument& argument : stage.arguments) {
-    if (!argument.where.empty() && fs::is_regular_file(cell / argument.where)) names.push_back(argument.where);
+    if (argument.where.empty() || !fs::is_regular_file(cell / argument.where)) continue;
+    names.push_back(argument.where);
+    for (std::string& name : frames_read(cell, argument.where)) names.push_back(std::move(name));
   }
   return names;
 }
@@ -179,6 +221,12 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
   }
   if (!record->finished) return {StageState::must_run, "was begun and not finished"};
   if (!missing.empty()) return {StageState::must_run, missing.front() + " is gone"};
+  const std::vector<Difference> of_inputs = differences(record->inputs, now.inputs);
+  const bool is_same = record->version == now.version && record->settings == now.settings;
+  const bool keeps_frames = is_same && are_of_series(of_inputs);
+  for (const auto& [name, hash] : record->outputs) {
+    if (!now.outputs.contains(name)) return {StageState::must_run, name + " is gone", keeps_frames};
+  }
   for (const auto& [name, hash] : now.outputs) {
     const auto ours = record->outputs.find(name);
     if (ours == record->outputs.end() || ours->second != hash) {
@@ -188,8 +236,9 @@ StageStatus status_of(const Stage& stage, const std::optional<StageRecord>& reco
   if (!stage.images.empty() && !now.has_images) return {StageState::given, "its images are gone: outputs kept"};
   if (record->version != now.version) return {StageState::must_run, "was made by version " + record->version};
   if (record->settings != now.settings) return {StageState::must_run, "its parameters have changed"};
-  const std::string difference = first_difference(record->inputs, now.inputs);
-  if (!difference.empty()) return {StageState::must_run, difference};
+  if (!of_inputs.empty()) {
+    return {StageState::must_run, of_inputs.front().name + of_inputs.front().what, keeps_frames};
+  }
   return {StageState::up_to_date, "same version, parameters and inputs"};
 }
 

@@ -27,11 +27,15 @@ struct StageRecord {
 /// Empty where the file is not there. @throws InputError where it is malformed
 std::optional<StageRecord> read_record(const std::filesystem::path& record_file);
 /// Before a stage begins: from now on its outputs may be a mixture of two runs.
-void write_begun(const std::filesystem::path& record_file, const Stage& stage);
+/// @param record_before  of a stage that keeps frames of the run before: what that run said of them stays; else empty
+void write_begun(const std::filesystem::path& record_file, const Stage& stage, const std::string& record_before = {});
 /// Take the mark back, and the folder with it where nothing else is in it.
 void forget_begun(const std::filesystem::path& record_file);
 /// The record is still the one of write_begun.
 bool is_begun(const std::filesystem::path& record_file);
+/// The files of a time series, relative to the cell folder, that the stage's record has among its outputs.
+std::vector<std::string> series_outputs(const std::filesystem::path& cell, const Stage& stage);
+
 /// What a stage took, and how it was started.
 struct StageRun {
   std::vector<std::string> command;  ///< paths relative to the cell folder
@@ -61,6 +65,7 @@ enum class StageState {
 struct StageStatus {
   StageState state = StageState::must_run;
   std::string why;
+  bool keeps_frames = false;  ///< must run for single frames of a time series alone: the others still hold
 };
 std::string name_of(StageState state);
 

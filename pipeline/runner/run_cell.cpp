@@ -115,7 +115,8 @@ class CellRun {
   void check_before_start(CellOutcome& now) const;
   void run_chains(CellOutcome& outcome);
   void bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome);
-  void start(const Stage& stage, const StageSurroundings& now, int threads, StageOutcome& outcome);
+  void start(const Stage& stage, const Present& now, int threads, StageOutcome& outcome);
+  Hashes outputs_of(const Stage& stage, const Present& before);
   void say(const Stage& stage, const std::string& what) const;
 
   fs::path cell_;
@@ -187,13 +188,33 @@ void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& ou
   note_failure(outcome, [&] {
     const Present now = present(stage);
     outcome.status = now.status;
-    if (now.status.state == StageState::must_run) return start(stage, now.surroundings, threads, outcome);
+    if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
     outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
     say(stage, name_of(now.status.state) + ": " + now.status.why);
   });
 }
 
-void CellRun::start(const Stage& stage, const StageSurroundings& now, int threads, StageOutcome& outcome) {
+/// Of what the stage has just written. Files of a series that it does not write any more go.
+Hashes CellRun::outputs_of(const Stage& stage, const Present& before) {
+  std::vector<std::string> names = stage.writes;
+  for (std::string& name : series_outputs(cell_, stage)) names.push_back(std::move(name));
+  Hashes outputs = hashes_.hash(names);
+  for (const std::string& file : stage.writes) {
+    if (outputs.contains(file)) continue;
+    throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file, .message = {}});
+  }
+  if (!before.record) return outputs;
+  for (const auto& [name, hash] : before.record->outputs) {
+    const auto found = before.surroundings.outputs.find(name);
+    const bool is_by_hand = found != before.surroundings.outputs.end() && found->second != hash;
+    if (!outputs.contains(name)) fs::remove(cell_ / name);
+    if (before.status.keeps_frames && is_by_hand) outputs[name] = hash;  // still the user's
+  }
+  return outputs;
+}
+
+void CellRun::start(const Stage& stage, const Present& before, int threads, StageOutcome& outcome) {
+  const StageSurroundings& now = before.surroundings;
   for (const std::string& file : stage.reads) {
     if (!fs::is_regular_file(cell_ / file)) {
       throw InputError((cell_ / file).string(), "a file that an earlier stage makes", "none",
@@ -206,7 +227,11 @@ void CellRun::start(const Stage& stage, const StageSurroundings& now, int thread
   const bool had_record = fs::is_regular_file(record_file);
   const std::string record_before = had_record ? read_text(record_file) : std::string();
   remove_partial_files(record_file.parent_path());
-  write_begun(record_file, stage);
+  if (before.status.keeps_frames) {
+    command.push_back("--kept");
+    command.push_back((cell_ / stage.folder).string());
+  }
+  write_begun(record_file, stage, before.status.keeps_frames ? record_before : "");
   const ProcessResult result = run_process(command, options_.limits);
   // A stage that did not converge and yet wrote its outputs has written a record, too.
   outcome.converged = result.exit_code != exit_code::kNotSolved;
@@ -218,11 +243,7 @@ void CellRun::start(const Stage& stage, const StageSurroundings& now, int thread
     if (!result.signal && !had_record) forget_begun(record_file);
     throw StageFailed(stage.name, failure_of(result));
   }
-  const Hashes outputs = hashes_.hash(stage.writes);
-  for (const std::string& file : stage.writes) {
-    if (outputs.contains(file)) continue;
-    throw StageFailed(stage.name, {.exit_code = exit_code::kBug, .how = "did not write " + file, .message = {}});
-  }
+  const Hashes outputs = outputs_of(stage, before);
   complete_record(
       record_file,
       {.finished = true,

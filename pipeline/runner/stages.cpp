@@ -1,5 +1,7 @@
 #include "pipeline/runner/stages.h"
 
+#include <fnmatch.h>
+
 #include <algorithm>
 
 namespace mbtfm::runner {
@@ -20,6 +22,7 @@ const std::vector<Stage>& stages() {
        .output = {"out", "1_segment"},
        .reads = {},
        .writes = cell_files,
+       .series = {},
        .tables = {"", "images", "segment"},
        .effects = {}},
       {.name = "track",
@@ -30,6 +33,7 @@ const std::vector<Stage>& stages() {
        .output = {"out", "2_track"},
        .reads = {},
        .writes = {displacement},
+       .series = {"2_track/frames.csv", "2_track/displacement_*.csv"},
        .tables = {"", "images", "track"},
        .effects = {"drift_rotation", "effect_tolerance"}},
       {.name = "network",
@@ -40,6 +44,7 @@ const std::vector<Stage>& stages() {
        .output = {"out", network},
        .reads = cell_files,
        .writes = {network},
+       .series = {},
        .tables = {"", "network"},
        .effects = {"stress_fibres"}},
       {.name = "fit",
@@ -53,11 +58,17 @@ const std::vector<Stage>& stages() {
        .output = {"out", "4_fit"},
        .reads = {cell_files[0], cell_files[1], cell_files[2], cell_files[3], displacement, network},
        .writes = {"4_fit/tensions.csv", "4_fit/adhesion_forces.csv", "4_fit/fit.json", "4_fit/contracted.vtu"},
+       .series = {"4_fit/frames.csv", "4_fit/tracks.csv"},
        .tables = {"", "gel", "network", "cables", "substrate", "fit"},
        .effects = {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
                    "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"}},
   };
   return list;
+}
+
+bool is_of_series(const Stage& stage, const std::string& file) {
+  return std::any_of(stage.series.begin(), stage.series.end(),
+                     [&](const std::string& glob) { return fnmatch(glob.c_str(), file.c_str(), FNM_PATHNAME) == 0; });
 }
 
 bool is_asked(const Stage& stage, const std::vector<std::string>& only) {

@@ -28,11 +28,15 @@ struct Stage {
   PathArgument output;
   std::vector<std::string> reads;    ///< files behind `arguments`, relative to the cell folder
   std::vector<std::string> writes;   ///< files without which the stage is not done
+  std::vector<std::string> series;   ///< globs: files that it writes of a time series only
   std::vector<std::string> tables;   ///< of cell.toml that its result depends on; empty: above the first table
   std::vector<std::string> effects;  ///< keys of [effects] that it depends on
 };
 
 const std::vector<Stage>& stages();
+
+/// Is the file, relative to the cell folder, one that this stage writes of a time series?
+bool is_of_series(const Stage& stage, const std::string& file);
 
 /// Is the stage among those named? @param only  empty: all are
 bool is_asked(const Stage& stage, const std::vector<std::string>& only);

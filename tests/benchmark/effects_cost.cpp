@@ -1,5 +1,6 @@
-/// effects_cost [REPEATS]: what an effect costs that is off, against a path that does not know of it. Each is run in a
-/// process of its own, in turn; median seconds of the processor and peak memory, and by how much the pairs differ.
+/// effects_cost [REPEATS [EFFECT]]: what an effect costs that is off, against a path that does not know of it. Each is
+/// run in a process of its own, in turn; median seconds of the processor and peak memory, and by how much the pairs
+/// differ. EFFECT: rows that have this in their name.
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -12,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "mbtfm/effects.h"
+#include "mbtfm/series.h"
 #include "network/effects.h"
 #include "segment/track.h"
 #include "tests/support/bead_pair.h"
@@ -20,6 +23,8 @@
 
 namespace mbtfm {
 namespace {
+
+std::string asked_for;  // set by main; empty: all rows
 
 struct Cost {
   double seconds = 0, peak_MB = 0;
@@ -52,6 +57,7 @@ double error_of_median(std::vector<double> values) {
 }
 
 void compare(const std::string& effect, int n, const std::function<void()>& off, const std::function<void()>& without) {
+  if (effect.find(asked_for) == std::string::npos) return;
   std::vector<double> seconds[2], memory[2], percent;
   for (int i = 0; i < n; ++i) {
     for (int turn = 0; turn < 2; ++turn) {
@@ -112,6 +118,57 @@ void compare_fit(int n) {
       "elasticity of cables (against on)", n, [&] { contract(0); }, [&] { contract(50); });
 }
 
+/// Adhesions and beads alike, with fibres or without: those that are switched off leave the cell that never had any.
+void compare_fibres(int n) {
+  const Cell even = test::round_cell(25, 40);
+  Cell fibrous = even;
+  for (int k = 1; k <= 8; ++k) test::add_ventral(fibrous, k, k + 17);
+  const test::TensionScene scene = test::scene_of(even, Eigen::VectorXd::Constant(1, 0.06), 5000, 0.05, 1);
+  const auto fit = [&](const Cell& cell) {
+    inverse::LinearData data = scene.data;
+    std::vector<network::CableNetwork> networks;
+    networks.emplace_back(network::generate_network(cell, {}).network);
+    inverse::fit_ensemble(networks, data, scene.adhesion_ids, {.n_meshes = 1}, 1, {});
+  };
+  const auto fit_without = [&] {
+    Cell cell = fibrous;
+    network::take_fibres(cell, "off");
+    fit(cell);
+  };
+  compare("stress fibres", n, fit_without, [&] { fit(even); });
+}
+
+/// Three frames of a series, against as many cells that are no series.
+void compare_series(int n) {
+  Cell cell = test::round_cell(25, 40);
+  for (int k = 1; k <= 8; ++k) test::add_ventral(cell, k, k + 17);
+  Eigen::VectorXd tensions = Eigen::VectorXd::Constant(9, 3);
+  tensions[0] = 0.06;
+  test::TensionScene scene = test::scene_of(cell, tensions, 5000, 0.05, 1);
+  std::vector<inverse::SeriesFrame> frames;
+  for (int f = 1; f <= 3; ++f) {
+    contract(scene, tensions * (1 + 0.1 * f));
+    measure(scene, 0.05, static_cast<unsigned>(f));
+    frames.push_back({.frame = f, .refused = {}, .beads = scene.beads});
+  }
+  std::vector<network::CableNetwork> networks;
+  networks.emplace_back(scene.cables.network());
+  const inverse::FitParameters parameters{.n_meshes = 1};
+  const Eigen::VectorXd start = Eigen::VectorXd::Ones(tensions.size());
+  const auto off = [&] {
+    const Effect coupling = inverse::decide_time_coupling(true, "off");
+    inverse::fit_series(frames, networks, scene.compliance_um_per_nN, {}, scene.adhesion_ids, parameters,
+                        coupling.is_on, 1, {}, start);
+  };
+  const auto one_by_one = [&] {
+    for (const inverse::SeriesFrame& frame : frames) {
+      inverse::LinearData data = inverse::reduce(frame.beads, scene.compliance_um_per_nN);
+      inverse::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {}, {}, start);
+    }
+  };
+  compare("time coupling", n, off, one_by_one);
+}
+
 void compare_tracking(int n) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(512, 6), {.width = 512, .n_beads = 5200});
   const auto track = [&](const std::string& drift) {
@@ -128,8 +185,11 @@ void compare_tracking(int n) {
 
 int main(int argc, char** argv) {
   const int n = argc > 1 ? std::atoi(argv[1]) : 5;
+  mbtfm::asked_for = argc > 2 ? argv[2] : "";
   std::printf("| off | seconds | without | difference | MB | without |\n|---|---|---|---|---|---|\n");
   mbtfm::compare_gel(n);
   mbtfm::compare_fit(n);
+  mbtfm::compare_fibres(n);
+  mbtfm::compare_series(n);
   mbtfm::compare_tracking(n);
 }

@@ -53,6 +53,22 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
               4 * frames.number(1, "total_force_sigma_nN"));
   EXPECT_TRUE(fs::exists(cell / "4_fit/tracks.svg"));
 
+  const std::string before = read_text(cell / "4_fit/tracks.csv");
+  DisplacementField field = read_displacement(cell / "2_track/displacement_0002.csv");
+  for (Bead& bead : field) bead.displacement_um = 1.5 * bead.displacement_um;
+  write_displacement(cell / "2_track/displacement_0002.csv", field);
+  const Outcome changed = run_program("mbtfm run " + cell.string());
+  ASSERT_EQ(changed.code, 0) << changed.output;
+  EXPECT_NE(read_text(cell / "4_fit/record.json").find("--kept"), std::string::npos);
+  const std::string after = read_text(cell / "4_fit/tracks.csv");
+  EXPECT_EQ(after.substr(0, after.find("\n2,")), before.substr(0, before.find("\n2,")));  // the first frame's rows
+  EXPECT_NEAR(CsvTable(cell / "4_fit/frames.csv").number(1, "total_force_nN"), 3 * frames.number(0, "total_force_nN"),
+              4 * frames.number(1, "total_force_sigma_nN"));
+  EXPECT_NE(run_program("mbtfm run " + cell.string()).output.find("up to date"), std::string::npos);
+  fs::remove(cell / "2_track/displacement_0002.csv");  // nothing is there to make it from
+  EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 3);
+  write_displacement(cell / "2_track/displacement_0002.csv", field);
+
   write_text(cell / "2_track/frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
   const Outcome again = run_program("mbtfm run " + cell.string());
   EXPECT_EQ(again.code, 0) << again.output;

@@ -71,6 +71,28 @@ TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
   EXPECT_EQ(read_text(folder / "out/displacement.csv"), read_text(folder / "out/displacement_0001.csv"));
 }
 
+TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not) {
+  const test::TemporaryFolder folder;
+  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
+  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});  // of the same beads
+  write(folder / "r.tif", one.relaxed, 0.2);
+  std::filesystem::create_directory(folder / "frames");
+  write(folder / "frames/a.tif", one.stressed, 0.2);
+  write(folder / "frames/b.tif", two.stressed, 0.2);
+  const std::string arguments = files(folder, "r.tif", "frames") + " --record " + (folder / "out/record.json").string();
+  ASSERT_EQ(run_track(folder, arguments).code, 0);
+  const std::string list = read_text(folder / "out/frames.csv"), lost = read_text(folder / "out/displacement_0002.csv");
+  const std::string other = read_text(folder / "out/displacement.csv") + "1,1,0,0,0.1,by hand\n";
+  write_text(folder / "out/displacement_0001.csv", other);  // no tracking would give it
+  std::filesystem::remove(folder / "out/displacement_0002.csv");
+  const Ended ended = run_track(folder, arguments + " --kept " + (folder / "out").string());
+  ASSERT_EQ(ended.code, 0) << ended.said;
+  EXPECT_EQ(read_text(folder / "out/displacement_0002.csv"), lost);
+  EXPECT_EQ(read_text(folder / "out/displacement_0001.csv"), other);
+  EXPECT_EQ(read_text(folder / "out/frames.csv"), list);
+  EXPECT_NE(read_text(folder / "out/record.json").find("\"n_frames_kept\": 1"), std::string::npos);
+}
+
 TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   const test::TemporaryFolder folder;
   write_text(folder / "piv.csv", "x,y,u,v\n0,0,1,0\n10,0,1,0\n0,10,1,0\n10,10,NaN,0\n");

@@ -11,11 +11,11 @@ namespace {
 
 const std::vector<test::Peak> kCell = test::ring_of_adhesions(384, 6);
 
-Tracking tracked(double turn_rad, std::uint64_t seed) {
+Tracking tracked(double turn_rad, std::uint64_t seed, const std::string& drift = "auto") {
   const auto pair = test::draw_bead_pair(
       kCell, {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = {2, -1}, .seed = seed});
   TrackParameters parameters;
-  parameters.drift = "auto";
+  parameters.drift = drift;
   return track_beads(pair.relaxed, pair.stressed, 0.1, parameters, 2);
 }
 
@@ -31,6 +31,16 @@ TEST(DriftRotation, is_left_where_nothing_is_turned) {
   for (const std::uint64_t seed : {1, 2}) {
     const Tracking tracking = tracked(0, seed);
     EXPECT_FALSE(tracking.rotation.is_on) << seed << ": " << tracking.rotation.why;
+  }
+}
+
+TEST(DriftRotation, the_question_changes_nothing_where_the_answer_is_no) {
+  const DisplacementField asked = tracked(0, 1).field, not_asked = tracked(0, 1, "translation").field;
+  ASSERT_EQ(asked.size(), not_asked.size());
+  for (std::size_t i = 0; i < asked.size(); ++i) {
+    // one least squares, another column beside it: rounding of sums of some thousand terms
+    EXPECT_NEAR(norm(asked[i].displacement_um - not_asked[i].displacement_um), 0, 1e-10);
+    EXPECT_EQ(asked[i].flag, not_asked[i].flag);
   }
 }
 

@@ -42,13 +42,13 @@ Series make_series(int n_frames) {
   return series;
 }
 
-std::vector<FrameFit> fit(const Series& series) {
+std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kept = {}) {
   std::vector<network::CableNetwork> networks;
   networks.emplace_back(series.scene.cables.network());
   FitParameters parameters;
   parameters.n_meshes = 1;
   return fit_series(series.frames, networks, series.scene.compliance_um_per_nN, {}, series.scene.adhesion_ids,
-                    parameters, true, 2, {}, Eigen::VectorXd::Ones(series.scene.tensions_nN.size()));
+                    parameters, true, 2, {}, Eigen::VectorXd::Ones(series.scene.tensions_nN.size()), kept);
 }
 
 TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
@@ -98,6 +98,58 @@ TEST(Series, flagged_beads_do_not_count) {
     EXPECT_NE(before[0].tensions[i].tension_nN, without[0].tensions[i].tension_nN);
     EXPECT_EQ(wrong[0].tensions[i].tension_nN, without[0].tensions[i].tension_nN);
   }
+}
+
+TEST(Series, the_compliance_of_beads_that_the_frames_share_is_found_once) {
+  const Series series = make_series(2);
+  int n_calls = 0;
+  const auto compliance = [&](const DisplacementField& beads) -> Eigen::MatrixXd {
+    ++n_calls;
+    Eigen::MatrixXd places(2 * beads.size(), 1);
+    for (std::size_t i = 0; i < beads.size(); ++i) {
+      places(2 * static_cast<Eigen::Index>(i), 0) = beads[i].position_um.x;
+      places(2 * static_cast<Eigen::Index>(i) + 1, 0) = beads[i].position_um.y;
+    }
+    return places;
+  };
+  DisplacementField good;  // as displacement.csv without the beads that its frame flags
+  for (std::size_t i = 3; i < series.frames[0].beads.size(); i += 2) good.push_back(series.frames[0].beads[i]);
+  const Compliances shared = compliances_of(good, series.frames, compliance);
+  EXPECT_EQ(n_calls, 1);
+  EXPECT_EQ(shared.of_beads, compliance(good));
+  EXPECT_EQ(shared.of_series, compliance(series.frames[0].beads));
+  good.back().position_um.x += 1;  // a field of another origin beside the series
+  n_calls = 0;
+  const Compliances apart = compliances_of(good, series.frames, compliance);
+  EXPECT_EQ(n_calls, 2);
+  EXPECT_EQ(apart.of_beads, compliance(good));
+  compliances_of(good, {}, compliance);
+  EXPECT_EQ(n_calls, 4);
+}
+
+TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
+  Series series = make_series(3);
+  for (SeriesFrame& frame : series.frames) frame.sha256 = "file " + std::to_string(frame.frame);
+  std::vector<FrameFit> whole = fit(series);
+  const test::TemporaryFolder folder;
+  whole[0].tensions[0].tension_nN = 42;  // no fit gives it
+  write_tracks(folder / "tracks.csv", whole, {}, 30);
+  write_frames(folder / "frames.csv", whole, 30);
+  const std::vector<FrameFit> known = read_fits(folder / "");
+  contract(series.scene, series.true_nN[0]);
+  measure(series.scene, kNoise, 99);
+  series.frames[1] = {.frame = 2, .refused = {}, .sha256 = "another file", .beads = series.scene.beads};
+  const std::vector<FrameFit> again = fit(series, known);
+  EXPECT_EQ(again[0].tensions[0].tension_nN, 42);
+  EXPECT_NE(again[1].total_force_nN.value, whole[1].total_force_nN.value);
+  EXPECT_EQ(again[1].displacement_sha256, "another file");
+  EXPECT_EQ(again[2].total_force_nN.value, whole[2].total_force_nN.value);
+  const auto written = [&](const std::vector<FrameFit>& fits) {
+    write_tracks(folder / "t.csv", fits, {}, 30);
+    write_frames(folder / "f.csv", fits, 30);
+    return read_text(folder / "t.csv") + read_text(folder / "f.csv");
+  };
+  EXPECT_EQ(written(known), written(whole));  // the same bytes
 }
 
 TEST(Series, frames_of_other_beads_are_an_error_that_names_the_file) {

@@ -39,22 +39,28 @@ while [ $# -gt 0 ]; do
     --record) record=$2; shift 2;;
     --config) config=$2; shift 2;;
     --threads) shift 2;;
+    --kept) kept=$2; shift 2;;
     *) [ -f "$2" ] && all="$all $2"; shift 2;;
   esac
 done
 if [ -n "$check" ]; then grep -q refuse_$name "$config" && { echo "mbtfm-$name: error: refused" >&2; exit 2; }; exit 0; fi
-echo $name >> "$here/calls"
+echo $name${kept:+-keeping} >> "$here/calls"
 [ -f "$here/shell-$name" ] && . "$here/shell-$name"
 code=0; [ -f "$here/exit-$name" ] && code=$(cat "$here/exit-$name")
 [ $code -ne 0 ] && [ $code -ne 4 ] && { echo "mbtfm-$name: error: made to fail" >&2; exit $code; }
 sum=$(cat $all "$config" | cksum)
 case $name in
   segment) for f in adhesions fibres fibre_points outline; do echo same > "$out/$f.csv"; done;;
-  track) echo "$sum" > "$out/displacement.csv";;
+  track) echo "$sum" > "$out/displacement.csv"
+    if [ -f "$here/series" ]; then
+      printf 'frame,refused\n1,\n2,blurred\n3,\n' > "$out/frames.csv"
+      for k in 1 3; do [ -n "$kept" -a -f "$out/displacement_000$k.csv" ] || echo "$k" > "$out/displacement_000$k.csv"; done
+      outputs='{"file": "frames.csv"}, {"file": "displacement_0001.csv"}, {"file": "displacement_0003.csv"}'
+    fi;;
   network) echo "$sum" > "$out";;
   fit) for f in tensions.csv adhesion_forces.csv fit.json contracted.vtu; do echo "{}" > "$out/$f"; done;;
 esac
-echo "{\"stage\": \"$name\", \"version\": \"1\", \"summary\": \"made by a script\"}" > "$record"
+echo "{\"stage\": \"$name\", \"version\": \"1\", \"summary\": \"made by a script\", \"outputs\": [$outputs]}" > "$record"
 exit $code
 )sh";
 
@@ -126,6 +132,40 @@ TEST_F(Runner, runs_again_exactly_what_depends_on_a_changed_table) {
   EXPECT_EQ(started(), "fit track");  // the script's displacement differs for another cell.toml
   write_parameters("[fit]\nn_meshes = 2\n[track]\nx = 1\n[segment]\ny = 1\n");
   EXPECT_EQ(started(), "segment");  // its outputs are the same bytes: nothing after it is affected
+}
+
+TEST_F(Runner, a_single_frame_of_a_series_that_is_lost_or_changed_is_made_anew_and_the_others_kept) {
+  write_text(bin_ / "series", "");
+  EXPECT_EQ(started(), "fit network segment track");
+  EXPECT_EQ(started(), "");
+  fs::remove(cell_ / "2_track/displacement_0003.csv");
+  EXPECT_EQ(started(), "track-keeping");  // it comes out as it was: the fit holds
+  EXPECT_TRUE(fs::exists(cell_ / "2_track/displacement_0003.csv"));
+  EXPECT_EQ(started(), "");
+  write_text(cell_ / "2_track/displacement_0001.csv", "by hand");
+  EXPECT_EQ(started(), "fit-keeping");
+  EXPECT_EQ(state_of("track"), StageState::replaced);
+  EXPECT_EQ(started(), "");
+  fs::remove(cell_ / "2_track/displacement_0003.csv");
+  EXPECT_EQ(started(), "track-keeping");
+  EXPECT_EQ(read_text(cell_ / "2_track/displacement_0001.csv"), "by hand");
+  EXPECT_EQ(started(), "");
+  EXPECT_EQ(state_of("track"), StageState::replaced);  // still the user's
+  fs::remove(cell_ / "2_track/displacement_0003.csv");
+  write_parameters("[track]\nx = 1\n");
+  EXPECT_EQ(started(), "fit track");  // nothing that other parameters gave is kept
+  EXPECT_EQ(read_text(cell_ / "2_track/displacement_0001.csv"), "1\n");
+}
+
+TEST_F(Runner, what_is_left_of_a_series_does_not_outlive_it) {
+  write_text(bin_ / "series", "");
+  started();
+  fs::remove(bin_ / "series");
+  write_text(cell_ / "beads_stressed.tif", "a single image");
+  EXPECT_EQ(started(), "fit track");
+  EXPECT_FALSE(fs::exists(cell_ / "2_track/frames.csv"));
+  EXPECT_FALSE(fs::exists(cell_ / "2_track/displacement_0003.csv"));
+  EXPECT_EQ(started(), "");
 }
 
 TEST_F(Runner, order_and_comments_of_the_parameter_file_do_not_matter) {
