@@ -138,20 +138,6 @@ void formulations(Cells cells) {
   }
 }
 
-/// The fit repeated with the data weighed by an error of each adhesion's force that is as between the meshes, in all as
-/// large as the fit found it.
-double error_if_weighed(const EnsembleFit& found, const std::vector<network::CableNetwork>& networks, LinearData data,
-                        const OtherNetwork& o) {
-  Eigen::VectorXd between = Eigen::VectorXd::Zero(found.forces_nN.size());
-  for (const MeshFit& mesh : found.meshes) between += (mesh.fit.trial.forces_nN - found.forces_nN).cwiseAbs2();
-  for (Eigen::Index row = 0; row < between.size(); row += 2)
-    between.segment<2>(row).setConstant(between.segment<2>(row).mean());
-  ModelError error = *found.model_error;
-  error.force_variance_nN2 = between * (error.force_variance_nN2.sum() / between.sum());
-  data.reduced = whitened(data.reduced, error);
-  return relative_error(fit(networks, data, o), o);
-}
-
 void truths(Cells cells) {
   const std::pair<const char*, network::NetworkParameters> formulations[] = {
       {"second neighbours", {}},
@@ -165,8 +151,10 @@ void truths(Cells cells) {
       for (LinearData* data : {&o.noisy, &o.exact}) {
         const EnsembleFit found = fit(networks, *data, o);
         const Score s = score(found, o);
+        LinearData weighed = *data;
+        weighed.reduced = whitened(found.data, *found.model_error);
         std::printf("%d,%s,%g,%.4f,%.3f,%.3f,%.4f\n", int(c), name, data == &o.noisy ? 1e3 * kNoise_um : 0,
-                    s.relative_error, s.over_stated, s.coverage, error_if_weighed(found, networks, *data, o));
+                    s.relative_error, s.over_stated, s.coverage, relative_error(fit(networks, weighed, o), o));
       }
     }
   }
