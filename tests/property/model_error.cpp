@@ -200,5 +200,39 @@ TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_e
   }
 }
 
+TEST(ModelError, widens_the_profile_as_it_does_the_standard_error_where_no_bound_is_near) {
+  LocalMisfit local{
+      .tensions_nN = Eigen::Vector2d(30, 40), .H = Eigen::Matrix2d::Identity(), .g = Eigen::Vector2d(0, 0)};
+  local.H << 2, 0.8, 0.8, 1;
+  local.model_variance = Eigen::Matrix2d::Identity();
+  local.model_variance << 6, -1, -1, 3;
+  const Eigen::Matrix2d K = local.H.inverse(), covariance = 1.5 * K + K * local.model_variance * K;
+  EXPECT_TRUE(covariance_nN2(local, 1.5).isApprox(covariance, 1e-9));
+  for (int i = 0; i < 2; ++i) {
+    const Sides sides = profile_95(local, 1.5, i);
+    EXPECT_NEAR(sides.below, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.below);
+    EXPECT_NEAR(sides.above, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.above);
+  }
+}
+
+TEST(ModelError, is_drawn_by_the_bootstrap_as_the_covariance_has_it) {
+  Cell cell = test::round_cell(12, 12);
+  for (int i = 1; i <= 3; ++i) test::add_ventral(cell, i, i + 6);
+  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 2, 5, 4), 800, 0.01, 3);
+  std::vector<network::CableNetwork> networks;
+  for (std::uint64_t seed = 11; seed <= 12; ++seed)
+    networks.emplace_back(network::generate_network(cell, {.seed = seed}).network);
+  FitParameters parameters;
+  const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
+  parameters.bootstrap = 80;
+  const EnsembleFit drawn = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
+  for (std::size_t i = 1; i < 4; ++i) {
+    const Estimate& e = fit.tensions_nN[i];
+    EXPECT_GT(e.standard_error, 1.5 * e.noise) << "the model must count for this to tell anything";
+    // 80 draws tell a standard deviation to 8 %; four of those
+    EXPECT_NEAR(drawn.tensions_nN[i].standard_error / e.standard_error, 1, 0.32) << "fibre " << i;
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm::inverse
