@@ -14,8 +14,6 @@ namespace mbtfm::inverse {
 
 namespace {
 
-constexpr int kFewestForModelError = 3;  // two meshes tell of their spread as much as of nothing
-
 void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
   if (n_components >= n_tensions) return;
   throw InvalidData("displacement",
@@ -51,16 +49,18 @@ bool is_near_a_bound(const MeshFit& mesh) {
 }
 
 void add_errors(MeshFit& mesh, const EnsembleFit& all) {
-  const double variance = all.variance;
-  mesh.covariance_nN2 = mesh.noise_covariance_nN2 = covariance_nN2(mesh.local, variance);
-  if (all.model_error) {  // A s² diag(noise share) Aᵀ, A = Cov Jᵀ / s²
-    const Eigen::MatrixXd A = mesh.covariance_nN2 * (all.data.compliance * mesh.force_derivatives).transpose();
-    mesh.noise_covariance_nN2 = A * all.model_error->noise_share.asDiagonal() * A.transpose() / variance;
-  }
-  mesh.past_bounds_nN = past_bounds_nN(mesh.local, variance);
+  const Eigen::MatrixXd J = all.data.compliance * mesh.force_derivatives;
+  const Eigen::MatrixXd by_slope = J.transpose() * all.data.compliance;
+  if (all.model_error)
+    mesh.local.model_variance = by_slope * all.model_error->force_variance_nN2.asDiagonal() * by_slope.transpose();
+  mesh.response = response_of(mesh.local, all.variance);
+  mesh.by_force = mesh.response * by_slope;
+  mesh.noise_covariance_nN2 = all.variance * mesh.response;
+  mesh.covariance_nN2 = covariance_nN2(mesh.local, all.variance);
+  mesh.past_bounds_nN = past_bounds_nN(mesh.local, all.variance);
   if (!is_near_a_bound(mesh)) return;
   for (int i = 0; i < static_cast<int>(mesh.local.g.size()); ++i) {
-    mesh.intervals_95.push_back(profile_95(mesh.local, variance, i));
+    mesh.intervals_95.push_back(profile_95(mesh.local, all.variance, i));
   }
 }
 
@@ -73,8 +73,9 @@ void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& n
     std::vector<std::uint64_t> draws;
     for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
     const TensionProblem problem(networks[m], all.data, adhesion_ids);
-    const Eigen::MatrixXd of_mesh =
-        bootstrap_deviations_nN(problem, parameters, all.meshes[m].fit.trial, all.variance, draws, threads);
+    const Eigen::MatrixXd of_mesh = bootstrap_deviations_nN(
+        problem, parameters, all.meshes[m].fit.trial, all.variance,
+        all.model_error ? all.model_error->force_variance_nN2 : Eigen::VectorXd(), draws, threads);
     for (std::size_t i = 0; i < deviations.size(); ++i) {
       const auto row = of_mesh.row(static_cast<Eigen::Index>(i));
       deviations[i].insert(deviations[i].end(), row.begin(), row.end());
@@ -83,34 +84,41 @@ void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& n
   for (std::size_t i = 0; i < deviations.size(); ++i) {
     double sum = 0;
     for (const double d : deviations[i]) sum += d * d;
-    all.tensions_nN[i].fitted = std::sqrt(sum / parameters.bootstrap);
-    all.tensions_nN[i].fitted_95 = percentiles_95(deviations[i]);
+    all.tensions_nN[i].standard_error = std::sqrt(sum / parameters.bootstrap);
+    all.tensions_nN[i].sides_95 = percentiles_95(deviations[i]);
   }
 }
 
 /// Mean and errors of a quantity that is linear in the tensions about each mesh's solution.
-/// @param value_of  of a mesh; @param gradient_of  by tension; @param own_variance  of the model, beside the tensions
+/// @param value_of  of a mesh; @param gradient_of  by tension
+/// @param along  the quantity by force: its own error is the model's, beside that of the tensions; empty for tensions
 template <class ValueOf, class GradientOf>
 Estimate estimate_of(const EnsembleFit& all, const ValueOf& value_of, const GradientOf& gradient_of,
-                     double own_variance = 0) {
+                     const Eigen::VectorXd& along = {}) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
-  std::vector<double> values;
   Estimate estimate;
-  double noise = 0, fitted = own_variance;
+  double noise = 0;
+  Eigen::VectorXd model = Eigen::VectorXd::Zero(all.model_error ? all.forces_nN.size() : 0);
   for (const MeshFit& mesh : all.meshes) {
-    values.push_back(value_of(mesh));
-    estimate.value += values.back() / n_meshes;
+    estimate.value += value_of(mesh) / n_meshes;
     const Eigen::VectorXd gradient = gradient_of(mesh);
     noise += gradient.dot(mesh.noise_covariance_nN2 * gradient) / n_meshes;
-    fitted += gradient.dot(mesh.covariance_nN2 * gradient) / n_meshes;
+    if (model.size() == 0) continue;
+    Eigen::VectorXd by_force = mesh.by_force.transpose() * gradient;
+    if (along.size() > 0) by_force -= along;
+    model += by_force.cwiseAbs2().cwiseProduct(all.model_error->force_variance_nN2) / n_meshes;
   }
-  estimate.noise = std::sqrt(std::max(0.0, noise));
-  estimate.fitted = std::sqrt(std::max(0.0, fitted));
-  estimate.spread = spread_of(values, all.model_error.has_value());
+  noise = std::max(0.0, noise);
+  const double variance = noise + model.sum();
+  estimate.noise = std::sqrt(noise);
+  estimate.standard_error = std::sqrt(variance);
+  double squares = 0;  // Welch–Satterthwaite, over the adhesions
+  for (Eigen::Index row = 0; row < model.size(); row += 2) squares += std::pow(model.segment<2>(row).sum(), 2);
+  if (squares > 0) estimate.degrees = std::min(1e6, variance * variance / squares * kDegreesByAdhesion);
   return estimate;
 }
 
-/// The fitted part of a tension's interval: the mean of the meshes'.
+/// A tension's interval where any mesh has a bound near: the mean of the meshes'.
 std::optional<Sides> mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
   const bool any = std::any_of(meshes.begin(), meshes.end(), [](const MeshFit& m) { return !m.intervals_95.empty(); });
   if (!any) return {};
@@ -128,16 +136,13 @@ std::optional<Sides> mean_sides(const std::vector<MeshFit>& meshes, std::size_t 
 /// Errors by way of the forces' directions in the mean over meshes.
 Estimate total_force_of(const EnsembleFit& all) {
   const Eigen::VectorXd along = directions_of(all.forces_nN);
-  double own_variance = 0;  // of each force along itself, none alike: see model_error()
-  for (Eigen::Index row = 0; all.model_error && row < along.size(); row += 2)
-    own_variance += all.model_error->force_variance_nN2[row];
   return estimate_of(
       all,
       [&](const MeshFit& mesh) {
         return along.dot(mesh.fit.trial.forces_nN + mesh.force_derivatives * mesh.past_bounds_nN) -
                magnitude_bias_nN(all.forces_nN, mesh.force_derivatives, mesh.covariance_nN2);
       },
-      [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, own_variance);
+      [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, along);
 }
 
 /// Proportional to the network's tension.
@@ -183,17 +188,15 @@ void add_estimates(EnsembleFit& all) {
   }
   for (Eigen::Index i = 0; i < n_tensions; ++i) {
     all.tensions_nN.push_back(sum_of(all, {static_cast<int>(i)}));
-    all.tensions_nN.back().fitted_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
+    all.tensions_nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
   }
   for (Eigen::Index row = 0; row < all.forces_nN.size(); row += 2) {
     const Eigen::Vector2d force = all.forces_nN.segment<2>(row);
-    const Eigen::Vector2d along = force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+    Eigen::VectorXd along = Eigen::VectorXd::Zero(all.forces_nN.size());
+    along.segment<2>(row) = force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
     all.force_magnitudes_nN.push_back(estimate_of(
-        all, [&](const MeshFit& mesh) { return along.dot(mesh.fit.trial.forces_nN.segment<2>(row)); },
-        [&](const MeshFit& mesh) -> Eigen::VectorXd {
-          return mesh.force_derivatives.middleRows<2>(row).transpose() * along;
-        },
-        all.model_error ? all.model_error->force_variance_nN2[row] : 0.0));
+        all, [&](const MeshFit& mesh) { return along.dot(mesh.fit.trial.forces_nN); },
+        [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, along));
   }
   all.total_force_nN = total_force_of(all);
   all.network_force_nN = network_force_of(all);
@@ -215,16 +218,16 @@ FirstFit fit_first(const network::CableNetwork& network, LinearData& data, const
   return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
 }
 
-/// What each mesh makes of these tensions.
-std::vector<MeshForces> forces_at(const std::vector<network::CableNetwork>& networks, const ReducedData& data,
-                                  const std::vector<int>& adhesion_ids, const Trial& trial, int threads) {
-  std::vector<MeshForces> forces(networks.size());
-  parallel_for(static_cast<int>(networks.size()), threads, [&](int m) {
-    const auto i = static_cast<std::size_t>(m);
-    const TensionProblem problem(networks[i], data, adhesion_ids);
-    const Trial here = problem.evaluate(trial.tensions_nN, m == 0 ? &trial : nullptr);
-    forces[i] = {here.forces_nN, problem.force_derivatives(here)};
-  });
+/// What each mesh makes of the mean tensions, by its derivatives about its own.
+std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
+  Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.fibre_ids.size()));
+  for (const MeshFit& mesh : all.meshes) mean_nN += mesh.fit.trial.tensions_nN / static_cast<double>(all.meshes.size());
+  std::vector<MeshForces> forces;
+  for (const MeshFit& mesh : all.meshes) {
+    const Trial& trial = mesh.fit.trial;
+    forces.push_back(
+        {trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN), mesh.force_derivatives});
+  }
   return forces;
 }
 
@@ -265,15 +268,6 @@ double total_nN(const Eigen::VectorXd& forces_nN) {
   return sum;
 }
 
-double spread_of(const std::vector<double>& values, bool is_cell_counted) {
-  const double n = static_cast<double>(values.size());
-  if (n < 2) return 0;
-  double mean = 0, sum = 0;
-  for (const double v : values) mean += v / n;
-  for (const double v : values) sum += (v - mean) * (v - mean);
-  return std::sqrt(sum / (n - 1) * (is_cell_counted ? 1 / n : 1 + 1 / n));
-}
-
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
   Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;
@@ -306,43 +300,36 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   tell();
   all.data = data.reduced;
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
-  if (parameters.model_error == "meshes" && n_meshes >= kFewestForModelError && !solved_misfit) {
-    const double variance = variance_beside_model_error(data, first.fit.trial.forces_nN, n_tensions, all.loss);
-    all.model_error =
-        model_error(forces_at(networks, data.reduced, adhesion_ids, first.fit.trial, threads), data.reduced, variance);
-    all.data = all.model_error->data;
-  }
   const Eigen::VectorXd answer = first.fit.trial.tensions_nN;
   parallel_for(n_meshes, threads, [&](int m) {
     const auto i = static_cast<std::size_t>(m);
     const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit);
-    const bool is_done = m == 0 && !all.model_error;
-    all.meshes[i] = describe(problem, is_done ? std::move(first.fit)
-                                              : fit_tensions(problem, parameters, 1, scaled_to_data(problem, answer)));
+    all.meshes[i] = describe(
+        problem, m == 0 ? std::move(first.fit) : fit_tensions(problem, parameters, 1, scaled_to_data(problem, answer)));
     tell();
   });
   add_means(all);
   all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
                                static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
-  all.variance =
-      all.model_error ? all.model_error->noise_variance : misfit_variance(data, all.forces_nN, n_tensions, all.loss);
+  all.variance = misfit_variance(data, all.forces_nN, n_tensions, all.loss);
+  if (n_meshes > 1) {
+    all.model_error = model_error(forces_at_mean(all), data.reduced,
+                                  variance_beside_model_error(data, all.forces_nN, n_tensions, all.loss));
+    all.variance = all.model_error->noise_variance;
+  }
   parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   add_estimates(all);
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;
 }
 
-Interval interval_95(const Estimate& estimate, int n_meshes) {
+Interval interval_95(const Estimate& estimate) {
   const double normal = boost::math::quantile(boost::math::normal(), 0.975);
-  const auto half_width = [&](double fitted) {
-    const double error = std::hypot(fitted, estimate.spread);
-    if (n_meshes < 2 || error == 0 || estimate.from_mesh() <= 0) return normal * error;
-    const double degrees = (n_meshes - 1) / std::pow(std::min(1.0, estimate.from_mesh() / error), 4);
-    return boost::math::quantile(boost::math::students_t(std::min(degrees, 1e6)), 0.975) * error;
-  };
-  const Sides sides = estimate.fitted_95.value_or(Sides{normal * estimate.fitted, normal * estimate.fitted});
-  return {.low = std::max(0.0, estimate.value - half_width(sides.below / normal)),
-          .high = estimate.value + half_width(sides.above / normal)};
+  const double student = boost::math::quantile(boost::math::students_t(estimate.degrees), 0.975);
+  const double half = normal * estimate.standard_error;
+  const Sides sides = estimate.sides_95.value_or(Sides{half, half});
+  return {.low = std::max(0.0, estimate.value - student / normal * sides.below),
+          .high = estimate.value + student / normal * sides.above};
 }
 
 }  // namespace mbtfm::inverse

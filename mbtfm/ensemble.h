@@ -14,16 +14,15 @@
 
 namespace mbtfm::inverse {
 
-/// An estimate with the parts of its standard error.
+/// An estimate with its standard error.
 struct Estimate {
   double value = 0;
-  double noise = 0;   ///< from the beads
-  double fitted = 0;  ///< from the beads and the model error that the fit counts with; noise, where it counts with none
-  double spread = 0;  ///< between the fits of the meshes, beside that; 0 for one mesh
-  std::optional<Sides> fitted_95 = {};  ///< where the part of `fitted` in the 95 % interval is not 1.96 times it
-  double standard_error() const { return std::hypot(fitted, spread); }
-  /// The part of the standard error that another mesh would change.
-  double from_mesh() const { return std::sqrt(std::max(0.0, fitted * fitted - noise * noise) + spread * spread); }
+  double noise = 0;           ///< from the beads
+  double standard_error = 0;  ///< from the beads and the error of the model; noise, where there is but one mesh
+  double degrees = 1e6;       ///< of freedom that the standard error has: few where few adhesions' errors make it
+  std::optional<Sides> sides_95 = {};  ///< where the 95 % interval is not 1.96 times it, but for the degrees
+  /// The part of the standard error that is the model's.
+  double from_model() const { return std::sqrt(std::max(0.0, standard_error * standard_error - noise * noise)); }
 };
 
 /// What one mesh says.
@@ -31,17 +30,19 @@ struct MeshFit {
   TensionFit fit;
   Eigen::MatrixXd force_derivatives;  ///< dR/dt at the solution
   LocalMisfit local;
-  Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from all that the fit counts with
+  Eigen::MatrixXd response;                          ///< of the tensions to −Jᵀ r, as response_of() has it
+  Eigen::MatrixXd by_force;                          ///< what an error of each force makes of the tensions
+  Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from noise and model
   Eigen::MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
   Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
-  std::vector<Sides> intervals_95;                   ///< of the tensions, from all that the fit counts with
+  std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
 };
 
 struct EnsembleFit {
   std::vector<int> fibre_ids;  ///< front() is 0, the actin network
   std::vector<Estimate> tensions_nN;
-  Eigen::MatrixXd covariance_nN2;             ///< of the tensions, as the fit counts; mean over the meshes
+  Eigen::MatrixXd covariance_nN2;             ///< of the tensions; mean over the meshes
   Eigen::VectorXd forces_nN;                  ///< by adhesion: fx, fy; mean over the meshes
   Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
   std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
@@ -50,15 +51,15 @@ struct EnsembleFit {
   Estimate total_force_nN, network_force_nN;
   double chi_squared_per_degree = 0;      ///< of the mean over meshes: 1 where the model explains all but the noise
   double variance = 0;                    ///< of a component of `data`: see misfit_variance
-  ReducedData data;                       ///< as the fit weighs it
+  ReducedData data;                       ///< as the loss weighs it
   std::string loss;                       ///< that the first fit called for
-  std::optional<ModelError> model_error;  ///< where the fit counts with one
+  std::optional<ModelError> model_error;  ///< that two meshes or more tell
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is
 };
 
-/// Fit on the first network; at its answer, see how the networks differ (three of them or more); then fit on each, with
-/// that for the error of the model, in threads.
+/// Fit on the first network, then, from its answer, on the others in threads; how they differ (two of them or more) and
+/// what they leave unexplained is the error of the model.
 /// @param data  its weights by bead are set anew: 1, or as a robust loss has them
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
 /// @param start  tensions to start from, and an equilibrium of the first network near by; null: all equal
@@ -67,12 +68,11 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
                          const Progress& progress, const SolvedMisfit& solved_misfit = {},
                          const Trial* start = nullptr);
 
-/// 95 % interval of a positive quantity: both parts of the error combined to either side. Student's t with the degrees
-/// of freedom that they have together (Welch–Satterthwaite): many for the noise, meshes − 1 for what meshes tell.
+/// 95 % interval of a positive quantity, by Student's t.
 struct Interval {
   double low = 0, high = 0;
 };
-Interval interval_95(const Estimate& estimate, int n_meshes);
+Interval interval_95(const Estimate& estimate);
 
 /// A trial of the first network at these tensions, but for its equilibrium, which is near: where the next frame starts.
 Trial next_start(const EnsembleFit& fit);
@@ -86,11 +86,6 @@ Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN);
 
 /// Sum of the magnitudes of forces (fx, fy by adhesion).
 double total_nN(const Eigen::VectorXd& forces_nN);
-
-/// Standard error that the meshes add to the mean of these values, one a mesh. Where the fit counts with their error
-/// the cell's own deviation is in its covariance, and the mean's is left: s² / n. Else that of one further mesh about
-/// the mean of these: s² (1 + 1/n).
-double spread_of(const std::vector<double>& values, bool is_cell_counted);
 
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);

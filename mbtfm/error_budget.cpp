@@ -26,12 +26,10 @@ struct Gain {
 /// dt = Cov Jᵀ C e / s² for an error e of the forces; total force: d|R| = eᵀ (dR/dt dt + dR).
 Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
   const Index n = mesh.covariance_nN2.rows();
-  const MatrixXd J = fit.data.compliance * mesh.force_derivatives;
-  const MatrixXd M = mesh.covariance_nN2 * J.transpose() * fit.data.compliance / fit.variance;
   const VectorXd e = directions_of(fit.forces_nN);
   Gain gain{MatrixXd::Identity(n + 1, n), {}, {}};
   gain.of_tensions.row(n) = e.transpose() * mesh.force_derivatives;
-  gain.of_forces = gain.of_tensions * M;
+  gain.of_forces = gain.of_tensions * mesh.by_force;
   gain.of_model = gain.of_forces;
   gain.of_model.row(n) -= e.transpose();
   return gain;
@@ -60,7 +58,7 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
   for (Index i = 0; i < slope.size(); ++i) {
     if (mesh.local.tensions_nN[i] <= 0) slope[i] = std::min(slope[i], 0.0);  // at its bound, where the minimum is
   }
-  const VectorXd step = mesh.covariance_nN2 * slope / fit.variance;
+  const VectorXd step = mesh.response * slope;
   return (gain.of_tensions * step).cwiseAbs() + imbalance * (gain.of_tensions * mesh.local.tensions_nN).cwiseAbs();
 }
 
@@ -76,27 +74,12 @@ MeanVariances mean_variances(const BudgetInputs& in) {
     mean.solver += solver_error(in.fit, mesh, gain).cwiseAbs2() / n;
     mean.model += (1 - bead_share(in)) / n * noise;
     if (!in.fit.model_error) continue;
-    const double of_mesh = in.fit.model_error->least_kappa / in.fit.model_error->kappa;
+    const double of_mesh = in.fit.model_error->least_phi_nN / std::max(in.fit.model_error->phi_nN, 1e-300);
     const VectorXd both = variances(gain.of_model, in.fit.model_error->force_variance_nN2);
     mean.mesh += of_mesh / n * both;
     mean.model += (1 - of_mesh) / n * both;
   }
   return mean;
-}
-
-/// Variances between the meshes' own answers, tensions and total force.
-VectorXd spread_variances(const EnsembleFit& fit) {
-  const auto n = static_cast<Index>(fit.fibre_ids.size());
-  const VectorXd e = directions_of(fit.forces_nN);
-  VectorXd result(n + 1);
-  for (Index i = 0; i <= n; ++i) {
-    std::vector<double> values;
-    for (const MeshFit& mesh : fit.meshes) {
-      values.push_back(i < n ? mesh.fit.trial.tensions_nN[i] : e.dot(mesh.fit.trial.forces_nN));
-    }
-    result[i] = std::pow(spread_of(values, fit.model_error.has_value()), 2);
-  }
-  return result;
 }
 
 /// Answers to displacements of the beads, 2·beads columns: those of the forces that these displacements look like,
@@ -274,7 +257,6 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const Gain gain = gain_of(in.fit, in.fit.meshes.front());
   const MatrixXd of_beads = gain_of_beads(in, gain);
   const MeanVariances mean = mean_variances(in);
-  const VectorXd mesh = mean.mesh + spread_variances(in.fit);
   const VectorXd segmentation = segmentation_variances(in, gain, of_beads, threads);
   const VectorXd substrate = substrate_variances(in, gain, of_beads);
   const auto parts = [&](Index i) {
@@ -284,7 +266,7 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
                  .substrate = std::sqrt(substrate[i]),
                  .solver = std::sqrt(mean.solver[i]),
                  .model = std::sqrt(mean.model[i])};
-    if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mesh[i]);
+    if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mean.mesh[i]);
     return p;
   };
   ErrorBudget budget;

@@ -95,7 +95,7 @@ std::string names_of_groups(const EnsembleFit& fit) {
     for (std::size_t k = 0; k < group.indices.size(); ++k) {
       text += (k > 0 ? " + " : "") + std::to_string(fit.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
     }
-    text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error()) + " nN";
+    text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error) + " nN";
   }
   return text;
 }

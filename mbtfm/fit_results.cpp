@@ -36,20 +36,19 @@ double surface_tension_nN_per_um(const Network& network, const Polygon& outline_
 }  // namespace
 
 std::vector<Tension> tensions_of(const EnsembleFit& fit) {
-  const int n_meshes = static_cast<int>(fit.meshes.size());
   double largest_nN = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
   std::vector<Tension> tensions;
   for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
     const Estimate& e = fit.tensions_nN[i];
-    const Interval interval = interval_95(e, n_meshes);
+    const Interval interval = interval_95(e);
     // A tension that could be anything that occurs in this cell was not measured.
     const double scale = i == 0 ? e.value : largest_nN;
     tensions.push_back({.fibre_id = fit.fibre_ids[i],
                         .tension_nN = e.value,
                         .low_nN = interval.low,
                         .high_nN = interval.high,
-                        .identifiable = e.fitted < scale});
+                        .identifiable = e.standard_error < scale});
   }
   return tensions;
 }
@@ -67,7 +66,7 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
     const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
     forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
                       .force_nN = force_nN,
-                      .sigma_nN = fit.force_magnitudes_nN[a].standard_error(),
+                      .sigma_nN = fit.force_magnitudes_nN[a].standard_error,
                       .connected = connected.contains(cell.adhesions[a].adhesion_id),
                       .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, force_nN)});
   }
@@ -95,13 +94,13 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
   const Imbalance balance = imbalance(fit);
   double mesh_part = 0, noise_part = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
-    mesh_part += std::pow(fit.tensions_nN[i].from_mesh(), 2);
+    mesh_part += std::pow(fit.tensions_nN[i].from_model(), 2);
     noise_part += std::pow(fit.tensions_nN[i].noise, 2);
   }
   s.more = {{"noise_source", noise.source},
             {"chi_squared_per_degree", fit.chi_squared_per_degree},
-            {"total_force_sigma_nN", fit.total_force_nN.standard_error()},
-            {"network_force_sigma_nN", fit.network_force_nN.standard_error()},
+            {"total_force_sigma_nN", fit.total_force_nN.standard_error},
+            {"network_force_sigma_nN", fit.network_force_nN.standard_error},
             {"net_force_over_total", balance.force},
             {"net_torque_over_total", balance.torque},
             {"tension_error_from_noise_nN", std::sqrt(noise_part)},

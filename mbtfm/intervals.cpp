@@ -30,13 +30,19 @@ Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
   return half * half.transpose();
 }
 
+Eigen::MatrixXd sandwich(const LocalMisfit& local, double variance, const Eigen::MatrixXd& K) {
+  if (local.model_variance.size() == 0) return variance * K;
+  return variance * K + K * local.model_variance * K;
+}
+
 /// Those that the data do not press against zero by more than so many standard errors.
-std::vector<int> free_tensions(const LocalMisfit& local, const Eigen::MatrixXd& covariance_nN2, double variance,
-                               double limit) {
+std::vector<int> free_tensions(const LocalMisfit& local, double variance, double limit) {
+  const Eigen::MatrixXd K = inverse_of(local.H);
+  const Eigen::MatrixXd covariance = sandwich(local, variance, K);
   std::vector<int> free;
   for (int i = 0; i < static_cast<int>(local.g.size()); ++i) {
-    // g_i has the variance (variance²/covariance_ii) where t_i is truly zero
-    const bool is_held = local.tensions_nN[i] <= 0 && local.g[i] * std::sqrt(covariance_nN2(i, i)) > limit * variance;
+    // without its bound t_i would go to −K_ii g_i
+    const bool is_held = local.tensions_nN[i] <= 0 && local.g[i] * K(i, i) > limit * std::sqrt(covariance(i, i));
     if (!is_held) free.push_back(i);
   }
   return free;
@@ -87,19 +93,20 @@ LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
           .g = jacobian.transpose() * trial.residual};
 }
 
+Eigen::MatrixXd response_of(const LocalMisfit& local, double variance) {
+  const std::vector<int> free = free_tensions(local, variance, kHeldBeyond);
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(local.H.rows(), local.H.cols());
+  if (!free.empty()) K(free, free) = inverse_of(local.H(free, free));
+  return K;
+}
+
 Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance) {
-  const Eigen::MatrixXd all = variance * inverse_of(local.H);
-  const std::vector<int> free = free_tensions(local, all, variance, kHeldBeyond);
-  if (free.size() == static_cast<std::size_t>(local.g.size())) return all;
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(all.rows(), all.cols());
-  if (!free.empty()) covariance(free, free) = variance * inverse_of(local.H(free, free));
-  return covariance;
+  return sandwich(local, variance, response_of(local, variance));
 }
 
 Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
   Eigen::VectorXd past = Eigen::VectorXd::Zero(local.g.size());
-  const std::vector<int> free =
-      free_tensions(local, variance * inverse_of(local.H), variance, kPressedByMoreThanChance);
+  const std::vector<int> free = free_tensions(local, variance, kPressedByMoreThanChance);
   if (free.empty()) return past;
   Eigen::VectorXd pressed = Eigen::VectorXd::Zero(local.g.size());  // a free tension's gradient is a last step's rest
   for (Eigen::Index i = 0; i < pressed.size(); ++i)
@@ -130,26 +137,33 @@ Sides profile_95(const LocalMisfit& local, double variance, int i) {
   // At the solution the gradient of a free tension is zero, and of a held one not negative, but for the last step's
   // rest.
   for (Eigen::Index k = 0; k < safe.g.size(); ++k) safe.g[k] = safe.tensions_nN[k] > 0 ? 0 : std::max(0.0, safe.g[k]);
-  const double wanted = kNormal95 * std::sqrt(variance);
-  const double first = wanted * std::sqrt(inverse_of(local.H)(i, i)) * (1 + 1e-6);
+  const Eigen::MatrixXd K = inverse_of(local.H);
+  const double half = kNormal95 * std::sqrt(sandwich(local, variance, K)(i, i));
+  const double wanted = half / std::sqrt(K(i, i)), first = half * (1 + 1e-6);
   const double t = local.tensions_nN[i];
   return {.below = t > 0 ? -shift_at(safe, i, wanted, -first, -t) : 0,
           .above = shift_at(safe, i, wanted, first, 1e300)};
 }
 
 Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters,
-                                        const Trial& solution, double variance, const std::vector<std::uint64_t>& draws,
-                                        int threads) {
+                                        const Trial& solution, double variance,
+                                        const Eigen::VectorXd& force_variance_nN2,
+                                        const std::vector<std::uint64_t>& draws, int threads) {
   Eigen::MatrixXd deviations(problem.n_tensions(), static_cast<Eigen::Index>(draws.size()));
   parallel_for(static_cast<int>(draws.size()), threads, [&](int d) {
     // In the reduced data white noise is white again (C = Λ^½ Vᵀ).
     std::mt19937_64 engine(draws[static_cast<std::size_t>(d)]);
     const auto uniform = [&] { return (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53; };
+    const auto normal = [&] {  // Box & Muller (1958): the same with every library
+      const double length = std::sqrt(-2 * std::log(uniform()));
+      return length * std::cos(6.283185307179586 * uniform());
+    };
     ReducedData drawn = problem.data();
-    for (Eigen::Index k = 0; k < drawn.target.size(); ++k) {  // Box & Muller (1958): the same with every library
-      const double normal = std::sqrt(-2 * std::log(uniform())) * std::cos(6.283185307179586 * uniform());
-      drawn.target[k] += solution.residual[k] + std::sqrt(variance) * normal;
-    }
+    for (Eigen::Index k = 0; k < drawn.target.size(); ++k)
+      drawn.target[k] += solution.residual[k] + std::sqrt(variance) * normal();
+    Eigen::VectorXd of_model = force_variance_nN2.cwiseSqrt();
+    for (double& e : of_model) e *= normal();
+    if (of_model.size() > 0) drawn.target += drawn.compliance * of_model;
     const TensionProblem again(problem.cables(), drawn, problem.adhesion_ids());
     const Trial start = again.evaluate(solution.tensions_nN, &solution);
     deviations.col(d) = fit_gauss_newton(again, parameters, start).trial.tensions_nN - solution.tensions_nN;

@@ -9,16 +9,21 @@
 
 namespace mbtfm::inverse {
 
-/// Around a solution t: 2 Phi(t + s) ≈ 2 Phi(t) + 2 gᵀ s + sᵀ H s, times a variance (see misfit_variance).
+/// Around a solution t: 2 Phi(t + s) ≈ 2 Phi(t) + 2 gᵀ s + sᵀ H s, in units of a variance (see misfit_variance). By the
+/// noise alone g has that variance times H.
 struct LocalMisfit {
   Eigen::VectorXd tensions_nN;
-  Eigen::MatrixXd H;  ///< Jᵀ J
-  Eigen::VectorXd g;  ///< Jᵀ r
+  Eigen::MatrixXd H;                    ///< Jᵀ J
+  Eigen::VectorXd g;                    ///< Jᵀ r
+  Eigen::MatrixXd model_variance = {};  ///< of g by the error of the model, beside that of the noise; empty: none
 };
 LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian);
 
-/// variance H⁻¹. Tensions that the data press against zero by more than two standard errors are held: they have no
-/// variance and give none to the others. A direction of which no bead tells anything gets a huge variance.
+/// K = H⁻¹: how the tensions follow −g. Those that the data press against zero by more than two standard errors are
+/// held: they do not move, and the others as without them. A direction of which no bead tells anything moves far.
+Eigen::MatrixXd response_of(const LocalMisfit& local, double variance);
+
+/// K Var(g) K: of both errors (the sandwich; White, Econometrica 50 (1982) 1).
 Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance);
 
 /// From the solution to where the misfit would be least without the bounds. Estimates that end at a bound are biased
@@ -40,14 +45,17 @@ struct Sides {
 };
 /// 95 % interval of tension i: where the least misfit over all other tensions >= 0 has risen by 1.96² variances. Ends
 /// at a bound; where no tension is near one it is 1.96 standard errors to either side (profile likelihood; Venzon &
-/// Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit).
+/// Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit). With an error of the model the rise is that which
+/// makes this so again (Chandler & Bate, Biometrika 94 (2007) 167).
 Sides profile_95(const LocalMisfit& local, double variance, int i);
 
 /// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance drawn anew, less
 /// the solution. One column a draw; the draws' random numbers follow from their index.
+/// @param force_variance_nN2  of the model's error, drawn too; empty: none
 Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters,
-                                        const Trial& solution, double variance, const std::vector<std::uint64_t>& draws,
-                                        int threads);
+                                        const Trial& solution, double variance,
+                                        const Eigen::VectorXd& force_variance_nN2,
+                                        const std::vector<std::uint64_t>& draws, int threads);
 /// Ends of the middle 95 % of the draws.
 Sides percentiles_95(std::vector<double> deviations);
 

@@ -75,13 +75,12 @@ std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
 }
 
 Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data) {
-  // With the reduced data y = C⁺ᵀ (W G)ᵀ W u and the fit's own coordinates M y, M C = C', the tensions change by
-  // H⁻¹ (C' D)ᵀ M dy = H⁻¹ (C' D)ᵀ C' (CᵀC)⁺ (W G)ᵀ W du, D = dR/dt. Rows of C are orthogonal.
+  // With the reduced data y = C⁺ᵀ (W G)ᵀ W u the tensions change by K (C D)ᵀ dy = K (C D)ᵀ C (CᵀC)⁺ (W G)ᵀ W du,
+  // D = dR/dt. Rows of C are orthogonal.
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd &C = data.reduced.compliance, &weighed = fit.data.compliance;
+  const Eigen::MatrixXd& C = data.reduced.compliance;
   const Eigen::VectorXd per_row = C.rowwise().squaredNorm().cwiseAbs2().cwiseInverse();
-  const Eigen::MatrixXd by_force = mesh.covariance_nN2 / fit.variance * (weighed * mesh.force_derivatives).transpose() *
-                                   weighed * C.transpose() * per_row.asDiagonal() * C;
+  const Eigen::MatrixXd by_force = mesh.by_force * C.transpose() * per_row.asDiagonal() * C;
   Eigen::MatrixXd influence = by_force * data.compliance_um_per_nN.transpose() * data.weight_per_um.asDiagonal();
   for (Eigen::Index i = 0; i < influence.rows(); ++i) {
     influence.row(i) /= std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
@@ -153,12 +152,13 @@ std::vector<int> most_informed_fibre(const EnsembleFit& fit, const Eigen::Matrix
 
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions) {
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd& C = fit.data.compliance;
-  const Eigen::VectorXd residual = fit.data.target - C * fit.forces_nN;
+  const ReducedData data = fit.model_error ? whitened(fit.data, *fit.model_error) : fit.data;
+  const Eigen::MatrixXd& C = data.compliance;
+  const Eigen::VectorXd residual = data.target - C * fit.forces_nN;
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
   const Eigen::MatrixXd CJ = C * mesh.force_derivatives;
   const Eigen::MatrixXd cross_terms = CJ.transpose() * C;
-  Eigen::MatrixXd H = mesh.local.H;
+  Eigen::MatrixXd H = CJ.transpose() * CJ;
   H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
   const Eigen::LDLT<Eigen::MatrixXd> solver(H);
   const Eigen::MatrixXd K = C.transpose() * C - cross_terms.transpose() * solver.solve(cross_terms);

@@ -1,8 +1,8 @@
 #include "mbtfm/model_error.h"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <Eigen/QR>
-#include <cmath>
+#include <algorithm>
 
 #include "pipeline/contract/errors.h"
 
@@ -21,72 +21,57 @@ MeshForces mean_of(const std::vector<MeshForces>& meshes) {
   return mean;
 }
 
-Eigen::VectorXd variance_between(const std::vector<MeshForces>& meshes, const Eigen::VectorXd& mean_nN) {
-  Eigen::VectorXd variance = Eigen::VectorXd::Zero(mean_nN.size());
-  for (const MeshForces& mesh : meshes)
-    variance += (mesh.forces_nN - mean_nN).cwiseAbs2() / static_cast<double>(meshes.size() - 1);
-  for (Eigen::Index i = 0; i < variance.size(); i += 2)
-    variance.segment<2>(i).setConstant(variance.segment<2>(i).mean());
-  return variance;
+/// |R_a|, once for each component.
+Eigen::VectorXd sizes_nN(const Eigen::VectorXd& forces_nN) {
+  Eigen::VectorXd sizes(forces_nN.size());
+  for (Eigen::Index row = 0; row < sizes.size(); row += 2)
+    sizes.segment<2>(row).setConstant(forces_nN.segment<2>(row).norm());
+  return sizes;
 }
 
-/// chi² of the residual in units of the errors, once the tensions have followed.
-double misfit(const Eigen::MatrixXd& jacobian, const Eigen::VectorXd& residual, const Eigen::VectorXd& row_scale) {
-  const Eigen::MatrixXd J = row_scale.asDiagonal() * jacobian;
-  const Eigen::VectorXd r = row_scale.cwiseProduct(residual);
-  return (r - J * J.colPivHouseholderQr().solve(r)).squaredNorm();
+/// Of one further mesh about the mean of these: all adhesions and meshes together tell it.
+double least_phi_nN(const std::vector<MeshForces>& meshes, const Eigen::VectorXd& mean_nN, double sum_of_sizes_nN) {
+  const auto n = static_cast<double>(meshes.size());
+  double squares = 0;
+  for (const MeshForces& mesh : meshes) squares += (mesh.forces_nN - mean_nN).squaredNorm();
+  return sum_of_sizes_nN > 0 ? (1 + 1 / n) * squares / (n - 1) / sum_of_sizes_nN : 0;
 }
 
 }  // namespace
 
 ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance) {
-  MBTFM_ASSERT(meshes.size() >= 3);
+  MBTFM_ASSERT(meshes.size() >= 2);
   // Simulated beads may be exact; but neither a tracked bead nor the model of a gel is right to a thousandth of what
-  // beads move on average. Below that, all weight would be on the few modes that no mesh happens to disagree upon.
+  // beads move on average.
   constexpr double kLeastShare = 1e-3;
   const double mean_square = (data.target.squaredNorm() + data.floor_squared) / static_cast<double>(data.n_components);
   const double noise_variance = std::max(beads_variance, kLeastShare * kLeastShare * mean_square);
   const MeshForces mean = mean_of(meshes);
-  const Eigen::VectorXd variance = variance_between(meshes, mean.forces_nN);
-  // C V Cᵀ = U diag(sizes) Uᵀ: in the coordinates Uᵀ y the errors of the rows are independent for every kappa
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> modes(data.compliance * variance.asDiagonal() *
-                                                             data.compliance.transpose());
-  const Eigen::VectorXd sizes = modes.eigenvalues().cwiseMax(0);  // rounding may leave some below
-  const Eigen::MatrixXd C = modes.eigenvectors().transpose() * data.compliance;
-  const Eigen::VectorXd y = modes.eigenvectors().transpose() * data.target;
-  const Eigen::MatrixXd J = C * mean.derivatives;
-  const Eigen::VectorXd residual = y - C * mean.forces_nN;
-  const double expected = noise_variance * static_cast<double>(std::max<Eigen::Index>(1, J.rows() - J.cols()));
-  const auto noise_share = [&](double kappa) -> Eigen::VectorXd {
-    return (1 + kappa / noise_variance * sizes.array()).inverse();
-  };
+  const Eigen::VectorXd sizes = sizes_nN(mean.forces_nN);
+  const double least = least_phi_nN(meshes, mean.forces_nN, sizes.sum());
 
-  constexpr double kLargest = 1e4;  // the meshes' spread would be a hundredth of the model's error: it tells nothing
-  const double least = 1 + 1 / static_cast<double>(meshes.size());
-  double low = least, high = least;
-  const auto is_too_small = [&](double kappa) {
-    return misfit(J, residual, noise_share(kappa).cwiseSqrt()) > expected;
+  // E |P r|² = s² (rows − tensions) + phi tr(P C diag(sizes) Cᵀ P), P taking out what the tensions can follow
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(data.compliance * mean.derivatives);
+  const auto projected = [&](const Eigen::MatrixXd& columns) -> Eigen::MatrixXd {
+    const Eigen::MatrixXd turned = qr.householderQ().adjoint() * columns;
+    return turned.bottomRows(turned.rows() - qr.rank());
   };
-  while (high < kLargest && is_too_small(high)) {
-    low = high;
-    high *= 4;
-  }
-  while (high > 1.01 * low) {
-    const double middle = std::sqrt(low * high);
-    (is_too_small(middle) ? low : high) = middle;
-  }
+  const Eigen::MatrixXd left = projected(data.target - data.compliance * mean.forces_nN);
+  const double per_phi = projected(data.compliance * sizes.cwiseSqrt().asDiagonal()).squaredNorm();
+  const double beyond_noise = left.squaredNorm() - noise_variance * static_cast<double>(left.rows());
+  const double phi = std::max(least, per_phi > 0 ? beyond_noise / per_phi : 0);
+  return {.phi_nN = phi, .least_phi_nN = least, .force_variance_nN2 = phi * sizes, .noise_variance = noise_variance};
+}
 
-  ModelError error{.force_variance_nN2 = high * variance,
-                   .kappa = high,
-                   .least_kappa = least,
-                   .noise_variance = noise_variance,
-                   .data = data,
-                   .noise_share = {}};
-  error.noise_share = noise_share(high);
-  const Eigen::VectorXd scale = error.noise_share.cwiseSqrt();
-  error.data.compliance = scale.asDiagonal() * C;
-  error.data.target = scale.cwiseProduct(y);
-  return error;
+ReducedData whitened(const ReducedData& data, const ModelError& error) {
+  const Eigen::MatrixXd& C = data.compliance;
+  Eigen::MatrixXd relative = C * (error.force_variance_nN2 / error.noise_variance).asDiagonal() * C.transpose();
+  relative.diagonal().array() += 1;
+  const Eigen::LLT<Eigen::MatrixXd> root(relative);
+  ReducedData white = data;
+  white.compliance = root.matrixL().solve(C);
+  white.target = root.matrixL().solve(data.target);
+  return white;
 }
 
 }  // namespace mbtfm::inverse

@@ -71,7 +71,7 @@ FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit, const Linea
                   .relative_l2 = relative_l2(data, fit.forces_nN),
                   .chi_squared_per_degree = fit.chi_squared_per_degree,
                   .converged = fit.report.converged};
-  for (const Estimate& e : fit.tensions_nN) result.sigmas_nN.push_back(e.standard_error());
+  for (const Estimate& e : fit.tensions_nN) result.sigmas_nN.push_back(e.standard_error);
   return result;
 }
 
@@ -159,7 +159,7 @@ charts::Chart force_chart(const std::vector<FrameFit>& fits, std::optional<doubl
   double largest = 0;
   for (const FrameFit& f : fits) {
     if (!f.refused.empty()) continue;
-    const double x = time_s(f.frame, interval_s).value_or(f.frame), half = 1.96 * f.total_force_nN.standard_error();
+    const double x = time_s(f.frame, interval_s).value_or(f.frame), half = 1.96 * f.total_force_nN.standard_error;
     total.points.push_back({x, f.total_force_nN.value});
     total.low.push_back(f.total_force_nN.value - half);
     total.high.push_back(f.total_force_nN.value + half);
@@ -265,8 +265,8 @@ void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::opti
   for (const FrameFit& f : fits) {
     csv.add(f.frame).add(time_s(f.frame, interval_s));
     if (f.refused.empty()) {
-      csv.add(f.total_force_nN.value).add(f.total_force_nN.standard_error());
-      csv.add(f.network_force_nN.value).add(f.network_force_nN.standard_error());
+      csv.add(f.total_force_nN.value).add(f.total_force_nN.standard_error);
+      csv.add(f.network_force_nN.value).add(f.network_force_nN.standard_error);
       csv.add(f.total_force_nN.value - f.network_force_nN.value).add(f.relative_l2).add(f.chi_squared_per_degree);
       csv.add(f.converged ? "true" : "false");
     } else {

@@ -17,10 +17,7 @@ void declare(ParameterList& list, FitParameters& p) {
   list.add("region_um", p.region_um, Range::not_negative(),
            "beads further than this outside the outline are left out of the fit (um); unset: none is");
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
-           "networks to fit on; tensions are their mean, and their spread is part of the error bars");
-  list.add("model_error", p.model_error,
-           "error of the adhesion forces beside the beads' noise: as they differ between three meshes or more, or none",
-           {"meshes", "none"});
+           "networks to fit on; tensions are their mean, and two or more tell the error of the model");
   list.add("tolerance", p.tolerance, Range::positive(), "relative change of the tensions at which the fit stops");
   list.add("max_steps", p.max_steps, Range::between(1, 100000), "steps of Gauss-Newton at most");
   list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),

@@ -68,7 +68,6 @@ std::vector<Rung> ladder(Extent extent) {
   add(rungs, "fit", "tolerance", {"0.1", "0.01", "0.0001"});
   add(rungs, "cables", "smoothing", {"0.01", "0.001", "1e-07"});
   add(rungs, "cables", "force_tolerance", {"0.001", "1e-05", "1e-12"});
-  add(rungs, "fit", "model_error", {"none"});
   add(rungs, "effects", "robust_loss", {"on", "off"});
   add(rungs, "effects", "cable_elasticity", {"off"});
   const std::vector<runner::Setting> split = {{"substrate", "model", "split"}};
@@ -92,7 +91,6 @@ std::string group_of(const std::string& knob) {
                                                             {"surface_lines", "gel"},
                                                             {"n_meshes", "network and meshes"},
                                                             {"edge_length_um", "network and meshes"},
-                                                            {"model_error", "network and meshes"},
                                                             {"beads", "data, presets, threads"},
                                                             {"image_scale", "data, presets, threads"},
                                                             {"robust_loss", "data, presets, threads"},

@@ -154,7 +154,7 @@ void compare_series(int n) {
   std::vector<network::CableNetwork> networks;
   networks.emplace_back(scene.cables.network());
   const inverse::FitParameters parameters{.n_meshes = 1};
-  const Eigen::VectorXd start = Eigen::VectorXd::Ones(tensions.size());
+  const inverse::Trial start = inverse::uniform_start({networks.front(), scene.data.reduced, scene.adhesion_ids});
   const auto off = [&] {
     const Effect coupling = inverse::decide_time_coupling(true, "off");
     inverse::fit_series(frames, networks, scene.compliance_um_per_nN, {}, scene.adhesion_ids, parameters,
@@ -163,7 +163,7 @@ void compare_series(int n) {
   const auto one_by_one = [&] {
     for (const inverse::SeriesFrame& frame : frames) {
       inverse::LinearData data = inverse::reduce(frame.beads, scene.compliance_um_per_nN);
-      inverse::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {}, {}, start);
+      inverse::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {}, {}, &start);
     }
   };
   compare("time coupling", n, off, one_by_one);

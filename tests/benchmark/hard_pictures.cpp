@@ -206,7 +206,7 @@ Chart intervals(const std::string& title, test::TensionScene& scene) {
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
     const double higher = std::max(fit.tensions_nN[i].value, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
     // a collapsed fibre pulls alike with any tension: its interval has no end
-    values.push_back(std::min(inverse::interval_95(fit.tensions_nN[i], 1).high, std::max(40.0, 3 * higher)));
+    values.push_back(std::min(inverse::interval_95(fit.tensions_nN[i]).high, std::max(40.0, 3 * higher)));
     values.push_back(higher);
   }
   Chart chart(title,
@@ -217,7 +217,7 @@ Chart intervals(const std::string& title, test::TensionScene& scene) {
               charts::axis_over("tension (nN)", values, charts::Scale::linear));
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
     const auto x = static_cast<double>(i);
-    const inverse::Interval interval = inverse::interval_95(fit.tensions_nN[i], 1);
+    const inverse::Interval interval = inverse::interval_95(fit.tensions_nN[i]);
     chart.curve({{x, interval.low}, {x, interval.high}}, stroke(0));
     chart.dot({x, fit.tensions_nN[i].value}, 3, fill(0));
     chart.dot({x + 0.25, scene.tensions_nN[static_cast<Eigen::Index>(i)]}, 3, fill(1));

@@ -97,8 +97,8 @@ void print_row(const Scene& s, LinearData data, network::NetworkParameters of_fi
     const double error = fit.tensions_nN[i].value - t;
     of_mean += error * error;
     size += t * t;
-    over_stated += std::pow(error / fit.tensions_nN[i].standard_error(), 2);
-    const Interval interval = interval_95(fit.tensions_nN[i], n_meshes);
+    over_stated += std::pow(error / fit.tensions_nN[i].standard_error, 2);
+    const Interval interval = interval_95(fit.tensions_nN[i]);
     n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
     for (const auto& mesh : fit.meshes)
       of_single += std::pow(mesh.fit.trial.tensions_nN[static_cast<Eigen::Index>(i)] - t, 2) / n_meshes;

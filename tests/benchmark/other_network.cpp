@@ -1,10 +1,15 @@
-/// other_network STUDY [cells]: how well tensions are found on other networks than the truth's, 20 nm of noise. A table
-/// (CSV) on stdout.
-///   formulations   the default ensemble of eight meshes beside one mesh in the thesis' formulation
+/// other_network STUDY [cells] [first seed]: how well tensions are found on other networks than the truth's, 20 nm of
+/// noise. A table (CSV) on stdout.
+///   formulations   the default ensemble beside one mesh in the thesis' formulation
+///   truths         truths of several formulations, beads with and without noise; and, beside the fit as it is, one
+///   that
+///                  weighs the data by what the meshes tell of each adhesion's error
+///   meshes         by the number of meshes, with and without noise: error and processor time
 ///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
 #include <cstdio>
 #include <cstdlib>
 #include <cstring>
+#include <ctime>
 
 #include "samples/experiment.h"
 #include "tests/support/tension_scene.h"
@@ -22,20 +27,31 @@ struct OtherNetwork {
   LinearData noisy, exact;  ///< weighted alike
 };
 
-OtherNetwork other_network(std::uint64_t seed) {
+struct Cells {
+  std::uint64_t first = 1, last = 20;
+};
+
+/// Forces of the experiment's tensions on a network of this formulation, as fine as the simulator's.
+Eigen::VectorXd forces_on(const samples::Experiment& experiment, network::NetworkParameters p, std::uint64_t seed) {
+  constexpr std::uint64_t kSeeds = 0x74727565;  // far from those of the fits
+  p.seed = kSeeds + seed;
+  p.edge_length_um = samples::MechanicsParameters{}.simulation_edge_length_um;
+  Network network = network::generate_network(experiment.cell, p).network;
+  for (Link& link : network.links)
+    if (link.fibre_id == 0) link.share *= p.edge_length_um / samples::kReferenceEdge_um;
+  const network::CableNetwork cables(std::move(network));
+  std::vector<double> tensions_nN;
+  for (const Tension& t : experiment.tensions) tensions_nN.push_back(t.tension_nN);
+  return cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN));
+}
+
+/// @param truth  formulation of the cell's own network; none: the simulator's
+OtherNetwork other_network(std::uint64_t seed, const network::NetworkParameters* truth = nullptr) {
   samples::ScenarioParameters p;
   p.seed = seed;
   OtherNetwork o{.experiment = samples::simulate(p, 2), .adhesion_ids = {}, .noisy = {}, .exact = {}};
-  std::mt19937_64 random(seed);
-  std::normal_distribution<double> normal(0, kNoise_um);
   std::vector<Vec2> points;
-  DisplacementField noisy = o.experiment.displacement, exact = noisy;
-  for (std::size_t i = 0; i < noisy.size(); ++i) {
-    const double x = normal(random), y = normal(random);
-    noisy[i].displacement_um += Vec2{x, y};
-    noisy[i].sigma_um = exact[i].sigma_um = kNoise_um;
-    points.push_back(noisy[i].position_um);
-  }
+  for (const Bead& bead : o.experiment.displacement) points.push_back(bead.position_um);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& adhesion : o.experiment.cell.adhesions) {
     ellipses.push_back(substrate::ellipse_of(adhesion));
@@ -43,6 +59,23 @@ OtherNetwork other_network(std::uint64_t seed) {
   }
   const Eigen::MatrixXd compliance =
       substrate::make_greens(p.gel, {.model = "layer"}, 2)->compliance_um_per_nN(points, ellipses);
+  DisplacementField exact = o.experiment.displacement;
+  if (truth) {
+    const Eigen::VectorXd u_um = compliance * forces_on(o.experiment, *truth, seed);
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      const auto row = 2 * static_cast<Eigen::Index>(i);
+      exact[i].displacement_um = {u_um[row], u_um[row + 1]};
+    }
+  }
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, kNoise_um);
+  DisplacementField noisy = exact;
+  for (std::size_t i = 0; i < noisy.size(); ++i) {
+    const double x = normal(random), y = normal(random);
+    noisy[i].displacement_um += Vec2{x, y};
+    noisy[i].sigma_um = kNoise_um;
+    exact[i].sigma_um = {};  // no error is stated where there is none
+  }
   o.noisy = reduce(noisy, compliance);
   o.exact = reduce(exact, compliance);
   return o;
@@ -57,62 +90,102 @@ std::vector<network::CableNetwork> span(const Cell& cell, int n_meshes, network:
   return networks;
 }
 
-EnsembleFit fit(const std::vector<network::CableNetwork>& networks, LinearData& data, const OtherNetwork& o) {
+EnsembleFit fit(const std::vector<network::CableNetwork>& networks, LinearData& data, const OtherNetwork& o,
+                int threads = 2) {
   FitParameters parameters;
   parameters.n_meshes = static_cast<int>(networks.size());
-  return fit_ensemble(networks, data, o.adhesion_ids, parameters, 2, {});
+  return fit_ensemble(networks, data, o.adhesion_ids, parameters, threads, {});
 }
 
-/// |t̂ − t| / |t| of the fibres
-double relative_error(const EnsembleFit& fit, const OtherNetwork& o) {
-  double error = 0, size = 0;
-  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+struct Score {
+  double relative_error = 0;  ///< |t̂ − t| / |t| of the fibres
+  double over_stated = 0;     ///< root mean square of error over stated standard error
+  double coverage = 0;        ///< of the 95 % intervals
+};
+
+Score score(const EnsembleFit& fit, const OtherNetwork& o) {
+  double error = 0, size = 0, over_stated = 0;
+  int n_covered = 0, n = 0;
+  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i, ++n) {
+    const Estimate& estimate = fit.tensions_nN[i];
     const double t = o.experiment.tensions[i].tension_nN;
-    error += std::pow(fit.tensions_nN[i].value - t, 2);
+    const Interval interval = interval_95(estimate);
+    error += std::pow(estimate.value - t, 2);
     size += t * t;
+    over_stated += estimate.standard_error > 0 ? std::pow((estimate.value - t) / estimate.standard_error, 2) : 0;
+    n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
   }
-  return std::sqrt(error / size);
+  return {std::sqrt(error / size), std::sqrt(over_stated / n), double(n_covered) / n};
 }
 
-void formulations(int n_cells) {
+double relative_error(const EnsembleFit& fit, const OtherNetwork& o) { return score(fit, o).relative_error; }
+
+void formulations(Cells cells) {
   network::NetworkParameters thesis;
   thesis.link_weights = "equal";
   thesis.link_reach = "neighbours";
   thesis.adhesion_anchor = "centre";
   std::printf("cell,formulation,meshes,relative_error,rms_error_over_stated,coverage\n");
-  for (int c = 1; c <= n_cells; ++c) {
-    OtherNetwork o = other_network(static_cast<std::uint64_t>(c));
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    OtherNetwork o = other_network(c);
     for (const bool is_thesis : {false, true}) {
       const int n_meshes = is_thesis ? 1 : FitParameters{}.n_meshes;
-      const EnsembleFit found =
-          fit(span(o.experiment.cell, n_meshes, is_thesis ? thesis : network::NetworkParameters{}), o.noisy, o);
-      double squares = 0;
-      int n_covered = 0, n = 0;
-      for (std::size_t i = 1; i < found.fibre_ids.size(); ++i) {
-        const Estimate& estimate = found.tensions_nN[i];
-        const double t = o.experiment.tensions[i].tension_nN, stated = estimate.standard_error();
-        const Interval interval = interval_95(estimate, n_meshes);
-        squares += stated > 0 ? std::pow((estimate.value - t) / stated, 2) : 0;
-        n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
-        ++n;
-      }
-      std::printf("%d,%s,%d,%.4f,%.3f,%.3f\n", c, is_thesis ? "thesis" : "default", n_meshes, relative_error(found, o),
-                  std::sqrt(squares / n), double(n_covered) / n);
+      const Score s = score(
+          fit(span(o.experiment.cell, n_meshes, is_thesis ? thesis : network::NetworkParameters{}), o.noisy, o), o);
+      std::printf("%d,%s,%d,%.4f,%.3f,%.3f\n", int(c), is_thesis ? "thesis" : "default", n_meshes, s.relative_error,
+                  s.over_stated, s.coverage);
     }
   }
 }
 
-void parts(int n_cells) {
+void truths(Cells cells) {
+  const std::pair<const char*, network::NetworkParameters> formulations[] = {
+      {"second neighbours", {}},
+      {"edges", {.link_reach = "neighbours"}},
+      {"edges and rims", {.link_reach = "neighbours", .adhesion_anchor = "rim", .rim_points = 12}}};
+  std::printf("cell,truth,noise_nm,relative_error,rms_error_over_stated,coverage,relative_error_if_weighed\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    for (const auto& [name, truth] : formulations) {
+      OtherNetwork o = other_network(c, &truth);
+      const std::vector<network::CableNetwork> networks = span(o.experiment.cell, FitParameters{}.n_meshes);
+      for (LinearData* data : {&o.noisy, &o.exact}) {
+        const EnsembleFit found = fit(networks, *data, o);
+        const Score s = score(found, o);
+        LinearData weighed = *data;
+        weighed.reduced = whitened(found.data, *found.model_error);
+        std::printf("%d,%s,%g,%.4f,%.3f,%.3f,%.4f\n", int(c), name, data == &o.noisy ? 1e3 * kNoise_um : 0,
+                    s.relative_error, s.over_stated, s.coverage, relative_error(fit(networks, weighed, o), o));
+      }
+    }
+  }
+}
+
+void meshes(Cells cells) {
+  std::printf("cell,noise_nm,meshes,relative_error,rms_error_over_stated,coverage,processor_s\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    OtherNetwork o = other_network(c);
+    for (const int n_meshes : {1, 2, 4, 8, 16}) {
+      for (LinearData* data : {&o.noisy, &o.exact}) {
+        const std::clock_t begin = std::clock();
+        const Score s = score(fit(span(o.experiment.cell, n_meshes), *data, o, 1), o);
+        std::printf("%d,%g,%d,%.4f,%.3f,%.3f,%.2f\n", int(c), data == &o.noisy ? 1e3 * kNoise_um : 0, n_meshes,
+                    s.relative_error, s.over_stated, s.coverage, double(std::clock() - begin) / CLOCKS_PER_SEC);
+      }
+    }
+  }
+}
+
+void parts(Cells cells) {
   network::NetworkParameters fine;
   fine.edge_length_um = samples::MechanicsParameters{}.simulation_edge_length_um;
   std::printf("cell,own_network,meshes_8,meshes_32,exact_meshes_8,exact_meshes_32,exact_meshes_8_of_its_edge\n");
-  for (int c = 1; c <= n_cells; ++c) {
-    OtherNetwork o = other_network(static_cast<std::uint64_t>(c));
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    OtherNetwork o = other_network(c);
     const Cell& cell = o.experiment.cell;
     std::vector<network::CableNetwork> own;
     own.emplace_back(o.experiment.network);
     const std::vector<network::CableNetwork> eight = span(cell, 8), many = span(cell, 32);
-    std::printf("%d,%.4f,%.4f,%.4f,", c, relative_error(fit(own, o.noisy, o), o),
+    std::printf("%d,%.4f,%.4f,%.4f,", int(c), relative_error(fit(own, o.noisy, o), o),
                 relative_error(fit(eight, o.noisy, o), o), relative_error(fit(many, o.noisy, o), o));
     std::printf("%.4f,%.4f,%.4f\n", relative_error(fit(eight, o.exact, o), o), relative_error(fit(many, o.exact, o), o),
                 relative_error(fit(span(cell, 8, fine), o.exact, o), o));
@@ -123,13 +196,16 @@ void parts(int n_cells) {
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 1 << 12);
-  const int n_cells = argc > 2 ? std::atoi(argv[2]) : 20;
-  const std::pair<const char*, void (*)(int)> studies[] = {{"formulations", formulations}, {"parts", parts}};
+  Cells cells;
+  if (argc > 3) cells.first = static_cast<std::uint64_t>(std::atoi(argv[3]));
+  cells.last = cells.first + static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 20) - 1;
+  const std::pair<const char*, void (*)(Cells)> studies[] = {
+      {"formulations", formulations}, {"truths", truths}, {"meshes", meshes}, {"parts", parts}};
   for (const auto& [name, study] : studies) {
     if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
-    study(n_cells);
+    study(cells);
     return 0;
   }
-  std::fprintf(stderr, "other_network formulations|parts [cells]\n");
+  std::fprintf(stderr, "other_network formulations|truths|meshes|parts [cells] [first seed]\n");
   return 2;
 }

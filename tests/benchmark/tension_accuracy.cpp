@@ -132,7 +132,7 @@ void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::Ve
   for (Eigen::Index i = 0; i < limit_nN.size(); ++i) {
     const Estimate& estimate = fit.tensions_nN[static_cast<std::size_t>(i)];
     const double t = true_nN[i], error = estimate.value - t;
-    const Interval interval = interval_95(estimate, 1);
+    const Interval interval = interval_95(estimate);
     const int is_covered = interval.low <= t && t <= interval.high ? 1 : 0;
     row.n_covered += is_covered;
     ++row.n_intervals;

@@ -101,7 +101,7 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
     const ErrorParts& parts = budget.tensions[i].parts_nN;
     EXPECT_NEAR(parts.beads, fit.tensions_nN[i].noise, 1e-9 * parts.beads) << i;
     ASSERT_TRUE(parts.mesh);
-    const double stated = fit.tensions_nN[i].standard_error();
+    const double stated = fit.tensions_nN[i].standard_error;
     EXPECT_NEAR(std::hypot(parts.beads, *parts.mesh, parts.model), stated, 1e-6 * stated) << i;
     EXPECT_EQ(parts.segmentation, 0);
     EXPECT_EQ(parts.substrate, 0);

@@ -66,7 +66,7 @@ TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_stan
       ++n;
     }
     const Estimate& total = fits[f].total_force_nN;
-    total_squares += std::pow((total.value - series.true_total_nN[f]) / total.standard_error(), 2);
+    total_squares += std::pow((total.value - series.true_total_nN[f]) / total.standard_error, 2);
   }
   ASSERT_GE(n, 40);
   // The root mean of n squares of normal variables deviates by 1/sqrt(2n): four of those.

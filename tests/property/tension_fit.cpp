@@ -28,7 +28,7 @@ TEST(TensionFit, errors_reach_the_Cramer_Rao_limit_and_intervals_cover) {
       measure(scene, noise, 100 + repeat);
       const EnsembleFit fit = fit_own_network(scene);
       for (Eigen::Index i = 0; i < limit.size(); ++i) {
-        const Interval interval = interval_95(fit.tensions_nN[static_cast<std::size_t>(i)], 1);
+        const Interval interval = interval_95(fit.tensions_nN[static_cast<std::size_t>(i)]);
         n_covered += interval.low <= scene.tensions_nN[i] && scene.tensions_nN[i] <= interval.high ? 1 : 0;
         ++n_intervals;
         if (scene.tensions_nN[i] < 3 * limit[i]) continue;  // the bound t >= 0 makes those better than the limit
@@ -263,8 +263,8 @@ TEST(TensionFit, bootstrap_draws_are_the_same_for_any_threads_and_agree_with_the
   const TensionFit fit = fit_gauss_newton(problem, {}, uniform_start(problem));
   std::vector<std::uint64_t> draws;
   for (std::uint64_t d = 1; d <= 60; ++d) draws.push_back(d);
-  const Eigen::MatrixXd one = bootstrap_deviations_nN(problem, {}, fit.trial, 1, draws, 1);
-  const Eigen::MatrixXd four = bootstrap_deviations_nN(problem, {}, fit.trial, 1, draws, 4);
+  const Eigen::MatrixXd one = bootstrap_deviations_nN(problem, {}, fit.trial, 1, {}, draws, 1);
+  const Eigen::MatrixXd four = bootstrap_deviations_nN(problem, {}, fit.trial, 1, {}, draws, 4);
   EXPECT_TRUE(one == four);
   const Eigen::MatrixXd covariance = covariance_nN2(local_misfit(fit.trial, problem.jacobian(fit.trial)), 1);
   for (Eigen::Index i = 0; i < one.rows(); ++i) {

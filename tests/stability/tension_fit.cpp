@@ -22,7 +22,7 @@ void expect_sound(const EnsembleFit& fit) {
   for (const Estimate& e : fit.tensions_nN) {
     EXPECT_TRUE(std::isfinite(e.value));
     EXPECT_GE(e.value, 0);
-    const Interval interval = interval_95(e, static_cast<int>(fit.meshes.size()));
+    const Interval interval = interval_95(e);
     EXPECT_LE(interval.low, e.value);
     EXPECT_GE(interval.high, e.value);
   }
@@ -138,7 +138,7 @@ TEST(TensionFitHard, a_fibre_without_beads_near_it_gets_a_wide_interval_that_cov
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
     const double before = everywhere.tensions_nN[i].noise;  // none where the tension is held at zero
     if (before > 0) widest = std::max(widest, fit.tensions_nN[i].noise / before);
-    const Interval interval = interval_95(fit.tensions_nN[i], 1);
+    const Interval interval = interval_95(fit.tensions_nN[i]);
     const double sigmas = 2 * fit.tensions_nN[i].noise;  // beyond the interval: four standard errors
     EXPECT_LE(interval.low - sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
     EXPECT_GE(interval.high + sigmas, scene.tensions_nN[static_cast<Eigen::Index>(i)]);
@@ -161,7 +161,7 @@ TEST(TensionFitHard, where_nothing_pulls_no_tension_is_found) {
   const EnsembleFit fit = fit_own_network(scene);
   expect_sound(fit);
   int n_covering = 0;
-  for (const Estimate& e : fit.tensions_nN) n_covering += interval_95(e, 1).low <= 1e-9 ? 1 : 0;
+  for (const Estimate& e : fit.tensions_nN) n_covering += interval_95(e).low <= 1e-9 ? 1 : 0;
   // 95 % intervals, at the bound 97.5 %: of a dozen one may miss
   EXPECT_GE(n_covering, static_cast<int>(fit.tensions_nN.size()) - 1);
   test::came_out(std::to_string(n_covering) + " of " + std::to_string(fit.tensions_nN.size()));
@@ -193,7 +193,7 @@ TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
   expect_sound(much);
   int n_covering = 0;
   for (std::size_t i = 0; i < much.tensions_nN.size(); ++i) {
-    const Interval wide = interval_95(much.tensions_nN[i], 1), narrow = interval_95(little.tensions_nN[i], 1);
+    const Interval wide = interval_95(much.tensions_nN[i]), narrow = interval_95(little.tensions_nN[i]);
     EXPECT_GT(wide.high - wide.low, narrow.high - narrow.low) << "tension " << i;
     const double truth = scene.tensions_nN[static_cast<Eigen::Index>(i)];
     n_covering += wide.low <= truth && truth <= wide.high ? 1 : 0;
