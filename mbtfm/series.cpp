@@ -84,7 +84,7 @@ Eigen::VectorXd values_of(const FrameFit& fit) {
 
 /// Of a force that a table holds: value and standard error, whatever that is made of.
 Estimate estimate(const CsvTable& table, int row, const std::string& name) {
-  return {.value = table.number(row, name + "_nN"), .fitted = table.number(row, name + "_sigma_nN")};
+  return {.value = table.number(row, name + "_nN"), .standard_error = table.number(row, name + "_sigma_nN")};
 }
 
 std::string type_name(const Tension& tension, const std::vector<Fibre>& fibres) {
