@@ -47,8 +47,9 @@ std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kep
   networks.emplace_back(series.scene.cables.network());
   FitParameters parameters;
   parameters.n_meshes = 1;
+  const Trial start = uniform_start({networks.front(), series.scene.data.reduced, series.scene.adhesion_ids});
   return fit_series(series.frames, networks, series.scene.compliance_um_per_nN, {}, series.scene.adhesion_ids,
-                    parameters, true, 2, {}, Eigen::VectorXd::Ones(series.scene.tensions_nN.size()), kept);
+                    parameters, true, 2, {}, start, kept);
 }
 
 TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {
