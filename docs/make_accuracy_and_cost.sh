@@ -105,8 +105,8 @@ PAGE
   preset_rows
   cat <<'PAGE'
 
-What each preset sets is in `pipeline/cost/presets.cpp`: `fast` tracks the beads on images of half the scale and fits few, coarse
-meshes, `high` many: the mean of more and finer meshes is the better network. The last column shows that part of the error. The noise
+What each preset sets is in `pipeline/cost/presets.cpp`: `fast` tracks the beads on images of half the scale and fits coarse
+meshes, `high` many: the mean of more meshes is the better network. The last column shows that part of the error. The noise
 of the beads remains in the others, and so does in all that the cell is one network and not the mean of many: where noise is the larger
 part, a single cell's error may be smaller with a coarser preset, by luck. What no computing mends is told by asking for too much, here
 of the demo cell:

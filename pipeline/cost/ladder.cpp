@@ -58,7 +58,7 @@ std::vector<Rung> ladder(Extent extent) {
                      .value = std::string("1/") + binning,
                      .settings = {{"segment", "binning", binning}, {"track", "binning", binning}}});
   }
-  add(rungs, "fit", "n_meshes", {"1", "2", "4"});
+  add(rungs, "fit", "n_meshes", {"1", "4", "8"});
   add(rungs, "network", "edge_length_um", {"3", "2"});
   add(rungs, "substrate", "model", {"half-space", "layer", "split"});
   for (const double share : {0.125, 0.25, 0.5}) {
