@@ -6,6 +6,7 @@
 #include <cfenv>
 #include <cmath>
 #include <filesystem>
+#include <mutex>
 
 #include "pipeline/contract/errors.h"
 #include "substrate/mesh_maker.h"
@@ -57,7 +58,12 @@ BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function
   BlockMesh mesh;
   mesh.order = order;
   mesh.lines = lines;
-  make(mesh, is_too_large, most_cells, threads);
+  {
+    // one at a time: deal.II has one limit of threads for all, and no lock on it
+    static std::mutex in_use;
+    const std::lock_guard lock(in_use);
+    make(mesh, is_too_large, most_cells, threads);
+  }
   for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
     const Box& box = mesh.cells[cell];
     MBTFM_ASSERT(mesh.cell_levels[cell] < kMostLevels);

@@ -4,6 +4,7 @@
 
 #include <cstdio>
 #include <cstdlib>
+#include <ostream>
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
@@ -72,6 +73,9 @@ struct KnownScene {
   const char* name;
   const char* was_wrong;
 };
+
+/// Not its bytes, as GoogleTest would: they hold addresses, and stand in the names that ctest knows.
+void PrintTo(const KnownScene& scene, std::ostream* out) { *out << "scene " << scene.seed; }
 
 /// Every scene that ever failed.
 class FailedOnce : public ::testing::TestWithParam<KnownScene> {};
