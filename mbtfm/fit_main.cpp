@@ -235,13 +235,21 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const Effect coupling =
       decide_time_coupling(context.has_input("start") || series.size() > 1, p.effects.time_coupling);
   const std::vector<int> adhesion_ids = adhesion_ids_of(inputs.cell);
-  const TensionProblem problem(networks.front(), data.reduced, adhesion_ids);
-  const Trial start = coupling.is_on && context.has_input("start")
-                          ? scaled_to_data(problem, start_of(context, networks.front().fibre_ids()))
-                          : uniform_start(problem);
-  Effect elasticity = network::decide_elasticity(
-      networks.front(), {start.tensions_nN.data(), start.tensions_nN.data() + start.tensions_nN.size()}, p.effects);
-  if (!elasticity.is_on) networks = of_cables(networks, inelastic(p.cables));
+  const auto start_on = [&](const network::CableNetwork& network) {
+    const TensionProblem problem(network, data.reduced, adhesion_ids);
+    return coupling.is_on && context.has_input("start")
+               ? scaled_to_data(problem, start_of(context, network.fibre_ids()))
+               : uniform_start(problem);
+  };
+  Trial start = start_on(networks.front());
+  const auto take_cables = [&](const network::CableParameters& cables) {
+    networks = of_cables(networks, cables);
+    start = start_on(networks.front());
+  };
+  const Eigen::VectorXd& start_nN = start.tensions_nN;
+  Effect elasticity =
+      network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
+  if (!elasticity.is_on) take_cables(inelastic(p.cables));
   const auto fit_all = [&] {
     return fit_ensemble(
         networks, data, adhesion_ids, p.fit, context.threads,
@@ -253,7 +261,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   };
   EnsembleFit fit = fit_all();
   if (was_left_out_wrongly(elasticity, networks.front(), fit.meshes.front().fit.trial, p)) {
-    networks = of_cables(networks, p.cables);
+    take_cables(p.cables);
     fit = fit_all();
   }
 

@@ -27,10 +27,10 @@ class SmallCell : public testing::Test {
 TEST_F(SmallCell, is_fitted_anew_where_the_preset_changes_and_only_then) {
   ASSERT_EQ(run("run --preset fast").code, 0);
   EXPECT_NE(read_text(cell / "run.json").find("\"preset\": \"fast\""), std::string::npos);
-  EXPECT_NE(read_text(cell / "4_fit/fit.json").find("\"n_meshes\": 2"), std::string::npos);
+  EXPECT_NE(read_text(cell / "4_fit/record.json").find("\"edge_length_um\": 2.5"), std::string::npos);
   EXPECT_NE(run("run --preset fast").output.find("fit      up to date"), std::string::npos);
   EXPECT_NE(run("run").output.find("fit      "), std::string::npos);
-  EXPECT_NE(read_text(cell / "run.json").find("\"preset\": \"standard\""), std::string::npos);
+  EXPECT_NE(read_text(cell / "4_fit/record.json").find("\"edge_length_um\": 1.5"), std::string::npos);
   EXPECT_NE(run("run --preset standard").output.find("fit      up to date"), std::string::npos);
   EXPECT_EQ(run("run --preset quick").code, 2);
 }
