@@ -36,10 +36,13 @@ constexpr std::size_t kLastSteps = 3;
 // A refused step is damped by no less: at a smaller part of the diagonal the next one would be the same again.
 constexpr double kFirstRefusal = 0.3;
 
-/// What no bead could tell, in Phi.
+/// What no bead could tell, in Phi; nor exact beads, as forces are known to some 1e-10.
 double negligible(const TensionProblem& problem, double objective) {
-  const double whole = objective + 0.5 * problem.data().floor_squared;
-  return kNegligible * whole / static_cast<double>(std::max<Eigen::Index>(1, problem.data().n_components));
+  constexpr double kRounding = 1e-20;
+  const ReducedData& data = problem.data();
+  const double whole = objective + 0.5 * data.floor_squared;
+  return std::max(kNegligible * whole / static_cast<double>(std::max<Eigen::Index>(1, data.n_components)),
+                  kRounding * data.target.squaredNorm());
 }
 
 double middle_of(const Eigen::VectorXd& values) {

@@ -49,7 +49,7 @@ void vertices(benchmark::State& state) {
   state.counters["vertices"] = static_cast<double>(n);
   fit_once(state, cables, scene);
 }
-BENCHMARK(vertices)->Arg(20)->Arg(17)->Arg(14)->Arg(12)->Arg(10)->Unit(benchmark::kMillisecond)->Complexity();
+BENCHMARK(vertices)->Arg(20)->Arg(17)->Arg(14)->Arg(12)->Arg(10)->Arg(9)->Unit(benchmark::kMillisecond)->Complexity();
 
 /// From the beads on: reducing them is the only part that grows with their number.
 void beads(benchmark::State& state) {
