@@ -17,11 +17,10 @@ constexpr double kFirstMu = 1e-2;
 constexpr double kLastMu = 1e-8;
 constexpr double kSharpening = 0.5;
 constexpr double kBoldSharpening = 0.05;
-// A stage is left once a step went (nearly) its full length, its slope was below mu for each second cable, and no net
-// force exceeds the force scale. More accuracy is lost again when the energy sharpens; with less, slack cables far from
+// A stage is left once a step went (nearly) its full length, its slope was below mu for each cable, and no net force
+// exceeds the force scale. More accuracy is lost again when the energy sharpens; with less, slack cables far from
 // the path throw the next steps far off, and the finer the mesh the more such cables share one step length.
 constexpr double kFullStep = 0.9;
-constexpr double kSlopePerCable = 0.5;
 // A warm start that has not converged by then is far away: the path is shorter.
 constexpr int kWarmSteps = 25;
 // A line search ends where the slope has fallen to this part of the first: finer costs more than it saves.
@@ -357,7 +356,7 @@ Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& c
     minimiser.reset_duals();
     while (rounding.mu_fJ >= kLastMu * unit_mu_fJ) {
       minimiser.set_rounding(rounding);
-      const double flat_fJ = kSlopePerCable * rounding.mu_fJ * static_cast<double>(cables.size());
+      const double flat_fJ = rounding.mu_fJ * static_cast<double>(cables.size());
       Newton::Step taken;
       int n_steps = 0;
       while (may_step(options.max_iterations) &&
