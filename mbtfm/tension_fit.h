@@ -25,7 +25,7 @@ struct FitParameters {
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
   std::optional<double> frame_interval_s = {};  ///< of a time series; unset: tracks go by frame
   int bootstrap = 0;         ///< draws; 0: intervals from the misfit's profile, which are as good and cost nothing
-  int surface_lines = 160;   ///< half a micrometre for a cell of 80; the time goes with their square
+  int surface_lines = 80;    ///< a micrometre for a cell of 80; the time goes with their square
   int cross_validation = 0;  ///< draws; 0: not asked for, as it takes an equilibrium each
 };
 void declare(ParameterList& list, FitParameters& parameters);

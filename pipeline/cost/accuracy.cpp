@@ -25,11 +25,14 @@ std::string verdict_of(double wanted, const AccuracyOutcome& outcome) {
   if (outcome.is_met) return text;
   if (e.unavoidable > wanted) {
     return text + fmt::format(
-                      ": no computing reaches that, as by the error budget the beads' noise alone makes {}, the "
-                      "segmentation {} and the model's misfit {}, together {}",
-                      percent(e.beads), percent(e.segmentation), percent(e.model), percent(e.unavoidable));
+                      ": no computing reaches that, as by the error budget the beads' noise alone makes {} and the "
+                      "segmentation {}, together {}; the model's misfit makes {}",
+                      percent(e.beads), percent(e.segmentation), percent(e.unavoidable), percent(e.model));
   }
-  return text + ": the mesh and the gel stand in the way; finer ones than those of the presets may reach it";
+  return text + fmt::format(
+                    ": the model's misfit ({}), the mesh and the gel stand in the way; finer meshes and gels than "
+                    "those of the presets may reach it",
+                    percent(e.model));
 }
 
 }  // namespace
@@ -52,7 +55,7 @@ RelativeError relative_error(const ErrorBudget& budget) {
   error.beads = std::sqrt(beads / tensions);
   error.segmentation = std::sqrt(segmentation / tensions);
   error.model = std::sqrt(model / tensions);
-  error.unavoidable = std::hypot(error.beads, error.segmentation, error.model);
+  error.unavoidable = std::hypot(error.beads, error.segmentation);
   return error;
 }
 

@@ -64,7 +64,7 @@ std::vector<Rung> ladder(Extent extent) {
   for (const double share : {0.125, 0.25, 0.5}) {
     rungs.push_back({.knob = "beads", .value = shortest(share), .bead_share = share});
   }
-  add(rungs, "fit", "surface_lines", {"40"});
+  add(rungs, "fit", "surface_lines", {"40", "160"});
   add(rungs, "fit", "tolerance", {"0.1", "0.01", "0.0001"});
   add(rungs, "cables", "smoothing", {"0.01", "0.001", "1e-07"});
   add(rungs, "cables", "force_tolerance", {"0.001", "1e-05", "1e-12"});

@@ -70,6 +70,15 @@ TEST(Accuracy, stops_where_noise_makes_it_unreachable_and_computing_is_in_vain) 
   EXPECT_NE(outcome.verdict.find("the beads' noise alone makes 14 %"), std::string::npos) << outcome.verdict;
 }
 
+TEST(Accuracy, does_not_take_the_misfit_of_a_coarse_model_for_unavoidable) {
+  const auto run = [](const std::string& preset) {
+    ErrorBudget b = budget(0.5, 0.05);
+    for (TensionError& t : b.tensions) t.parts_nN.model = preset == "fast" ? 0.8 : 0.1;
+    return b;
+  };
+  EXPECT_EQ(reach_accuracy(0.01, run).preset, "standard");
+}
+
 Measurement measured(double cpu_seconds, double error) {
   return {.rung = {.knob = "knob", .value = "1"},
           .seconds = cpu_seconds,
