@@ -39,6 +39,16 @@ void write(const std::filesystem::path& file, segment::Image image, std::optiona
   segment::write_tiff(file, image);
 }
 
+/// r.tif and two frames of the same beads, shifted by (2, 1) and (-3, 2) px of 0.2 um.
+void write_series(const test::TemporaryFolder& folder) {
+  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
+  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
+  write(folder / "r.tif", one.relaxed, 0.2);
+  std::filesystem::create_directory(folder / "frames");
+  write(folder / "frames/a.tif", one.stressed, 0.2);
+  write(folder / "frames/b.tif", two.stressed, 0.2);
+}
+
 TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
   const test::TemporaryFolder folder;
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
@@ -54,12 +64,7 @@ TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
 
 TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
   const test::TemporaryFolder folder;
-  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
-  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});  // of the same beads
-  write(folder / "r.tif", one.relaxed, 0.2);
-  std::filesystem::create_directory(folder / "frames");
-  write(folder / "frames/a.tif", one.stressed, 0.2);
-  write(folder / "frames/b.tif", two.stressed, 0.2);
+  write_series(folder);
   const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
   ASSERT_EQ(ended.code, 0) << ended.said;
   const CsvTable frames(folder / "out/frames.csv");
@@ -73,12 +78,7 @@ TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
 
 TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not) {
   const test::TemporaryFolder folder;
-  const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
-  const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});  // of the same beads
-  write(folder / "r.tif", one.relaxed, 0.2);
-  std::filesystem::create_directory(folder / "frames");
-  write(folder / "frames/a.tif", one.stressed, 0.2);
-  write(folder / "frames/b.tif", two.stressed, 0.2);
+  write_series(folder);
   const std::string arguments = files(folder, "r.tif", "frames") + " --record " + (folder / "out/record.json").string();
   ASSERT_EQ(run_track(folder, arguments).code, 0);
   const std::string list = read_text(folder / "out/frames.csv"), lost = read_text(folder / "out/displacement_0002.csv");
