@@ -35,6 +35,7 @@ struct MeshFit {
   Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from noise and model
   Eigen::MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
   Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
+  double network_bias_nN = 0;                        ///< of its tension, where forces bend within its error
   std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
 };

@@ -68,6 +68,35 @@ TEST(TensionFit, total_and_network_force_are_unbiased_at_a_quarter_of_noise) {
   EXPECT_LE(std::abs(network), 0.05 + 3 * std::sqrt(network_squared / kRepeats));
 }
 
+TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
+  // what is taken off the network's force beside the bounds, against fits of noise anew; those of the linearised
+  // problem, whose mean error is zero, are taken off them and leave little of chance
+  const TensionScene scene = tension_scene("case_21", 1000, 0.05, 2);
+  const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const Trial truth = problem.evaluate(scene.tensions_nN);
+  const Eigen::MatrixXd J = problem.jacobian(truth), covariance = (J.transpose() * J).inverse();
+  const double bias = bending_bias_nN(problem, truth, J, covariance, covariance)[0];
+  constexpr int kRepeats = 400;
+  double sum = 0, squares = 0;
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal(0, 1);
+  for (int repeat = 0; repeat < kRepeats; ++repeat) {
+    Eigen::VectorXd noise(J.rows());
+    for (double& n : noise) n = normal(random);
+    ReducedData data = problem.data();
+    data.target = problem.data().compliance * truth.forces_nN + noise;
+    const TensionProblem again(scene.cables, data, scene.adhesion_ids);
+    const TensionFit fit = fit_gauss_newton(again, {}, again.evaluate(scene.tensions_nN, &truth));
+    const LocalMisfit local = local_misfit(fit.trial, again.jacobian(fit.trial));
+    const double error = fit.trial.tensions_nN[0] + past_bounds_nN(local, 1)[0] - scene.tensions_nN[0];
+    const double rest = error - (covariance * (J.transpose() * noise))[0];
+    sum += rest / kRepeats, squares += rest * rest / kRepeats;
+  }
+  const double standard_error = std::sqrt((squares - sum * sum) / kRepeats);
+  EXPECT_LT(sum, -3 * standard_error) << "no bias to be told";
+  EXPECT_NEAR(sum, bias, 0.5 * std::abs(sum) + 3 * standard_error);  // second order: the next ones are beyond it
+}
+
 TEST(TensionFit, tensions_up_to_10_nN_deviate_as_the_Cramer_Rao_limit_implies) {
   // thesis 3.3: t uniform in [0, 10] nN, 10 000 beads. Its mean relative deviation depends on the cell and on the
   // weakest fibre drawn; docs/validation.md has it for whole cells.
