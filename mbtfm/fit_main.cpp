@@ -321,7 +321,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   report.figures.emplace_back("error_budget_s", budget_s);
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
-  if (n_unidentifiable > 0) report.summary += "; " + std::to_string(n_unidentifiable) + " tensions not identifiable";
+  if (n_unidentifiable > 0)
+    report.summary += "; " + std::to_string(n_unidentifiable) + (n_unidentifiable == 1 ? " tension" : " tensions") +
+                      " not identifiable";
   if (inputs.n_flagged > 0) report.summary += "; " + std::to_string(inputs.n_flagged) + " flagged beads left out";
   if (!fit.report.converged) report.summary = fit.report.reason;
   if (data.has_errors && fit.chi_squared_per_degree > kPoorFit) {
