@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "pipeline/contract/errors.h"
 #include "segment/given_field.h"
 #include "segment/plane.h"
@@ -90,6 +93,25 @@ TEST(TrackStability, loose_beads_in_steep_peaks_are_found) {
   // windows alone find two thirds; a share of a hundred beads is good to 0.04
   EXPECT_GE(n_tracked - n_wrong, 0.75 * n_steep);
   EXPECT_LE(n_wrong, 0.1 * n_tracked);
+}
+
+/// Where beads scatter so, many registrations run off; one that did once asked for more memory than there is.
+TEST(TrackStability, beads_that_are_lost_stay_in_the_picture) {
+  test::hard_case("dense beads that each move by two fifths of their distance",
+                  "all displacements, of flagged beads too, end within 64 px of the picture");
+  constexpr double kSide = 400, kDistance = 5;
+  const auto peaks = test::ring_of_adhesions(kSide, 6);
+  const auto pair = test::draw_bead_pair(peaks, {.width = static_cast<int>(kSide),
+                                                 .n_beads = static_cast<int>(std::pow(kSide / kDistance, 2)),
+                                                 .bead_sigma = 1.0,
+                                                 .brightness_spread = 0.25,
+                                                 .jitter = 0.4 * kDistance,
+                                                 .lost = 0.03,
+                                                 .seed = 7});
+  for (const Bead& bead : track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2).field) {
+    const Vec2 from_middle = bead.position_um + bead.displacement_um - Vec2{0.5 * kSide, 0.5 * kSide};
+    EXPECT_LE(std::max(std::abs(from_middle.x), std::abs(from_middle.y)), 0.5 * kSide + 64);
+  }
 }
 
 TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
