@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <functional>
 #include <optional>
 #include <utility>
 
@@ -127,23 +126,23 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Su
 
 }  // namespace
 
-void require_common_beads(int n_found, int n_beads) {
-  constexpr double kFewest = 0.2;
-  if (n_found >= kFewest * n_beads) return;
+void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads) {
+  constexpr double kFewest = 0.2, kMost = 2.0 / 3;
+  const int n_found = std::min(n_by_grid, n_in_the_end);
+  if (n_found >= kFewest * n_beads || n_in_the_end >= kMost * n_beads) return;
   throw InvalidData("the stressed image", "the beads of the relaxed image, displaced",
                     std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
 }
 
-std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
   std::vector<Track> tracks(scene.relaxed->beads.size());
   follow_grid(scene, grid, parameters.least_similarity, tracks);
   Surroundings surroundings;
   update(scene, tracks, surroundings);
   flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
-  require_common_beads(static_cast<int>(std::count_if(tracks.begin(), tracks.end(), std::mem_fn(&Track::is_good))),
-                       scene.n_beads());
+  const int n_by_grid = n_good(tracks);
   follow_neighbours(scene, parameters, surroundings, tracks);
-  return tracks;
+  return {std::move(tracks), n_by_grid};
 }
 
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks) {

@@ -10,14 +10,21 @@
 
 namespace mbtfm::segment {
 
-/// With the wide window chance finds one bead in twenty of unrelated pictures "again", of related ones most.
-/// @throws InvalidData where it is less than one in five
-void require_common_beads(int n_found, int n_beads);
+struct Followed {
+  std::vector<Track> tracks;
+  int n_by_grid = 0;  ///< found from the grid's prediction, and not contradicted by their neighbours
+};
 
 /// Find the beads with the wide window: from the grid's prediction, then, where that fails, from the motion of the
 /// beads already tracked around, again and again.
-/// @throws InvalidData where the two images do not show the same beads
-std::vector<Track> follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters);
+
+/// Of unrelated pictures the wide window finds one bead in twenty "again", by chance, and all that comes after finds up
+/// to two in five; of related ones each finds most. Of beads that scatter by more than their width, but by less than
+/// a quarter of their distance, the window finds few and what comes after three in four.
+/// @throws InvalidData where fewer than two in three are found in the end, and fewer than one in five there or by the
+/// grid
+void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads);
 
 /// What the good tracks around say of each good one.
 std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks);

@@ -366,7 +366,11 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
     const double shift = std::hypot(change[0], change[1]);
     const double share = shift > 1 ? 1 / shift : 1;  // a slope tells nothing beyond a bead's flank
     result.motion = composed(result.motion, share * change);
-    if (!is_finite(result.motion.u) || std::abs(result.motion.u.x - guess.u.x) > 50) return result;
+    constexpr double kFarthest = 50;  // px; steps are of a pixel at most, but a gradient that runs off magnifies them
+    if (!is_finite(result.motion.u) || norm(result.motion.u - guess.u) > kFarthest) {
+      result.motion = guess;  // what ran off leads nowhere
+      return result;
+    }
     if (shift < window.settled_px) {
       result.is_converged = true;
       break;

@@ -66,7 +66,7 @@ struct Registered {
 /// Minimises Σ w (a target(x + u(x)) + b − reference(x))² + (G − G₀)² noise²/gradient_sd² over u, G, a, b by
 /// inverse-compositional Gauss–Newton steps: slopes and normal matrix come from the reference and stay. Gain and
 /// offset are projected out. The standard error is that of a weighted fit with the window's own residual:
-/// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹.
+/// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹. What has not converged is no further than 50 px from the guess.
 Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,
                       const Window& window, const Others& others = {});
 

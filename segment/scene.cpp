@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
@@ -71,6 +72,10 @@ std::vector<int> good_around(const Scene& scene, const std::vector<Track>& track
     result.push_back(k);
   }
   return result;
+}
+
+int n_good(const std::vector<Track>& tracks) {
+  return static_cast<int>(std::count_if(tracks.begin(), tracks.end(), std::mem_fn(&Track::is_good)));
 }
 
 std::vector<Motion> motions_of(const std::vector<Track>& tracks) {

@@ -62,6 +62,8 @@ void for_each_bead(const Scene& scene, const Body& body) {
 /// The n good tracks nearest to a bead and at least `gap` px from it.
 std::vector<int> good_around(const Scene& scene, const std::vector<Track>& tracks, int bead, int n, double gap = 0);
 
+int n_good(const std::vector<Track>& tracks);
+
 std::vector<Motion> motions_of(const std::vector<Track>& tracks);
 
 }  // namespace mbtfm::segment

@@ -249,7 +249,7 @@ Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, 
   if (kind != "auto" && drift_kind(kind) != Drift::translation) {
     const Plane light = without_background(stressed, background_sigma(side_->bead_sigma));
     turn = turn_between(plane, light, side_->bead_sigma, threads_);
-    if (!turn) require_common_beads(0, static_cast<int>(side_->beads.size()));
+    if (!turn) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
   }
   const Scene scene = scene_of(side_,
                                side_of(turn ? turned_back(stressed, *turn, threads_) : stressed, side_->bead_sigma,
@@ -259,10 +259,11 @@ Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, 
   const Plane& moved = scene.stressed.image.plane;
   const GridField grid = coarse_field(plane, moved, search_window(scene, parameters_, pixel_size_um), threads_);
   tell(0.5, "registering beads");
-  std::vector<Track> followed = follow(scene, grid, parameters_);
+  Followed followed = follow(scene, grid, parameters_);
   tell(0.7, "measuring beads");
-  const Measured measured = measured_beads(scene, std::move(followed), turn, parameters_);
+  const Measured measured = measured_beads(scene, std::move(followed.tracks), turn, parameters_);
   const std::vector<Track>& tracks = measured.tracks;
+  require_common_beads(followed.n_by_grid, n_good(tracks), scene.n_beads());
   const Pooling& pooling = measured.pooling;
   const auto [far, rotation] = drift_of_all(scene, measured, parameters_, kind, turn);
   Tracking result = tracking_of(scene, tracks, pooling, far, pixel_size_um);

@@ -1,5 +1,8 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "pipeline/contract/errors.h"
 #include "segment/given_field.h"
 #include "segment/plane.h"
@@ -92,6 +95,57 @@ TEST(TrackStability, loose_beads_in_steep_peaks_are_found) {
   EXPECT_LE(n_wrong, 0.1 * n_tracked);
 }
 
+/// Good beads that went where none did.
+int n_wrong(const Tracking& tracking, const test::BeadPair& pair) {
+  const Neighbours truth(pair.positions, 8);
+  return static_cast<int>(std::count_if(tracking.field.begin(), tracking.field.end(), [&](const Bead& bead) {
+    const auto around = truth.within(bead.position_um - Vec2{0.5, 0.5}, 2, 3);
+    return bead.flag.empty() && std::none_of(around.begin(), around.end(), [&](int k) {
+             return norm(bead.displacement_um + tracking.drift_um - pair.displacements[k]) < 1;
+           });
+  }));
+}
+
+/// The wide window then finds one in six: its neighbours are elsewhere.
+TEST(TrackStability, sparse_beads_that_scatter_by_many_widths_are_matched) {
+  test::hard_case("each bead moves on its own by four times its width, nearly a quarter of the distance to the next",
+                  "three in four found, at most one in ten of them wrong");
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  double n_good = 0, n_beads = 0, n_strangers = 0;
+  for (const std::uint64_t seed : {101u, 102u, 103u}) {
+    const auto pair = test::draw_bead_pair(
+        peaks, {.width = 384, .n_beads = 300, .brightness_spread = 0.25, .jitter = 5, .lost = 0.015, .seed = seed});
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    n_good += tracking.n_good;
+    n_beads += static_cast<double>(tracking.field.size());
+    n_strangers += n_wrong(tracking, pair);
+  }
+  // a share of eight hundred beads is good to 0.015
+  EXPECT_GE(n_good, 0.75 * n_beads);
+  EXPECT_LE(n_strangers, 0.1 * n_good);
+  test::came_out(test::two_digits(100 * n_good / n_beads) + " % found, " +
+                 test::two_digits(100 * n_strangers / n_good) + " % of them wrong");
+}
+
+/// Where beads scatter so, many registrations run off; one that did once asked for more memory than there is.
+TEST(TrackStability, beads_that_are_lost_stay_in_the_picture) {
+  test::hard_case("dense beads that each move by two fifths of their distance",
+                  "all displacements, of flagged beads too, end within 64 px of the picture");
+  constexpr double kSide = 400, kDistance = 5;
+  const auto peaks = test::ring_of_adhesions(kSide, 6);
+  const auto pair = test::draw_bead_pair(peaks, {.width = static_cast<int>(kSide),
+                                                 .n_beads = static_cast<int>(std::pow(kSide / kDistance, 2)),
+                                                 .bead_sigma = 1.0,
+                                                 .brightness_spread = 0.25,
+                                                 .jitter = 0.4 * kDistance,
+                                                 .lost = 0.03,
+                                                 .seed = 7});
+  for (const Bead& bead : track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2).field) {
+    const Vec2 from_middle = bead.position_um + bead.displacement_um - Vec2{0.5 * kSide, 0.5 * kSide};
+    EXPECT_LE(std::max(std::abs(from_middle.x), std::abs(from_middle.y)), 0.5 * kSide + 64);
+  }
+}
+
 TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
   test::hard_case("beads ten times fainter", "larger stated errors, at most 1 % wrong");
   const auto peaks = test::ring_of_adhesions(256, 2);
@@ -150,6 +204,22 @@ TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_gi
     EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed, parameters).substr(0, refused.size()), refused);
     EXPECT_EQ(what_is_wrong(one.relaxed, one.stressed, parameters), "nothing");
   }
+}
+
+TEST(TrackStability, few_beads_of_another_place_are_not_taken_for_the_same) {
+  test::hard_case("pictures of two places with two dozen beads each", "an error, or a fifth of the beads at least");
+  int n_refused = 0;
+  for (std::uint64_t seed = 1; seed <= 30; ++seed) {
+    const auto one = test::draw_bead_pair({}, {.width = 80, .n_beads = 24, .bead_sigma = 2.1, .seed = seed});
+    const auto other = test::draw_bead_pair({}, {.width = 80, .n_beads = 24, .bead_sigma = 2.1, .seed = 100 + seed});
+    try {
+      const Tracking tracking = track_beads(one.relaxed, other.stressed, 1.0);
+      EXPECT_GE(tracking.n_good, 0.2 * static_cast<double>(tracking.field.size())) << "seed " << seed;
+    } catch (const InvalidData&) {
+      ++n_refused;
+    }
+  }
+  test::came_out(std::to_string(n_refused) + " of 30 refused");
 }
 
 TEST(TrackStability, one_bead_and_a_pixel_without_a_number_are_refused) {
