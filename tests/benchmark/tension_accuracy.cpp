@@ -337,7 +337,7 @@ void bounds(const Arguments& a) {
     const double size = a.n_repeats * scene.tensions_nN[0];
     std::printf("%g,%.3f,%.4f,%.4f,%.4f,%.4f,%.4f\n", level, std::sqrt(covariance(0, 0)) / scene.tensions_nN[0],
                 unbounded / size, bounded / size, corrected / size, reported / size,
-                1 + bending_bias_nN(problem, truth, J, covariance, covariance)[0] / scene.tensions_nN[0]);
+                1 + bending_bias_nN(problem, truth, J, covariance, covariance, 2)[0] / scene.tensions_nN[0]);
   }
 }
 
