@@ -48,17 +48,7 @@ bool is_near_a_bound(const MeshFit& mesh) {
   return false;
 }
 
-/// Forces are not linear in the tensions, which matters only where these are badly known: the bias of the network's
-/// falls with the square of its standard error, and is 8 % where that is a half (docs/validation.md).
-double network_bias_nN(const MeshFit& mesh, const TensionProblem& problem, const Eigen::MatrixXd& jacobian) {
-  constexpr double kBent = 0.2;  // of the tension: 1.5 % there
-  const double tension = mesh.local.tensions_nN[0], standard_error = std::sqrt(mesh.covariance_nN2(0, 0));
-  if (tension <= 0 || standard_error < kBent * tension) return 0;
-  const double bias = bending_bias_nN(problem, mesh.fit.trial, jacobian, mesh.response, mesh.covariance_nN2)[0];
-  return std::clamp(bias, -standard_error, standard_error);
-}
-
-void add_errors(MeshFit& mesh, const EnsembleFit& all, const TensionProblem& problem) {
+void add_errors(MeshFit& mesh, const EnsembleFit& all) {
   const Eigen::MatrixXd J = all.data.compliance * mesh.force_derivatives;
   const Eigen::MatrixXd by_slope = J.transpose() * all.data.compliance;
   if (all.model_error)
@@ -68,11 +58,22 @@ void add_errors(MeshFit& mesh, const EnsembleFit& all, const TensionProblem& pro
   mesh.noise_covariance_nN2 = all.variance * mesh.response;
   mesh.covariance_nN2 = covariance_nN2(mesh.local, all.variance);
   mesh.past_bounds_nN = past_bounds_nN(mesh.local, all.variance);
-  mesh.network_bias_nN = network_bias_nN(mesh, problem, J);
   if (!is_near_a_bound(mesh)) return;
   for (int i = 0; i < static_cast<int>(mesh.local.g.size()); ++i) {
     mesh.intervals_95.push_back(profile_95(mesh.local, all.variance, i));
   }
+}
+
+/// Forces are not linear in the tensions, which matters only where these are badly known: relative to the network's,
+/// the bias falls with the square of its standard error, and is 8 % where that is a half (docs/validation.md).
+double network_bias(const MeshFit& mesh, const TensionProblem& problem, int threads) {
+  constexpr double kBadlyKnown = 0.35;  // 4 % there
+  const double tension = mesh.local.tensions_nN[0], standard_error = std::sqrt(mesh.covariance_nN2(0, 0));
+  if (tension <= 0 || standard_error < kBadlyKnown * tension) return 0;
+  const Eigen::MatrixXd J = problem.data().compliance * mesh.force_derivatives;
+  const Eigen::VectorXd bias_nN =
+      bending_bias_nN(problem, mesh.fit.trial, J, mesh.response, mesh.covariance_nN2, threads);
+  return std::clamp(bias_nN[0], -standard_error, standard_error) / tension;
 }
 
 /// Draws shared out over the meshes in turn; replaces the profile.
@@ -167,7 +168,7 @@ Estimate network_force_of(const EnsembleFit& all) {
       all,
       [&](const MeshFit& mesh) {
         return per_tension(mesh) *
-               std::max(0.0, mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0] - mesh.network_bias_nN);
+               std::max(0.0, (1 - all.network_bias) * mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0]);
       },
       [&](const MeshFit& mesh) -> Eigen::VectorXd {
         return per_tension(mesh) * Eigen::VectorXd::Unit(mesh.local.g.size(), 0);
@@ -329,10 +330,9 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
                                   variance_beside_model_error(data, all.forces_nN, n_tensions, all.loss));
     all.variance = all.model_error->noise_variance;
   }
-  parallel_for(n_meshes, threads, [&](int m) {
-    const auto i = static_cast<std::size_t>(m);
-    add_errors(all.meshes[i], all, TensionProblem(networks[i], all.data, adhesion_ids));
-  });
+  parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
+  all.network_bias =
+      network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data, adhesion_ids), threads);
   add_estimates(all);
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;

@@ -35,7 +35,6 @@ struct MeshFit {
   Eigen::MatrixXd covariance_nN2;                    ///< of the tensions, from noise and model
   Eigen::MatrixXd noise_covariance_nN2;              ///< of the tensions, from the beads' noise
   Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
-  double network_bias_nN = 0;                        ///< of its tension, where forces bend within its error
   std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
 };
@@ -51,6 +50,7 @@ struct EnsembleFit {
   /// Sums of the magnitudes of both, less what noise and the bounds t >= 0 add to them on average.
   Estimate total_force_nN, network_force_nN;
   double chi_squared_per_degree = 0;      ///< of the mean over meshes: 1 where the model explains all but the noise
+  double network_bias = 0;                ///< of its tension, relative: by forces that bend within its error
   double variance = 0;                    ///< of a component of `data`: see misfit_variance
   ReducedData data;                       ///< as the loss weighs it
   std::string loss;                       ///< that the first fit called for

@@ -83,16 +83,39 @@ double force_tolerance(const Trial& trial, const TensionProblem& problem, double
 
 struct Step {
   Eigen::VectorXd change_nN;
-  double predicted = 0;  ///< by how much it lowers Phi, if forces are linear in the tensions
+  double predicted = 0;  ///< by how much it lowers Phi, if that is quadratic
 };
 
-Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, double damping) {
-  const Eigen::MatrixXd H = jacobian.transpose() * jacobian;
+/// What a step changes of the gradient beyond JᵀJ, r · d²(C R)/dt², learnt from what the last steps changed (Dennis,
+/// Gay & Welsch, ACM Trans. Math. Softw. 7 (1981) 348). Where noise leaves residuals and cables pass their rest length,
+/// JᵀJ alone promises several times what a step gains, and shorter and shorter steps are all that helps.
+/// @param before, after  trials before and after a step, with their Jacobians
+void learn_bend(Eigen::MatrixXd& bend, const Trial& before, const Eigen::MatrixXd& jacobian_before, const Trial& after,
+                const Eigen::MatrixXd& jacobian_after) {
+  const Eigen::VectorXd s = after.tensions_nN - before.tensions_nN;
+  const Eigen::VectorXd gradient = jacobian_after.transpose() * after.residual;
+  const Eigen::VectorXd y = gradient - jacobian_before.transpose() * before.residual;
+  const Eigen::VectorXd wanted = gradient - jacobian_before.transpose() * after.residual;  // of bend · s
+  const double y_s = y.dot(s);
+  constexpr double kLeast = 1e-3;  // less curvature than that part of JᵀJ's is no minimum's
+  if (y_s <= kLeast * (jacobian_after * s).squaredNorm()) return;
+  const double size = s.dot(bend * s);
+  if (size != 0) bend *= std::min(1.0, std::abs(s.dot(wanted) / size));
+  const Eigen::VectorXd rest = wanted - bend * s;
+  bend += (rest * y.transpose() + y * rest.transpose()) / y_s - rest.dot(s) / (y_s * y_s) * y * y.transpose();
+}
+
+/// @param bend  see learn_bend(); left out where a step with it would be ten times one without
+Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& bend, double damping) {
+  const Eigen::MatrixXd straight = jacobian.transpose() * jacobian;
   const Eigen::VectorXd gradient = jacobian.transpose() * trial.residual;
   // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
   // damps its steps, but moves no minimum.
-  const Eigen::VectorXd weak = Eigen::VectorXd::Constant(H.rows(), 1e-6 * middle_of(H.diagonal()) + 1e-300);
-  const Eigen::VectorXd scale = H.diagonal();
+  const Eigen::VectorXd scale = straight.diagonal();
+  const Eigen::VectorXd weak = Eigen::VectorXd::Constant(scale.size(), 1e-6 * middle_of(scale) + 1e-300);
+  const Eigen::MatrixXd least = 0.5 * straight + bend + Eigen::MatrixXd(weak.asDiagonal());
+  const bool is_convex = least.llt().info() == Eigen::Success;
+  const Eigen::MatrixXd H = is_convex ? straight + bend : straight;
   const Eigen::MatrixXd damped = H + Eigen::MatrixXd((damping * scale + weak).asDiagonal());
   const Eigen::VectorXd step = bounded_quadratic_minimum(damped, gradient, lowest_step(trial.tensions_nN));
   return {.change_nN = step, .predicted = -(gradient.dot(step) + 0.5 * step.dot(H * step))};
@@ -107,7 +130,7 @@ double gained_of_late(const TensionFit& fit) {
 /// Whether a descent may end before its time.
 using Enough = std::function<bool(const Trial&)>;
 
-/// Levenberg–Marquardt from fit.trial.
+/// Levenberg–Marquardt from fit.trial, the Hessian bent.
 void descend(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit,
              const Enough& is_enough = {}) {
   fit.report = {};
@@ -117,20 +140,21 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
     fit.report.reason = reason;
   };
   Eigen::MatrixXd jacobian = problem.jacobian(fit.trial);
+  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(jacobian.cols(), jacobian.cols());
   for (int i = 0; i < parameters.max_steps; ++i) {
     if (is_enough && is_enough(fit.trial)) return has_ended("nothing else is to be found there");
     fit.report.iterations = i + 1;
     fit.history.push_back({.n_evaluations = fit.n_evaluations, .objective = fit.trial.objective});
-    const auto [step, predicted] = damped_step(fit.trial, jacobian, damping);
+    const auto [step, predicted] = damped_step(fit.trial, jacobian, bend, damping);
     const double largest = std::max(fit.trial.tensions_nN.maxCoeff(), std::numeric_limits<double>::min());
     fit.report.last_change = step.cwiseAbs().maxCoeff() / largest;
     if (predicted <= 1e-15 * fit.trial.objective || step.cwiseAbs().maxCoeff() == 0)
       return has_ended("no step lowers the misfit any further");
 
-    const std::optional<Trial> next = try_evaluate(problem, (fit.trial.tensions_nN + step).cwiseMax(0.0), fit,
-                                                   force_tolerance(fit.trial, problem, predicted));
+    std::optional<Trial> next = try_evaluate(problem, (fit.trial.tensions_nN + step).cwiseMax(0.0), fit,
+                                             force_tolerance(fit.trial, problem, predicted));
     const double gain = next ? (fit.trial.objective - next->objective) / predicted : -1;
-    if (gain > 0) fit.trial = *next;
+    if (gain > 0) std::swap(fit.trial, *next);  // which then is the one before
     // A step that is short because it is damped says nothing of convergence.
     if (fit.report.last_change < parameters.tolerance && damping <= 1e-2)
       return has_ended("the tensions change by less than the tolerance");
@@ -138,7 +162,11 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
     const double told = negligible(problem, fit.trial.objective);
     if ((predicted < told && damping <= 1e-2) || (gain > 0 && gained_of_late(fit) < told))
       return has_ended("the last steps lower the misfit by less than any bead could tell");
-    if (gain > 0) jacobian = problem.jacobian(fit.trial);
+    if (gain > 0) {
+      Eigen::MatrixXd after = problem.jacobian(fit.trial);
+      learn_bend(bend, *next, jacobian, fit.trial, after);
+      jacobian = std::move(after);
+    }
     if (gain > 0.75) damping = std::max(1e-12, damping / 10);
     if (gain < 0.25) damping = std::max(10 * damping, gain > 0 ? 0.0 : kFirstRefusal);
   }

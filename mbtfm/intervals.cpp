@@ -116,23 +116,23 @@ Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
 }
 
 Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
-                                const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2) {
+                                const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2, int threads) {
   constexpr double kRough = 1e-5;  // of an equilibrium: what bends is a hundredth of the forces and more
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(covariance_nN2);
   const double largest = solution.tensions_nN.maxCoeff();
-  Eigen::VectorXd bend = Eigen::VectorXd::Zero(jacobian.rows());
-  for (Eigen::Index k = 0; k < jacobian.cols(); ++k) {
+  Eigen::MatrixXd bend = Eigen::MatrixXd::Zero(jacobian.rows(), jacobian.cols());  // by direction
+  parallel_for(static_cast<int>(jacobian.cols()), threads, [&](int k) {
     const Eigen::VectorXd deviation = std::sqrt(std::max(0.0, eigen.eigenvalues()[k])) * eigen.eigenvectors().col(k);
     const double size = deviation.cwiseAbs().maxCoeff();
-    if (size == 0) continue;                            // held
+    if (size == 0) return;                              // held
     const double part = std::min(1.0, largest / size);  // what no bead tells of deviates without bounds
     for (const double step : {part, -part}) {
       const Eigen::VectorXd there = (solution.tensions_nN + step * deviation).cwiseMax(0.0);
       const Eigen::VectorXd straight = solution.residual + jacobian * (there - solution.tensions_nN);
-      bend += (problem.evaluate(there, &solution, kRough).residual - straight) / (part * part);
+      bend.col(k) += (problem.evaluate(there, &solution, kRough).residual - straight) / (part * part);
     }
-  }
-  return -0.5 * response * (jacobian.transpose() * bend);
+  });
+  return -0.5 * response * (jacobian.transpose() * bend.rowwise().sum());
 }
 
 double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd& derivatives,

@@ -36,7 +36,7 @@ Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance);
 /// 171): two equilibria for each tension, a standard error up and down along uncorrelated directions of them.
 /// @param response, covariance_nN2  as response_of() and covariance_nN2() have them
 Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
-                                const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2);
+                                const Eigen::MatrixXd& response, const Eigen::MatrixXd& covariance_nN2, int threads);
 
 /// By how much noise makes the sum of the forces' magnitudes too large, to second order: an error across a force F
 /// lengthens it by its square over 2 F.

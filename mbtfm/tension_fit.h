@@ -51,7 +51,8 @@ struct TensionFit {
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
                         const Trial& start);
 
-/// Levenberg–Marquardt with the exact Jacobian; each step solves the bounded quadratic problem.
+/// Levenberg–Marquardt with the exact Jacobian, and what else the Hessian has learnt from the steps before; each step
+/// solves the bounded quadratic problem.
 TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start);
 
 /// Non-linear conjugate gradients (Polak–Ribière), projected on t >= 0. `blocks` are taken in turn: so many steps on

@@ -1,6 +1,6 @@
 /// tension_accuracy STUDY [repeats] [cells] [folder]: how well tensions are found, for docs/validation.md. Studies:
-/// descent, noise, bounds, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts (SVG)
-/// into the folder.
+/// descent, noise, bounds, deviations, beside-fttc, segmentation, directions, types. A table (CSV) on stdout; charts
+/// (SVG) into the folder.
 #include <Eigen/Cholesky>
 #include <Eigen/Eigenvalues>
 #include <chrono>
@@ -260,6 +260,54 @@ void noise(const Arguments& a) {
          .series = {deviation, implied}}});
 }
 
+/// As the thesis has it: link values along edges only, adhesions at points.
+network::NetworkParameters thesis_network() {
+  network::NetworkParameters p;
+  p.link_weights = "equal";
+  p.link_reach = "neighbours";
+  p.adhesion_anchor = "centre";
+  return p;
+}
+
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return (values[values.size() / 2] + values[(values.size() - 1) / 2]) / 2;
+}
+
+// The mean relative deviation from cell to cell, in the thesis' formulation of the network and in ours, truth and fit
+// alike, and what the Cramér–Rao limit implies.
+void deviations(const Arguments& a) {
+  const std::vector<double> levels = {0.05, 0.07, 0.1};
+  std::printf("network,noise,median_found,median_implied,median_ratio,cells,cells_whose_limit_is_below_a_tenth\n");
+  for (const bool is_thesis : {true, false}) {
+    std::vector<std::vector<double>> found(levels.size()), implied(levels.size()), ratio(levels.size());
+    for (int c = 1; c <= a.n_cells; ++c) {
+      const Cell cell = drawn_cell(static_cast<std::uint64_t>(c));
+      const Eigen::VectorXd truth = test::thesis_tensions_nN(cell.fibres.size(), static_cast<std::uint64_t>(c));
+      TensionScene scene = test::scene_of(cell, truth, 10000, 0, static_cast<unsigned>(c),
+                                          is_thesis ? thesis_network() : network::NetworkParameters{});
+      const auto fibres = Eigen::seq(1, Eigen::last);
+      for (std::size_t l = 0; l < levels.size(); ++l) {
+        test::measure(scene, levels[l], 1);
+        const Eigen::VectorXd limit = test::cramer_rao_nN(scene);
+        implied[l].push_back(std::sqrt(2 / kPi) * limit(fibres).cwiseQuotient(truth(fibres)).mean());
+        double sum = 0;
+        for (int r = 0; r < a.n_repeats; ++r) {
+          measure_again(scene, levels[l], static_cast<unsigned>(a.n_repeats * c + r));
+          const Eigen::VectorXd error = test::values_of(test::fit_own_network(scene)) - truth;
+          sum += error(fibres).cwiseAbs().cwiseQuotient(truth(fibres)).mean();
+        }
+        found[l].push_back(sum / a.n_repeats);
+        ratio[l].push_back(found[l].back() / implied[l].back());
+      }
+    }
+    for (std::size_t l = 0; l < levels.size(); ++l)
+      std::printf("%s,%g,%.3f,%.3f,%.2f,%d,%d\n", is_thesis ? "thesis" : "default", levels[l], median(found[l]),
+                  median(implied[l]), median(ratio[l]), a.n_cells,
+                  int(std::count_if(implied[l].begin(), implied[l].end(), [](double m) { return m <= 0.1; })));
+  }
+}
+
 // What the bounds t >= 0 do to the network's force, and what the correction leaves of it: on the problem linearised at
 // the truth, where nothing else makes a bias. And what the bending of the forces does, without the bounds.
 void bounds(const Arguments& a) {
@@ -289,7 +337,7 @@ void bounds(const Arguments& a) {
     const double size = a.n_repeats * scene.tensions_nN[0];
     std::printf("%g,%.3f,%.4f,%.4f,%.4f,%.4f,%.4f\n", level, std::sqrt(covariance(0, 0)) / scene.tensions_nN[0],
                 unbounded / size, bounded / size, corrected / size, reported / size,
-                1 + bending_bias_nN(problem, truth, J, covariance, covariance)[0] / scene.tensions_nN[0]);
+                1 + bending_bias_nN(problem, truth, J, covariance, covariance, 2)[0] / scene.tensions_nN[0]);
   }
 }
 
@@ -538,8 +586,10 @@ int main(int argc, char** argv) {
                     .n_cells = argc > 3 ? std::atoi(argv[3]) : 1,
                     .folder = argc > 4 ? argv[4] : "."};
   const std::pair<const char*, void (*)(const Arguments&)> studies[] = {
-      {"descent", descent},           {"noise", noise},           {"bounds", bounds}, {"beside-fttc", beside_fttc},
-      {"segmentation", segmentation}, {"directions", directions}, {"types", types}};
+      {"descent", descent},         {"noise", noise},
+      {"bounds", bounds},           {"deviations", deviations},
+      {"beside-fttc", beside_fttc}, {"segmentation", segmentation},
+      {"directions", directions},   {"types", types}};
   for (const auto& [name, run] : studies) {
     if (argc > 1 && std::strcmp(argv[1], name) == 0) {
       run(a);
@@ -547,7 +597,7 @@ int main(int argc, char** argv) {
     }
   }
   std::fprintf(stderr,
-               "tension_accuracy descent|noise|bounds|beside-fttc|segmentation|directions|types [repeats] "
+               "tension_accuracy descent|noise|bounds|deviations|beside-fttc|segmentation|directions|types [repeats] "
                "[cells] [folder]\n");
   return 2;
 }

@@ -75,7 +75,7 @@ TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
   const TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
   const Trial truth = problem.evaluate(scene.tensions_nN);
   const Eigen::MatrixXd J = problem.jacobian(truth), covariance = (J.transpose() * J).inverse();
-  const double bias = bending_bias_nN(problem, truth, J, covariance, covariance)[0];
+  const double bias = bending_bias_nN(problem, truth, J, covariance, covariance, 2)[0];
   constexpr int kRepeats = 400;
   double sum = 0, squares = 0;
   std::mt19937_64 random(5);

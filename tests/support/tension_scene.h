@@ -151,10 +151,10 @@ inline void add_ventral(Cell& cell, int start_id, int end_id) {
 
 /// @param tensions_nN  the network's, then the fibres'
 inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_nN, int n_beads, double noise,
-                             unsigned seed) {
+                             unsigned seed, const network::NetworkParameters& network = {}) {
   std::map<int, substrate::Ellipse> ellipses;
   for (const Adhesion& a : cell.adhesions) ellipses[a.adhesion_id] = substrate::ellipse_of(a);
-  TensionScene scene = scene_of(network::generate_network(cell, {}).network, tensions_nN, ellipses, n_beads, seed);
+  TensionScene scene = scene_of(network::generate_network(cell, network).network, tensions_nN, ellipses, n_beads, seed);
   measure(scene, noise, seed);
   return scene;
 }
