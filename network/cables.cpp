@@ -82,6 +82,12 @@ struct CableNetwork::Impl {
   std::vector<Cable> cables(const std::vector<double>& tensions_nN) const;
 };
 
+/// The least tension over the largest, a zero one counted as what it stands for.
+double weakest(const std::vector<double>& tensions_nN) {
+  const auto [least, largest] = std::minmax_element(tensions_nN.begin(), tensions_nN.end());
+  return *largest > 0 ? std::max(kSlackTension, *least / *largest) : 1;
+}
+
 // What is given is checked here; from here on indices are in range, lengths positive, tensions not negative.
 std::vector<Cable> CableNetwork::Impl::cables(const std::vector<double>& tensions_nN) const {
   if (tensions_nN.size() != fibre_ids.size())
@@ -156,6 +162,7 @@ Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, co
                 .eps_um = impl_->rounding().eps_um,
                 .edge_length_um = impl_->mean_rest_length_um,
                 .force_nN = force > 0 ? force : axial_stiffness,
+                .weakest = weakest(tensions_nN),
                 .force_tolerance_nN = std::max(force_tolerance.value_or(impl_->parameters.force_tolerance) * force,
                                                kStretchRounding * axial_stiffness),
                 .is_polished = !force_tolerance,

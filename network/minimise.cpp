@@ -11,7 +11,7 @@ namespace {
 // of force times edge: a network at rest, all of whose cables stand at the kink, is smooth then. Each stage sharpens
 // twofold, for on fine meshes wider strides leave too many cables on the wrong side of the kink; where one step did for
 // a stage the path is straight, and mu falls twentyfold. At the last mu so few cables are still undecided that the
-// exact energy settles them as fast.
+// exact energy settles them as fast: where some pull by far less than others, it must be small beside the least pull.
 constexpr double kFirstEps = 0.2;
 constexpr double kFirstMu = 1e-2;
 constexpr double kLastMu = 1e-8;
@@ -352,9 +352,10 @@ Minimum minimise_by_newton(const FreeVertices& free, const std::vector<Cable>& c
   if (!has_converged()) {
     const double unit_mu_fJ = options.force_nN * options.edge_length_um;
     Rounding rounding{.eps_um = kFirstEps * options.edge_length_um, .mu_fJ = kFirstMu * unit_mu_fJ};
+    const double last_mu_fJ = kLastMu * options.weakest * unit_mu_fJ;
     minimiser.set_rounding(rounding);
     minimiser.reset_duals();
-    while (rounding.mu_fJ >= kLastMu * unit_mu_fJ) {
+    while (rounding.mu_fJ >= last_mu_fJ) {
       minimiser.set_rounding(rounding);
       const double flat_fJ = rounding.mu_fJ * static_cast<double>(cables.size());
       Newton::Step taken;

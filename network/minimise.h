@@ -31,6 +31,7 @@ struct MinimiseOptions {
   double eps_um = 0;              ///< of the length
   double edge_length_um = 0;      ///< what lengths compare with
   double force_nN = 0;            ///< what forces compare with
+  double weakest = 1;             ///< the least pull over the greatest
   double force_tolerance_nN = 0;  ///< largest net force on a free vertex at the end
   bool is_polished = true;        ///< a step more, to rounding
   int max_iterations = 0;

@@ -56,6 +56,19 @@ TEST(HardCables, only_the_network_or_only_the_fibres_pull) {
   }
 }
 
+TEST(HardCables, a_fibre_alone_collapses_in_a_slack_network_however_weakly_it_pulls) {
+  test::hard_case(
+      "a free fibre draws in a network that does not pull: forces over seven orders of magnitude, stiffness "
+      "over seventeen",
+      "convergence for 10 to 1e-9 nN");
+  const std::vector<Vec2> rim = test::on_circle(0, 360, 4);
+  const CableNetwork cables(test::mesh_of({rim, {{rim[1], {1, 2}}}}));
+  for (const double t : {10., 0.1, 1e-3, 1e-6, 1e-9}) {
+    SCOPED_TRACE(t);
+    solved(cables, {0, t});
+  }
+}
+
 TEST(HardCables, any_axial_stiffness) {
   test::hard_case("EA from 1 to 1e6 nN: cables that stretch to any length, cables that do not stretch", "convergence");
   for (const double axial_stiffness : {1.0, 1e2, 1e4, 1e6}) {
