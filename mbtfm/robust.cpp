@@ -61,7 +61,8 @@ Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& r
 TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network, const std::vector<int>& adhesion_ids,
                          const FitParameters& parameters, int threads, TensionFit fit, const std::string& loss,
                          std::optional<double> fixed_scale) {
-  constexpr int kMaxRounds = 20;  // each halves the change at least
+  constexpr int kMaxRounds = 20;    // each halves the change at least
+  constexpr double kSettled = 0.1;  // of a standard error, along one direction of all tensions
   for (int round = 0; round < kMaxRounds; ++round) {
     const Trial last = fit.trial;
     const Eigen::VectorXd& before = last.tensions_nN;
@@ -76,8 +77,9 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     const int n_evaluations = fit.n_evaluations;
     fit = fit_tensions(reweighted, parameters, threads, scaled_to_data(reweighted, before, &last));
     fit.n_evaluations += n_evaluations;
-    // a thousandth of the largest tension: a tenth of any error bar there is
-    if ((fit.trial.tensions_nN - before).cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
+    // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
+    const Eigen::VectorXd change = fit.trial.tensions_nN - before;
+    if ((J * change).norm() <= kSettled * scale || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
   }
   return fit;
 }
