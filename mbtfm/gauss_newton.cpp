@@ -33,6 +33,8 @@ constexpr double kSlack = 0.05;
 constexpr double kNegligible = 1e-3;
 // Steps that together must lower Phi by more than that.
 constexpr std::size_t kLastSteps = 3;
+// Of the data, left unexplained: less than any experiment leaves.
+constexpr double kExplained = 1e-3;
 // A refused step is damped by no less: at a smaller part of the diagonal the next one would be the same again.
 constexpr double kFirstRefusal = 0.3;
 
@@ -105,7 +107,7 @@ void learn_bend(Eigen::MatrixXd& bend, const Trial& before, const Eigen::MatrixX
   bend += (rest * y.transpose() + y * rest.transpose()) / y_s - rest.dot(s) / (y_s * y_s) * y * y.transpose();
 }
 
-/// @param bend  see learn_bend(); left out where a step with it would be ten times one without
+/// @param bend  see learn_bend(); left out where it takes more than half of the curvature away
 Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& bend, double damping) {
   const Eigen::MatrixXd straight = jacobian.transpose() * jacobian;
   const Eigen::VectorXd gradient = jacobian.transpose() * trial.residual;
@@ -145,6 +147,8 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
     if (is_enough && is_enough(fit.trial)) return has_ended("nothing else is to be found there");
     fit.report.iterations = i + 1;
     fit.history.push_back({.n_evaluations = fit.n_evaluations, .objective = fit.trial.objective});
+    // no more is left to bend where the data are exact, and JᵀJ alone then ends in a step or two
+    if (fit.trial.residual.norm() < kExplained * problem.data().target.norm()) bend.setZero();
     const auto [step, predicted] = damped_step(fit.trial, jacobian, bend, damping);
     const double largest = std::max(fit.trial.tensions_nN.maxCoeff(), std::numeric_limits<double>::min());
     fit.report.last_change = step.cwiseAbs().maxCoeff() / largest;

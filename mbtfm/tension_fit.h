@@ -19,7 +19,7 @@ struct FitParameters {
   std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
   std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
   int n_meshes = 2;  ///< the fewest that tell the model's error; more take 7 % off that of the tensions (validation.md)
-  double tolerance = 1e-6;      ///< relative change of the tensions at which the fit stops: far below any error bar
+  double tolerance = 1e-8;      ///< relative change of the tensions at which the fit stops; with noise it stops before
   int max_steps = 100;          ///< of Gauss–Newton: every loop ends
   int max_evaluations = 5000;   ///< of the conjugate gradients
   double far_distance_um = 10;  ///< beads this far outside the outline tell the noise level
