@@ -24,6 +24,12 @@ int index_of(const std::vector<int>& sorted, int value) {
   return static_cast<int>(std::lower_bound(sorted.begin(), sorted.end(), value) - sorted.begin());
 }
 
+/// The least tension over the largest, a zero one counted as what it stands for.
+double weakest(const std::vector<double>& tensions_nN) {
+  const auto [least, largest] = std::minmax_element(tensions_nN.begin(), tensions_nN.end());
+  return *largest > 0 ? std::max(kSlackTension, *least / *largest) : 1;
+}
+
 double mean_rest_length_um(const Network& network) {
   double sum = 0;
   for (const Link& link : network.links) sum += link.rest_length_um;
@@ -81,12 +87,6 @@ struct CableNetwork::Impl {
   Rounding rounding() const { return {.eps_um = parameters.smoothing * mean_rest_length_um, .mu_fJ = 0}; }
   std::vector<Cable> cables(const std::vector<double>& tensions_nN) const;
 };
-
-/// The least tension over the largest, a zero one counted as what it stands for.
-double weakest(const std::vector<double>& tensions_nN) {
-  const auto [least, largest] = std::minmax_element(tensions_nN.begin(), tensions_nN.end());
-  return *largest > 0 ? std::max(kSlackTension, *least / *largest) : 1;
-}
 
 // What is given is checked here; from here on indices are in range, lengths positive, tensions not negative.
 std::vector<Cable> CableNetwork::Impl::cables(const std::vector<double>& tensions_nN) const {
