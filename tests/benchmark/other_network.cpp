@@ -121,10 +121,7 @@ Score score(const EnsembleFit& fit, const OtherNetwork& o) {
 double relative_error(const EnsembleFit& fit, const OtherNetwork& o) { return score(fit, o).relative_error; }
 
 void formulations(Cells cells) {
-  network::NetworkParameters thesis;
-  thesis.link_weights = "equal";
-  thesis.link_reach = "neighbours";
-  thesis.adhesion_anchor = "centre";
+  const network::NetworkParameters thesis = test::thesis_network();
   std::printf("cell,formulation,meshes,relative_error,rms_error_over_stated,coverage\n");
   for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
     OtherNetwork o = other_network(c);

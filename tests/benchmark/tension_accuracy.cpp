@@ -133,12 +133,7 @@ class Linearised {
  public:
   Linearised(const TensionProblem& problem, const Eigen::VectorXd& true_nN)
       : problem_(problem), truth_(problem.evaluate(true_nN)), jacobian_(problem.jacobian(truth_)) {
-    const Eigen::MatrixXd dF = problem.force_derivatives(truth_);
-    total_gradient_ = Eigen::VectorXd::Zero(true_nN.size());
-    for (Eigen::Index i = 0; i < dF.rows() / 2; ++i) {
-      const Eigen::Vector2d force = truth_.forces_nN.segment<2>(2 * i);
-      if (force.norm() > 0) total_gradient_ += dF.middleRows<2>(2 * i).transpose() * force / force.norm();
-    }
+    total_gradient_ = problem.force_derivatives(truth_).transpose() * directions_of(truth_.forces_nN);
   }
   /// Errors of the tensions with the present noise.
   Eigen::VectorXd errors_nN() const {
@@ -260,15 +255,6 @@ void noise(const Arguments& a) {
          .series = {deviation, implied}}});
 }
 
-/// As the thesis has it: link values along edges only, adhesions at points.
-network::NetworkParameters thesis_network() {
-  network::NetworkParameters p;
-  p.link_weights = "equal";
-  p.link_reach = "neighbours";
-  p.adhesion_anchor = "centre";
-  return p;
-}
-
 double median(std::vector<double> values) {
   std::sort(values.begin(), values.end());
   return (values[values.size() / 2] + values[(values.size() - 1) / 2]) / 2;
@@ -285,7 +271,7 @@ void deviations(const Arguments& a) {
       const Cell cell = drawn_cell(static_cast<std::uint64_t>(c));
       const Eigen::VectorXd truth = test::thesis_tensions_nN(cell.fibres.size(), static_cast<std::uint64_t>(c));
       TensionScene scene = test::scene_of(cell, truth, 10000, 0, static_cast<unsigned>(c),
-                                          is_thesis ? thesis_network() : network::NetworkParameters{});
+                                          is_thesis ? test::thesis_network() : network::NetworkParameters{});
       const auto fibres = Eigen::seq(1, Eigen::last);
       for (std::size_t l = 0; l < levels.size(); ++l) {
         test::measure(scene, levels[l], 1);

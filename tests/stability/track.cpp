@@ -23,6 +23,12 @@ double share_wrong(const Tracking& tracking, const std::vector<test::Peak>& peak
   return n_wrong / std::max(1.0, static_cast<double>(tracking.n_good));
 }
 
+/// Whether a bead went where none of those around went, one of which it is.
+bool is_stranger(Vec2 displacement, const std::vector<int>& around, const test::BeadPair& pair) {
+  return std::none_of(around.begin(), around.end(),
+                      [&](int k) { return norm(displacement - pair.displacements[k]) < 1; });
+}
+
 TEST(TrackStability, lost_beads_uneven_light_and_another_exposure_cost_beads_but_not_trust) {
   test::hard_case("one bead in ten lost, light falling by half, another exposure",
                   "80 % tracked, at most 1 % of them wrong");
@@ -56,8 +62,7 @@ TEST(TrackStability, loose_beads_are_followed_and_their_steps_are_in_the_standar
       const Vec2 error = bead.displacement_um - test::displacement(peaks, place);
       squares += 0.5 * dot(error, error) / (bead.sigma_um * bead.sigma_um);
       ++n;
-      n_wrong += std::none_of(around.begin(), around.end(),
-                              [&](int k) { return norm(bead.displacement_um - pair.displacements[k]) < 1; });
+      n_wrong += is_stranger(bead.displacement_um, around, pair);
     }
   }
   EXPECT_GE(n, 0.93 * n_beads);
@@ -86,8 +91,7 @@ TEST(TrackStability, loose_beads_in_steep_peaks_are_found) {
       ++n_steep;
       if (!bead.flag.empty()) continue;
       ++n_tracked;
-      n_wrong += std::none_of(around.begin(), around.end(),
-                              [&](int k) { return norm(bead.displacement_um - pair.displacements[k]) < 1; });
+      n_wrong += is_stranger(bead.displacement_um, around, pair);
     }
   }
   // windows alone find two thirds; a share of a hundred beads is good to 0.04
@@ -100,9 +104,7 @@ int n_wrong(const Tracking& tracking, const test::BeadPair& pair) {
   const Neighbours truth(pair.positions, 8);
   return static_cast<int>(std::count_if(tracking.field.begin(), tracking.field.end(), [&](const Bead& bead) {
     const auto around = truth.within(bead.position_um - Vec2{0.5, 0.5}, 2, 3);
-    return bead.flag.empty() && std::none_of(around.begin(), around.end(), [&](int k) {
-             return norm(bead.displacement_um + tracking.drift_um - pair.displacements[k]) < 1;
-           });
+    return bead.flag.empty() && is_stranger(bead.displacement_um + tracking.drift_um, around, pair);
   }));
 }
 

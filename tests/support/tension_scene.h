@@ -149,6 +149,15 @@ inline void add_ventral(Cell& cell, int start_id, int end_id) {
   cell.fibres.push_back(f);
 }
 
+/// As the thesis has it: link values along edges only, adhesions at points.
+inline network::NetworkParameters thesis_network() {
+  network::NetworkParameters p;
+  p.link_weights = "equal";
+  p.link_reach = "neighbours";
+  p.adhesion_anchor = "centre";
+  return p;
+}
+
 /// @param tensions_nN  the network's, then the fibres'
 inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_nN, int n_beads, double noise,
                              unsigned seed, const network::NetworkParameters& network = {}) {
