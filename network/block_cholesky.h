@@ -45,8 +45,6 @@ class BlockCholesky {
   enum class Part { columns, rest };
   void add_update(const Panel& child, const double* update, const Panel& panel, Part part, double* own_update);
   void eliminate(const Panel& panel, double* update, double shift);
-  template <class X>
-  void solve_permuted(X& x) const;
 
   std::shared_ptr<const Pattern> pattern_;
   std::vector<Block> diagonal_, off_diagonal_;  // the matrix, in the order of elimination

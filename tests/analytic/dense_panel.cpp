@@ -1,4 +1,4 @@
-#include "network/partial_cholesky.h"
+#include "network/dense_panel.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 
 namespace {
 
-using mbtfm::network::partial_cholesky;
+using namespace mbtfm::network;
 
 // Sizes about the tile (8 × 4), the chunk (16) and the depth (128) of the kernels.
 constexpr int kHeights[] = {1, 2, 7, 8, 9, 16, 18, 31, 128, 150, 290};
@@ -46,6 +46,39 @@ TEST(PartialCholesky, a_lost_pivot_holds_its_direction_still) {
   EXPECT_EQ(columns(1, 1), std::numeric_limits<double>::infinity());
   EXPECT_EQ(columns(2, 1), 0);
   EXPECT_DOUBLE_EQ(a(2, 2) + change, 4);
+}
+
+TEST(SolvePanel, is_what_the_blocks_of_the_factor_say) {
+  using Rows = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  for (const int height : kHeights)
+    for (const int width : kHeights) {
+      if (width > height) continue;
+      for (const int n : {1, 8, 24}) {
+        SCOPED_TRACE(testing::Message() << height << " x " << width << ", right-hand sides: " << n);
+        Eigen::MatrixXd factor = Eigen::MatrixXd::Random(height, width) / height;
+        for (int j = 0; j < width; ++j) factor(j, j) = 1 + 0.01 * j;
+        const Eigen::MatrixXd l1 = factor.topRows(width).triangularView<Eigen::Lower>();
+        const Eigen::MatrixXd l2 = factor.bottomRows(height - width);
+        for (int j = 1; j < width; ++j) factor.col(j).head(j).setConstant(std::numeric_limits<double>::quiet_NaN());
+        const DenseFactor dense{factor.data(), static_cast<std::size_t>(height), static_cast<std::size_t>(width)};
+        const Rows start = Rows::Random(height, n);
+
+        Rows rows = start;
+        solve_lower(dense, rows.data(), static_cast<std::size_t>(n));
+        EXPECT_LT((l1 * rows.topRows(width) - start.topRows(width)).norm(), 1e-12);
+        EXPECT_LT(
+            (rows.bottomRows(height - width) + l2 * rows.topRows(width) - start.bottomRows(height - width)).norm(),
+            1e-12);
+
+        rows = start;
+        solve_upper(dense, rows.data(), static_cast<std::size_t>(n));
+        EXPECT_LT((l1.transpose() * rows.topRows(width) + l2.transpose() * start.bottomRows(height - width) -
+                   start.topRows(width))
+                      .norm(),
+                  1e-12);
+        EXPECT_EQ(rows.bottomRows(height - width), start.bottomRows(height - width));
+      }
+    }
 }
 
 }  // namespace
