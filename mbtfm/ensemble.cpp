@@ -224,8 +224,8 @@ FirstFit fit_first(const network::CableNetwork& network, LinearData& data, const
                    const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
                    const Trial* start) {
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit);
-  const Trial from = start ? *start : uniform_start(problem);  // of other data, it may be
-  TensionFit fit = fit_tensions(problem, parameters, threads, problem.evaluate(from.tensions_nN, &from));
+  TensionFit fit = fit_tensions(problem, parameters, threads,
+                                start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
   const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
   if (loss == "squares") return {std::move(fit), loss};
   return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
