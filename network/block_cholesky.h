@@ -3,7 +3,7 @@
 /// to its right is handed on to the next panel up the elimination tree (Liu, SIAM Review 34 (1992) 82).
 ///
 /// Written out here for two reasons. A slack direction (a pivot that vanishes) must hold still, where CHOLMOD's panels
-/// fail. And CHOLMOD takes three times as long at 1 200 vertices, half as long again at 20 000 (benchmark_cables).
+/// fail. And CHOLMOD takes more than three times as long at 1 200 to 20 000 vertices (benchmark_cables).
 #pragma once
 
 #include <Eigen/Core>
