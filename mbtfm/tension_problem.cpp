@@ -83,13 +83,13 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
 }
 
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby) {
-  constexpr double kRough = 1e-3;  // the fit's first step goes further
+  constexpr double kRough = 1e-3;  // its size is all that is asked for
   const Trial trial = problem.evaluate(tensions_nN, nearby, kRough);
   const Eigen::VectorXd response = problem.data().compliance * trial.forces_nN;
   double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
   // Where the cell seems to push, as noise alone may look, any small positive size serves.
   if (factor <= 0) factor = 1e-3 / std::max(tensions_nN.maxCoeff(), 1e-300);
-  return problem.evaluate(factor * tensions_nN, &trial, kRough);
+  return problem.evaluate(factor * tensions_nN, &trial);
 }
 
 Trial uniform_start(const TensionProblem& problem) {

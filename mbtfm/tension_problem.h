@@ -63,7 +63,7 @@ class TensionProblem {
 
 /// The multiple of these tensions that fits best. Forces grow in proportion to the tensions (but for cables beyond
 /// their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps. And the
-/// vertices hardly move, so the second equilibrium starts where the first one is. Both to a thousandth of the forces.
+/// vertices hardly move, so the second equilibrium starts where the first one is.
 /// @param nearby  a trial of tensions like these, to start the first one from
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr);
 
