@@ -147,6 +147,10 @@ struct BlockCholesky::Panel {
   std::vector<Entry> entries;  // of the matrix, off the diagonal
 
   int height() const { return n_columns + static_cast<int>(rows.size()); }
+  template <class Value>
+  DensePanel<Value> in(Value* factor) const {
+    return {factor + values, 2 * static_cast<std::size_t>(height()), 2 * static_cast<std::size_t>(n_columns)};
+  }
   std::size_t update_size() const { return 4 * rows.size() * rows.size(); }
   int place_of(int row) const {
     if (row < first + n_columns) return row - first;
@@ -310,10 +314,7 @@ void BlockCholesky::eliminate(const Panel& panel, double* update, double shift) 
   std::vector<double> least_pivot(2 * panel.n_columns);
   for (int j = 0; j < 2 * panel.n_columns; ++j)
     least_pivot[j] = kLostPivot * (diagonal_[panel.first + j / 2](j % 2, j % 2) + shift);
-  partial_cholesky({.values = factor_.data() + panel.values,
-                    .height = 2 * static_cast<std::size_t>(panel.height()),
-                    .width = 2 * static_cast<std::size_t>(panel.n_columns)},
-                   least_pivot.data(), update);
+  partial_cholesky(panel.in(factor_.data()), least_pivot.data(), update);
 }
 
 bool BlockCholesky::is_parent(const Panel& panel, const Panel& child) const {
@@ -350,39 +351,33 @@ void BlockCholesky::factorise(double shift) {
 void BlockCholesky::solve(Columns& columns) const {
   const auto n_columns = static_cast<std::size_t>(columns.cols());
   const std::size_t n = n_columns == 1 ? 1 : (n_columns + kRightHandSides - 1) / kRightHandSides * kRightHandSides;
-  std::vector<double> x(2 * n * n_blocks(), 0.0);  // in the order of elimination
-  std::vector<double> rows;                        // of a panel: its own, then those below
+  Columns in_order = Columns::Zero(columns.rows(), static_cast<Eigen::Index>(n));  // of elimination
   for (int i = 0; i < n_blocks(); ++i)
-    for (int side = 0; side < 2; ++side)
-      std::copy_n(&columns(2 * i + side, 0), n_columns, &x[(2 * pattern_->place[i] + side) * n]);
-  const auto factor_of = [&](const Panel& panel) {
-    return DenseFactor{.values = factor_.data() + panel.values,
-                       .height = 2 * static_cast<std::size_t>(panel.height()),
-                       .width = 2 * static_cast<std::size_t>(panel.n_columns)};
-  };
+    in_order.middleRows<2>(2 * pattern_->place[i]).leftCols(columns.cols()) = columns.middleRows<2>(2 * i);
+  double* const x = in_order.data();
+  std::vector<double> rows;  // of a panel: its own, then those below
   for (const Panel& panel : pattern_->panels) {
     const std::size_t n_own = 2 * n * panel.n_columns;
-    double* own = &x[2 * n * panel.first];
+    double* own = x + 2 * n * panel.first;
     rows.assign(2 * n * panel.height(), 0);
     std::copy_n(own, n_own, rows.data());
-    solve_lower(factor_of(panel), rows.data(), n);
+    solve_lower(panel.in(factor_.data()), rows.data(), n);
     std::copy_n(rows.data(), n_own, own);
     const double* change = rows.data() + n_own;
     for (const int row : panel.rows)
-      for (double *to = &x[2 * n * row], *end = to + 2 * n; to != end; ++to) *to += *change++;
+      for (double *to = x + 2 * n * row, *end = to + 2 * n; to != end; ++to) *to += *change++;
   }
   for (auto panel = pattern_->panels.rbegin(); panel != pattern_->panels.rend(); ++panel) {
     const std::size_t n_own = 2 * n * panel->n_columns;
-    double* own = &x[2 * n * panel->first];
+    double* own = x + 2 * n * panel->first;
     rows.resize(2 * n * panel->height());
     double* to = std::copy_n(own, n_own, rows.data());
-    for (const int row : panel->rows) to = std::copy_n(&x[2 * n * row], 2 * n, to);
-    solve_upper(factor_of(*panel), rows.data(), n);
+    for (const int row : panel->rows) to = std::copy_n(x + 2 * n * row, 2 * n, to);
+    solve_upper(panel->in(factor_.data()), rows.data(), n);
     std::copy_n(rows.data(), n_own, own);
   }
   for (int i = 0; i < n_blocks(); ++i)
-    for (int side = 0; side < 2; ++side)
-      std::copy_n(&x[(2 * pattern_->place[i] + side) * n], n_columns, &columns(2 * i + side, 0));
+    columns.middleRows<2>(2 * i) = in_order.middleRows<2>(2 * pattern_->place[i]).leftCols(columns.cols());
 }
 
 }  // namespace mbtfm::network

@@ -6,23 +6,22 @@
 
 namespace mbtfm::network {
 
-/// The first columns of a symmetric matrix, on and below its diagonal: `height` rows, `width` columns, column-major.
-struct DenseColumns {
-  double* values = nullptr;
+/// The first columns of a matrix, on and below its diagonal: `height` rows, `width` columns, column-major.
+template <class Value>
+struct DensePanel {
+  Value* values = nullptr;
   std::size_t height = 0, width = 0;
 };
+/// Of a symmetric matrix.
+using DenseColumns = DensePanel<double>;
+/// What partial_cholesky() leaves of them.
+using DenseFactor = DensePanel<const double>;
 
 /// The first `width` steps of Cholesky's factorisation, in place. A pivot not above least_pivot[column] is replaced by
 /// an infinite one. What is above the diagonal is overwritten.
 /// @param change  out: what the height − width rows and columns that remain change by, column-major, on and below
 ///                their diagonal: minus the product of the new columns' lower rows with their transpose
 void partial_cholesky(const DenseColumns& columns, const double* least_pivot, double* change);
-
-/// What partial_cholesky() leaves of them.
-struct DenseFactor {
-  const double* values = nullptr;
-  std::size_t height = 0, width = 0;
-};
 
 /// Right-hand sides are rows of so many numbers, one row for each of the matrix: 1 number, or a multiple of this.
 constexpr std::size_t kRightHandSides = 8;
