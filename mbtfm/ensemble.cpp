@@ -9,6 +9,7 @@
 #include "mbtfm/robust.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -34,7 +35,7 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
   mesh.fit = std::move(fit);
   const Trial& trial = mesh.fit.trial;
   mesh.force_derivatives = problem.force_derivatives(trial);
-  mesh.local = local_misfit(trial, problem.data().compliance * mesh.force_derivatives);
+  mesh.local = local_misfit(trial, displace(problem.data(), mesh.force_derivatives));
   mesh.network_forces_nN = network_forces_nN(problem, trial);
   mesh.torques_nN_um = problem.torques_nN_um(trial);
   return mesh;
@@ -49,8 +50,8 @@ bool is_near_a_bound(const MeshFit& mesh) {
 }
 
 void add_errors(MeshFit& mesh, const EnsembleFit& all) {
-  const Eigen::MatrixXd J = all.data.compliance * mesh.force_derivatives;
-  const Eigen::MatrixXd by_slope = J.transpose() * all.data.compliance;
+  const Eigen::MatrixXd J = displace(all.data, mesh.force_derivatives);
+  const Eigen::MatrixXd by_slope = transposed_product(J, *all.data.compliance);
   if (all.model_error)
     mesh.local.model_variance = by_slope * all.model_error->force_variance_nN2.asDiagonal() * by_slope.transpose();
   mesh.response = response_of(mesh.local, all.variance);
@@ -70,7 +71,7 @@ double network_bias(const MeshFit& mesh, const TensionProblem& problem, int thre
   constexpr double kBadlyKnown = 0.35;  // 4 % there
   const double tension = mesh.local.tensions_nN[0], standard_error = std::sqrt(mesh.covariance_nN2(0, 0));
   if (tension <= 0 || standard_error < kBadlyKnown * tension) return 0;
-  const Eigen::MatrixXd J = problem.data().compliance * mesh.force_derivatives;
+  const Eigen::MatrixXd J = displace(problem.data(), mesh.force_derivatives);
   const Eigen::VectorXd bias_nN =
       bending_bias_nN(problem, mesh.fit.trial, J, mesh.response, mesh.covariance_nN2, threads);
   return std::clamp(bias_nN[0], -standard_error, standard_error) / tension;
@@ -223,7 +224,7 @@ struct FirstFit {
 FirstFit fit_first(const network::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
                    const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
                    const Trial* start) {
-  const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit);
+  const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
   TensionFit fit = fit_tensions(problem, parameters, threads,
                                 start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
   const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
@@ -248,7 +249,7 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
 double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
                                    const std::string& loss) {
   constexpr Eigen::Index kEnough = 50;  // known to 20 %
-  const bool is_told = data.n_used - data.reduced.compliance.rows() >= kEnough;
+  const bool is_told = data.n_used - data.reduced.n_felt >= kEnough;
   return loss == "squares" && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
 }
 

@@ -82,15 +82,9 @@ MeanVariances mean_variances(const BudgetInputs& in) {
   return mean;
 }
 
-/// Answers to displacements of the beads, 2·beads columns: those of the forces that these displacements look like,
-/// (GᵀW²G)⁻¹ GᵀW² du. With C = Λ^½ Vᵀ that inverse is Cᵀ Λ⁻² C.
-MatrixXd gain_of_beads(const BudgetInputs& in, const Gain& gain) {
-  const MatrixXd& C = in.data.reduced.compliance;
-  const VectorXd inverse = C.rowwise().squaredNorm().cwiseInverse().cwiseAbs2();
-  const MatrixXd small = gain.of_forces * C.transpose() * inverse.asDiagonal() * C;
-  VectorXd weight = in.data.weight_per_um.cwiseAbs2();
-  for (Index b = 0; b < in.data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= in.data.bead_weight[b];
-  return small * in.data.compliance_um_per_nN.transpose() * weight.asDiagonal();
+/// Answers to displacements of the beads: those of the forces that these displacements look like, (GᵀW²G)⁻¹ GᵀW² du.
+BeadAnswers answers_of(const BudgetInputs& in, const Gain& gain) {
+  return {in.data, solve_normal(in.data.reduced, gain.of_forces.transpose()).transpose()};
 }
 
 /// What an ellipse's standard errors make of it, and of the vertices that it holds.
@@ -119,19 +113,19 @@ std::vector<Variation> variations_of(const Ellipse& ellipse, const SegmentationE
 // this many semi-axes. There base and sides of the gel change nothing.
 constexpr double kReach = 6;
 
-/// Change of the displacement, by bead within reach, as the force of `before` comes from `after`.
-VectorXd answer_to_other_ellipse(const BudgetInputs& in, const MatrixXd& of_beads, const std::vector<Index>& near,
-                                 const Ellipse& before, const Ellipse& after, Vec2 force_nN) {
+/// Change of the displacement (um) of these beads, as the force of `before` comes from `after`: x, y in turn.
+VectorXd change_by_other_ellipse(const BudgetInputs& in, const std::vector<Index>& near, const Ellipse& before,
+                                 const Ellipse& after, Vec2 force_nN) {
   const substrate::HalfSpaceEllipse old(in.gel, before), other(in.gel, after);
-  VectorXd answer = VectorXd::Zero(of_beads.rows());
-  for (const Index b : near) {
-    const Vec2 at = in.beads[static_cast<std::size_t>(b)].position_um;
+  VectorXd change(2 * static_cast<Index>(near.size()));
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    const Vec2 at = in.beads[static_cast<std::size_t>(near[i])].position_um;
     const substrate::Sym2 a = other.compliance_um_per_nN(at), c = old.compliance_um_per_nN(at);
-    const substrate::Sym2 change{a.xx - c.xx, a.xy - c.xy, a.yy - c.yy};
-    answer += of_beads.middleCols<2>(2 * b) * Eigen::Vector2d(change.xx * force_nN.x + change.xy * force_nN.y,
-                                                              change.xy * force_nN.x + change.yy * force_nN.y);
+    const substrate::Sym2 g{a.xx - c.xx, a.xy - c.xy, a.yy - c.yy};
+    change.segment<2>(2 * static_cast<Index>(i)) << g.xx * force_nN.x + g.xy * force_nN.y,
+        g.xy * force_nN.x + g.yy * force_nN.y;
   }
-  return answer;
+  return change;
 }
 
 std::vector<Index> beads_near(const DisplacementField& beads, const Ellipse& ellipse) {
@@ -181,33 +175,61 @@ VectorXd variance_of_ends(const BudgetInputs& in, const network::GeometryGradien
   return variance;
 }
 
-VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const MatrixXd& of_beads, int threads) {
+/// What an adhesion's standard errors change, variation by variation.
+struct AdhesionChanges {
+  std::vector<Index> near;  ///< beads
+  MatrixXd displacement;    ///< theirs: 2·near × variations
+  MatrixXd by_vertices;     ///< answers to the vertices held otherwise: rows × variations
+};
+
+AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const network::GeometryGradient& gradient) {
   const network::CableNetwork& cables = in.networks.front();
+  const Adhesion& a = in.cell.adhesions[adhesion];
+  const Ellipse ellipse = substrate::ellipse_of(a);
+  const auto row = 2 * static_cast<Index>(adhesion);
+  const Vec2 force_nN{in.fit.forces_nN[row], in.fit.forces_nN[row + 1]};
+  const std::vector<Variation> variations = variations_of(ellipse, in.segmentation);
+  AdhesionChanges changes{.near = beads_near(in.beads, ellipse), .displacement = {}, .by_vertices = {}};
+  const auto n = static_cast<Index>(variations.size());
+  changes.displacement.resize(2 * static_cast<Index>(changes.near.size()), n);
+  changes.by_vertices = MatrixXd::Zero(gradient.by_held_vertex.cols(), n);
+  for (Index v = 0; v < n; ++v) {
+    const Variation& variation = variations[static_cast<std::size_t>(v)];
+    changes.displacement.col(v) = change_by_other_ellipse(in, changes.near, ellipse, variation.ellipse, force_nN);
+    const std::vector<int>& held = cables.held_vertices();
+    for (std::size_t h = 0; h < held.size(); ++h) {
+      if (cables.network().adhesion_id[static_cast<std::size_t>(held[h])] != a.adhesion_id) continue;
+      const Vec2 arm = cables.network().vertices_um[static_cast<std::size_t>(held[h])] - a.position_um;
+      const Vec2 moved = variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
+      changes.by_vertices.col(v) += gradient.by_held_vertex.middleRows<2>(2 * static_cast<Index>(h)).transpose() *
+                                    Eigen::Vector2d(moved.x, moved.y);
+    }
+  }
+  return changes;
+}
+
+VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
   const Trial& trial = in.fit.meshes.front().fit.trial;
   const std::vector<double> tensions(trial.tensions_nN.begin(), trial.tensions_nN.end());
   const network::GeometryGradient gradient =
-      cables.geometry_gradient(tensions, trial.equilibrium, by_network_adhesion(in, gain.of_model));
-  std::vector<VectorXd> by_adhesion(in.cell.adhesions.size(), VectorXd::Zero(gain.of_model.rows()));
-  parallel_for(static_cast<int>(by_adhesion.size()), threads, [&](int i) {
-    const Adhesion& adhesion = in.cell.adhesions[static_cast<std::size_t>(i)];
-    const Ellipse ellipse = substrate::ellipse_of(adhesion);
-    const std::vector<Index> near = beads_near(in.beads, ellipse);
-    const Vec2 force_nN{in.fit.forces_nN[2 * i], in.fit.forces_nN[2 * i + 1]};
-    for (const Variation& variation : variations_of(ellipse, in.segmentation)) {
-      VectorXd answer = answer_to_other_ellipse(in, of_beads, near, ellipse, variation.ellipse, force_nN);
-      const std::vector<int>& held = cables.held_vertices();
-      for (std::size_t h = 0; h < held.size(); ++h) {
-        if (cables.network().adhesion_id[static_cast<std::size_t>(held[h])] != adhesion.adhesion_id) continue;
-        const Vec2 arm = cables.network().vertices_um[static_cast<std::size_t>(held[h])] - adhesion.position_um;
-        const Vec2 moved = variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
-        answer += gradient.by_held_vertex.middleRows<2>(2 * static_cast<Index>(h)).transpose() *
-                  Eigen::Vector2d(moved.x, moved.y);
-      }
-      by_adhesion[static_cast<std::size_t>(i)] += answer.cwiseAbs2();
-    }
+      in.networks.front().geometry_gradient(tensions, trial.equilibrium, by_network_adhesion(in, gain.of_model));
+  std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
+  parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
+    changes[static_cast<std::size_t>(i)] = changes_of(in, static_cast<std::size_t>(i), gradient);
   });
   VectorXd variance = variance_of_ends(in, gradient);
-  for (const VectorXd& v : by_adhesion) variance += v;
+  answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
+    std::vector<VectorXd> by_adhesion(changes.size());
+    parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
+      const AdhesionChanges& c = changes[static_cast<std::size_t>(i)];
+      MatrixXd answer = c.by_vertices.middleRows(first, of_beads.rows());
+      for (std::size_t b = 0; b < c.near.size(); ++b) {
+        answer += of_beads.middleCols<2>(2 * c.near[b]) * c.displacement.middleRows<2>(2 * static_cast<Index>(b));
+      }
+      by_adhesion[static_cast<std::size_t>(i)] = answer.cwiseAbs2().rowwise().sum();
+    });
+    for (const VectorXd& v : by_adhesion) variance.segment(first, of_beads.rows()) += v;
+  });
   return variance;
 }
 
@@ -229,13 +251,17 @@ VectorXd field_of_base_um(const BudgetInputs& in) {
 
 /// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
 /// Which of the two it is no model tells: both are counted.
-VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const MatrixXd& of_beads) {
+VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
   const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
   VectorXd variance = (in.substrate_error * values).cwiseAbs2();
   for (Index a = 0; a < in.fit.forces_nN.size(); a += 2) {
     variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces_nN.segment<2>(a)).cwiseAbs2();
   }
-  if (in.lacks_base) variance += (of_beads * field_of_base_um(in)).cwiseAbs2();
+  if (!in.lacks_base) return variance;
+  const VectorXd field = field_of_base_um(in);
+  answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
+    variance.segment(first, of_beads.rows()) += (of_beads * field).cwiseAbs2();
+  });
   return variance;
 }
 
@@ -255,10 +281,10 @@ void declare(ParameterList& list, SegmentationErrors& p) {
 
 ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const Gain gain = gain_of(in.fit, in.fit.meshes.front());
-  const MatrixXd of_beads = gain_of_beads(in, gain);
+  const BeadAnswers answers = answers_of(in, gain);
   const MeanVariances mean = mean_variances(in);
-  const VectorXd segmentation = segmentation_variances(in, gain, of_beads, threads);
-  const VectorXd substrate = substrate_variances(in, gain, of_beads);
+  const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
+  const VectorXd substrate = substrate_variances(in, gain, answers);
   const auto parts = [&](Index i) {
     ErrorParts p{.beads = std::sqrt(mean.beads[i]),
                  .segmentation = std::sqrt(segmentation[i]),

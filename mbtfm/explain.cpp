@@ -25,8 +25,7 @@ LinearData without_turn(LinearData data) {
   if (norm <= 0) return data;
   weighted /= norm;
   // the angle that fits best for any forces is linear in them: (turnᵀ W² (u − G R)) / (turnᵀ W² turn)
-  const Eigen::RowVectorXd angles = weighted.transpose() * data.compliance_um_per_nN;
-  data.compliance_um_per_nN -= turn * angles;
+  data.response = substrate::less_a_mode(data.response, turn, data.response->pull_back(weighted));
   data.displacement_um -= weighted.dot(data.displacement_um) * turn;
   reweight(data, Eigen::VectorXd(data.bead_weight));
   return data;

@@ -30,7 +30,7 @@ std::optional<Change> change_by_gel(const std::string& name, const FittedCell& c
                                     const substrate::SubstrateParameters& parameters, int threads) {
   const auto gel = substrate::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.data;
-  with.compliance_um_per_nN = gel->compliance_um_per_nN(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
+  with.response = gel->response(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
   return change_between(name, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }

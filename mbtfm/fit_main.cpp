@@ -42,10 +42,6 @@ FitInputs read_inputs(StageContext& context) {
   return inputs;
 }
 
-Eigen::MatrixXd compliance_of(const substrate::Substrate& substrate, const DisplacementField& beads, const Cell& cell) {
-  return substrate.compliance_um_per_nN(points_of(beads), ellipses_of(cell));
-}
-
 std::vector<bool> beads_in_region(const DisplacementField& beads, const Cell& cell, const FitParameters& p) {
   std::vector<bool> is_used;
   for (const Bead& b : beads) {
@@ -133,10 +129,10 @@ Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models
           {"n_missing_fibres_hinted", std::int64_t(missing.size())}};
 }
 
-PointArray most_informed_array(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
-  PointArray array{.name = "informs_fibre_id", .scalars = {}, .vectors = {}};
-  for (const int id : most_informed_fibre(fit, influence)) array.scalars.push_back(id);
-  return array;
+PointArray most_informed_array(const Influence& influence) {
+  return {.name = "informs_fibre_id",
+          .scalars = {influence.most_informed.begin(), influence.most_informed.end()},
+          .vectors = {}};
 }
 
 /// What the loss and the region leave of each bead.
@@ -197,11 +193,11 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
 }
 
 /// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
-std::string fit_frames(const std::vector<SeriesFrame>& frames, const Eigen::MatrixXd& compliance_um_per_nN,
+std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::SharedResponse& response,
                        const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
                        const FitParameters& p, bool is_coupled, StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
-      frames, networks, compliance_um_per_nN, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p,
+      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p,
       is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
       next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
@@ -225,10 +221,11 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   check_fibres(inputs, fibres, context.inputs_.at("network"));
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  Compliances compliances = compliances_of(
-      inputs.beads, series, [&](const DisplacementField& b) { return compliance_of(*substrate, b, inputs.cell); });
+  Responses responses = responses_of(inputs.beads, series, [&](const DisplacementField& b) {
+    return substrate->response(points_of(b), ellipses_of(inputs.cell));
+  });
   LinearData data =
-      reduce(inputs.beads, std::move(compliances.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit));
+      reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit));
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -273,9 +270,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
   const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
-  const Eigen::MatrixXd influence = influence_of(fit, data);
+  const Influence influence = influence_of(fit, data);
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence);
-  const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions);
+  const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions, context.threads);
   for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
   write_correlations(context.output("out", "correlations.csv"), fit);
   write_models(context.output("out", "models.csv"), models);
@@ -292,9 +289,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_displacement(context.output("out", "displacement_without_fibres.csv"),
                      field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
-                         {most_informed_array(fit, influence), weight_array(data)});
+                         {most_informed_array(influence), weight_array(data)});
   const std::string of_series = series.empty() ? ""
-                                               : fit_frames(series, compliances.of_series, inputs.cell, networks, fit,
+                                               : fit_frames(series, responses.of_series, inputs.cell, networks, fit,
                                                             p.fit, coupling.is_on, context);
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces, p.fit.surface_lines);

@@ -114,7 +114,7 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
 }
 
 DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data) {
-  const Eigen::VectorXd model = data.compliance_um_per_nN * forces_nN;
+  const Eigen::VectorXd model = data.response->displace(forces_nN);
   DisplacementField field = inputs.beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);

@@ -8,6 +8,7 @@
 #include "mbtfm/tension_fit.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -109,7 +110,7 @@ void learn_bend(Eigen::MatrixXd& bend, const Trial& before, const Eigen::MatrixX
 
 /// @param bend  see learn_bend(); left out where it takes more than half of the curvature away
 Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, const Eigen::MatrixXd& bend, double damping) {
-  const Eigen::MatrixXd straight = jacobian.transpose() * jacobian;
+  const Eigen::MatrixXd straight = gram(jacobian);
   const Eigen::VectorXd gradient = jacobian.transpose() * trial.residual;
   // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
   // damps its steps, but moves no minimum.
@@ -178,6 +179,13 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
                       std::to_string(fit.report.iterations) + " steps";
 }
 
+/// H⁻¹ b, in blocks where rounding leaves H positive definite.
+Eigen::VectorXd solve_positive(const Eigen::MatrixXd& H, const Eigen::VectorXd& b) {
+  const Eigen::LLT<Eigen::MatrixXd> quick(H);
+  if (quick.info() == Eigen::Success) return quick.solve(b);
+  return H.ldlt().solve(b);
+}
+
 bool is_slack(const Eigen::VectorXd& tensions_nN, Eigen::Index i) {
   return tensions_nN[i] <= kSlack * tensions_nN.maxCoeff();
 }
@@ -218,15 +226,16 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
   // each release, so no set comes twice; the bound on the steps only guards against rounding.
   const int n = static_cast<int>(g.size());
   Eigen::VectorXd x = low.cwiseMax(0.0);
+  // What is pressed against its bound from the start is held from the start: found one by one, each costs a step.
   std::vector<bool> is_held(n, false);
+  const Eigen::VectorXd slope = H * x + g;
+  for (int i = 0; i < n; ++i) is_held[i] = x[i] <= low[i] && slope[i] > 0;
   for (int step = 0; step < 20 * n + 20; ++step) {
     const std::vector<int> free = indices_where(is_held, false);
     Eigen::VectorXd wanted = x;
     if (!free.empty()) {
       const Eigen::VectorXd gradient = H * x + g;
-      const Eigen::MatrixXd H_free = H(free, free);
-      const Eigen::VectorXd move = H_free.ldlt().solve(gradient(free));
-      wanted(free) -= move;
+      wanted(free) -= solve_positive(H(free, free), gradient(free));
     }
     double fraction = 1;
     int blocking = -1;

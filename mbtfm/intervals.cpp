@@ -7,6 +7,7 @@
 #include <random>
 
 #include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -89,7 +90,7 @@ double shift_at(const LocalMisfit& local, int i, double wanted, double first, do
 
 LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
   return {.tensions_nN = trial.tensions_nN,
-          .H = jacobian.transpose() * jacobian,
+          .H = gram(jacobian),
           .g = jacobian.transpose() * trial.residual};
 }
 
@@ -171,7 +172,7 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
                                         const std::vector<std::uint64_t>& draws, int threads) {
   Eigen::MatrixXd deviations(problem.n_tensions(), static_cast<Eigen::Index>(draws.size()));
   parallel_for(static_cast<int>(draws.size()), threads, [&](int d) {
-    // In the reduced data white noise is white again (C = Λ^½ Vᵀ).
+    // In the reduced data white noise is white again (see ReducedData).
     std::mt19937_64 engine(draws[static_cast<std::size_t>(d)]);
     const auto uniform = [&] { return (static_cast<double>(engine() >> 11) + 0.5) * 0x1p-53; };
     const auto normal = [&] {  // Box & Muller (1958): the same with every library
@@ -183,7 +184,7 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
       drawn.target[k] += solution.residual[k] + std::sqrt(variance) * normal();
     Eigen::VectorXd of_model = force_variance_nN2.cwiseSqrt();
     for (double& e : of_model) e *= normal();
-    if (of_model.size() > 0) drawn.target += drawn.compliance * of_model;
+    if (of_model.size() > 0) drawn.target += *drawn.compliance * of_model;
     const TensionProblem again(problem.cables(), drawn, problem.adhesion_ids());
     const Trial start = again.evaluate(solution.tensions_nN, &solution);
     deviations.col(d) = fit_gauss_newton(again, parameters, start).trial.tensions_nN - solution.tensions_nN;

@@ -1,34 +1,50 @@
 #include "mbtfm/linear_data.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
-
-extern "C" void dsyrk_(const char* triangle, const char* transpose, const int* n, const int* k, const double* alpha,
-                       const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
 namespace {
 
-/// The lower triangle of Aᵀ A. By BLAS, which is several times quicker here than Eigen without AVX: with ten thousand
-/// beads this product is a quarter of a quick fit.
-Eigen::MatrixXd lower_gram(const Eigen::MatrixXd& A) {
-  const auto n = static_cast<int>(A.cols()), k = static_cast<int>(A.rows());
-  Eigen::MatrixXd gram = Eigen::MatrixXd::Zero(n, n);
-  const double one = 1, zero = 0;
-  if (n > 0 && k > 0) dsyrk_("L", "T", &n, &k, &one, A.data(), &k, &zero, gram.data(), &n);
-  return gram;
+/// U with Uᵀ U = A, and how many of its pivots are more than rounding. What no bead feels gets a small stiffness: any
+/// force there explains as much as another.
+struct Root {
+  Eigen::MatrixXd U;
+  Eigen::Index n_felt = 0;
+};
+
+Root root_of(Eigen::MatrixXd A) {
+  constexpr double kRounding = 1e-13;  // of a normal matrix
+  const Eigen::VectorXd diagonal = A.diagonal();
+  const double least = kRounding * std::max(diagonal.sum(), 1e-300);
+  mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
+  bool is_definite = upper_cholesky(A);
+  if (!is_definite || A.diagonal().cwiseAbs2().minCoeff() <= least) {
+    mirror_lower(A);
+    A.diagonal() = diagonal.array() + least;
+    is_definite = upper_cholesky(A);
+    MBTFM_ASSERT(is_definite);
+  }
+  const Eigen::Index n_felt = (A.diagonal().array().square() > 4 * least).count();
+  clear_below_diagonal(A);
+  return {std::move(A), n_felt};
 }
 
 }  // namespace
 
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used) {
+  return reduce(beads, substrate::dense_response(std::move(compliance_um_per_nN)), is_used);
+}
+
+LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
+                  const std::vector<bool>& is_used) {
   const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
-  MBTFM_ASSERT(compliance_um_per_nN.rows() == n_rows);
+  MBTFM_ASSERT(response->rows() == n_rows);
   LinearData data;
   data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
   data.displacement_um.resize(n_rows);
@@ -41,44 +57,82 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
     data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);
     data.n_used += 2;
   }
-  data.compliance_um_per_nN = std::move(compliance_um_per_nN);
+  data.response = std::move(response);
   reweight(data, Eigen::VectorXd::Ones(n_rows / 2));
   return data;
 }
 
 void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
-  Eigen::VectorXd weight = data.weight_per_um;
-  for (Eigen::Index i = 0; i < bead_weight.size(); ++i) weight.segment<2>(2 * i) *= std::sqrt(bead_weight[i]);
-  // A = (W G)ᵀ W G = V Λ Vᵀ; then C = Λ^½ Vᵀ and y = Λ^−½ Vᵀ (W G)ᵀ W u. Directions that no bead feels drop out.
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * data.compliance_um_per_nN;
+  data.reduced.compliance.reset();  // not two of them in memory
+  const Eigen::VectorXd weight = squared_weights(data);
   const Eigen::VectorXd weighted_u = weight.cwiseProduct(data.displacement_um);
-  const Eigen::MatrixXd normal = lower_gram(weighted);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
-  const double smallest = 1e-13 * eigen.eigenvalues().maxCoeff();  // rounding of the normal matrix
-  Eigen::Index n_felt = 0;
-  while (n_felt < normal.cols() && eigen.eigenvalues()[normal.cols() - 1 - n_felt] > smallest) ++n_felt;
-  const auto roots = eigen.eigenvalues().tail(n_felt).cwiseSqrt();
-  const auto vectors = eigen.eigenvectors().rightCols(n_felt);
-  data.reduced.compliance = roots.asDiagonal() * vectors.transpose();
-  data.reduced.target = roots.cwiseInverse().asDiagonal() * (vectors.transpose() * (weighted.transpose() * weighted_u));
+  // A = Gᵀ W² G = Cᵀ C; then y = C⁻ᵀ Gᵀ W² u.
+  auto [root, n_felt] = root_of(data.response->upper_gram(weight));
+  Eigen::MatrixXd target = data.response->pull_back(weighted_u);
+  solve_upper_transposed(root, target);
+  data.reduced.target = target;
+  data.reduced.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root));
+  data.reduced.n_felt = n_felt;
+  data.reduced.is_upper = true;
   data.reduced.n_components = data.n_used;
-  data.reduced.floor_squared = std::max(0.0, weighted_u.squaredNorm() - data.reduced.target.squaredNorm());
+  data.reduced.floor_squared = std::max(0.0, weighted_u.dot(data.displacement_um) - target.squaredNorm());
+}
+
+Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {
+  if (!data.is_upper) return product(*data.compliance, forces_nN, threads);
+  Eigen::MatrixXd displaced = forces_nN;
+  multiply_upper(*data.compliance, displaced, threads);
+  return displaced;
+}
+
+Eigen::VectorXd squared_weights(const LinearData& data) {
+  Eigen::VectorXd weight = data.weight_per_um.cwiseAbs2();
+  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= data.bead_weight[b];
+  return weight;
+}
+
+Eigen::VectorXd free_forces_nN(const ReducedData& reduced) {
+  Eigen::MatrixXd forces = reduced.target;
+  solve_upper(*reduced.compliance, forces);
+  return forces;
+}
+
+Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X) {
+  solve_upper_transposed(*reduced.compliance, X);
+  solve_upper(*reduced.compliance, X);
+  return X;
+}
+
+BeadAnswers::BeadAnswers(const LinearData& data, Eigen::MatrixXd by_force)
+    : data_(data), by_force_(std::move(by_force)) {
+  MBTFM_ASSERT(by_force_.cols() == data.response->cols());
+}
+
+void BeadAnswers::for_each_block(const std::function<void(Eigen::Index, const Eigen::MatrixXd&)>& body) const {
+  constexpr Eigen::Index kNumbers = 16'000'000;  // of a block: 128 MB
+  const Eigen::Index at_once = std::max<Eigen::Index>(1, kNumbers / std::max<Eigen::Index>(1, data_.response->rows()));
+  const Eigen::VectorXd weight = squared_weights(data_);
+  for (Eigen::Index first = 0; first < n_rows(); first += at_once) {
+    const Eigen::Index count = std::min(at_once, n_rows() - first);
+    const Eigen::MatrixXd forces = by_force_.middleRows(first, count).transpose();
+    body(first, data_.response->displace(forces).transpose() * weight.asDiagonal());
+  }
 }
 
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN) {
-  return data.weight_per_um.cwiseProduct(data.displacement_um - data.compliance_um_per_nN * forces_nN);
+  return data.weight_per_um.cwiseProduct(data.displacement_um - data.response->displace(forces_nN));
 }
 
 double noise_variance(const LinearData& data) {
-  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.compliance.rows()));
+  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.n_felt));
   return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / n_free);
 }
 
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
   const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
   const double scale = is_used.cwiseProduct(data.displacement_um).norm();
-  const double misfit = is_used.cwiseProduct(data.displacement_um - data.compliance_um_per_nN * forces_nN).norm();
+  const double misfit = is_used.cwiseProduct(data.displacement_um - data.response->displace(forces_nN)).norm();
   return scale > 0 ? misfit / scale : misfit;
 }
 

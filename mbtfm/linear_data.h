@@ -2,39 +2,72 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
+#include <memory>
 #include <vector>
 
 #include "pipeline/contract/types.h"
+#include "substrate/response.h"
 
 namespace mbtfm::inverse {
 
-/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, with C of at most as many rows as R is long.
+/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R. White noise of W u is white in y.
 struct ReducedData {
-  Eigen::MatrixXd compliance;     ///< C
-  Eigen::VectorXd target;         ///< y
-  double floor_squared = 0;       ///< what no force can explain
-  Eigen::Index n_components = 0;  ///< of the beads' displacements that it stands for
+  std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
+  Eigen::VectorXd target;                             ///< y
+  double floor_squared = 0;                           ///< what no force can explain
+  Eigen::Index n_components = 0;                      ///< of the beads' displacements that it stands for
+  Eigen::Index n_felt = 0;                            ///< directions of the forces that any bead feels
+  bool is_upper = false;                              ///< C is an upper triangle
 };
+/// C F
+Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads = 1);
 
 struct LinearData {
-  std::vector<Vec2> position_um;         ///< of the beads
-  Eigen::MatrixXd compliance_um_per_nN;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
-  Eigen::VectorXd displacement_um;       ///< u, in the same order
-  Eigen::VectorXd weight_per_um;         ///< W, diagonal: 1/sigma; 0 where the bead is not used
-  Eigen::VectorXd bead_weight;           ///< by bead, 0 … 1: what a robust loss leaves of W²
-  Eigen::Index n_used = 0;               ///< components of the beads that are used
+  std::vector<Vec2> position_um;       ///< of the beads
+  substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
+  Eigen::VectorXd displacement_um;     ///< u, in the same order
+  Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
+  Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
+  Eigen::Index n_used = 0;             ///< components of the beads that are used
   bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
   ReducedData reduced;      ///< of all that, bead_weight included
 };
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
-/// @param compliance_um_per_nN  2·beads × 2·adhesions
+/// @param response  2·beads × 2·adhesions
 /// @param is_used  by bead; empty: all
+LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
+                  const std::vector<bool>& is_used = {});
+/// The same with the matrix of the response.
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used = {});
 
 /// Reduce again with these weights by bead.
 void reweight(LinearData& data, const Eigen::VectorXd& bead_weight);
+
+/// W² and the weights by bead, by component.
+Eigen::VectorXd squared_weights(const LinearData& data);
+
+/// Forces independent of each other that explain the beads best: C⁻¹ y.
+/// @param reduced  of reduce(), as for the next one
+Eigen::VectorXd free_forces_nN(const ReducedData& reduced);
+/// (CᵀC)⁻¹ X
+Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X);
+
+/// Answers to the displacements of the beads, M Gᵀ W², some rows at a time: a whole is too large for large scenes.
+class BeadAnswers {
+ public:
+  /// @param by_force  M: any number × 2·adhesions
+  BeadAnswers(const LinearData& data, Eigen::MatrixXd by_force);
+  Eigen::Index n_rows() const { return by_force_.rows(); }
+  /// Calls body(first, block) with rows first, first + 1, … of the answers: some × 2·beads.
+  void for_each_block(const std::function<void(Eigen::Index first, const Eigen::MatrixXd& block)>& body) const;
+
+ private:
+  const LinearData& data_;
+  Eigen::MatrixXd by_force_;
+};
 
 /// u − G R, times W
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);

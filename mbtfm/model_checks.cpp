@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -74,19 +75,34 @@ std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
   return groups;
 }
 
-Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data) {
-  // With the reduced data y = C⁺ᵀ (W G)ᵀ W u the tensions change by K (C D)ᵀ dy = K (C D)ᵀ C (CᵀC)⁺ (W G)ᵀ W du,
-  // D = dR/dt. Rows of C are orthogonal.
+Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
+  // With the reduced data y = C⁻ᵀ Gᵀ W² u the tensions change by K (C D)ᵀ dy = K (C D)ᵀ C (CᵀC)⁻¹ Gᵀ W² du, D = dR/dt;
+  // a component's own standard error is 1/w.
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd& C = data.reduced.compliance;
-  const Eigen::VectorXd per_row = C.rowwise().squaredNorm().cwiseAbs2().cwiseInverse();
-  const Eigen::MatrixXd by_force = mesh.by_force * C.transpose() * per_row.asDiagonal() * C;
-  Eigen::MatrixXd influence = by_force * data.compliance_um_per_nN.transpose() * data.weight_per_um.asDiagonal();
-  for (Eigen::Index i = 0; i < influence.rows(); ++i) {
-    influence.row(i) /= std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
-    for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b)
-      influence.row(i).segment<2>(2 * b) *= data.bead_weight[b];
-  }
+  const BeadAnswers answers(data, solve_normal(data.reduced, mesh.by_force.transpose()).transpose());
+  const Eigen::VectorXd own_error = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1 / w : 0; });
+  const Eigen::Index n_beads = data.bead_weight.size();
+  Influence influence{.variance = Eigen::VectorXd(answers.n_rows()),
+                      .n_informing_beads = Eigen::VectorXd(answers.n_rows()),
+                      .most_informed = std::vector<int>(static_cast<std::size_t>(n_beads), fit.fibre_ids.front())};
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(n_beads);
+  answers.for_each_block([&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    for (Eigen::Index k = 0; k < block.rows(); ++k) {
+      const Eigen::Index i = first + k;
+      const double standard_error = std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
+      const Eigen::VectorXd row = block.row(k).transpose().cwiseProduct(own_error) / standard_error;
+      Eigen::VectorXd by_bead(n_beads);
+      for (Eigen::Index b = 0; b < n_beads; ++b) {
+        by_bead[b] = row.segment<2>(2 * b).squaredNorm();
+        if (by_bead[b] <= largest[b]) continue;
+        largest[b] = by_bead[b];
+        influence.most_informed[static_cast<std::size_t>(b)] = fit.fibre_ids[static_cast<std::size_t>(i)];
+      }
+      const double sum_of_squares = by_bead.squaredNorm();
+      influence.variance[i] = by_bead.sum();
+      influence.n_informing_beads[i] = sum_of_squares > 0 ? std::pow(by_bead.sum(), 2) / sum_of_squares : 0;
+    }
+  });
   return influence;
 }
 
@@ -96,23 +112,21 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
   const ReducedData& reduced = data.reduced;
   const double variance = noise_variance(data);
   const auto misfit = [&](const Eigen::VectorXd& forces) {
-    return (reduced.compliance * forces - reduced.target).squaredNorm() + reduced.floor_squared;
+    return (*reduced.compliance * forces - reduced.target).squaredNorm() + reduced.floor_squared;
   };
   const Eigen::VectorXd uniform = best_uniform(TensionProblem(first_network, reduced, adhesion_ids)).forces_nN;
-  const Eigen::VectorXd free = reduced.compliance.transpose() *
-                               (reduced.compliance * reduced.compliance.transpose()).ldlt().solve(reduced.target);
   std::vector<ModelScore> models = {
       score("no-fibres", 1, misfit(uniform), variance, data),
       score("full", static_cast<int>(fit.fibre_ids.size()), misfit(fit.forces_nN), variance, data),
-      score("adhesion-forces", static_cast<int>(reduced.compliance.rows()), reduced.floor_squared, variance, data)};
+      score("adhesion-forces", static_cast<int>(reduced.n_felt), reduced.floor_squared, variance, data)};
   models[0].forces_nN = uniform;
   models[1].forces_nN = fit.forces_nN;
-  models[2].forces_nN = free;
+  models[2].forces_nN = free_forces_nN(reduced);
   for (ModelScore& model : models) model.relative_l2 = relative_l2(data, model.forces_nN);
   return models;
 }
 
-std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
   std::vector<FibreLeftOut> fibres;
   for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.fibre_ids.size()); ++i) {
     FibreLeftOut left{.fibre_id = fit.fibre_ids[static_cast<std::size_t>(i)],
@@ -128,40 +142,27 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Eig
       left.chi_squared_rise += difference * difference / variance / static_cast<double>(fit.meshes.size());
     }
     left.aic_rise = left.chi_squared_rise - 2;
-    double sum = 0, sum_of_squares = 0;
-    for (Eigen::Index b = 0; b < influence.cols(); b += 2) {
-      const double q = influence.row(i).segment<2>(b).squaredNorm();
-      sum += q;
-      sum_of_squares += q * q;
-    }
-    left.n_informing_beads = sum_of_squares > 0 ? sum * sum / sum_of_squares : 0;
+    left.n_informing_beads = influence.n_informing_beads[i];
     fibres.push_back(left);
   }
   return fibres;
 }
 
-std::vector<int> most_informed_fibre(const EnsembleFit& fit, const Eigen::MatrixXd& influence) {
-  std::vector<int> ids;
-  for (Eigen::Index b = 0; b < influence.cols(); b += 2) {
-    Eigen::Index strongest = 0;
-    influence.middleCols<2>(b).rowwise().squaredNorm().maxCoeff(&strongest);
-    ids.push_back(fit.fibre_ids[static_cast<std::size_t>(strongest)]);
-  }
-  return ids;
-}
-
-std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions) {
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions, int threads) {
   const MeshFit& mesh = fit.meshes.front();
-  const ReducedData data = fit.model_error ? whitened(fit.data, *fit.model_error) : fit.data;
-  const Eigen::MatrixXd& C = data.compliance;
+  const ReducedData data = fit.model_error ? whitened(fit.data, *fit.model_error, threads) : fit.data;
+  const Eigen::MatrixXd& C = *data.compliance;
   const Eigen::VectorXd residual = data.target - C * fit.forces_nN;
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
-  const Eigen::MatrixXd CJ = C * mesh.force_derivatives;
-  const Eigen::MatrixXd cross_terms = CJ.transpose() * C;
+  const Eigen::MatrixXd CJ = product(C, mesh.force_derivatives, threads);
+  const Eigen::MatrixXd cross_terms = transposed_product(CJ, C, threads);
   Eigen::MatrixXd H = CJ.transpose() * CJ;
   H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
-  const Eigen::LDLT<Eigen::MatrixXd> solver(H);
-  const Eigen::MatrixXd K = C.transpose() * C - cross_terms.transpose() * solver.solve(cross_terms);
+  const Eigen::LLT<Eigen::MatrixXd> solver(H);
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(C.cols(), C.cols());
+  add_upper_gram(C, K, threads);
+  add_upper_gram(solver.matrixL().solve(cross_terms), K, threads, -1);
+  mirror_upper(K);
   const Eigen::VectorXd q =
       C.transpose() * residual - cross_terms.transpose() * solver.solve(CJ.transpose() * residual);
 

@@ -35,23 +35,23 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
                                        const network::CableNetwork& first_network,
                                        const std::vector<int>& adhesion_ids);
 
-/// By how many of its standard errors each tension changes (on the first mesh) where a bead's displacement component
-/// changes by one of its own: tensions × components, as the fit weighs beads and meshes.
-Eigen::MatrixXd influence_of(const EnsembleFit& fit, const LinearData& data);
+/// What the beads tell of each tension. Influence: by how many of its standard errors a tension changes (on the first
+/// mesh) where a bead's displacement component changes by one of its own, as the fit weighs beads and meshes.
+struct Influence {
+  Eigen::VectorXd variance;           ///< by tension: sum of the squared influence over all components
+  Eigen::VectorXd n_informing_beads;  ///< by tension, over which it is spread: (sum q)² / sum q², q by bead
+  std::vector<int> most_informed;     ///< by bead: the fibre whose tension it moves most; 0: the network
+};
+Influence influence_of(const EnsembleFit& fit, const LinearData& data);
 
 /// What becomes of the fit where a fibre is taken for plain network, the other tensions following.
 struct FibreLeftOut {
   int fibre_id = 0;
   double chi_squared_rise = 0;   ///< from the local misfit, mean over the meshes, in units of the noise
   double aic_rise = 0;           ///< less 2 for the parameter saved: positive where the beads call for the fibre
-  double n_informing_beads = 0;  ///< over which the estimate is spread: (sum q)² / sum q², q the squared influence
+  double n_informing_beads = 0;  ///< see Influence
 };
-std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Eigen::MatrixXd& influence);
-
-/// By bead: the fibre whose tension a displacement there moves most, in standard errors of that tension; 0: the
-/// network.
-/// @param influence  see influence_of
-std::vector<int> most_informed_fibre(const EnsembleFit& fit, const Eigen::MatrixXd& influence);
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 
 /// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
 struct MissingFibre {
@@ -61,7 +61,8 @@ struct MissingFibre {
 };
 /// The best ones, no adhesion twice. A gain is kept where chance would reach it in one cell of twenty, all pairs tried
 /// (Bonferroni).
-std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions);
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
+                                         int threads = 1);
 
 void write_correlations(const Path& file, const EnsembleFit& fit);
 void write_models(const Path& file, const std::vector<ModelScore>& models);

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -51,26 +52,32 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   const double least = least_phi_nN(meshes, mean.forces_nN, sizes.sum());
 
   // E |P r|² = s² (rows − tensions) + phi tr(P C diag(sizes) Cᵀ P), P taking out what the tensions can follow
-  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(data.compliance * mean.derivatives);
-  const auto projected = [&](const Eigen::MatrixXd& columns) -> Eigen::MatrixXd {
-    const Eigen::MatrixXd turned = qr.householderQ().adjoint() * columns;
-    return turned.bottomRows(turned.rows() - qr.rank());
+  const Eigen::MatrixXd& C = *data.compliance;
+  const Eigen::ColPivHouseholderQR<Eigen::MatrixXd> qr(displace(data, mean.derivatives));
+  const Eigen::MatrixXd followed = qr.householderQ() * Eigen::MatrixXd::Identity(C.rows(), qr.rank());
+  const auto left_of = [&](const Eigen::MatrixXd& columns) {
+    return columns.squaredNorm() - transposed_product(followed, columns).squaredNorm();
   };
-  const Eigen::MatrixXd left = projected(data.target - data.compliance * mean.forces_nN);
-  const double per_phi = projected(data.compliance * sizes.cwiseSqrt().asDiagonal()).squaredNorm();
-  const double beyond_noise = left.squaredNorm() - noise_variance * static_cast<double>(left.rows());
+  const double left = left_of(data.target - C * mean.forces_nN);
+  const double per_phi = left_of(C * sizes.cwiseSqrt().asDiagonal());
+  const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - qr.rank());
   const double phi = std::max(least, per_phi > 0 ? beyond_noise / per_phi : 0);
   return {.phi_nN = phi, .least_phi_nN = least, .force_variance_nN2 = phi * sizes, .noise_variance = noise_variance};
 }
 
-ReducedData whitened(const ReducedData& data, const ModelError& error) {
-  const Eigen::MatrixXd& C = data.compliance;
-  Eigen::MatrixXd relative = C * (error.force_variance_nN2 / error.noise_variance).asDiagonal() * C.transpose();
-  relative.diagonal().array() += 1;
-  const Eigen::LLT<Eigen::MatrixXd> root(relative);
+ReducedData whitened(const ReducedData& data, const ModelError& error, int threads) {
+  Eigen::MatrixXd C = *data.compliance * (error.force_variance_nN2 / error.noise_variance).cwiseSqrt().asDiagonal();
+  Eigen::MatrixXd relative = Eigen::MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
+  add_upper_outer(C, relative, threads);
+  C = *data.compliance;
+  const bool is_definite = upper_cholesky(relative);
+  MBTFM_ASSERT(is_definite);
+  solve_upper_transposed(relative, C, threads);
+  solve_upper_transposed(relative, target);
   ReducedData white = data;
-  white.compliance = root.matrixL().solve(C);
-  white.target = root.matrixL().solve(data.target);
+  white.is_upper = false;
+  white.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(C));
+  white.target = target;
   return white;
 }
 

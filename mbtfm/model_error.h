@@ -37,6 +37,6 @@ struct MeshForces {
 ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance);
 
 /// The data in coordinates in which both errors together have the variance s².
-ReducedData whitened(const ReducedData& data, const ModelError& error);
+ReducedData whitened(const ReducedData& data, const ModelError& error, int threads = 1);
 
 }  // namespace mbtfm::inverse

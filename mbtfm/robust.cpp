@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -37,22 +38,56 @@ bool is_exact(const LinearData& data, double scale) {
   return scale <= 1e-9 * data.weight_per_um.cwiseProduct(data.displacement_um).cwiseAbs().maxCoeff();
 }
 
+/// Changes of the weighted displacements by tension, 2·beads × tensions. Single precision: weights settle to 1e-4.
+using BeadJacobian = Eigen::MatrixXf;
+
+BeadJacobian bead_jacobian(const LinearData& data, const Eigen::MatrixXd& force_derivatives) {
+  constexpr Eigen::Index kColumns = 64;  // at a time in double precision
+  BeadJacobian J(data.weight_per_um.size(), force_derivatives.cols());
+  for (Eigen::Index first = 0; first < J.cols(); first += kColumns) {
+    const Eigen::Index count = std::min(kColumns, J.cols() - first);
+    J.middleCols(first, count) =
+        (data.weight_per_um.asDiagonal() * data.response->displace(force_derivatives.middleCols(first, count)))
+            .cast<float>();
+  }
+  return J;
+}
+
+/// Jᵀ W J and Jᵀ W r, W the weights by bead.
+struct NormalEquations {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd b;
+};
+
+NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& bead_weights,
+                                 const Eigen::VectorXd& residual, int threads) {
+  constexpr Eigen::Index kBeads = 4096;  // at a time in double precision
+  NormalEquations sum{Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())};
+  for (Eigen::Index first = 0; first < bead_weights.size(); first += kBeads) {
+    const Eigen::Index count = std::min(kBeads, bead_weights.size() - first);
+    Eigen::VectorXd root(2 * count);
+    for (Eigen::Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
+    const Eigen::MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
+    add_upper_gram(weighted, sum.H, threads);
+    sum.b += weighted.transpose() * root.cwiseProduct(residual.segment(2 * first, 2 * count));
+  }
+  mirror_upper(sum.H);
+  return sum;
+}
+
 /// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
-Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& residual, const Eigen::MatrixXd& J,
-                               const Eigen::VectorXd& low, double scale) {
+Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& residual, const BeadJacobian& J,
+                               const Eigen::VectorXd& low, double scale, int threads) {
   Eigen::VectorXd step = Eigen::VectorXd::Zero(J.cols());
   Eigen::VectorXd weights = weights_of(loss, residual, scale);
   constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
   for (int i = 0; i < kMaxSteps; ++i) {
-    Eigen::VectorXd by_component(residual.size());
-    for (Eigen::Index b = 0; b < weights.size(); ++b) by_component.segment<2>(2 * b).setConstant(weights[b]);
-    const Eigen::MatrixXd weighted = by_component.asDiagonal() * J;
-    Eigen::MatrixXd H = J.transpose() * weighted;
+    auto [H, b] = normal_equations(J, weights, residual, threads);
     H.diagonal() += 1e-12 * H.diagonal().maxCoeff() * Eigen::VectorXd::Ones(H.rows());  // a tension that no bead feels
-    const Eigen::VectorXd next = bounded_quadratic_minimum(H, -(weighted.transpose() * residual), low);
+    const Eigen::VectorXd next = bounded_quadratic_minimum(H, -b, low);
     const double change = (next - step).norm();
     step = next;
-    weights = weights_of(loss, residual - J * step, scale);
+    weights = weights_of(loss, residual - (J * step.cast<float>()).cast<double>(), scale);
     if (change <= 1e-4 * step.norm()) break;
   }
   return weights;
@@ -69,17 +104,16 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     const Eigen::VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
     const double scale = fixed_scale ? *fixed_scale : robust_scale(data, residual);
     if (is_exact(data, scale)) break;
-    const TensionProblem problem(network, data.reduced, adhesion_ids);
-    const Eigen::MatrixXd J =
-        data.weight_per_um.asDiagonal() * (data.compliance_um_per_nN * problem.force_derivatives(fit.trial));
-    reweight(data, linear_weights(loss, residual, J, -before, scale));
-    const TensionProblem reweighted(network, data.reduced, adhesion_ids);
+    const TensionProblem problem(network, data.reduced, adhesion_ids, {}, threads);
+    const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
+    reweight(data, linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads));
+    const TensionProblem reweighted(network, data.reduced, adhesion_ids, {}, threads);
     const int n_evaluations = fit.n_evaluations;
     fit = fit_tensions(reweighted, parameters, threads, scaled_to_data(reweighted, before, &last));
     fit.n_evaluations += n_evaluations;
     // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
     const Eigen::VectorXd change = fit.trial.tensions_nN - before;
-    if ((J * change).norm() <= kSettled * scale || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
+    if (data.weight_per_um.cwiseProduct(data.response->displace(derivatives * change)).norm() <= kSettled * scale || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
   }
   return fit;
 }

@@ -25,38 +25,36 @@ void check_same_beads(const Path& file, const DisplacementField& beads, const Di
   }
 }
 
-/// Rows of a compliance of `all` that are those of `beads`; nothing where not all of them are there, in that order.
-std::optional<std::vector<Eigen::Index>> rows_among(const DisplacementField& all, const DisplacementField& beads) {
-  std::vector<Eigen::Index> rows;
+/// Which of `all` are `beads`; nothing where not all of them are there, in that order.
+std::optional<std::vector<Eigen::Index>> places_among(const DisplacementField& all, const DisplacementField& beads) {
+  std::vector<Eigen::Index> places;
   for (std::size_t i = 0, next = 0; next < beads.size(); ++i) {
     if (i == all.size()) return std::nullopt;
     if (all[i].position_um != beads[next].position_um) continue;
     ++next;
-    rows.push_back(2 * static_cast<Eigen::Index>(i));
-    rows.push_back(rows.back() + 1);
+    places.push_back(static_cast<Eigen::Index>(i));
   }
-  return rows;
+  return places;
 }
 
 struct FrameData {
   DisplacementField beads;
   std::vector<bool> is_used;
-  Eigen::MatrixXd compliance_um_per_nN;
+  substrate::SharedResponse response;
 };
 
 /// Without the flagged beads.
-FrameData good_beads_of(const SeriesFrame& frame, const Eigen::MatrixXd& compliance_um_per_nN,
+FrameData good_beads_of(const SeriesFrame& frame, const substrate::SharedResponse& response,
                         const std::vector<bool>& is_used) {
   FrameData data;
-  std::vector<Eigen::Index> rows;
+  std::vector<Eigen::Index> good;
   for (std::size_t i = 0; i < frame.beads.size(); ++i) {
     if (!frame.beads[i].flag.empty()) continue;
     data.beads.push_back(frame.beads[i]);
     data.is_used.push_back(is_used.empty() || is_used[i]);
-    rows.push_back(2 * static_cast<Eigen::Index>(i));
-    rows.push_back(rows.back() + 1);
+    good.push_back(static_cast<Eigen::Index>(i));
   }
-  data.compliance_um_per_nN = compliance_um_per_nN(rows, Eigen::all);
+  data.response = response->at_points(good);
   return data;
 }
 
@@ -200,26 +198,26 @@ const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames) {
   return std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
 }
 
-Compliances compliances_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
-                           const std::function<Eigen::MatrixXd(const DisplacementField&)>& compliance_um_per_nN) {
-  if (frames.empty()) return {compliance_um_per_nN(beads), {}};
+Responses responses_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                       const std::function<substrate::SharedResponse(const DisplacementField&)>& response) {
+  if (frames.empty()) return {response(beads), {}};
   const DisplacementField& all = beads_of(frames);
-  Compliances result{{}, compliance_um_per_nN(all)};
-  const auto rows = rows_among(all, beads);
-  result.of_beads = rows ? Eigen::MatrixXd(result.of_series(*rows, Eigen::all)) : compliance_um_per_nN(beads);
+  Responses result{{}, response(all)};
+  const auto places = places_among(all, beads);
+  result.of_beads = places ? result.of_series->at_points(*places) : response(beads);
   return result;
 }
 
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
-                                 const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
+                                 const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
                                  int threads, const Progress& progress, Trial start,
                                  const std::vector<FrameFit>& kept) {
   std::vector<FrameFit> fits;
   const auto fitted = [&](const SeriesFrame& frame) {
-    FrameData good = good_beads_of(frame, compliance_um_per_nN, is_used);
-    LinearData data = reduce(good.beads, std::move(good.compliance_um_per_nN), good.is_used);
+    FrameData good = good_beads_of(frame, response, is_used);
+    LinearData data = reduce(good.beads, std::move(good.response), good.is_used);
     return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start), data);
   };
   for (const SeriesFrame& frame : frames) {

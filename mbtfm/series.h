@@ -27,15 +27,15 @@ std::vector<SeriesFrame> read_series(const Path& folder);
 /// The beads of the first frame that was tracked, and so of all. @param frames  one at least is not refused
 const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames);
 
-/// Compliance of displacement.csv's good beads, and of all beads of a series.
-struct Compliances {
-  Eigen::MatrixXd of_beads, of_series;
+/// Response of displacement.csv's good beads, and of all beads of a series.
+struct Responses {
+  substrate::SharedResponse of_beads, of_series;
 };
 /// displacement.csv is a frame of the series, as a rule, and so found with it; of another origin it is found apart.
 /// @param frames  may be none
-/// @param compliance_um_per_nN  by beads
-Compliances compliances_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
-                           const std::function<Eigen::MatrixXd(const DisplacementField&)>& compliance_um_per_nN);
+/// @param response  by beads
+Responses responses_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                           const std::function<substrate::SharedResponse(const DisplacementField&)>& response);
 
 /// What came of a frame.
 struct FrameFit {
@@ -52,14 +52,14 @@ struct FrameFit {
 /// The fits that write_tracks and write_frames put into a folder; none where not both files are there.
 std::vector<FrameFit> read_fits(const Path& folder);
 
-/// @param compliance_um_per_nN  of all beads
+/// @param response  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
 /// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
 /// @param start  of the first frame, on the first network
 /// @param kept  fits of the same networks, compliance and parameters: taken for frames whose file is still the same
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
-                                 const Eigen::MatrixXd& compliance_um_per_nN, const std::vector<bool>& is_used,
+                                 const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
                                  int threads, const Progress& progress, Trial start,
                                  const std::vector<FrameFit>& kept = {});

@@ -13,9 +13,13 @@ std::vector<double> to_vector(const Eigen::VectorXd& v) { return {v.data(), v.da
 }  // namespace
 
 TensionProblem::TensionProblem(const network::CableNetwork& cables, const ReducedData& data,
-                               const std::vector<int>& adhesion_ids, SolvedMisfit solved_misfit)
-    : cables_(cables), data_(data), adhesion_ids_(adhesion_ids), solved_misfit_(std::move(solved_misfit)) {
-  MBTFM_ASSERT(data.compliance.cols() == 2 * static_cast<Eigen::Index>(adhesion_ids.size()));
+                               const std::vector<int>& adhesion_ids, SolvedMisfit solved_misfit, int threads)
+    : cables_(cables),
+      data_(data),
+      adhesion_ids_(adhesion_ids),
+      solved_misfit_(std::move(solved_misfit)),
+      threads_(threads) {
+  MBTFM_ASSERT(data.compliance->cols() == 2 * static_cast<Eigen::Index>(adhesion_ids.size()));
   for (const int id : cables.adhesion_ids()) {
     const auto at = std::find(adhesion_ids.begin(), adhesion_ids.end(), id);
     if (at == adhesion_ids.end()) {
@@ -27,7 +31,7 @@ TensionProblem::TensionProblem(const network::CableNetwork& cables, const Reduce
 }
 
 Eigen::MatrixXd TensionProblem::to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const {
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(data_.compliance.cols(), by_network_adhesion.cols());
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(data_.compliance->cols(), by_network_adhesion.cols());
   for (std::size_t i = 0; i < pair_of_.size(); ++i) {
     rows.middleRows<2>(2 * pair_of_[i]) = by_network_adhesion.middleRows<2>(2 * static_cast<Eigen::Index>(i));
   }
@@ -42,7 +46,7 @@ Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* 
       cables_.equilibrium(tensions, nearby ? nearby->equilibrium.positions_um : std::vector<Vec2>{}, force_tolerance);
   if (!trial.equilibrium.report.converged) throw NotSolved(trial.equilibrium.report);
   trial.forces_nN = to_data_rows(cables_.adhesion_forces_nN(tensions, trial.equilibrium));
-  trial.residual = data_.compliance * trial.forces_nN - data_.target;
+  trial.residual = *data_.compliance * trial.forces_nN - data_.target;
   trial.objective =
       0.5 * (solved_misfit_ ? solved_misfit_(trial.forces_nN) - data_.floor_squared : trial.residual.squaredNorm());
   return trial;
@@ -51,7 +55,7 @@ Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* 
 Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
   const Network& network = cables_.network();
   const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
-  Eigen::VectorXd torques = Eigen::VectorXd::Zero(data_.compliance.cols() / 2);
+  Eigen::VectorXd torques = Eigen::VectorXd::Zero(data_.compliance->cols() / 2);
   for (std::size_t v = 0; v < reactions.size(); ++v) {
     if (network.adhesion_id[v] == 0) continue;
     const auto& ids = cables_.adhesion_ids();
@@ -62,7 +66,7 @@ Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
 }
 
 Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
-  return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium));
+  return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium, threads_));
 }
 
 Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, int threads) const {
@@ -85,7 +89,7 @@ Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, i
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby) {
   constexpr double kRough = 1e-3;  // its size is all that is asked for
   const Trial trial = problem.evaluate(tensions_nN, nearby, kRough);
-  const Eigen::VectorXd response = problem.data().compliance * trial.forces_nN;
+  const Eigen::VectorXd response = *problem.data().compliance * trial.forces_nN;
   double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
   // Where the cell seems to push, as noise alone may look, any small positive size serves.
   if (factor <= 0) factor = 1e-3 / std::max(tensions_nN.maxCoeff(), 1e-300);

@@ -29,8 +29,9 @@ class TensionProblem {
   ///                      be among them
   /// @param solved_misfit  where given, the objective of every trial comes from it, and not from the data's compliance:
   ///                       the same to rounding, at the thesis' cost
+  /// @param threads  that derivatives take
   TensionProblem(const network::CableNetwork& cables, const ReducedData& data, const std::vector<int>& adhesion_ids,
-                 SolvedMisfit solved_misfit = {});
+                 SolvedMisfit solved_misfit = {}, int threads = 1);
 
   int n_tensions() const { return static_cast<int>(cables_.fibre_ids().size()); }
   const network::CableNetwork& cables() const { return cables_; }
@@ -46,7 +47,7 @@ class TensionProblem {
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
   Eigen::MatrixXd force_derivatives(const Trial& trial) const;
   /// d(C R)/dt
-  Eigen::MatrixXd jacobian(const Trial& trial) const { return data_.compliance * force_derivatives(trial); }
+  Eigen::MatrixXd jacobian(const Trial& trial) const { return displace(data_, force_derivatives(trial), threads_); }
   /// dPhi/dt, exact.
   Eigen::VectorXd gradient(const Trial& trial) const { return jacobian(trial).transpose() * trial.residual; }
   /// dPhi/dt by central differences over threads, as the thesis does (3.2.5); for comparison.
@@ -58,6 +59,7 @@ class TensionProblem {
   const ReducedData& data_;
   std::vector<int> adhesion_ids_;
   SolvedMisfit solved_misfit_;
+  int threads_;
   std::vector<Eigen::Index> pair_of_;  ///< of the network's i-th adhesion in the data
 };
 

@@ -6,8 +6,10 @@
 #include <string>
 
 #include "network/cable_energy.h"
+#include "network/dense_panel.h"
 #include "network/minimise.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
 
 namespace mbtfm::network {
 namespace {
@@ -208,7 +210,7 @@ Eigen::VectorXd CableNetwork::adhesion_forces_nN(const std::vector<double>& tens
 }
 
 Eigen::MatrixXd CableNetwork::reaction_derivatives(const std::vector<double>& tensions_nN,
-                                                   const Equilibrium& equilibrium) const {
+                                                   const Equilibrium& equilibrium, int threads) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
   const Eigen::Index n_groups = static_cast<Eigen::Index>(impl_->fibre_ids.size());
   BlockCholesky h_ff = impl_->free.matrix;
@@ -240,15 +242,21 @@ Eigen::MatrixXd CableNetwork::reaction_derivatives(const std::vector<double>& te
     }
   }
   h_ff.factorise();
-  h_ff.solve(b_f);  // now −dx_f/dt
-  for (const Coupling& c : couplings)
-    result.middleRows<2>(2 * c.held) -= c.stiffness * b_f.middleRows<2>(2 * c.unknown);
+  // tensions in groups, each on its own
+  constexpr Eigen::Index kGroup = 8 * kRightHandSides;
+  parallel_for(static_cast<int>((n_groups + kGroup - 1) / kGroup), threads, [&](int g) {
+    const Eigen::Index first = g * kGroup, count = std::min(kGroup, n_groups - first);
+    BlockCholesky::Columns moved = b_f.middleCols(first, count);
+    h_ff.solve(moved);  // now −dx_f/dt
+    for (const Coupling& c : couplings)
+      result.block(2 * c.held, first, 2, count) -= c.stiffness * moved.middleRows<2>(2 * c.unknown);
+  });
   return result;
 }
 
 Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<double>& tensions_nN,
-                                                         const Equilibrium& equilibrium) const {
-  const Eigen::MatrixXd by_vertex = reaction_derivatives(tensions_nN, equilibrium);
+                                                         const Equilibrium& equilibrium, int threads) const {
+  const Eigen::MatrixXd by_vertex = reaction_derivatives(tensions_nN, equilibrium, threads);
   Eigen::MatrixXd result =
       Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()), by_vertex.cols());
   for (std::size_t i = 0; i < impl_->held_vertices.size(); ++i)

@@ -84,9 +84,10 @@ class CableNetwork {
   /// with all tensions zero: the elastic response of the network at rest.
   /// A column without entries belongs to a group whose tension only takes the place of its cables' stretch.
   Eigen::MatrixXd adhesion_force_derivatives(const std::vector<double>& tensions_nN,
-                                             const Equilibrium& equilibrium) const;
+                                             const Equilibrium& equilibrium, int threads = 1) const;
   /// The same by held vertex: rows 2i, 2i+1 are the force on held_vertices()[i]. Moments of an adhesion follow from it.
-  Eigen::MatrixXd reaction_derivatives(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
+  Eigen::MatrixXd reaction_derivatives(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium,
+                                       int threads = 1) const;
 
   /// Gradients of the sums weightsᵀ R with respect to what the network was spanned over. @param weights  2·adhesions ×
   /// sums

@@ -12,6 +12,7 @@
 #include "pipeline/contract/effects.h"
 #include "substrate/effects.h"
 #include "substrate/models.h"
+#include "substrate/response.h"
 #include "substrate/scene.h"
 #include "substrate/stated_error.h"
 
@@ -62,6 +63,9 @@ class Automatic final : public Substrate {
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<Ellipse>& ellipses) const override {
     return timed(points_um, ellipses, [&](const Substrate& m) { return m.compliance_um_per_nN(points_um, ellipses); });
+  }
+  SharedResponse response(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const override {
+    return timed(points_um, ellipses, [&](const Substrate& m) { return m.response(points_um, ellipses); });
   }
   std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                      const std::vector<Vec2>& forces_nN) const override {

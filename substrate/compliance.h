@@ -61,6 +61,8 @@ struct VolumeField {
   std::vector<std::array<double, 6>> stress_kPa;  ///< mean over each box: xx, yy, zz, xy, yz, xz; empty: not asked
 };
 
+class Response;  // see response.h
+
 class Substrate {
  public:
   virtual ~Substrate() = default;
@@ -70,6 +72,9 @@ class Substrate {
   ///         NotSolved where the memory would not suffice
   virtual Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                                const std::vector<Ellipse>& ellipses) const = 0;
+  /// The same as an operator, which need not hold the matrix.
+  virtual std::shared_ptr<const Response> response(const std::vector<Vec2>& points_um,
+                                                   const std::vector<Ellipse>& ellipses) const;
   /// Displacement (um) of each point for given forces on the ellipses, without forming the matrix.
   /// @throws as compliance_um_per_nN, and InvalidData where a force is not finite or their number differs
   virtual std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,

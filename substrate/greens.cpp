@@ -4,6 +4,7 @@
 #include "pipeline/contract/errors.h"
 #include "substrate/effects.h"
 #include "substrate/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::substrate {
 
@@ -54,6 +55,10 @@ void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>&
   for (std::size_t j = 0; j < forces_nN.size(); ++j) {
     if (!is_finite(forces_nN[j])) throw InvalidData("force " + std::to_string(j), "finite numbers", "others");
   }
+}
+
+SharedResponse Substrate::response(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const {
+  return dense_response(compliance_um_per_nN(points_um, ellipses));
 }
 
 std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,

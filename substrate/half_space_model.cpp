@@ -1,6 +1,7 @@
 #include "substrate/effects.h"
 #include "substrate/greens_model.h"
 #include "substrate/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -14,6 +15,9 @@ class HalfSpace final : public Substrate {
                                        const std::vector<Ellipse>& ellipses) const override {
     return compliance_by_columns(points_um, ellipses, threads_,
                                  [this](const Ellipse& ellipse) { return HalfSpaceEllipse(gel_, ellipse); });
+  }
+  SharedResponse response(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const override {
+    return pointwise_response(*this, points_um, ellipses, threads_);
   }
   std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                   const std::vector<Vec2>& forces_nN) const override {

@@ -3,6 +3,7 @@
 #include "substrate/layer.h"
 #include "substrate/layer_vertical.h"
 #include "substrate/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -16,6 +17,9 @@ class LayerModel final : public Substrate {
                                        const std::vector<Ellipse>& ellipses) const override {
     return compliance_by_columns(points_um, ellipses, threads_,
                                  [this](const Ellipse& ellipse) { return LayerEllipse(layer_, ellipse); });
+  }
+  SharedResponse response(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const override {
+    return pointwise_response(*this, points_um, ellipses, threads_);
   }
   std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                   const std::vector<Vec2>& forces_nN) const override {

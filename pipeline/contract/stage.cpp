@@ -285,6 +285,7 @@ int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<void(ParameterList&)>& declare_parameters,
               const std::function<StageReport(StageContext&)>& body) {
   const std::string& stage = description.name;
+  restart_with_kernels_of_processor(argv);
   watch_signals();
   keep_blas_to_one_thread();
   try {

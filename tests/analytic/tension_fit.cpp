@@ -37,8 +37,8 @@ TEST(TensionFit, reduced_data_give_the_misfit_of_all_beads) {
   const TensionScene scene = tension_scene("case_21", 500, 0.07, 2);
   const Eigen::VectorXd forces = 0.8 * scene.forces_nN;
   const Eigen::VectorXd all =
-      scene.data.weight_per_um.cwiseProduct(scene.data.compliance_um_per_nN * forces - scene.data.displacement_um);
-  const double reduced = (scene.data.reduced.compliance * forces - scene.data.reduced.target).squaredNorm() +
+      scene.data.weight_per_um.cwiseProduct(scene.data.response->displace(forces) - scene.data.displacement_um);
+  const double reduced = (*scene.data.reduced.compliance * forces - scene.data.reduced.target).squaredNorm() +
                          scene.data.reduced.floor_squared;
   EXPECT_NEAR(reduced, all.squaredNorm(), 1e-9 * all.squaredNorm());
 }

@@ -137,7 +137,7 @@ class Linearised {
   }
   /// Errors of the tensions with the present noise.
   Eigen::VectorXd errors_nN() const {
-    const Eigen::VectorXd residual = problem_.data().compliance * truth_.forces_nN - problem_.data().target;
+    const Eigen::VectorXd residual = *problem_.data().compliance * truth_.forces_nN - problem_.data().target;
     return -(jacobian_.transpose() * jacobian_).ldlt().solve(jacobian_.transpose() * residual);
   }
   double total_error_nN(const Eigen::VectorXd& errors_nN) const { return total_gradient_.dot(errors_nN); }
@@ -191,9 +191,9 @@ void measure_again(TensionScene& scene, double noise, unsigned seed) {
     data.displacement_um[row] = scene.displacement_um[row] + normal(random);
   if ((data.bead_weight.array() != 1).any()) return reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
   const Eigen::VectorXd weighted_u = data.weight_per_um.cwiseProduct(data.displacement_um);
-  const Eigen::MatrixXd& C = data.reduced.compliance;
-  data.reduced.target = (C * (data.compliance_um_per_nN.transpose() * data.weight_per_um.cwiseProduct(weighted_u)))
-                            .cwiseQuotient(C.rowwise().squaredNorm());
+  Eigen::MatrixXd target = data.response->pull_back(data.weight_per_um.cwiseProduct(weighted_u));
+  solve_upper_transposed(*data.reduced.compliance, target);
+  data.reduced.target = target;
   data.reduced.floor_squared = weighted_u.squaredNorm() - data.reduced.target.squaredNorm();
 }
 
@@ -495,8 +495,7 @@ void directions(const Arguments& a) {
     TensionScene scene = thesis_scene(static_cast<std::uint64_t>(c), 10000, 0.07);
     const EnsembleFit fit = test::fit_own_network(scene);
     const ReducedData& d = scene.data.reduced;
-    const Eigen::VectorXd free =
-        d.compliance.transpose() * (d.compliance * d.compliance.transpose()).ldlt().solve(d.target);
+    const Eigen::VectorXd free = free_forces_nN(d);
     const TensionProblem problem(scene.cables, d, scene.adhesion_ids);
     const Eigen::VectorXd equal = uniform_start(problem).forces_nN;
     for (Eigen::Index row = 0; row < free.size(); row += 2) {

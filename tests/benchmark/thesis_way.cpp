@@ -143,7 +143,7 @@ Thesis run_thesis(const TensionScene& scene, bool is_kept, double signal_squared
   const double minimum = 2 * end.trial.objective + data.reduced.floor_squared;
   constexpr int kMostEvaluations = 50000;
   const SolvedMisfit by_compliance = [&](const Eigen::VectorXd& forces_nN) {
-    return (data.reduced.compliance * forces_nN - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
+    return (*data.reduced.compliance * forces_nN - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
   };
   to_the_end = minimise(problem, by_compliance, minimum, 1e300, kMostEvaluations, nullptr);
   Trace trace(signal_squared, minimum);

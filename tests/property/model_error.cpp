@@ -46,7 +46,11 @@ struct Model {
   /// What the beads tell of a cell whose forces deviate `size` times as much as the meshes'.
   ReducedData data(double size) {
     const Eigen::VectorXd y = C * forces(size) + draw(kRows, 1).col(0);
-    return {.compliance = C, .target = y, .floor_squared = 0, .n_components = kRows};
+    return {.compliance = std::make_shared<const Eigen::MatrixXd>(C),
+            .target = y,
+            .floor_squared = 0,
+            .n_components = kRows,
+            .n_felt = kRows};
   }
 };
 
@@ -61,11 +65,11 @@ TEST(ModelError, tells_the_errors_of_the_tensions_from_two_meshes_as_from_eight)
       const ModelError error = model_error(meshes, data, 1);
       Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(Model::kForces);
       for (const MeshForces& mesh : meshes) mean_nN += mesh.forces_nN / n_meshes;
-      const Eigen::MatrixXd J = data.compliance * model.D;
-      const Eigen::MatrixXd K = (J.transpose() * J).inverse(), by_slope = J.transpose() * data.compliance;
+      const Eigen::MatrixXd J = *data.compliance * model.D;
+      const Eigen::MatrixXd K = (J.transpose() * J).inverse(), by_slope = J.transpose() * *data.compliance;
       LocalMisfit local{.tensions_nN = model.tensions, .H = J.transpose() * J, .g = Eigen::VectorXd::Zero(4)};
       local.model_variance = by_slope * error.force_variance_nN2.asDiagonal() * by_slope.transpose();
-      const Eigen::VectorXd deviation = K * J.transpose() * (data.target - data.compliance * mean_nN);
+      const Eigen::VectorXd deviation = K * J.transpose() * (data.target - *data.compliance * mean_nN);
       z_squared += deviation.cwiseAbs2().cwiseQuotient(covariance_nN2(local, 1).diagonal()).mean() / kDraws;
     }
     // 1 200 values, four by four of one draw: to 6 %; phi itself is known to 20 % in each draw
@@ -94,7 +98,7 @@ TEST(ModelError, that_is_none_leaves_the_data_as_they_are) {
   Model model(1);
   const std::vector<MeshForces> meshes(3, {model.D * model.tensions, model.D});
   ReducedData data = model.data(0);
-  data.target = data.compliance * model.D * model.tensions;
+  data.target = *data.compliance * model.D * model.tensions;
   const ModelError error = model_error(meshes, data, 1);
   EXPECT_LT(error.force_variance_nN2.maxCoeff(), 1e-20);
   EXPECT_TRUE(whitened(data, error).target.isApprox(data.target, 1e-10));
@@ -104,7 +108,7 @@ TEST(ModelError, whitened_data_have_errors_of_one_variance) {
   Model model(1);
   const ModelError error = model_error(model.meshes(8), model.data(2), 1);
   ReducedData data = model.data(0);
-  const Eigen::MatrixXd C = data.compliance;
+  const Eigen::MatrixXd C = *data.compliance;
   const Eigen::MatrixXd variance =
       Eigen::MatrixXd(C * error.force_variance_nN2.asDiagonal() * C.transpose()) + Eigen::MatrixXd::Identity(60, 60);
   Eigen::MatrixXd root(60, 60);  // W y for every unit vector y
@@ -113,7 +117,7 @@ TEST(ModelError, whitened_data_have_errors_of_one_variance) {
     root.col(i) = whitened(data, error).target;
   }
   EXPECT_TRUE((root * variance * root.transpose()).isIdentity(1e-9));
-  EXPECT_TRUE(whitened(data, error).compliance.isApprox(root * C, 1e-9));
+  EXPECT_TRUE(whitened(data, error).compliance->isApprox(root * C, 1e-9));
 }
 
 Cell cell_with_arcs() {
@@ -191,12 +195,12 @@ TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_e
   parameters.loss = "squares";  // with one that weighs beads down their noise counts for less than it is
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
   ASSERT_TRUE(fit.model_error.has_value());
-  const Eigen::MatrixXd influence = influence_of(fit, scene.data);
+  const Influence influence = influence_of(fit, scene.data);
   const MeshFit& mesh = fit.meshes.front();
-  for (Eigen::Index i = 0; i < influence.rows(); ++i) {
+  for (Eigen::Index i = 0; i < influence.variance.size(); ++i) {
     const double part = mesh.noise_covariance_nN2(i, i) / mesh.covariance_nN2(i, i);
     EXPECT_LT(part, 0.999) << "the meshes must differ for this to tell anything";
-    EXPECT_NEAR(fit.variance * influence.row(i).squaredNorm(), part, 1e-6);
+    EXPECT_NEAR(fit.variance * influence.variance[i], part, 1e-6);
   }
 }
 

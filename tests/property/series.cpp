@@ -48,7 +48,7 @@ std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kep
   FitParameters parameters;
   parameters.n_meshes = 1;
   const Trial start = uniform_start({networks.front(), series.scene.data.reduced, series.scene.adhesion_ids});
-  return fit_series(series.frames, networks, series.scene.compliance_um_per_nN, {}, series.scene.adhesion_ids,
+  return fit_series(series.frames, networks, substrate::dense_response(series.scene.compliance_um_per_nN), {}, series.scene.adhesion_ids,
                     parameters, true, 2, {}, start, kept);
 }
 

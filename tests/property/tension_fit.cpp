@@ -84,7 +84,7 @@ TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
     Eigen::VectorXd noise(J.rows());
     for (double& n : noise) n = normal(random);
     ReducedData data = problem.data();
-    data.target = problem.data().compliance * truth.forces_nN + noise;
+    data.target = *problem.data().compliance * truth.forces_nN + noise;
     const TensionProblem again(scene.cables, data, scene.adhesion_ids);
     const TensionFit fit = fit_gauss_newton(again, {}, again.evaluate(scene.tensions_nN, &truth));
     const LocalMisfit local = local_misfit(fit.trial, again.jacobian(fit.trial));

@@ -1,0 +1,130 @@
+#include "pipeline/numerics/dense.h"
+
+#include <algorithm>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
+
+extern "C" {
+void dgemm_(const char* transpose_a, const char* transpose_b, const int* m, const int* n, const int* k,
+            const double* alpha, const double* a, const int* lda, const double* b, const int* ldb, const double* beta,
+            double* c, const int* ldc);
+void dsyrk_(const char* triangle, const char* transpose, const int* n, const int* k, const double* alpha,
+            const double* a, const int* lda, const double* beta, double* c, const int* ldc);
+void dtrsm_(const char* side, const char* triangle, const char* transpose, const char* diagonal, const int* m,
+            const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dtrmm_(const char* side, const char* triangle, const char* transpose, const char* diagonal, const int* m,
+            const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dpotrf_(const char* triangle, const int* n, double* a, const int* lda, int* info);
+}
+
+namespace mbtfm {
+
+namespace {
+
+using Eigen::MatrixXd;
+
+constexpr double kOne = 1, kZero = 0;
+constexpr int kStrip = 128;  // columns that one thread takes at a time: enough for BLAS' own blocks
+
+/// body(begin, count) over strips of columns.
+template <class Body>
+void over_strips(Eigen::Index n_columns, int threads, const Body& body) {
+  const int n = static_cast<int>(n_columns);
+  parallel_for((n + kStrip - 1) / kStrip, threads,
+               [&](int s) { body(s * kStrip, std::min(kStrip, n - s * kStrip)); });
+}
+
+MatrixXd general_product(char transpose_a, const MatrixXd& A, const MatrixXd& B, int threads) {
+  const bool is_transposed = transpose_a == 'T';
+  const int m = static_cast<int>(is_transposed ? A.cols() : A.rows());
+  const int k = static_cast<int>(is_transposed ? A.rows() : A.cols());
+  MBTFM_ASSERT(B.rows() == k);
+  MatrixXd C = MatrixXd::Zero(m, B.cols());
+  if (C.size() == 0 || k == 0) return C;
+  const int lda = static_cast<int>(A.rows());
+  over_strips(B.cols(), threads, [&](int begin, int count) {
+    dgemm_(&transpose_a, "N", &m, &count, &k, &kOne, A.data(), &lda, B.col(begin).data(), &k, &kZero,
+           C.col(begin).data(), &m);
+  });
+  return C;
+}
+
+/// dtrsm or dtrmm.
+using TriangleRoutine = decltype(dtrsm_);
+
+void with_triangle(TriangleRoutine routine, char transpose, const MatrixXd& U, MatrixXd& B, int threads) {
+  const int n = static_cast<int>(U.rows());
+  MBTFM_ASSERT(B.rows() == n && U.cols() == n);
+  if (B.size() == 0) return;
+  over_strips(B.cols(), threads, [&](int begin, int count) {
+    routine("L", "U", &transpose, "N", &n, &count, &kOne, U.data(), &n, B.col(begin).data(), &n);
+  });
+}
+
+}  // namespace
+
+MatrixXd product(const MatrixXd& A, const MatrixXd& B, int threads) { return general_product('N', A, B, threads); }
+
+MatrixXd transposed_product(const MatrixXd& A, const MatrixXd& B, int threads) {
+  return general_product('T', A, B, threads);
+}
+
+void add_upper_gram(const MatrixXd& A, MatrixXd& square, int threads, double factor) {
+  const int n = static_cast<int>(A.cols()), k = static_cast<int>(A.rows());
+  MBTFM_ASSERT(square.rows() == n && square.cols() == n);
+  if (n == 0 || k == 0) return;
+  over_strips(n, threads, [&](int begin, int count) {
+    const double* strip = A.col(begin).data();
+    if (begin > 0) {
+      dgemm_("T", "N", &begin, &count, &k, &factor, A.data(), &k, strip, &k, &kOne, square.col(begin).data(), &n);
+    }
+    dsyrk_("U", "T", &count, &k, &factor, strip, &k, &kOne, &square(begin, begin), &n);
+  });
+}
+
+void add_upper_outer(const MatrixXd& A, MatrixXd& square, int threads) {
+  const int n = static_cast<int>(A.rows()), k = static_cast<int>(A.cols());
+  MBTFM_ASSERT(square.rows() == n && square.cols() == n);
+  if (n == 0 || k == 0) return;
+  over_strips(n, threads, [&](int begin, int count) {
+    const double* strip = A.data() + begin;
+    if (begin > 0) {
+      dgemm_("N", "T", &begin, &count, &k, &kOne, A.data(), &n, strip, &n, &kOne, square.col(begin).data(), &n);
+    }
+    dsyrk_("U", "N", &count, &k, &kOne, strip, &n, &kOne, &square(begin, begin), &n);
+  });
+}
+
+void mirror_upper(MatrixXd& square) {
+  for (Eigen::Index j = 0; j < square.cols(); ++j)
+    for (Eigen::Index i = j + 1; i < square.rows(); ++i) square(i, j) = square(j, i);
+}
+
+void mirror_lower(MatrixXd& square) {
+  for (Eigen::Index j = 0; j < square.cols(); ++j)
+    for (Eigen::Index i = j + 1; i < square.rows(); ++i) square(j, i) = square(i, j);
+}
+
+void clear_below_diagonal(MatrixXd& square) { square.triangularView<Eigen::StrictlyLower>().setZero(); }
+
+MatrixXd gram(const MatrixXd& A, int threads) {
+  MatrixXd square = MatrixXd::Zero(A.cols(), A.cols());
+  add_upper_gram(A, square, threads);
+  mirror_upper(square);
+  return square;
+}
+
+bool upper_cholesky(MatrixXd& A) {
+  const int n = static_cast<int>(A.rows());
+  if (n == 0) return true;
+  int info = 0;
+  dpotrf_("U", &n, A.data(), &n, &info);
+  return info == 0;
+}
+
+void multiply_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrmm_, 'N', U, B, threads); }
+void solve_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrsm_, 'N', U, B, threads); }
+void solve_upper_transposed(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrsm_, 'T', U, B, threads); }
+
+}  // namespace mbtfm

@@ -1,0 +1,39 @@
+/// Products and factorisations of large dense matrices, by BLAS and LAPACK: several times quicker than Eigen's, which
+/// is compiled here for any processor. Cut in pieces of fixed size, so that the bits are the same for any number of
+/// threads.
+#pragma once
+
+#include <Eigen/Core>
+
+namespace mbtfm {
+
+/// A B
+Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B, int threads = 1);
+/// Aᵀ B
+Eigen::MatrixXd transposed_product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B, int threads = 1);
+
+/// square += factor Aᵀ A, on and above its diagonal.
+/// @param square  n × n, A being k × n
+void add_upper_gram(const Eigen::MatrixXd& A, Eigen::MatrixXd& square, int threads = 1, double factor = 1);
+/// square += A Aᵀ, on and above its diagonal.
+void add_upper_outer(const Eigen::MatrixXd& A, Eigen::MatrixXd& square, int threads = 1);
+/// Aᵀ A, symmetric.
+Eigen::MatrixXd gram(const Eigen::MatrixXd& A, int threads = 1);
+
+/// Copy what is above the diagonal to below it, or the other way round.
+void mirror_upper(Eigen::MatrixXd& square);
+void mirror_lower(Eigen::MatrixXd& square);
+void clear_below_diagonal(Eigen::MatrixXd& square);
+
+/// A = Uᵀ U with U upper triangular. Of A, what is below the diagonal neither counts nor changes.
+/// @return whether A is positive definite; if not, its upper half is spoiled
+bool upper_cholesky(Eigen::MatrixXd& A);
+
+/// B = U B for the upper triangle U.
+void multiply_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
+
+/// U⁻¹ B and U⁻ᵀ B for the upper triangle U, in place.
+void solve_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
+void solve_upper_transposed(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
+
+}  // namespace mbtfm

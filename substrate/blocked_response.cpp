@@ -1,0 +1,300 @@
+/// blocked_response(): see response.h.
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/dense.h"
+#include "substrate/response.h"
+
+namespace mbtfm::substrate {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::MatrixXf;
+using Eigen::VectorXd;
+
+constexpr int kNodes = 6;         // along each axis of a square
+constexpr double kFarFrom = 3.0;  // half sides from its centre
+
+/// A square of the plane.
+struct Square {
+  Vec2 centre_um;
+  double half_um = 0;
+};
+
+double chebyshev_node(int k) { return std::cos(std::numbers::pi * (k + 0.5) / kNodes); }
+
+std::vector<Vec2> nodes_um(const Square& square) {
+  std::vector<Vec2> nodes;
+  for (int j = 0; j < kNodes; ++j)
+    for (int i = 0; i < kNodes; ++i)
+      nodes.push_back(square.centre_um + square.half_um * Vec2{chebyshev_node(i), chebyshev_node(j)});
+  return nodes;
+}
+
+/// Lagrange's polynomials of the nodes at t in [-1, 1]: 1/n + 2/n Σ T_m(t) T_m(node), the discrete transform.
+std::array<double, kNodes> polynomials(double t) {
+  const double angle = std::acos(std::clamp(t, -1.0, 1.0));
+  std::array<double, kNodes> values{};
+  for (int k = 0; k < kNodes; ++k) {
+    double sum = 0.5;
+    for (int m = 1; m < kNodes; ++m)
+      sum += std::cos(m * angle) * std::cos(m * std::numbers::pi * (k + 0.5) / kNodes);
+    values[static_cast<std::size_t>(k)] = 2 * sum / kNodes;
+  }
+  return values;
+}
+
+/// Points × nodes: what the value at each node counts at a point.
+MatrixXd interpolation(const Square& square, const std::vector<Vec2>& points_um) {
+  MatrixXd weights(points_um.size(), kNodes * kNodes);
+  for (std::size_t p = 0; p < points_um.size(); ++p) {
+    const Vec2 at = points_um[p] - square.centre_um;
+    const double scale = square.half_um > 0 ? 1 / square.half_um : 0;
+    const auto along_x = polynomials(scale * at.x), along_y = polynomials(scale * at.y);
+    for (std::size_t j = 0; j < kNodes; ++j)
+      for (std::size_t i = 0; i < kNodes; ++i)
+        weights(static_cast<Index>(p), static_cast<Index>(kNodes * j + i)) = along_x[i] * along_y[j];
+  }
+  return weights;
+}
+
+bool is_far(const Square& square, const Ellipse& ellipse) {
+  const Vec2 d = ellipse.centre_um - square.centre_um;
+  return std::max(std::abs(d.x), std::abs(d.y)) - ellipse.semi_major_um >= kFarFrom * square.half_um;
+}
+
+/// The points of a square and what acts on them. Single precision: 6e-8 of numbers that are right to 1e-5.
+struct Block {
+  std::vector<Index> points;               ///< of all
+  MatrixXd weights;                        ///< see interpolation()
+  std::shared_ptr<const MatrixXf> far;     ///< 2·nodes × 2·ellipses; zero columns for those near
+  std::shared_ptr<const std::vector<Index>> near_columns;
+  MatrixXf near;                           ///< 2·points × near columns
+};
+
+/// Every second row from `first` on.
+template <class Matrix>
+auto axis_of(Matrix& matrix, Index first) {
+  using Plain = std::conditional_t<std::is_const_v<Matrix>, const typename Matrix::PlainObject, typename Matrix::PlainObject>;
+  return Eigen::Map<Plain, 0, Eigen::Stride<Eigen::Dynamic, 2>>(
+      matrix.data() + first, matrix.rows() / 2, matrix.cols(),
+      Eigen::Stride<Eigen::Dynamic, 2>(matrix.rows(), 2));
+}
+
+class Blocked final : public Response {
+ public:
+  Blocked(Index n_points, Index n_columns, std::vector<Block> blocks, int threads)
+      : n_points_(n_points), n_columns_(n_columns), blocks_(std::move(blocks)), threads_(threads) {}
+
+  Index rows() const override { return 2 * n_points_; }
+  Index cols() const override { return n_columns_; }
+
+  MatrixXd displace(const MatrixXd& forces_nN) const override {
+    MBTFM_ASSERT(forces_nN.rows() == n_columns_);
+    MatrixXd u = MatrixXd::Zero(rows(), forces_nN.cols());
+    over_blocks([&](const Block& block) {
+      const MatrixXd at_nodes = product(block.far->cast<double>(), forces_nN);
+      MatrixXd own = product(block.near.cast<double>(), forces_nN(*block.near_columns, Eigen::all));
+      for (const Index axis : {0, 1}) axis_of(own, axis) += block.weights * axis_of(at_nodes, axis);
+      for (std::size_t p = 0; p < block.points.size(); ++p)
+        u.middleRows<2>(2 * block.points[p]) = own.middleRows<2>(2 * static_cast<Index>(p));
+    });
+    return u;
+  }
+
+  MatrixXd pull_back(const MatrixXd& displacements) const override {
+    MBTFM_ASSERT(displacements.rows() == rows());
+    std::vector<MatrixXd> parts(kPieces, MatrixXd::Zero(n_columns_, displacements.cols()));
+    parallel_for(kPieces, threads_, [&](int piece) {
+      MatrixXd& sum = parts[static_cast<std::size_t>(piece)];
+      for (std::size_t b = static_cast<std::size_t>(piece); b < blocks_.size(); b += kPieces) {
+        const Block& block = blocks_[b];
+        const MatrixXd own = displacements(rows_of(block), Eigen::all);
+        MatrixXd at_nodes(block.far->rows(), own.cols());
+        for (const Index axis : {0, 1}) axis_of(at_nodes, axis) = block.weights.transpose() * axis_of(own, axis);
+        sum += transposed_product(block.far->cast<double>(), at_nodes);
+        sum(*block.near_columns, Eigen::all) += transposed_product(block.near.cast<double>(), own);
+      }
+    });
+    MatrixXd sum = std::move(parts.front());
+    for (std::size_t piece = 1; piece < parts.size(); ++piece) sum += parts[piece];
+    return sum;
+  }
+
+  /// With B the interpolation, F the far and N the near part: Fᵀ (Bᵀ W B) F + Fᵀ (Bᵀ W N) + … + Nᵀ W N. The first takes
+  /// nearly all the time: as squares of (Bᵀ W B)^½ F, many blocks at once.
+  MatrixXd upper_gram(const VectorXd& weight) const override {
+    MatrixXd square = MatrixXd::Zero(n_columns_, n_columns_);
+    constexpr std::size_t kAtOnce = 16;
+    for (std::size_t begin = 0; begin < blocks_.size(); begin += kAtOnce) {
+      const std::size_t count = std::min(kAtOnce, blocks_.size() - begin);
+      constexpr Index kRows = 2 * kNodes * kNodes;
+      MatrixXd roots(kRows * static_cast<Index>(count), n_columns_);
+      std::vector<MatrixXd> mixed(count), own(count);
+      parallel_for(static_cast<int>(count), threads_, [&](int i) {
+        const auto at = static_cast<std::size_t>(i);
+        const Block& block = blocks_[begin + at];
+        const MatrixXd far = block.far->cast<double>();
+        const MatrixXd near = block.near.cast<double>();
+        const VectorXd weight_here = weight(rows_of(block));
+        MatrixXd projected(kRows, near.cols());  // Bᵀ W N
+        for (const Index axis : {0, 1}) {
+          const MatrixXd weighted = axis_of(weight_here, axis).col(0).asDiagonal() * block.weights;
+          roots.middleRows(kRows * i + kRows / 2 * axis, kRows / 2) =
+              square_root(block.weights.transpose() * weighted) * axis_of(far, axis);
+          axis_of(projected, axis) = weighted.transpose() * axis_of(near, axis);
+        }
+        mixed[at] = transposed_product(far, projected);
+        own[at] = gram(weight_here.cwiseSqrt().asDiagonal() * near);
+      });
+      add_upper_gram(roots, square, threads_);
+      for (std::size_t i = 0; i < count; ++i)
+        add_near(*blocks_[begin + i].near_columns, mixed[i], own[i], square);
+    }
+    return square;
+  }
+
+  SharedResponse at_points(const std::vector<Index>& points) const override {
+    std::vector<Index> block_of(static_cast<std::size_t>(n_points_)), place_of(block_of.size());
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      for (std::size_t p = 0; p < blocks_[b].points.size(); ++p) {
+        block_of[static_cast<std::size_t>(blocks_[b].points[p])] = static_cast<Index>(b);
+        place_of[static_cast<std::size_t>(blocks_[b].points[p])] = static_cast<Index>(p);
+      }
+    std::vector<std::vector<Index>> kept(blocks_.size()), named(blocks_.size());
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      const auto p = static_cast<std::size_t>(points[i]);
+      kept[static_cast<std::size_t>(block_of[p])].push_back(place_of[p]);
+      named[static_cast<std::size_t>(block_of[p])].push_back(static_cast<Index>(i));
+    }
+    std::vector<Block> some;
+    for (std::size_t b = 0; b < blocks_.size(); ++b) {
+      if (kept[b].empty()) continue;
+      std::vector<Index> near_rows;
+      for (const Index p : kept[b]) near_rows.insert(near_rows.end(), {2 * p, 2 * p + 1});
+      some.push_back({.points = named[b],
+                      .weights = blocks_[b].weights(kept[b], Eigen::all),
+                      .far = blocks_[b].far,
+                      .near_columns = blocks_[b].near_columns,
+                      .near = blocks_[b].near(near_rows, Eigen::all)});
+    }
+    return std::make_shared<Blocked>(static_cast<Index>(points.size()), n_columns_, std::move(some), threads_);
+  }
+
+ private:
+  static constexpr int kPieces = 8;  // that sums are made of, whatever the threads
+
+  template <class Body>
+  void over_blocks(const Body& body) const {
+    parallel_for(static_cast<int>(blocks_.size()), threads_,
+                 [&](int b) { body(blocks_[static_cast<std::size_t>(b)]); });
+  }
+
+  static std::vector<Index> rows_of(const Block& block) {
+    std::vector<Index> rows;
+    for (const Index p : block.points) rows.insert(rows.end(), {2 * p, 2 * p + 1});
+    return rows;
+  }
+
+  /// R with Rᵀ R = A, which may be singular: fewer points than nodes.
+  static MatrixXd square_root(const MatrixXd& A) {
+    const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(A);
+    return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();
+  }
+
+  /// square += M Eᵀ + E Mᵀ + E O Eᵀ on and above the diagonal, E picking the near columns.
+  static void add_near(const std::vector<Index>& near, const MatrixXd& mixed, const MatrixXd& own, MatrixXd& square) {
+    for (std::size_t c = 0; c < near.size(); ++c) {
+      const Index column = near[c];
+      for (Index row = 0; row < mixed.rows(); ++row) {
+        const double value = mixed(row, static_cast<Index>(c));  // of (row, column) and of (column, row)
+        if (row <= column) square(row, column) += value;
+        if (row >= column) square(column, row) += value;
+      }
+      for (std::size_t r = 0; r <= c; ++r)  // the near columns ascend
+        square(near[r], column) += own(static_cast<Index>(r), static_cast<Index>(c));
+    }
+  }
+
+  Index n_points_, n_columns_;
+  std::vector<Block> blocks_;
+  int threads_;
+};
+
+/// Points in a part of the plane, halved across its longer side until they are few.
+void split(const std::vector<Vec2>& points_um, std::vector<Index> points, std::size_t most,
+           std::vector<std::vector<Index>>& parts) {
+  Vec2 low = points_um[static_cast<std::size_t>(points.front())], high = low;
+  for (const Index p : points) {
+    const Vec2 at = points_um[static_cast<std::size_t>(p)];
+    low = {std::min(low.x, at.x), std::min(low.y, at.y)};
+    high = {std::max(high.x, at.x), std::max(high.y, at.y)};
+  }
+  if (points.size() <= most || low == high) return parts.push_back(std::move(points));
+  const bool is_wide = high.x - low.x >= high.y - low.y;
+  const double middle = is_wide ? 0.5 * (low.x + high.x) : 0.5 * (low.y + high.y);
+  const auto is_below = [&](Index p) {
+    const Vec2 at = points_um[static_cast<std::size_t>(p)];
+    return (is_wide ? at.x : at.y) < middle;
+  };
+  const auto cut = std::stable_partition(points.begin(), points.end(), is_below);
+  split(points_um, {points.begin(), cut}, most, parts);
+  split(points_um, {cut, points.end()}, most, parts);
+}
+
+Square square_around(const std::vector<Vec2>& points_um) {
+  Vec2 low = points_um.front(), high = low;
+  for (const Vec2 at : points_um) {
+    low = {std::min(low.x, at.x), std::min(low.y, at.y)};
+    high = {std::max(high.x, at.x), std::max(high.y, at.y)};
+  }
+  return {.centre_um = 0.5 * (low + high), .half_um = 0.5 * std::max(high.x - low.x, high.y - low.y)};
+}
+
+Block block_of(const Substrate& model, const std::vector<Vec2>& points_um, std::vector<Index> points,
+               const std::vector<Ellipse>& ellipses) {
+  std::vector<Vec2> own_um;
+  for (const Index p : points) own_um.push_back(points_um[static_cast<std::size_t>(p)]);
+  const Square square = square_around(own_um);
+  std::vector<Ellipse> far, near;
+  std::vector<Index> far_columns, near_columns;
+  for (std::size_t e = 0; e < ellipses.size(); ++e) {
+    const bool is_away = is_far(square, ellipses[e]);
+    (is_away ? far : near).push_back(ellipses[e]);
+    const auto column = 2 * static_cast<Index>(e);
+    std::vector<Index>& columns = is_away ? far_columns : near_columns;
+    columns.insert(columns.end(), {column, column + 1});
+  }
+  MatrixXf at_nodes = MatrixXf::Zero(2 * kNodes * kNodes, 2 * static_cast<Index>(ellipses.size()));
+  at_nodes(Eigen::all, far_columns) = model.compliance_um_per_nN(nodes_um(square), far).cast<float>();
+  return {.points = std::move(points),
+          .weights = interpolation(square, own_um),
+          .far = std::make_shared<const MatrixXf>(std::move(at_nodes)),
+          .near_columns = std::make_shared<const std::vector<Index>>(std::move(near_columns)),
+          .near = model.compliance_um_per_nN(own_um, near).cast<float>()};
+}
+
+}  // namespace
+
+SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>& points_um,
+                                const std::vector<Ellipse>& ellipses, int threads) {
+  std::vector<std::vector<Index>> parts;
+  std::vector<Index> all(points_um.size());
+  std::iota(all.begin(), all.end(), Index{0});
+  // Far parts take 2·nodes numbers a block and column, near ones grow with a block's area: this makes both alike.
+  const double most = 2 * std::sqrt(static_cast<double>(points_um.size()));
+  if (!all.empty()) split(points_um, std::move(all), static_cast<std::size_t>(most), parts);
+  std::vector<Block> blocks;
+  for (std::vector<Index>& part : parts) blocks.push_back(block_of(model, points_um, std::move(part), ellipses));
+  return std::make_shared<Blocked>(static_cast<Index>(points_um.size()), 2 * static_cast<Index>(ellipses.size()),
+                                   std::move(blocks), threads);
+}
+
+}  // namespace mbtfm::substrate

@@ -1,0 +1,87 @@
+/// Large dense products against Eigen's own, about the sizes at which they are cut in pieces.
+#include "pipeline/numerics/dense.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+namespace mbtfm {
+namespace {
+
+using Eigen::MatrixXd;
+
+// Rounding of sums of some hundred products of numbers up to 1.
+constexpr double kRounding = 1e-12;
+
+MatrixXd numbers(int rows, int columns, unsigned seed) {
+  std::srand(seed);
+  return MatrixXd::Random(rows, columns);
+}
+
+class Dense : public testing::TestWithParam<int> {};
+
+TEST_P(Dense, products_are_those_of_the_textbook) {
+  const int n = GetParam();
+  const MatrixXd A = numbers(n, 7, 1), B = numbers(7, n, 2), C = numbers(n, 5, 3);
+  EXPECT_LE((product(A, B) - A.lazyProduct(B)).norm(), kRounding * (1 + n));
+  EXPECT_LE((transposed_product(A, C) - A.transpose().lazyProduct(C)).norm(), kRounding * (1 + n));
+  EXPECT_LE((gram(B) - B.transpose().lazyProduct(B)).norm(), kRounding * (1 + n));
+  MatrixXd outer = MatrixXd::Identity(n, n);
+  add_upper_outer(A, outer);
+  mirror_upper(outer);
+  EXPECT_LE((outer - MatrixXd::Identity(n, n) - A.lazyProduct(A.transpose())).norm(), kRounding * (1 + n));
+}
+
+TEST_P(Dense, gram_adds_to_the_upper_half_alone_and_may_take_away) {
+  const int n = GetParam();
+  const MatrixXd A = numbers(6, n, 4), before = numbers(n, n, 5);
+  MatrixXd square = before;
+  add_upper_gram(A, square, 2, -2.0);
+  const MatrixXd wanted = before - 2 * A.transpose().lazyProduct(A);
+  for (int j = 0; j < n; ++j) {
+    for (int i = 0; i < n; ++i) {
+      EXPECT_NEAR(square(i, j), i > j ? before(i, j) : wanted(i, j), i > j ? 0 : kRounding);
+    }
+  }
+}
+
+TEST_P(Dense, cholesky_s_factor_squares_to_the_matrix_and_solves_with_it) {
+  const int n = GetParam();
+  MatrixXd A = gram(numbers(n + 3, n, 6));
+  A.diagonal().array() += n;  // well conditioned
+  MatrixXd U = A;
+  ASSERT_TRUE(upper_cholesky(U));
+  EXPECT_EQ(MatrixXd(U.triangularView<Eigen::StrictlyLower>()), MatrixXd(A.triangularView<Eigen::StrictlyLower>()));
+  clear_below_diagonal(U);
+  EXPECT_LE((U.transpose() * U - A).norm(), kRounding * (1 + A.norm()));
+  const MatrixXd B = numbers(n, 3, 7);
+  MatrixXd X = B;
+  solve_upper_transposed(U, X);
+  solve_upper(U, X);
+  EXPECT_LE((A * X - B).norm(), kRounding * (1 + n));
+  MatrixXd Y = B;
+  multiply_upper(U, Y);
+  EXPECT_LE((Y - U.lazyProduct(B)).norm(), kRounding * (1 + n) * U.norm());
+}
+
+TEST_P(Dense, the_bits_are_the_same_for_any_number_of_threads) {
+  const int n = GetParam();
+  const MatrixXd A = numbers(9, n, 8), B = numbers(n, n, 9);
+  const MatrixXd one_gram = gram(A, 1), one_product = product(A, B, 1);
+  for (const int threads : {2, 4}) {
+    EXPECT_TRUE(one_gram == gram(A, threads));
+    EXPECT_TRUE(one_product == product(A, B, threads));
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 300));
+
+TEST(DenseCholesky, a_matrix_that_is_not_positive_is_told_and_its_lower_half_kept) {
+  MatrixXd A(2, 2);
+  A << 1, 2, 2, 1;
+  EXPECT_FALSE(upper_cholesky(A));
+  EXPECT_EQ(A(1, 0), 2);
+}
+
+}  // namespace
+}  // namespace mbtfm
