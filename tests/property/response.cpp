@@ -26,9 +26,9 @@ Scene uneven_scene() {
     return low + (high - low) * static_cast<double>(random() >> 11) * 0x1p-53;
   };
   Scene s;
-  for (int i = 0; i < 1500; ++i) s.points.push_back({between(0, 100), between(0, 80)});
-  for (int i = 0; i < 500; ++i) s.points.push_back({between(0, 10), between(0, 5)});
-  for (int j = 0; j < 60; ++j) {
+  for (int i = 0; i < 500; ++i) s.points.push_back({between(0, 100), between(0, 80)});
+  for (int i = 0; i < 150; ++i) s.points.push_back({between(0, 10), between(0, 5)});
+  for (int j = 0; j < 30; ++j) {
     const double semi_major = between(0.2, 3);
     s.ellipses.push_back({{between(-20, 120), between(-20, 100)}, semi_major, semi_major * between(0.2, 1), between(0, 3)});
   }
@@ -55,11 +55,12 @@ class BlockedResponse : public testing::TestWithParam<std::pair<const char*, dou
 };
 
 // Trefethen (2013), theorem 8.2: 4 M rho^-n / (rho − 1) with rho = 3 + 2 sqrt(2), n = 6 and M, the largest value in the
-// complex ellipse half-way to the source, some twice the field: 4e-5, for the ellipses nearest to a far square.
+// complex ellipse half-way to the source, some twice the field (a layer's falls faster: four times): up to 8e-5, for the
+// ellipses nearest to a far square.
 TEST_P(BlockedResponse, every_ellipse_s_field_is_the_exact_one_but_for_the_far_field_s_interpolation) {
   const MatrixXd G = whole(*blocked);
   for (Index column = 0; column < G.cols(); ++column)
-    EXPECT_LE((G - exact).col(column).norm(), 4e-5 * exact.col(column).norm()) << column;
+    EXPECT_LE((G - exact).col(column).norm(), 8e-5 * exact.col(column).norm()) << column;
 }
 
 TEST_P(BlockedResponse, pulling_back_is_the_transpose_of_displacing) {
@@ -78,7 +79,7 @@ TEST_P(BlockedResponse, its_gram_matrix_is_that_of_its_own_matrix) {
 }
 
 TEST_P(BlockedResponse, at_some_of_the_points_it_is_those_rows_in_their_order) {
-  const std::vector<Index> some = {1700, 3, 1999, 0, 42};
+  const std::vector<Index> some = {570, 3, 649, 0, 42};
   const MatrixXd G = whole(*blocked), part = whole(*blocked->at_points(some));
   ASSERT_EQ(part.rows(), 10);
   for (std::size_t i = 0; i < some.size(); ++i)
