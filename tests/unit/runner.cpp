@@ -452,7 +452,7 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   write_text(folder / "a/inner/cell.toml", "");  // part of a, not a cell
   make_executable(folder / "mbtfm",
                   "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
-  const auto cells = find_cells(folder.path());
+  const auto cells = find_cells(folder.path()).cells;
   ASSERT_EQ(cells.size(), 3u);
   const auto outcomes = run_batch(cells, {.program = folder / "mbtfm",
                                           .arguments = {},
