@@ -4,6 +4,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 
 namespace mbtfm {
 namespace {
@@ -13,9 +14,6 @@ using Json = JsonRecord::Json;
 // Ours nest six deep. Deeper ones are refused before they are taken apart: most of what is done with a JSON value calls
 // itself once a level.
 constexpr int kDeepest = 32;
-// Ours have some hundred bytes for each fibre and parameter. A file with holes may claim any size.
-constexpr std::uintmax_t kLargest_bytes = 256u << 20;
-
 Json parse(const std::string& text) {
   const Json::parser_callback_t watch = [](int depth, Json::parse_event_t, Json&) {
     if (depth > kDeepest) throw InvalidData("", "", "more than " + std::to_string(kDeepest) + " levels");
@@ -46,7 +44,7 @@ JsonRecord::JsonRecord(const std::filesystem::path& file, std::string kind, std:
   File whole{.name = file.string(), .kind = std::move(kind), .hint = std::move(hint), .json = {}};
   const auto refuse = [&](const std::string& found) { throw InputError(whole.name, whole.kind, found, whole.hint); };
   std::error_code error;
-  if (std::filesystem::file_size(file, error) > kLargest_bytes && !error) refuse("a file of more than 256 MB");
+  if (std::filesystem::file_size(file, error) > kLargestText_bytes && !error) refuse("a file of more than 256 MB");
   try {
     whole.json = parse(read_text(file));
   } catch (const InvalidData& deep) {

@@ -51,9 +51,15 @@ bool is_folder(const fs::path& folder) {
 
 bool is_own_file(const fs::path& file) { return type_of(file) == fs::file_type::regular; }
 
+bool is_own_text(const fs::path& file) {
+  std::error_code error;
+  return is_own_file(file) && fs::file_size(file, error) <= kLargestText_bytes;
+}
+
 fs::path inside(const fs::path& folder, const fs::path& name, const std::string& told_by) {
   const auto refuse = [&](const std::string& found) {
-    throw InputError(told_by, "names of files inside of " + folder.string(), found, "remove the file if it is not yours");
+    throw InputError(told_by, "names of files inside of " + folder.string(), found,
+                     "remove the file if it is not yours");
   };
   const std::string text = name.string();
   if (text.empty() || text.find('\0') != std::string::npos) refuse("a name that is none");

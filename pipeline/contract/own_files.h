@@ -2,6 +2,7 @@
 /// reads or writes a cell folder asks here. Inputs that settings name are free: they may lie anywhere and be links.
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <string>
 
@@ -13,6 +14,11 @@ bool is_file(const std::filesystem::path& file);
 bool is_folder(const std::filesystem::path& folder);
 /// A regular file itself: no link.
 bool is_own_file(const std::filesystem::path& file);
+/// The largest of the texts of ours that are read whole (records, hashes, reports): some ten MB at most in fact. A file
+/// with holes may claim to be of any size.
+inline constexpr std::uintmax_t kLargestText_bytes = 256u << 20;
+/// The same of such a text: larger ones are not ours.
+bool is_own_text(const std::filesystem::path& file);
 
 /// Where `name` lies, which a file of the folder tells: below the folder, and on no way through a link. The folder
 /// itself may be reached through links.
@@ -22,7 +28,8 @@ std::filesystem::path inside(const std::filesystem::path& folder, const std::fil
                              const std::string& told_by);
 
 /// The folders of a cell that hold what the stages write, and the truth of a simulated one, are folders, and all in
-/// them is files and folders: no links, pipes, sockets, devices. Called wherever a cell folder is opened. @throws InputError naming the first that is not so
+/// them is files and folders: no links, pipes, sockets, devices. Called wherever a cell folder is opened. @throws
+/// InputError naming the first that is not so
 void check_cell_folder(const std::filesystem::path& cell);
 
 /// Before a file is written: what is there and is not a file of this folder alone goes (a link, a second name of a

@@ -226,11 +226,10 @@ std::string report_html(const std::filesystem::path& cell) {
 void update_report(const std::filesystem::path& cell) {
   check_cell_folder(cell);
   const std::filesystem::path script = cell / "view_in_paraview.py";
-  if (!is_own_file(script) || read_text(script) != kParaviewScript)
-    write_whole(script, std::string(kParaviewScript));
+  if (!is_own_text(script) || read_text(script) != kParaviewScript) write_whole(script, std::string(kParaviewScript));
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
-  if (is_own_file(file) && read_text(file).ends_with(signature)) return;
+  if (is_own_text(file) && read_text(file).ends_with(signature)) return;
   write_whole(file, report_html(cell) + signature);
 }
 

@@ -186,7 +186,8 @@ FoundCells find_cells(const fs::path& folder) {
   collect_cells(folder, found);
   if (found.cells.empty()) {
     const std::string skipped =
-        found.skipped.empty() ? "" : "; skipped " + found.skipped.front().folder.string() + ": " + found.skipped.front().why;
+        found.skipped.empty() ? ""
+                              : "; skipped " + found.skipped.front().folder.string() + ": " + found.skipped.front().why;
     throw InputError(folder.string(), "cell folders (with a cell.toml) at or below it", "none" + skipped,
                      "write a cell.toml beside each cell's images");
   }

@@ -45,7 +45,7 @@ std::int64_t file_system_time_ns(const fs::path& file) {
 }  // namespace
 
 HashCache::HashCache(fs::path cell) : cell_(std::move(cell)) {
-  if (!is_own_file(file_in(cell_))) return;
+  if (!is_own_text(file_in(cell_))) return;
   std::ifstream file(file_in(cell_));
   for (std::string line; std::getline(file, line);) {
     std::istringstream fields(line);

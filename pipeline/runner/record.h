@@ -26,8 +26,9 @@ struct StageRecord {
 
 std::filesystem::path record_file_of(const std::filesystem::path& cell, const Stage& stage);
 
-/// Where an output lies that a record names, relative to the cell folder. Outputs are hashed, copied and deleted by what
-/// records say. @param told_by  the record @throws InputError where it does not lie inside of the stage's own folder
+/// Where an output lies that a record names, relative to the cell folder. Outputs are hashed, copied and deleted by
+/// what records say. @param told_by  the record @throws InputError where it does not lie inside of the stage's own
+/// folder
 std::filesystem::path output_file(const std::filesystem::path& cell, const Stage& stage,
                                   const std::filesystem::path& name, const std::string& told_by);
 

@@ -67,7 +67,8 @@ void remove_partial_files(const fs::path& folder) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     if (entry->path().filename().string().starts_with(kPartialPrefix)) partial.push_back(entry->path());
   }
-  for (const fs::path& file : partial) fs::remove(file, error);  // a link, not what it points to; no folder that is full
+  for (const fs::path& file : partial)
+    fs::remove(file, error);  // a link, not what it points to; no folder that is full
 }
 
 StageFailure failure_of(const ProcessResult& result) {

@@ -148,9 +148,10 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
 }
 
 bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {
-  if (!is_own_file(cell / "run.json")) return false;
+  const fs::path file = cell / "run.json";
+  if (!is_own_file(file)) return false;
   // The line as we write it, outside of any string, as these hold no line breaks: spares parsing thousands of files.
-  if (read_text(cell / "run.json").find("\n \"outcome\": \"done\",") != std::string::npos) return true;
+  if (is_own_text(file) && read_text(file).find("\n \"outcome\": \"done\",") != std::string::npos) return true;
   const std::optional<JsonRecord> run = open_run_record(cell);
   return std::all_of(stages().begin(), stages().end(), [&](const Stage& stage) {
     const auto entry = entry_of(run, stage.name);

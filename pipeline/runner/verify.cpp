@@ -25,7 +25,8 @@ struct KnownFile {
 };
 
 JsonRecord open_run_json(const fs::path& file) {
-  if (!is_file(file)) throw InputError(file.string(), "a run.json of mbtfm run", "none", "run the cell first: mbtfm run");
+  if (!is_file(file))
+    throw InputError(file.string(), "a run.json of mbtfm run", "none", "run the cell first: mbtfm run");
   return JsonRecord(file, "a run.json of mbtfm run", "run the cell again: mbtfm run");
 }
 
@@ -66,7 +67,8 @@ std::vector<fs::path> named_images(const fs::path& cell) {
   for (const Stage& stage : stages()) {
     for (const auto& inputs : {images_of(stage, names), stage.optional_images}) {
       for (const ImageInput& image : inputs) {
-        for (fs::path& file : match_image(cell, name_of_image(names, image.key)).files) files.push_back(std::move(file));
+        for (fs::path& file : match_image(cell, name_of_image(names, image.key)).files)
+          files.push_back(std::move(file));
       }
     }
   }
@@ -176,7 +178,8 @@ void prepare(const JsonRecord& run, const std::vector<KnownFile>& files, const f
 Verification verify_cell(const fs::path& cell) {
   check_cell_folder(cell);
   const fs::path run_json = cell / "run.json";
-  if (!is_own_file(run_json) && is_file(run_json)) throw InputError(run_json.string(), "a file of the cell's own", "a link");
+  if (!is_own_file(run_json) && is_file(run_json))
+    throw InputError(run_json.string(), "a file of the cell's own", "a link");
   const JsonRecord run = open_run_json(run_json);
   const std::vector<fs::path> images = named_images(cell);
   Verification found;
