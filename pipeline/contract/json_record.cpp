@@ -57,9 +57,10 @@ JsonRecord::JsonRecord(const std::filesystem::path& file, std::string kind, std:
   expect_object();
 }
 
+std::string JsonRecord::place() const { return place_.empty() ? file_->kind : "'" + place_ + "' of " + file_->kind; }
+
 void JsonRecord::fail(const std::string& expected) const {
-  const std::string of = place_.empty() ? file_->kind : "'" + place_ + "' of " + file_->kind;
-  throw InputError(file_->name, of + " to be " + expected, kind_of(*value_), file_->hint);
+  throw InputError(file_->name, place() + " to be " + expected, kind_of(*value_), file_->hint);
 }
 
 void JsonRecord::expect_object() const {
@@ -73,7 +74,7 @@ JsonRecord JsonRecord::child(const std::string& key, const Json& value) const {
 JsonRecord JsonRecord::at(const std::string& key) const {
   expect_object();
   const auto found = value_->find(key);
-  if (found == value_->end()) fail("an object with '" + key + "'");
+  if (found == value_->end()) throw InputError(file_->name, "'" + key + "' in " + place(), "none", file_->hint);
   return child(key, *found);
 }
 

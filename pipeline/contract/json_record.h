@@ -58,6 +58,7 @@ class JsonRecord {
   JsonRecord(std::shared_ptr<const File> file, const Json& value, std::string place)
       : file_(std::move(file)), value_(&value), place_(std::move(place)) {}
   JsonRecord child(const std::string& key, const Json& value) const;
+  std::string place() const;  ///< for messages
 
   std::shared_ptr<const File> file_;
   const Json* value_;

@@ -26,15 +26,16 @@ void check_own_folder(const fs::path& folder) {
   if (type == fs::file_type::symlink)
     throw InputError(folder.string(), "a folder of the cell's own", target_of(folder), kNoLinks);
   if (type != fs::file_type::directory) throw InputError(folder.string(), "a folder", "a file", "remove it");
-  std::error_code error;
+  std::error_code error, is_gone;  // an entry that another run has just renamed
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    const fs::file_type its = type_of(entry->path());
-    if (its == fs::file_type::regular || its == fs::file_type::directory || its == fs::file_type::not_found) continue;
+    const fs::file_type its = entry->symlink_status(is_gone).type();
+    if (its == fs::file_type::regular || its == fs::file_type::directory || is_gone) continue;
     if (its == fs::file_type::symlink)
       throw InputError(entry->path().string(), "a file of the cell's own", target_of(entry->path()), kNoLinks);
     throw InputError(entry->path().string(), "a file", "a pipe, a socket or a device", "remove it");
   }
-  if (error) throw InputError(folder.string(), "a folder that can be read", error.message());
+  if (error && error != std::errc::no_such_file_or_directory)
+    throw InputError(folder.string(), "a folder that can be read", error.message());
 }
 
 }  // namespace

@@ -383,7 +383,10 @@ CellOutcome look_at_cell(const fs::path& cell, const RunOptions& options) {
 
 bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome& now) {
   for (const StageOutcome& stage : now.stages) {
-    if (stage.status.state == StageState::must_run) return false;
+    const StageState state = stage.status.state;
+    if (state == StageState::must_run) return false;
+    // What was changed by hand since then is neither checked nor reported.
+    if (state == StageState::replaced && recorded_state(cell, stage.stage) != name_of(state)) return false;
   }
   if (is_asked(stages().back(), options.only) && !is_own_file(cell / "report.html")) return false;
   return run_record_tells_of(cell, options);

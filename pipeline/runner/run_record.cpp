@@ -159,6 +159,11 @@ bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {
   });
 }
 
+std::string recorded_state(const fs::path& cell, const std::string& stage) {
+  const auto entry = entry_of(open_run_record(cell), stage);
+  return entry ? entry->text_or("state", "") : "";
+}
+
 std::optional<RecordedFailure> recorded_failure(const fs::path& cell) {
   const std::optional<JsonRecord> run = open_run_record(cell);
   for (const Stage& stage : stages()) {

@@ -222,8 +222,10 @@ const std::vector<Way>& ways() {
        kRefused},
       {"record-has-a-huge-number",
        [](const Scene& s) { s.write("4_fit/record.json", "{\"run\":{\"finished\":1e999}}"); }, kRefused},
-      {"fit-cannot-be-read", [](const Scene& s) { s.write("4_fit/fit.json", "{\"noise_um\": \"\\ud800\"}"); },
-       kRefused},
+      {"fit-cannot-be-read",
+       [](const Scene& s) { s.write("4_fit/fit.json", "{\"noise_um\": \"\\ud800\"}"); },
+       {1, 1, 3, 0},
+       kept},
       // the study's folder
       {"folder-is-a-loop", [](const Scene& s) { fs::create_symlink("loop", s.study() / "loop"); }},
       {"folder-is-a-link-upwards", [](const Scene& s) { fs::create_symlink("..", s.study() / "up"); }},
@@ -315,15 +317,21 @@ class HostileCells : public testing::Test {
  protected:
   static void SetUpTestSuite() {
     scene_ = new TemporaryFolder;
-    stages_ = test::make_script_stages(scene_->path());
-    test::make_unfinished_cell(*scene_ / "cell");
-    const Outcome run =
-        test::run_program("mbtfm run --stages-dir " + stages_.string() + " " + (*scene_ / "cell").string());
-    ASSERT_EQ(run.code, 0) << run.output;
+    stages_ = test::make_script_stages(*scene_ / "first", 1);
+    make_finished(*scene_ / "cell", stages_);
+    make_finished(*scene_ / "sound", test::make_script_stages(*scene_ / "second", 2));
   }
   static void TearDownTestSuite() { delete scene_; }
 
-  static void copy_cell(const fs::path& to) { fs::copy(*scene_ / "cell", to, fs::copy_options::recursive); }
+  static void make_finished(const fs::path& cell, const fs::path& stages) {
+    test::make_unfinished_cell(cell);
+    const Outcome run = test::run_program("mbtfm run --stages-dir " + stages.string() + " " + cell.string());
+    ASSERT_EQ(run.code, 0) << run.output;
+  }
+  static void copy_cell(const std::string& name, const fs::path& to) {
+    fs::create_directories(to.parent_path());
+    fs::copy(*scene_ / name, to, fs::copy_options::recursive);
+  }
 
   /// Exit code 124: it hangs.
   static Outcome mbtfm(const std::string& arguments) {
@@ -371,10 +379,9 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
     SCOPED_TRACE(way.name);
     const TemporaryFolder folder;
     const Scene scene{folder.path()};
-    fs::create_directories(scene.study());
-    copy_cell(scene.cell());
-    copy_cell(scene.study() / "sound");
-    copy_cell(scene.outside() / "cell");
+    copy_cell("cell", scene.cell());
+    copy_cell("sound", scene.study() / "sound");
+    copy_cell("cell", scene.outside() / "cell");
     make_outside(scene.outside());
     if (way.run_record == Way::RunRecord::removed) {
       fs::remove(scene.cell() / "run.json");
@@ -418,7 +425,7 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
 TEST_F(HostileCells, a_link_under_the_name_of_an_unfinished_table_is_not_followed) {
   const TemporaryFolder folder;
   const Scene scene{folder.path()};
-  copy_cell(scene.study() / "sound");
+  copy_cell("sound", scene.study() / "sound");
   fs::create_directories(scene.outside());
   write_text(scene.outside() / "precious.txt", kSecret);
   // The number of the process is in the name: the shell has it, and becomes mbtfm.

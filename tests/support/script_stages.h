@@ -55,11 +55,12 @@ inline nlohmann::ordered_json record_of_folder(const fs::path& folder, const std
              {"would_change", "would change little"}}}}};
 }
 
+/// @param seed  of the invented tensions
 /// @returns the folder of the stages, FOLDER/bin
-inline fs::path make_script_stages(const fs::path& folder) {
+inline fs::path make_script_stages(const fs::path& folder, unsigned seed = 1) {
   const fs::path made = folder / "made", bin = folder / "bin";
   write_given_stages(made, round_cell());
-  write_invented_fit(made);
+  write_invented_fit(made, seed);
   FitSummary fit = read_fit_summary(made / "4_fit/fit.json");
   const ErrorParts parts{.beads = 0.1, .segmentation = 0.2, .mesh = 0.1, .substrate = 0.01, .solver = 0, .model = 0.1};
   fit.error_budget = ErrorBudget{.tensions = {{0, 0.06, parts}, {1, 2, parts}, {2, 3, parts}},
