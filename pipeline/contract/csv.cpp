@@ -205,6 +205,7 @@ std::string read_text(const std::filesystem::path& file) {
   std::error_code unreachable;
   if (!std::filesystem::exists(file, unreachable))
     throw InputError(file.string(), "a file", unreachable ? unreachable.message() : "none of that name");
+  expect_no_hole(file);
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();

@@ -1,5 +1,7 @@
 #include "pipeline/contract/own_files.h"
 
+#include <sys/stat.h>
+
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm {
@@ -55,6 +57,17 @@ bool is_own_file(const fs::path& file) { return type_of(file) == fs::file_type::
 bool is_own_text(const fs::path& file) {
   std::error_code error;
   return is_own_file(file) && fs::file_size(file, error) <= kLargestText_bytes;
+}
+
+void expect_no_hole(const fs::path& file) {
+  constexpr std::uintmax_t kBlock_bytes = 512;      // of st_blocks, whatever the file system's own are
+  constexpr std::uintmax_t kDensest_packing = 100;  // file systems that compress pack texts to a tenth
+  struct stat status {};
+  if (stat(file.c_str(), &status) != 0) return;  // reading tells why
+  const auto size = static_cast<std::uintmax_t>(status.st_size);
+  const auto taken = kBlock_bytes * static_cast<std::uintmax_t>(status.st_blocks);
+  if (!S_ISREG(status.st_mode) || size <= kLargestText_bytes || taken >= size / kDensest_packing) return;
+  throw InputError(file.string(), "a file of data", "a hole of " + std::to_string(size) + " bytes", "remove it");
 }
 
 fs::path inside(const fs::path& folder, const fs::path& name, const std::string& told_by) {

@@ -20,6 +20,10 @@ inline constexpr std::uintmax_t kLargestText_bytes = 256u << 20;
 /// The same of such a text: larger ones are not ours.
 bool is_own_text(const std::filesystem::path& file);
 
+/// Before a file is read whole or hashed: a file that takes no room on the disk may claim to be of any size.
+/// @throws InputError where it is large, and nearly all of it a hole
+void expect_no_hole(const std::filesystem::path& file);
+
 /// Where `name` lies, which a file of the folder tells: below the folder, and on no way through a link. The folder
 /// itself may be reached through links.
 /// @param told_by  for the message: the file that has the name, or the folder

@@ -59,6 +59,8 @@ struct Scene {
     change("4_fit/record.json", [&](ordered_json& record) { record["run"]["outputs"][name] = std::string(64, '0'); });
     fs::remove(cell() / "4_fit/tensions.csv");  // the fit is run again, and outputs that it has no more deleted
   }
+  /// Of nothing: it takes no room on the disk.
+  void make_terabyte(const std::string& in_cell) const { fs::resize_file(cell() / in_cell, std::uintmax_t{1} << 40); }
   std::string precious() const { return (outside() / "precious.txt").string(); }
 };
 
@@ -153,6 +155,8 @@ const std::vector<Way>& ways() {
                                   std::string(5000, 'a') + "\"\n");
        },
        kRefused},
+      {"settings-are-a-terabyte", [](const Scene& s) { s.make_terabyte("cell.toml"); }, kRefused},
+      {"output-is-a-terabyte", [](const Scene& s) { s.make_terabyte("1_segment/adhesions.csv"); }, kRefused},
       // names in records
       {"output-is-absolute", [](const Scene& s) { s.name_output(s.precious()); }, kRefused},
       {"output-is-above", [](const Scene& s) { s.name_output("../../outside/precious.txt"); }, kRefused},
@@ -211,8 +215,7 @@ const std::vector<Way>& ways() {
        kept},
       {"run-record-nests-deep", [](const Scene& s) { s.write("run.json", "{\"stages\":" + nested(100000) + "}"); },
        kRefused, kept},
-      {"run-record-is-a-terabyte",
-       [](const Scene& s) { fs::resize_file(s.cell() / "run.json", std::uintmax_t{1} << 40); }, kRefused, kept},
+      {"run-record-is-a-terabyte", [](const Scene& s) { s.make_terabyte("run.json"); }, kRefused, kept},
       {"record-has-effects-of-texts",
        [](const Scene& s) {
          s.change("4_fit/record.json", [](ordered_json& record) { record["effects"] = {"a", "b"}; });

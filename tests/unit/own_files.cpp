@@ -99,6 +99,14 @@ TEST_F(OwnFiles, looking_at_a_loop_or_a_name_too_long_is_no_error) {
   }
 }
 
+TEST_F(OwnFiles, a_hole_is_not_read) {
+  write_text(cell_ / "hole", "x");
+  EXPECT_NO_THROW(expect_no_hole(cell_ / "hole"));
+  fs::resize_file(cell_ / "hole", std::uintmax_t{1} << 40);
+  EXPECT_THROW(read_text(cell_ / "hole"), InputError);
+  EXPECT_FALSE(is_own_text(cell_ / "hole"));
+}
+
 class Records : public testing::Test {
  protected:
   JsonRecord record(const std::string& text) {
