@@ -344,7 +344,7 @@ class HostileCells : public testing::Test {
 
   /// Exit code 124: it hangs.
   static Outcome mbtfm(const std::string& arguments) {
-    return test::run_program("mbtfm " + arguments + " --stages-dir " + stages_.string(), "timeout 60 ");
+    return test::run_program("mbtfm " + arguments + " --stages-dir " + stages_.string(), "timeout -k 5 60 ");
   }
 
   static inline TemporaryFolder* scene_ = nullptr;
@@ -403,11 +403,11 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
     const std::string cell = scene.cell().string(), study = scene.study().string();
     const auto run_further = [&] {
       if (way.further.empty()) return;
-      const Outcome further = test::run_program("mbtfm " + with_folders(way.further, scene), "timeout 60 ");
+      const Outcome further = test::run_program("mbtfm " + with_folders(way.further, scene), "timeout -k 5 60 ");
       EXPECT_EQ(further.code, way.further_code) << further.output;
     };
     if (way.run_record == Way::RunRecord::kept) run_further();  // before the next run writes another
-    const Outcome verify = test::run_program("mbtfm verify " + cell, "timeout 60 ");
+    const Outcome verify = test::run_program("mbtfm verify " + cell, "timeout -k 5 60 ");
     EXPECT_EQ(verify.code, way.codes.verify) << verify.output;
     const Outcome list = mbtfm("batch --list " + study);
     EXPECT_EQ(list.code, 0) << list.output;
@@ -418,7 +418,7 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
     const Outcome table = mbtfm("batch --table " + study);
     EXPECT_EQ(table.code, way.codes.batch) << table.output;
     if (way.codes.stats) {
-      const Outcome stats = test::run_program("mbtfm stats " + study + " --bootstrap_draws 100", "timeout 60 ");
+      const Outcome stats = test::run_program("mbtfm stats " + study + " --bootstrap_draws 100", "timeout -k 5 60 ");
       EXPECT_EQ(stats.code, *way.codes.stats) << stats.output;
     }
     for (const Outcome* outcome : {&batch, &list, &table})
