@@ -6,6 +6,7 @@
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/contract/stage.h"
 
@@ -31,11 +32,12 @@ Cells read_cells(StageContext& context) {
   const Path folder = context.input("cells", {});
   std::vector<Path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (std::filesystem::exists(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
+    if (is_own_file(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
   Cells cells;
   for (const Path& path : paths) {
+    check_cell_folder(path);
     const FitSummary fit = read_fit_summary(path / "4_fit/fit.json");
     if (!fit.converged) {
       ++cells.n_not_converged;

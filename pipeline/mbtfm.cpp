@@ -11,6 +11,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/cost/accuracy.h"
@@ -101,7 +102,7 @@ runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions 
 int run(const CommandLine& line) {
   runner::RunOptions options = run_options(line);
   options.finish = [&] {
-    if (!fs::is_regular_file(line.folder / "4_fit/fit.json")) return;
+    if (!is_own_file(line.folder / "4_fit/fit.json")) return;
     report::update_report(line.folder);
     if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
   };
@@ -117,7 +118,10 @@ std::vector<fs::path> cells_of(const CommandLine& line) {
   std::vector<runner::ImagePattern> patterns;
   for (const std::string& text : line.patterns) patterns.push_back(runner::parse_pattern(text));
   if (!patterns.empty()) runner::make_cell_folders(line.folder, patterns, line.template_toml);
-  return runner::find_cells(line.folder);
+  runner::FoundCells found = runner::find_cells(line.folder);
+  for (const runner::SkippedFolder& skipped : found.skipped)
+    say("skipped, as it cannot be read: " + skipped.folder.string() + ": " + skipped.why);
+  return std::move(found.cells);
 }
 
 std::vector<std::string> arguments_of_cell(const CommandLine& line) {
@@ -166,8 +170,7 @@ int tell(const runner::Verification& found, const std::string& what) {
 int verify(const CommandLine& line) { return tell(runner::verify_cell(line.folder), line.folder.string()); }
 
 int repeat(const CommandLine& line) {
-  const bool is_file = fs::is_regular_file(line.folder);
-  const fs::path run_json = is_file ? line.folder : line.folder / "run.json";
+  const fs::path run_json = is_file(line.folder) ? line.folder : line.folder / "run.json";
   const fs::path inputs = line.inputs.empty() ? run_json.parent_path() : line.inputs;
   return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
 }
@@ -179,7 +182,7 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
                                         "--cells",
                                         line.folder.string(),
                                         "--out",
-                                        (line.folder / "statistics").string(),
+                                        inside(line.folder, "statistics", line.folder.string()).string(),
                                         "--threads",
                                         std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
@@ -212,7 +215,7 @@ int cost_study(const CommandLine& line) {
                                            .extent = line.is_whole ? cost::Extent::whole : cost::Extent::quick,
                                            .say = line.is_quiet ? nullptr : say}));
   }
-  const fs::path folder = line.out.empty() ? line.folder / "cost" : line.out;
+  const fs::path folder = line.out.empty() ? inside(line.folder, "cost", line.folder.string()) : line.out;
   cost::write_study(folder, cost::combined(studies), names);
   if (!line.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
   return kDone;

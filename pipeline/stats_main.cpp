@@ -1,5 +1,6 @@
 /// mbtfm-stats: tables, tests and figures over all finished cells of a folder.
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/stage.h"
 #include "pipeline/statistics/png.h"
 #include "pipeline/statistics/study_files.h"
@@ -16,7 +17,7 @@ Study read_study(const StudyParameters& parameters, StageContext& context) {
     for (const std::string& file : files_of_a_cell()) context.input("cells", {cell.name + "/" + file});
     for (const std::string& file : further_files_of_a_cell()) {
       const std::string name = cell.name + "/" + file;
-      if (std::filesystem::is_regular_file(folder / name)) context.input("cells", {name});
+      if (is_own_file(folder / name)) context.input("cells", {name});
     }
   }
   return study;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
 
@@ -114,7 +115,8 @@ bool go_together(const Mark& a, const Mark& b) {
 }
 
 /// Six digits: what one can see where one zooms in a thousandfold.
-double short_number(double value) { return std::stod(fmt::format("{:.6g}", value)); }
+// std::stod would throw where the number is too small for full precision.
+double short_number(double value) { return std::strtod(fmt::format("{:.6g}", value).c_str(), nullptr); }
 
 ordered_json row_of(const Mark& mark, const Axes& axes) {
   ordered_json row = properties(mark.style);

@@ -12,6 +12,7 @@
 #include <unordered_set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 
 namespace mbtfm {
 
@@ -200,8 +201,11 @@ std::string brief(double value) {
 }
 
 std::string read_text(const std::filesystem::path& file) {
-  if (!std::filesystem::exists(file)) throw InputError(file.string(), "a file", "none of that name");
-  if (std::filesystem::is_directory(file)) throw InputError(file.string(), "a file", "a folder");
+  if (is_folder(file)) throw InputError(file.string(), "a file", "a folder");
+  std::error_code unreachable;
+  if (!std::filesystem::exists(file, unreachable))
+    throw InputError(file.string(), "a file", unreachable ? unreachable.message() : "none of that name");
+  expect_no_hole(file);
   std::ifstream stream(file, std::ios::binary);
   std::ostringstream text;
   text << stream.rdbuf();
@@ -213,6 +217,7 @@ std::string read_text(const std::filesystem::path& file) {
 }
 
 void write_text(const std::filesystem::path& file, std::string_view text) {
+  make_way(file);
   errno = 0;
   std::ofstream stream(file, std::ios::binary | std::ios::trunc);
   stream.write(text.data(), static_cast<std::streamsize>(text.size()));
@@ -226,15 +231,14 @@ std::filesystem::path temporary_name(const std::filesystem::path& file) {
 
 void write_whole(const std::filesystem::path& file, std::string_view text) {
   const std::filesystem::path temporary = temporary_name(file);
-  std::error_code error;
   try {
     write_text(temporary, text);
   } catch (...) {
-    std::filesystem::remove(temporary, error);
+    std::error_code ignored;
+    std::filesystem::remove(temporary, ignored);
     throw;
   }
-  std::filesystem::rename(temporary, file, error);
-  if (error) throw OutputError("cannot put " + file.string() + " in place: " + error.message());
+  put_in_place(temporary, file);
 }
 
 }  // namespace mbtfm

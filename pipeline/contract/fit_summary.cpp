@@ -44,10 +44,10 @@ nlohmann::ordered_json json_of_parts(const ErrorParts& parts) {
   return json;
 }
 
-ErrorParts parts_of(const nlohmann::ordered_json& json) {
+ErrorParts parts_of(const JsonRecord& record) {
   ErrorParts parts;
   for_each_part(parts, [&](const char* name, auto& part) {
-    if (!json.at(name).is_null()) part = json.at(name).get<double>();
+    if (!record.at(name).json().is_null()) part = record.at(name).number();
   });
   return parts;
 }
@@ -69,18 +69,22 @@ nlohmann::ordered_json json_of_budget(const ErrorBudget& budget, const std::vect
   return json;
 }
 
-ErrorBudget budget_of(const nlohmann::ordered_json& json) {
+ErrorBudget budget_of(const JsonRecord& record) {
   ErrorBudget budget;
-  for (const auto& row : json.at("fibres")) {
-    budget.tensions.push_back({.fibre_id = row.at("fibre_id").get<int>(),
-                               .tension_nN = row.at("tension_nN").get<double>(),
+  for (const JsonRecord& row : record.at("fibres").list()) {
+    budget.tensions.push_back({.fibre_id = row.at("fibre_id").integer(),
+                               .tension_nN = row.at("tension_nN").number(),
                                .parts_nN = parts_of(row.at("parts_nN"))});
   }
-  const auto& force = json.at("total_force");
-  budget.total_force_nN = force.at("total_force_nN").get<double>();
+  const JsonRecord force = record.at("total_force");
+  budget.total_force_nN = force.at("total_force_nN").number();
   budget.total_force_parts_nN = parts_of(force.at("parts_nN"));
   return budget;
 }
+
+void read(const JsonRecord& record, double& member) { member = record.number(); }
+void read(const JsonRecord& record, int& member) { member = record.integer(); }
+void read(const JsonRecord& record, bool& member) { member = record.is_true(); }
 
 }  // namespace
 
@@ -93,17 +97,14 @@ double total(const ErrorParts& parts) {
 
 FitSummary read_fit_summary(const Path& file) {
   FitSummary summary;
-  try {
-    const auto json = nlohmann::ordered_json::parse(read_text(file));
-    for_each_member(summary, [&](const char* name, auto& member) { json.at(name).get_to(member); });
-    for (const auto& [name, value] : json.items()) {
-      bool is_named = false;
-      for_each_member(summary, [&](const char* known, auto&) { is_named = is_named || name == known; });
-      if (name == "error_budget") summary.error_budget = budget_of(value);
-      if (!is_named && value.is_primitive() && !value.is_null()) summary.more.emplace_back(name, value_of(value));
-    }
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError(file.string(), "a fit summary as mbtfm-fit writes it", error.what());
+  const JsonRecord record(file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
+  for_each_member(summary, [&](const char* name, auto& member) { read(record.at(name), member); });
+  for (const auto& [name, value] : record.members()) {
+    bool is_named = false;
+    for_each_member(summary, [&](const char* known, auto&) { is_named = is_named || name == known; });
+    if (name == "error_budget") summary.error_budget = budget_of(value);
+    const bool is_figure = value.json().is_primitive() && !value.json().is_null();
+    if (!is_named && name != "error_budget" && is_figure) summary.more.emplace_back(name, value.figure());
   }
   return summary;
 }

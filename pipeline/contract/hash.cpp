@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 
 namespace mbtfm {
 
@@ -45,6 +46,7 @@ std::string sha256(std::string_view bytes) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& file) {
+  expect_no_hole(file);
   std::ifstream stream(file, std::ios::binary);
   if (!stream) throw InputError(file.string(), "a readable file", "none");
   Sha256 hash;

@@ -12,13 +12,6 @@ nlohmann::ordered_json json_of(const Figures& figures) {
   return json;
 }
 
-Value value_of(const nlohmann::ordered_json& json) {
-  if (json.is_boolean()) return json.get<bool>();
-  if (json.is_number_integer()) return json.get<std::int64_t>();
-  if (json.is_number()) return json.get<double>();
-  return json.get<std::string>();
-}
-
 nlohmann::ordered_json json_of(const Effect& e) {
   nlohmann::ordered_json json = {{"name", e.name}, {"switch", e.setting}, {"on", e.is_on}};
   if (e.number) json["number"] = *e.number;
@@ -30,19 +23,20 @@ nlohmann::ordered_json json_of(const Effect& e) {
   return json;
 }
 
-Effect effect_of(const nlohmann::ordered_json& json) {
+Effect effect_of(const JsonRecord& record) {
   const auto number = [&](const char* key) -> std::optional<double> {
-    return json.contains(key) ? std::optional<double>(json.at(key).get<double>()) : std::nullopt;
+    const auto member = record.find(key);
+    return member ? std::optional(member->number()) : std::nullopt;
   };
-  return {.name = json.at("name"),
-          .setting = json.at("switch"),
-          .is_on = json.at("on"),
+  return {.name = record.at("name").text(),
+          .setting = record.at("switch").text(),
+          .is_on = record.at("on").is_true(),
           .number = number("number"),
           .threshold = number("threshold"),
-          .why = json.at("why"),
-          .seconds = json.at("seconds"),
+          .why = record.at("why").text(),
+          .seconds = record.at("seconds").number(),
           .change = number("change"),
-          .would_change = json.value("would_change", "")};
+          .would_change = record.text_or("would_change", "")};
 }
 
 }  // namespace mbtfm

@@ -3,6 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/json_record.h"
 #include "pipeline/contract/report.h"
 
 namespace mbtfm {
@@ -10,8 +11,7 @@ namespace mbtfm {
 nlohmann::ordered_json json_of(const Value& value);
 nlohmann::ordered_json json_of(const Figures& figures);
 nlohmann::ordered_json json_of(const Effect& effect);
-/// @throws nlohmann::json::exception where it is not a boolean, number or string
-Value value_of(const nlohmann::ordered_json& json);
-Effect effect_of(const nlohmann::ordered_json& json);
+/// @throws InputError where it is none
+Effect effect_of(const JsonRecord& record);
 
 }  // namespace mbtfm

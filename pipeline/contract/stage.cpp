@@ -15,6 +15,7 @@
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/hash.h"
 #include "pipeline/contract/json.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/contract/version.h"
 
@@ -171,9 +172,7 @@ void write_record(const fs::path& file, const StageDescription& description, con
                                          {"summary", report.summary},
                                          {"figures", json_of(report.figures)},
                                          {"effects", effects}};
-  context.make_folder(file.parent_path());
-  context.pending_.push_back({.temporary = temporary_name(file), .destination = file});
-  write_text(temporary_name(file), record.dump(2) + "\n");
+  write_text(context.pending_path(file), record.dump(2) + "\n");
 }
 
 /// Remove what an unfinished run has left: temporary files, and folders made for them that are still empty.
@@ -190,11 +189,7 @@ void expect_all_written(const StageContext& context) {
 }
 
 void commit(const StageContext& context) {
-  for (const auto& [temporary, destination] : context.pending_) {
-    std::error_code error;
-    fs::rename(temporary, destination, error);
-    if (error) throw OutputError("cannot put " + destination.string() + " in place: " + error.message());
-  }
+  for (const auto& [temporary, destination] : context.pending_) put_in_place(temporary, destination);
 }
 
 int run(const StageDescription& description, ParameterList& list, const CommandLine& line,
@@ -229,16 +224,14 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
 }  // namespace
 
 StageReport read_report(const fs::path& record_file) {
-  try {
-    const auto record = nlohmann::ordered_json::parse(read_text(record_file));
-    StageReport report{
-        .converged = record.at("converged"), .summary = record.at("summary"), .figures = {}, .effects = {}};
-    for (const auto& [name, value] : record.at("figures").items()) report.figures.emplace_back(name, value_of(value));
-    for (const auto& effect : record.at("effects")) report.effects.push_back(effect_of(effect));
-    return report;
-  } catch (const nlohmann::json::exception& error) {
-    throw InputError(record_file.string(), "a stage's record", error.what());
-  }
+  const JsonRecord record(record_file, "a stage's record");
+  StageReport report{.converged = record.at("converged").is_true(),
+                     .summary = record.at("summary").text(),
+                     .figures = {},
+                     .effects = {}};
+  for (const auto& [name, value] : record.at("figures").members()) report.figures.emplace_back(name, value.figure());
+  for (const JsonRecord& effect : record.at("effects").list()) report.effects.push_back(effect_of(effect));
+  return report;
 }
 
 fs::path StageContext::input(const std::string& name) {
@@ -257,19 +250,24 @@ fs::path StageContext::output(const std::string& name) { return output(name, {})
 
 fs::path StageContext::output(const std::string& name, const std::string& file) {
   MBTFM_ASSERT(outputs_.contains(name));
-  const fs::path destination = file.empty() ? outputs_.at(name) : outputs_.at(name) / file;
-  make_folder(destination.parent_path());
-  pending_.push_back({.temporary = temporary_name(destination), .destination = destination});
-  return pending_.back().temporary;
+  const fs::path& output = outputs_.at(name);
+  // The output folder may be a link, of whoever named it; folders in it may not.
+  if (const fs::path below = fs::path(file).parent_path(); !below.empty()) inside(output, below, output.string());
+  return pending_path(file.empty() ? output : output / file);
 }
 
 fs::path StageContext::output_beside(const std::string& name, const std::string& ending) {
   MBTFM_ASSERT(outputs_.contains(name));
   const fs::path& output = outputs_.at(name);
-  const fs::path destination = output.parent_path() / (output.stem().string() + ending);
+  return pending_path(output.parent_path() / (output.stem().string() + ending));
+}
+
+fs::path StageContext::pending_path(const fs::path& destination) {
   make_folder(destination.parent_path());
-  pending_.push_back({.temporary = temporary_name(destination), .destination = destination});
-  return pending_.back().temporary;
+  const fs::path temporary = temporary_name(destination);
+  make_way(temporary);  // whoever writes it, VTK or a TIFF library, opens it by name
+  pending_.push_back({.temporary = temporary, .destination = destination});
+  return temporary;
 }
 
 void StageContext::make_folder(const fs::path& folder) {

@@ -45,16 +45,19 @@ class StageContext {
   /// Temporary path for a file beside the output `name`, called after it: its name with `ending` for its extension.
   std::filesystem::path output_beside(const std::string& name, const std::string& ending);
 
-  /// Folders that outputs need are made, and unmade where the stage fails.
-  void make_folder(const std::filesystem::path& folder);
-
   // used by run_stage
+  /// Temporary path, free to be written to, of what is to be `destination`.
+  std::filesystem::path pending_path(const std::filesystem::path& destination);
   std::map<std::string, std::filesystem::path> inputs_, outputs_;
   std::vector<std::filesystem::path> read_, made_;
   struct Pending {
     std::filesystem::path temporary, destination;
   };
   std::vector<Pending> pending_;
+
+ private:
+  /// Folders that outputs need are made, and unmade where the stage fails.
+  void make_folder(const std::filesystem::path& folder);
 };
 
 /// What a stage reported when it wrote this record. @throws InputError where it is no record of a stage

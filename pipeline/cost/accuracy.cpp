@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/json_record.h"
 #include "pipeline/cost/presets.h"
 
 namespace mbtfm::cost {
@@ -88,7 +89,7 @@ AccuracyOutcome reach_accuracy(double wanted, const std::function<ErrorBudget(co
 
 void record_accuracy(const std::filesystem::path& cell, double wanted, const AccuracyOutcome& outcome) {
   const std::filesystem::path file = cell / "run.json";
-  auto run = nlohmann::ordered_json::parse(read_text(file));
+  nlohmann::ordered_json run = JsonRecord(file, "a run.json of mbtfm run", "run the cell again: mbtfm run").json();
   const RelativeError& e = outcome.reached;
   run["accuracy"] = {{"wanted", wanted},
                      {"reached", e.total},

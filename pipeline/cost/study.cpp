@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/match_fibres.h"
@@ -55,21 +56,33 @@ bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
   return true;
 }
 
+/// The files of a folder, without what lies in folders below it.
+void copy_files(const fs::path& from, const fs::path& to) {
+  fs::create_directories(to);
+  for (const fs::directory_entry& entry : fs::directory_iterator(from)) {
+    if (is_own_file(entry.path())) fs::copy_file(entry.path(), to / entry.path().filename());
+  }
+}
+
 /// A folder that looks like the cell, whose stages are run anew by each rung.
 class Scratch {
  public:
   Scratch(const fs::path& cell, const StudyOptions& options)
-      : options_(options), cell_(cell), folder_(cell / "cost/scratch"), images_(runner::read_image_names(cell)) {
+      : options_(options),
+        cell_(cell),
+        folder_(inside(cell, "cost/scratch", cell.string())),  // it is emptied
+        images_(runner::read_image_names(cell)) {
+    check_cell_folder(cell);
     has_images_ = has_all_images(cell, images_);
     for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
-      if (fs::is_regular_file(cell / file)) continue;
+      if (is_file(cell / file)) continue;
       throw InputError((cell / file).string(), "a cell whose images were segmented and tracked", "none",
                        "run it first: mbtfm run " + cell.string());
     }
     fs::remove_all(folder_);
     fs::create_directories(folder_);
-    fs::copy(cell / "cell.toml", folder_ / "cell.toml");
-    if (fs::is_directory(cell / "truth")) fs::copy(cell / "truth", folder_ / "truth", fs::copy_options::recursive);
+    fs::copy_file(cell / "cell.toml", folder_ / "cell.toml");
+    if (is_folder(cell / "truth")) copy_files(cell / "truth", folder_ / "truth");
     take_from_cell();
   }
   ~Scratch() {
@@ -110,7 +123,7 @@ class Scratch {
   void take_from_cell() const {
     for (const char* part : {"1_segment", "2_track"}) {
       fs::remove_all(folder_ / part);
-      fs::copy(cell_ / part, folder_ / part, fs::copy_options::recursive);
+      copy_files(cell_ / part, folder_ / part);
     }
   }
 

@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/report/match_fibres.h"
 
 namespace mbtfm::report {
@@ -50,14 +51,15 @@ std::string label(const std::optional<Fibre>& fibre) { return fibre ? std::to_st
 
 }  // namespace
 
-bool has_truth(const fs::path& cell) { return fs::is_regular_file(cell / "truth/tensions.csv"); }
+bool has_truth(const fs::path& cell) { return is_own_file(cell / "truth/tensions.csv"); }
 
 Comparison compare_with_truth(const fs::path& cell) {
+  check_cell_folder(cell);
   if (!has_truth(cell)) {
     throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none");
   }
   const std::vector<Fibre> found = read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
-  const bool by_place = fs::is_regular_file(cell / "truth/fibres.csv");
+  const bool by_place = is_own_file(cell / "truth/fibres.csv");
   const std::vector<Fibre> truth =
       by_place ? read_fibres(cell / "truth/fibres.csv", cell / "truth/fibre_points.csv") : found;
 
@@ -95,7 +97,7 @@ Comparison compare_with_truth(const fs::path& cell) {
   }
   add_figures(comparison);
   comparison.total_force_nN = read_fit_summary(cell / "4_fit/fit.json").total_force_nN;
-  if (fs::is_regular_file(cell / "truth/adhesion_forces.csv")) {
+  if (is_own_file(cell / "truth/adhesion_forces.csv")) {
     comparison.true_total_force_nN = sum_of_magnitudes(read_adhesion_forces(cell / "truth/adhesion_forces.csv"));
   }
   return comparison;

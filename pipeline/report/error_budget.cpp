@@ -3,24 +3,29 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <nlohmann/json.hpp>
 
 #include "pipeline/contract/csv.h"
-#include "pipeline/contract/errors.h"
+#include "pipeline/contract/json_record.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 
 namespace mbtfm::report {
 namespace {
 
-using nlohmann::ordered_json;
-
-BudgetLine line_of(const ordered_json& json, const char* value) {
-  BudgetLine line{.value_nN = json.at(value), .total_nN = json.at("total_nN")};
-  for (const auto& [source, part] : json.at("parts_nN").items()) {
-    line.parts_nN.emplace_back(source, part.is_null() ? std::nullopt : std::optional(part.get<double>()));
+BudgetLine line_of(const JsonRecord& record, const char* value) {
+  BudgetLine line{.value_nN = record.at(value).number(), .total_nN = record.at("total_nN").number()};
+  for (const auto& [source, part] : record.at("parts_nN").members()) {
+    line.parts_nN.emplace_back(source, part.json().is_null() ? std::nullopt : std::optional(part.number()));
   }
   return line;
+}
+
+/// The table has a column for each source of the first line.
+void expect_same_sources(const JsonRecord& record, const BudgetLine& line, const BudgetLine& first) {
+  const bool is_same = std::ranges::equal(line.parts_nN, first.parts_nN,
+                                          [](const auto& a, const auto& b) { return a.first == b.first; });
+  if (!is_same) record.at("parts_nN").fail("of the same sources as the first");
 }
 
 std::string name_of(const BudgetLine& line) {
@@ -73,21 +78,22 @@ charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
 
 std::vector<BudgetLine> read_error_budget(const std::filesystem::path& run_file) {
   std::vector<BudgetLine> lines;
-  if (!std::filesystem::is_regular_file(run_file)) return lines;
-  try {
-    const ordered_json run = ordered_json::parse(read_text(run_file));
-    if (!run.contains("error_budget")) return lines;
-    const ordered_json& budget = run.at("error_budget");
-    for (const ordered_json& fibre : budget.at("fibres")) {
-      BudgetLine line = line_of(fibre, "tension_nN");
-      line.fibre_id = fibre.at("fibre_id");
-      line.type = fibre.at("type");
-      lines.push_back(std::move(line));
-    }
-    if (budget.contains("total_force")) lines.push_back(line_of(budget.at("total_force"), "total_force_nN"));
-  } catch (const ordered_json::exception& error) {
-    throw InputError(run_file.string(), "an error_budget as mbtfm run writes it", error.what());
+  if (!is_own_file(run_file)) return lines;
+  const JsonRecord run(run_file, "a run.json as mbtfm run writes it",
+                       "delete it; if that does not help, 4_fit/fit.json, too");
+  const auto budget = run.find("error_budget");
+  if (!budget) return lines;
+  const auto add = [&](const JsonRecord& record, BudgetLine line) {
+    if (!lines.empty()) expect_same_sources(record, line, lines.front());
+    lines.push_back(std::move(line));
+  };
+  for (const JsonRecord& fibre : budget->at("fibres").list()) {
+    BudgetLine line = line_of(fibre, "tension_nN");
+    line.fibre_id = fibre.at("fibre_id").integer();
+    line.type = fibre.at("type").text();
+    add(fibre, std::move(line));
   }
+  if (const auto force = budget->find("total_force")) add(*force, line_of(*force, "total_force_nN"));
   return lines;
 }
 

@@ -2,8 +2,8 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/errors.h"
+#include "pipeline/contract/json_record.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/report/numbers.h"
 
 namespace mbtfm::report {
@@ -32,55 +32,58 @@ void flatten(const ordered_json& json, const std::string& prefix, Pairs& pairs) 
   }
 }
 
-Pairs flat(const ordered_json& json, const char* key) {
+Pairs flat(const std::optional<JsonRecord>& record, const char* key) {
   Pairs pairs;
-  if (json.contains(key)) flatten(json.at(key), {}, pairs);
+  const auto member = record ? record->find(key) : std::nullopt;
+  if (!member) return pairs;
+  member->expect_object();
+  flatten(member->json(), {}, pairs);
   return pairs;
 }
 
-std::string number_of(const ordered_json& json, const char* key) {
-  return json.contains(key) && json.at(key).is_number() ? readable(json.at(key).get<double>()) : std::string();
+std::string number_of(const std::optional<JsonRecord>& record, const char* key) {
+  const auto member = record ? record->find(key) : std::nullopt;
+  return member ? readable(member->number()) : std::string();
 }
 
-StageLine stage_of(const std::string& name, const ordered_json& json) {
-  const ordered_json run = json.value("run", ordered_json::object());
+StageLine stage_of(const std::string& name, const JsonRecord& record) {
+  const auto run = record.find("run");
   return {.name = name,
-          .state = json.at("state"),
-          .why = json.at("why"),
-          .version = json.value("version", ""),
-          .summary = json.value("summary", ""),
+          .state = record.at("state").text(),
+          .why = record.at("why").text(),
+          .version = record.text_or("version", ""),
+          .summary = record.text_or("summary", ""),
           .seconds = number_of(run, "seconds"),
           .peak_memory_MB = number_of(run, "peak_memory_MB"),
-          .converged = json.value("converged", true),
-          .parameters = flat(json, "parameters"),
-          .figures = flat(json, "figures"),
+          .converged = record.is_true_or("converged", true),
+          .parameters = flat(record, "parameters"),
+          .figures = flat(record, "figures"),
           .inputs = flat(run, "inputs")};
+}
+
+EffectLine effect_of(const JsonRecord& record) {
+  return {.name = record.at("name").text(),
+          .stage = record.text_or("stage", ""),
+          .why = record.text_or("why", ""),
+          .seconds = record.number_or("seconds", 0) > 0 ? number_of(record, "seconds") : "",
+          .is_on = record.at("on").is_true()};
 }
 
 }  // namespace
 
 Provenance read_provenance(const std::filesystem::path& run_file) {
   Provenance provenance;
-  if (!std::filesystem::is_regular_file(run_file)) return provenance;
-  try {
-    const ordered_json run = ordered_json::parse(read_text(run_file));
-    provenance.version = run.at("version");
-    provenance.preset = run.value("preset", "");
-    if (run.contains("accuracy")) {
-      const ordered_json& accuracy = run.at("accuracy");
-      provenance.accuracy = WantedAccuracy{.verdict = accuracy.at("verdict"), .is_met = accuracy.at("met")};
-    }
-    for (const auto& [name, stage] : run.at("stages").items()) provenance.stages.push_back(stage_of(name, stage));
-    for (const ordered_json& effect : run.at("effects")) {
-      provenance.effects.push_back({.name = effect.at("name"),
-                                    .stage = effect.value("stage", ""),
-                                    .why = effect.value("why", ""),
-                                    .seconds = effect.value("seconds", 0.0) > 0 ? number_of(effect, "seconds") : "",
-                                    .is_on = effect.at("on")});
-    }
-  } catch (const ordered_json::exception& error) {
-    throw InputError(run_file.string(), "a run.json as mbtfm run writes it", error.what());
+  if (!is_own_file(run_file)) return provenance;
+  const JsonRecord run(run_file, "a run.json as mbtfm run writes it",
+                       "delete it; if that does not help, the record.json of the stage, too");
+  provenance.version = run.at("version").text();
+  provenance.preset = run.text_or("preset", "");
+  if (const auto accuracy = run.find("accuracy")) {
+    provenance.accuracy =
+        WantedAccuracy{.verdict = accuracy->at("verdict").text(), .is_met = accuracy->at("met").is_true()};
   }
+  for (const auto& [name, stage] : run.at("stages").members()) provenance.stages.push_back(stage_of(name, stage));
+  for (const JsonRecord& effect : run.at("effects").list()) provenance.effects.push_back(effect_of(effect));
   return provenance;
 }
 

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/report/error_budget.h"
 #include "pipeline/report/findings.h"
@@ -187,9 +188,9 @@ std::string fingerprint(const std::filesystem::path& cell) {
   namespace fs = std::filesystem;
   std::vector<fs::path> files = {cell / "cell.toml"};
   for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) {
-    if (!fs::is_directory(cell / folder)) continue;
+    if (!is_folder(cell / folder)) continue;
     for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
-      if (entry.is_regular_file()) files.push_back(entry.path());
+      if (is_own_file(entry.path())) files.push_back(entry.path());
     }
   }
   std::sort(files.begin(), files.end());
@@ -223,12 +224,12 @@ std::string report_html(const std::filesystem::path& cell) {
 }
 
 void update_report(const std::filesystem::path& cell) {
+  check_cell_folder(cell);
   const std::filesystem::path script = cell / "view_in_paraview.py";
-  if (!std::filesystem::is_regular_file(script) || read_text(script) != kParaviewScript)
-    write_whole(script, std::string(kParaviewScript));
+  if (!is_own_text(script) || read_text(script) != kParaviewScript) write_whole(script, std::string(kParaviewScript));
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
-  if (std::filesystem::is_regular_file(file) && read_text(file).ends_with(signature)) return;
+  if (is_own_text(file) && read_text(file).ends_with(signature)) return;
   write_whole(file, report_html(cell) + signature);
 }
 

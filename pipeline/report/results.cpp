@@ -2,6 +2,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parameters.h"
 
 namespace mbtfm::report {
@@ -10,7 +11,7 @@ namespace {
 
 /// Both files hold the unflagged beads in the same order. @throws InputError where they do not
 std::optional<Residual> residual_of(const DisplacementField& measured, const Path& fitted_file) {
-  if (!fs::is_regular_file(fitted_file)) return {};
+  if (!is_own_file(fitted_file)) return {};
   const DisplacementField fitted = read_displacement(fitted_file);
   Residual residual;
   for (const Bead& bead : measured) {
@@ -28,7 +29,7 @@ std::optional<Residual> residual_of(const DisplacementField& measured, const Pat
 
 std::optional<Images> images_of(const Path& segmentation) {
   const Path file = segmentation / "images.jpg", place = segmentation / "images.csv";
-  if (!fs::is_regular_file(file) || !fs::is_regular_file(place)) return {};
+  if (!is_own_file(file) || !is_own_file(place)) return {};
   const CsvTable table(place);
   if (table.n_rows() != 1) throw InputError(place.string(), "one row", std::to_string(table.n_rows()));
   const Vec2 low_um{table.number(0, "x_um"), table.number(0, "y_um")};
@@ -38,6 +39,7 @@ std::optional<Images> images_of(const Path& segmentation) {
 }  // namespace
 
 CellResults read_results(const Path& cell) {
+  check_cell_folder(cell);
   CellResults results;
   results.folder = cell;
   results.name = fs::weakly_canonical(cell).filename().string();

@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/lock.h"
@@ -18,14 +19,24 @@ namespace mbtfm::runner {
 namespace fs = std::filesystem;
 namespace {
 
-void collect_cells(const fs::path& folder, std::vector<fs::path>& cells) {
-  if (fs::is_regular_file(folder / "cell.toml")) {
-    cells.push_back(folder);
+/// What cannot be read is skipped: a study may hold lost+found, or a folder of somebody else.
+void collect_cells(const fs::path& folder, FoundCells& found) {
+  std::error_code error;
+  if (fs::is_regular_file(folder / "cell.toml", error)) {
+    found.cells.push_back(folder);
     return;
   }
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.is_directory() && !entry.is_symlink()) collect_cells(entry.path(), cells);
+  // That there is none is no error. One that leads round in a circle is: the folder is meant to be a cell.
+  const bool is_missing = !error || error == std::errc::no_such_file_or_directory;
+  if (!is_missing) {
+    found.skipped.push_back({folder, "cell.toml: " + error.message()});
+    return;
   }
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    std::error_code is_gone;  // an entry that is deleted meanwhile
+    if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone)) collect_cells(entry->path(), found);
+  }
+  if (error) found.skipped.push_back({folder, error.message()});
 }
 
 constexpr const char* kRunRecord = "run.json";
@@ -46,11 +57,23 @@ ProcessLimits limits_of_cell(const ProcessLimits& of_stage) {
   return {.seconds = static_cast<double>(stages().size()) * *of_stage.seconds + kMargin_s, .memory_bytes = {}};
 }
 
-void tell_of_failure(const std::optional<RecordedFailure>& failure, BatchCell& cell) {
-  if (!failure) return;
-  cell.failed_stage = failure->stage;
-  cell.how = failure->how;
-  if (!failure->message.empty()) cell.message = first_line(failure->message);
+void tell_that_unreadable(const std::exception& error, BatchCell& cell) {
+  cell.exit_code = exit_code::kInput;
+  cell.how = "unreadable";
+  cell.message = first_line(error.what());
+}
+
+/// What run.json tells, if anything.
+void tell_of_failure(BatchCell& cell) {
+  try {
+    const std::optional<RecordedFailure> failure = recorded_failure(cell.cell);
+    if (!failure) return;
+    cell.failed_stage = failure->stage;
+    cell.how = failure->how;
+    if (!failure->message.empty()) cell.message = first_line(failure->message);
+  } catch (const InputError& error) {
+    tell_that_unreadable(error, cell);
+  }
 }
 
 BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
@@ -69,7 +92,7 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
     outcome.how = how_it_ended(result);
     outcome.message = first_line(error_in(result.last_output));
     if (time_of_record(cell) == record_before) return outcome;
-    tell_of_failure(recorded_failure(cell), outcome);
+    tell_of_failure(outcome);
   } catch (const OutputError& error) {  // no log, no process: this cell's matter, not the batch's
     outcome.exit_code = exit_code::kOutput;
     outcome.how = "not started";
@@ -83,7 +106,7 @@ struct Look {
   enum class Finding { done, to_run, busy };
   Finding finding = Finding::to_run;
   std::vector<std::string> stages;  ///< that may run
-  BatchCell outcome;                ///< of a cell that is done
+  BatchCell outcome;                ///< of a cell that is done, or cannot be read
 };
 
 /// Is there anything to do for the cell? Where it is not even readable, `mbtfm run` tells why.
@@ -106,8 +129,10 @@ Look look_at(const fs::path& cell, const RunOptions& options) {
     look.outcome.message = "not converged; the outputs are marked";
   } catch (const CellBusy&) {
     look.finding = Look::Finding::busy;
-  } catch (const InputError&) {
-    // to run
+  } catch (const InputError& error) {
+    tell_that_unreadable(error, look.outcome);
+  } catch (const fs::filesystem_error& error) {
+    tell_that_unreadable(error, look.outcome);
   } catch (const OutputError&) {
     // to run
   }
@@ -158,16 +183,20 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
 
 }  // namespace
 
-std::vector<fs::path> find_cells(const fs::path& folder) {
-  if (!fs::is_directory(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");
-  std::vector<fs::path> cells;
-  collect_cells(folder, cells);
-  if (cells.empty()) {
-    throw InputError(folder.string(), "cell folders (with a cell.toml) at or below it", "none",
+FoundCells find_cells(const fs::path& folder) {
+  if (!is_folder(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");
+  FoundCells found;
+  collect_cells(folder, found);
+  if (found.cells.empty()) {
+    const std::string skipped =
+        found.skipped.empty() ? ""
+                              : "; skipped " + found.skipped.front().folder.string() + ": " + found.skipped.front().why;
+    throw InputError(folder.string(), "cell folders (with a cell.toml) at or below it", "none" + skipped,
                      "write a cell.toml beside each cell's images");
   }
-  std::sort(cells.begin(), cells.end());
-  return cells;
+  std::sort(found.cells.begin(), found.cells.end());
+  std::ranges::sort(found.skipped, {}, &SkippedFolder::folder);
+  return found;
 }
 
 std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const BatchOptions& options) {
@@ -207,10 +236,10 @@ std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const
   parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
     const Look look = look_at(cells[i], options);
     outcomes[i] = look.outcome;
-    if (look.finding == Look::Finding::done) return;
+    if (look.finding == Look::Finding::done || look.outcome.exit_code != 0) return;
     outcomes[i].exit_code = exit_code::kFailed;
     outcomes[i].how = look.finding == Look::Finding::busy ? "being run" : "not run";
-    tell_of_failure(recorded_failure(cells[i]), outcomes[i]);
+    tell_of_failure(outcomes[i]);
   });
   return outcomes;
 }
@@ -222,6 +251,8 @@ std::string list_cells(const std::vector<fs::path>& cells, const RunOptions& opt
     try {
       looks[i] = look_at_cell(cells[i], options);
     } catch (const InputError& error) {
+      errors[i] = error.what();
+    } catch (const fs::filesystem_error& error) {
       errors[i] = error.what();
     }
   });

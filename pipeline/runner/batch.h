@@ -10,9 +10,20 @@
 
 namespace mbtfm::runner {
 
-/// Folders with a cell.toml at or below `folder`, in alphabetical order. A cell folder is not searched for more.
+/// A folder that could not be searched for cells.
+struct SkippedFolder {
+  std::filesystem::path folder;
+  std::string why;
+};
+
+struct FoundCells {
+  std::vector<std::filesystem::path> cells;  ///< in alphabetical order
+  std::vector<SkippedFolder> skipped;
+};
+
+/// Folders with a cell.toml at or below `folder`. A cell folder is not searched for more, nor are links followed.
 /// @throws InputError where there is none
-std::vector<std::filesystem::path> find_cells(const std::filesystem::path& folder);
+FoundCells find_cells(const std::filesystem::path& folder);
 
 struct BatchOptions {
   std::filesystem::path program;                 ///< mbtfm itself

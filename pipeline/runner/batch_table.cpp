@@ -4,32 +4,53 @@
 #include <array>
 #include <iomanip>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <set>
 #include <sstream>
 
 #include "pipeline/contract/csv.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/runner/stages.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/json_record.h"
+#include "pipeline/contract/own_files.h"
+#include "pipeline/runner/record.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
-using nlohmann::ordered_json;
 
 namespace {
 
-/// The record of a stage that has ended; null where there is none. A damaged one counts as none: the run itself tells.
-ordered_json record_of(const fs::path& cell, const Stage& stage) {
-  const fs::path file = cell / stage.folder / "record.json";
-  if (!fs::is_regular_file(file)) return {};
-  ordered_json record = ordered_json::parse(read_text(file), nullptr, /*allow_exceptions=*/false);
-  return record.is_object() && record.contains("figures") ? record : ordered_json{};
+/// What a stage that has ended says of itself.
+struct StageSays {
+  std::string summary;
+  std::vector<std::pair<std::string, std::string>> figures;  ///< name, value
+};
+
+std::string text_of(const Value& value) {
+  return std::visit(
+      [](const auto& v) -> std::string {
+        using V = std::decay_t<decltype(v)>;
+        if constexpr (std::is_same_v<V, std::string>) return v;
+        if constexpr (std::is_same_v<V, bool>) return v ? "true" : "false";
+        if constexpr (std::is_same_v<V, double>) return shortest(v);
+        if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
+      },
+      value);
 }
 
-std::string text_of(const ordered_json& value) {
-  if (value.is_string()) return value.get<std::string>();
-  if (value.is_number_float()) return shortest(value.get<double>());
-  return value.dump();
+/// None where there is no record, or a damaged one: the run itself tells.
+std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
+  const fs::path file = record_file_of(cell, stage);
+  if (!is_own_file(file)) return std::nullopt;
+  try {
+    const JsonRecord record(file, "a stage's record");
+    StageSays says{.summary = record.text_or("summary", ""), .figures = {}};
+    for (const auto& [name, value] : record.at("figures").members()) {
+      // null: not a number, in JSON
+      says.figures.emplace_back(name, value.json().is_null() ? std::string() : text_of(value.figure()));
+    }
+    return says;
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 }  // namespace
@@ -38,8 +59,8 @@ std::string last_summary(const fs::path& cell, const std::vector<std::string>& o
   std::string summary;
   for (const Stage& stage : stages()) {
     if (!is_asked(stage, only)) continue;
-    const ordered_json record = record_of(cell, stage);
-    if (record.is_object()) summary = record.value("summary", summary);
+    const auto record = record_of(cell, stage);
+    if (record && !record->summary.empty()) summary = record->summary;
   }
   return summary;
 }
@@ -54,12 +75,12 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
     if (cells[i].exit_code != 0) continue;  // what it has on disk may be of an earlier run
     for (const Stage& stage : stages()) {
       if (!is_asked(stage, only)) continue;
-      const ordered_json record = record_of(cells[i].cell, stage);
-      if (!record.is_object()) continue;
-      for (const auto& [name, value] : record["figures"].items()) {
+      const auto record = record_of(cells[i].cell, stage);
+      if (!record) continue;
+      for (const auto& [name, value] : record->figures) {
         const std::string column = stage.name + "." + name;
         if (columns.insert(column).second) header.push_back(column);
-        rows[i][column] = text_of(value);
+        rows[i][column] = value;
       }
     }
   }

@@ -11,6 +11,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/own_files.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -28,7 +29,12 @@ fs::path file_in(const fs::path& cell) { return cell / ".mbtfm.hashes"; }
 
 /// What the file system's clock says, by touching a file; 0 where it cannot be touched.
 std::int64_t file_system_time_ns(const fs::path& file) {
-  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC, 0666);
+  try {
+    make_way(file);  // a file elsewhere must not be touched through a link
+  } catch (const OutputError&) {
+    return 0;
+  }
+  const int descriptor = open(file.c_str(), O_WRONLY | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
   if (descriptor < 0) return 0;
   struct stat status {};
   const bool is_known = futimens(descriptor, nullptr) == 0 && fstat(descriptor, &status) == 0;
@@ -39,6 +45,7 @@ std::int64_t file_system_time_ns(const fs::path& file) {
 }  // namespace
 
 HashCache::HashCache(fs::path cell) : cell_(std::move(cell)) {
+  if (!is_own_text(file_in(cell_))) return;
   std::ifstream file(file_in(cell_));
   for (std::string line; std::getline(file, line);) {
     std::istringstream fields(line);

@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/runner/images.h"
 
 namespace mbtfm::runner {
@@ -37,10 +38,22 @@ std::regex regex_of(const std::string& pattern) {
 /// Images of one cell: path by key of [images].
 using ImageSet = std::map<std::string, fs::path>;
 
+/// Folders that cannot be read have no images: the patterns then find none of theirs.
+void collect_files(const fs::path& folder, std::vector<fs::path>& files) {
+  std::error_code error, is_gone;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone)) {
+      collect_files(entry->path(), files);
+    } else if (is_file(entry->path())) {
+      files.push_back(entry->path());
+    }
+  }
+}
+
 std::vector<fs::path> files_below(const fs::path& folder) {
   std::vector<fs::path> files;
-  for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder))
-    if (entry.is_regular_file()) files.push_back(entry.path().lexically_relative(folder));
+  collect_files(folder, files);
+  for (fs::path& file : files) file = file.lexically_relative(folder);
   std::sort(files.begin(), files.end());
   return files;
 }
@@ -103,16 +116,17 @@ ImagePattern parse_pattern(const std::string& text) {
 
 std::vector<std::string> make_cell_folders(const fs::path& folder, const std::vector<ImagePattern>& patterns,
                                            const fs::path& template_toml) {
-  if (!fs::is_directory(folder)) throw InputError(folder.string(), "a folder of images", "none");
+  if (!is_folder(folder)) throw InputError(folder.string(), "a folder of images", "none");
   const std::string settings = template_toml.empty() ? "" : read_text(template_toml);
   if (std::regex_search(settings, std::regex(R"((^|\n)\s*\[images\])")))
     throw InputError(template_toml.string(), "settings without [images]", "[images]",
                      "the images of each cell come from --pattern");
   std::vector<std::string> cells;
   for (const auto& [name, images] : group_images(folder, patterns)) {
-    const fs::path cell = folder / name, toml = cell / "cell.toml";
+    // '.._pax.tif' is a name, too
+    const fs::path cell = inside(folder, name, folder.string()), toml = cell / "cell.toml";
     cells.push_back(name);
-    if (fs::exists(toml)) continue;
+    if (fs::exists(fs::symlink_status(toml))) continue;
     fs::create_directories(cell);
     write_whole(toml, toml_of(settings, images, folder, cell));
   }

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -42,7 +43,7 @@ std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {
   ImageMatch match{.files = {}, .pattern = name_or_glob};
   const fs::path exact = folder / name_or_glob;
-  if (fs::is_regular_file(exact)) {
+  if (is_file(exact)) {
     match.files = {exact};
     return match;
   }
@@ -55,12 +56,12 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
     return match;
   }
   const fs::path parent = exact.parent_path();
-  if (!fs::is_directory(parent)) return match;
   const std::string pattern = exact.filename().string();
-  for (const fs::directory_entry& entry : fs::directory_iterator(parent)) {
-    const std::string name = entry.path().filename().string();
-    if (entry.is_regular_file() && fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0) {
-      match.files.push_back(entry.path());
+  std::error_code error;  // of a folder that is not there, or cannot be read: no file of it is found
+  for (fs::directory_iterator entry(parent, error), end; !error && entry != end; entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0 && is_file(entry->path())) {
+      match.files.push_back(entry->path());
     }
   }
   std::sort(match.files.begin(), match.files.end());

@@ -1,6 +1,7 @@
 #include "pipeline/runner/lock.h"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -13,8 +14,15 @@ namespace mbtfm::runner {
 
 LockFile::LockFile(const std::filesystem::path& cell) {
   const std::filesystem::path file = cell / ".mbtfm.lock";
-  descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0666);
-  if (descriptor_ < 0) throw OutputError("cannot write " + file.string() + ": " + std::strerror(errno));
+  // Not replaced where it is a link, as other outputs are: another run may just have replaced it, and hold the new one.
+  descriptor_ = open(file.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0666);
+  const int error = errno;
+  struct stat status {};
+  if (lstat(file.c_str(), &status) == 0 && !S_ISREG(status.st_mode)) {
+    if (descriptor_ >= 0) close(descriptor_);
+    throw InputError(file.string(), "a lock file", "a link, a folder or a pipe", "remove it");
+  }
+  if (descriptor_ < 0) throw OutputError("cannot write " + file.string() + ": " + std::strerror(error));
 }
 
 LockFile::~LockFile() { close(descriptor_); }

@@ -17,7 +17,7 @@ class LockFile {
  public:
   enum class IfTaken { give_up, wait };
 
-  /// @throws OutputError where it cannot be made
+  /// @throws InputError where a link or the like is in its place, OutputError where it cannot be made
   explicit LockFile(const std::filesystem::path& cell);
   ~LockFile();
   LockFile(const LockFile&) = delete;

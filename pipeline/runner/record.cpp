@@ -7,6 +7,8 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/json_record.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/runner/toml_file.h"
 
 namespace mbtfm::runner {
@@ -15,12 +17,18 @@ using nlohmann::json;
 
 namespace {
 
-json parse_json(const fs::path& file) {
-  try {
-    return json::parse(read_text(file));
-  } catch (const json::exception& error) {
-    throw InputError(file.string(), "a JSON file", error.what(), "delete it to run the stage again");
-  }
+/// A stage's record as it and mbtfm wrote it; none where it is not there.
+std::optional<JsonRecord> open_record(const fs::path& file) {
+  if (!is_own_file(file)) return std::nullopt;
+  return JsonRecord(file, "a record of mbtfm run", "delete it to run the stage again");
+}
+
+Hashes hashes_of(const JsonRecord& run, const std::string& key) {
+  Hashes hashes;
+  const auto list = run.find(key);
+  if (!list) return hashes;
+  for (const auto& [name, hash] : list->members()) hashes[name] = hash.text();
+  return hashes;
 }
 
 struct Difference {
@@ -63,22 +71,30 @@ std::vector<std::string> frames_read(const fs::path& cell, const std::string& li
 
 }  // namespace
 
-std::optional<StageRecord> read_record(const fs::path& record_file) {
-  if (!fs::is_regular_file(record_file)) return {};
-  const json whole = parse_json(record_file);
+fs::path record_file_of(const fs::path& cell, const Stage& stage) { return cell / stage.folder / "record.json"; }
+
+fs::path output_file(const fs::path& cell, const Stage& stage, const fs::path& name, const std::string& told_by) {
+  const fs::path file = inside(cell, name, told_by);
+  if (!name.empty() && *name.begin() == stage.folder) return file;
+  throw InputError(told_by, "outputs of " + stage.name + " in " + stage.folder, "'" + name.string() + "'",
+                   "remove the file if it is not yours");
+}
+
+std::optional<StageRecord> read_record(const fs::path& cell, const Stage& stage) {
+  const fs::path file = record_file_of(cell, stage);
+  const std::optional<JsonRecord> whole = open_record(file);
+  if (!whole) return {};
   StageRecord record;
-  const auto run = whole.find("run");
-  if (run == whole.end()) return record;
-  try {
-    record.finished = run->at("finished");
-    record.converged = run->value("converged", true);
-    record.version = run->value("version", "");
-    record.settings = run->value("settings", json::object()).dump();
-    record.inputs = run->value("inputs", Hashes{});
-    record.outputs = run->value("outputs", Hashes{});
-  } catch (const json::exception& error) {
-    throw InputError(record_file.string(), "a record of mbtfm run", error.what(), "delete it to run the stage again");
-  }
+  const auto run = whole->find("run");
+  if (!run) return record;
+  record.finished = run->at("finished").is_true();
+  record.converged = run->is_true_or("converged", true);
+  record.version = run->text_or("version", "");
+  const auto settings = run->find("settings");
+  record.settings = settings ? settings->json().dump() : "{}";
+  record.inputs = hashes_of(*run, "inputs");
+  record.outputs = hashes_of(*run, "outputs");
+  for (const auto& [name, hash] : record.outputs) output_file(cell, stage, name, file.string());
   return record;
 }
 
@@ -92,10 +108,12 @@ void write_begun(const fs::path& record_file, const Stage& stage, const std::str
 
 std::vector<std::string> series_outputs(const fs::path& cell, const Stage& stage) {
   std::vector<std::string> names;
-  const json record = parse_json(cell / stage.folder / "record.json");
-  for (const json& output : record.value("outputs", json::array())) {
-    const fs::path file = fs::path(stage.folder) / output.value("file", "");
-    if (is_of_series(stage, file.generic_string())) names.push_back(file.generic_string());
+  const std::optional<JsonRecord> record = open_record(record_file_of(cell, stage));
+  const auto outputs = record ? record->find("outputs") : std::nullopt;
+  if (!outputs) return names;
+  for (const JsonRecord& output : outputs->list()) {
+    const std::string name = (fs::path(stage.folder) / output.at("file").text()).generic_string();
+    if (is_of_series(stage, name)) names.push_back(name);
   }
   return names;
 }
@@ -107,11 +125,14 @@ void forget_begun(const fs::path& record_file) {
 }
 
 bool is_begun(const fs::path& record_file) {
-  return fs::is_regular_file(record_file) && parse_json(record_file).contains("run");
+  const std::optional<JsonRecord> record = open_record(record_file);
+  return record && record->find("run");
 }
 
 void complete_record(const fs::path& record_file, const StageRecord& record, const StageRun& run) {
-  nlohmann::ordered_json whole = nlohmann::ordered_json::parse(read_text(record_file));
+  const std::optional<JsonRecord> of_stage = open_record(record_file);
+  if (!of_stage) throw InputError(record_file.string(), "the record that the stage wrote", "none");
+  nlohmann::ordered_json whole = of_stage->json();
   whole["run"] = {{"finished", record.finished},
                   {"converged", record.converged},
                   {"version", record.version},
@@ -171,7 +192,7 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
   for (const PathArgument& argument : stage.arguments) {
-    if (argument.where.empty() || !fs::is_regular_file(cell / argument.where)) continue;
+    if (argument.where.empty() || !is_own_file(cell / argument.where)) continue;
     names.push_back(argument.where);
     for (std::string& name : frames_read(cell, argument.where)) names.push_back(std::move(name));
   }

@@ -24,8 +24,16 @@ struct StageRecord {
   Hashes outputs;
 };
 
-/// Empty where the file is not there. @throws InputError where it is malformed
-std::optional<StageRecord> read_record(const std::filesystem::path& record_file);
+std::filesystem::path record_file_of(const std::filesystem::path& cell, const Stage& stage);
+
+/// Where an output lies that a record names, relative to the cell folder. Outputs are hashed, copied and deleted by
+/// what records say. @param told_by  the record @throws InputError where it does not lie inside of the stage's own
+/// folder
+std::filesystem::path output_file(const std::filesystem::path& cell, const Stage& stage,
+                                  const std::filesystem::path& name, const std::string& told_by);
+
+/// Empty where there is none. @throws InputError where it is malformed, or names outputs outside of the stage's folder
+std::optional<StageRecord> read_record(const std::filesystem::path& cell, const Stage& stage);
 /// Before a stage begins: from now on its outputs may be a mixture of two runs.
 /// @param record_before  of a stage that keeps frames of the run before: what that run said of them stays; else empty
 void write_begun(const std::filesystem::path& record_file, const Stage& stage, const std::string& record_before = {});

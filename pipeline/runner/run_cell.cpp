@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
@@ -37,13 +38,13 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
   }
   for (const PathArgument& argument : stage.arguments) {
-    if (argument.where.empty() || fs::is_regular_file(cell / argument.where))
+    if (argument.where.empty() || is_own_file(cell / argument.where))
       add(argument.flag, (cell / argument.path).string());
   }
   add("config", (cell / "cell.toml").string());
   add(stage.output.flag, (cell / stage.output.path).string());
   add("threads", std::to_string(threads));
-  add("record", (cell / stage.folder / "record.json").string());
+  add("record", record_file_of(cell, stage).string());
   if (options.is_quiet) command.push_back("--quiet");
   if (options.explain && stage.name == "fit") command.push_back("--explain");
   return command;
@@ -61,12 +62,13 @@ std::vector<std::string> command_to_tell(std::vector<std::string> command, const
 
 /// Files that a run which was killed had not finished.
 void remove_partial_files(const fs::path& folder) {
-  if (!fs::is_directory(folder)) return;
+  std::error_code error;
   std::vector<fs::path> partial;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    if (entry.path().filename().string().starts_with(kPartialPrefix)) partial.push_back(entry.path());
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+    if (entry->path().filename().string().starts_with(kPartialPrefix)) partial.push_back(entry->path());
   }
-  for (const fs::path& file : partial) fs::remove(file);
+  for (const fs::path& file : partial)
+    fs::remove(file, error);  // a link, not what it points to; no folder that is full
 }
 
 StageFailure failure_of(const ProcessResult& result) {
@@ -91,11 +93,16 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
   }
 }
 
+fs::path checked(fs::path cell) {
+  check_cell_folder(cell);
+  return cell;
+}
+
 /// One cell's run: the parts that several steps need.
 class CellRun {
  public:
   CellRun(fs::path cell, const RunOptions& options)
-      : cell_(std::move(cell)),
+      : cell_(checked(std::move(cell))),
         options_(options),
         images_(read_image_names(cell_)),
         beneath_(unset_in(cell_ / "cell.toml", options.beneath)),
@@ -129,7 +136,7 @@ class CellRun {
 
 CellRun::Present CellRun::present(const Stage& stage) {
   Present now;
-  now.record = read_record(cell_ / stage.folder / "record.json");
+  now.record = read_record(cell_, stage);
   if (!is_asked(stage, options_.only)) {
     now.status = {StageState::not_asked, "left out by --only"};
     return now;
@@ -207,7 +214,7 @@ Hashes CellRun::outputs_of(const Stage& stage, const Present& before) {
   for (const auto& [name, hash] : before.record->outputs) {
     const auto found = before.surroundings.outputs.find(name);
     const bool is_by_hand = found != before.surroundings.outputs.end() && found->second != hash;
-    if (!outputs.contains(name)) fs::remove(cell_ / name);
+    if (!outputs.contains(name) && is_of_series(stage, name)) fs::remove(cell_ / name);
     if (before.status.keeps_frames && is_by_hand) outputs[name] = hash;  // still the user's
   }
   return outputs;
@@ -216,15 +223,15 @@ Hashes CellRun::outputs_of(const Stage& stage, const Present& before) {
 void CellRun::start(const Stage& stage, const Present& before, int threads, StageOutcome& outcome) {
   const StageSurroundings& now = before.surroundings;
   for (const std::string& file : stage.reads) {
-    if (!fs::is_regular_file(cell_ / file)) {
+    if (!is_own_file(cell_ / file)) {
       throw InputError((cell_ / file).string(), "a file that an earlier stage makes", "none",
                        "run all stages: mbtfm run without --only");
     }
   }
-  const fs::path record_file = cell_ / stage.folder / "record.json";
+  const fs::path record_file = record_file_of(cell_, stage);
   std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
   for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
-  const bool had_record = fs::is_regular_file(record_file);
+  const bool had_record = is_own_file(record_file);
   const std::string record_before = had_record ? read_text(record_file) : std::string();
   remove_partial_files(record_file.parent_path());
   if (before.status.keeps_frames) {
@@ -306,7 +313,8 @@ CellOutcome CellRun::run() {
     throw;
   }
   // A report of what is no more must not outlive a kill between here and the next one.
-  if (has_work) fs::remove(cell_ / "report.html");
+  std::error_code is_folder;  // then writing the report tells
+  if (has_work) fs::remove(cell_ / "report.html", is_folder);
   write_run_record(cell_, options_, outcome);
   hashes_.save();
   return outcome;
@@ -346,8 +354,8 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
 }
 
 ImageNames read_image_names(const fs::path& cell) {
-  if (!fs::is_directory(cell)) throw InputError(cell.string(), "a cell folder", "none");
-  if (!fs::is_regular_file(cell / "cell.toml")) {
+  if (!is_folder(cell)) throw InputError(cell.string(), "a cell folder", "none");
+  if (!is_file(cell / "cell.toml")) {
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
                      "write one with pixel_size_um and, in [gel], youngs_modulus_kPa");
   }
@@ -375,9 +383,12 @@ CellOutcome look_at_cell(const fs::path& cell, const RunOptions& options) {
 
 bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome& now) {
   for (const StageOutcome& stage : now.stages) {
-    if (stage.status.state == StageState::must_run) return false;
+    const StageState state = stage.status.state;
+    if (state == StageState::must_run) return false;
+    // What was changed by hand since then is neither checked nor reported.
+    if (state == StageState::replaced && recorded_state(cell, stage.stage) != name_of(state)) return false;
   }
-  if (is_asked(stages().back(), options.only) && !fs::is_regular_file(cell / "report.html")) return false;
+  if (is_asked(stages().back(), options.only) && !is_own_file(cell / "report.html")) return false;
   return run_record_tells_of(cell, options);
 }
 

@@ -6,6 +6,8 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/json_record.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/runner/lock.h"
 
 namespace mbtfm::runner {
@@ -16,12 +18,19 @@ namespace {
 
 constexpr const char* kNotRun = "not run";
 
-/// null where there is none, or a damaged one: it is written anew.
-ordered_json read_run_record(const fs::path& cell) {
+/// None where there is none: a link, which the next one replaces, is none of ours.
+std::optional<JsonRecord> open_run_record(const fs::path& cell) {
   const fs::path file = cell / "run.json";
-  if (!fs::is_regular_file(file)) return {};
-  ordered_json run = ordered_json::parse(read_text(file), nullptr, /*allow_exceptions=*/false);
-  return run.is_object() ? run : ordered_json{};
+  if (!is_own_file(file)) return std::nullopt;
+  return JsonRecord(file, "a run.json of mbtfm run", "delete it: the next run writes another");
+}
+
+/// What an earlier run told of a stage; none where it told nothing.
+std::optional<JsonRecord> entry_of(const std::optional<JsonRecord>& run, const std::string& stage) {
+  const auto entries = run ? run->find("stages") : std::nullopt;
+  const auto entry = entries ? entries->find(stage) : std::nullopt;
+  if (entry) entry->expect_object();
+  return entry;
 }
 
 std::string state_of(const StageOutcome& outcome) {
@@ -30,34 +39,45 @@ std::string state_of(const StageOutcome& outcome) {
   return outcome.status.state == StageState::must_run ? kNotRun : name_of(outcome.status.state);
 }
 
+ordered_json json_of(const StageFailure& failure) {
+  return {{"exit_code", failure.exit_code}, {"how", failure.how}, {"message", failure.message}};
+}
+
+std::optional<StageFailure> failure_in(const JsonRecord& entry) {
+  const auto failure = entry.find("failure");
+  if (!failure) return std::nullopt;
+  return StageFailure{.exit_code = failure->at("exit_code").integer(),
+                      .how = failure->text_or("how", ""),
+                      .message = failure->text_or("message", "")};
+}
+
 ordered_json stage_entry(const Stage& stage, const StageOutcome& outcome, const fs::path& cell,
-                         const ordered_json& before) {
+                         const std::optional<JsonRecord>& before) {
   ordered_json entry;
   entry["state"] = state_of(outcome);
   entry["why"] = outcome.status.why;
   entry["converged"] = outcome.converged;
-  if (outcome.status.state == StageState::not_asked && before.is_object() && before.contains("state")) {
-    for (const char* key : {"state", "why", "converged", "failure"}) {
-      if (before.contains(key)) entry[key] = before[key];
-    }
+  if (outcome.status.state == StageState::not_asked && before && before->find("state")) {
+    entry["state"] = before->at("state").text();
+    entry["why"] = before->text_or("why", "");
+    entry["converged"] = before->is_true_or("converged", true);
+    if (const auto failure = failure_in(*before)) entry["failure"] = json_of(*failure);
   }
-  if (outcome.failure) {
-    entry["failure"] = {{"exit_code", outcome.failure->exit_code},
-                        {"how", outcome.failure->how},
-                        {"message", outcome.failure->message}};
-  }
+  if (outcome.failure) entry["failure"] = json_of(*outcome.failure);
   if (outcome.status.state == StageState::given || outcome.status.state == StageState::replaced) {
     Hashes outputs;  // not ours: what they are is all that is known of them
     for (const std::string& file : stage.writes) outputs[file] = sha256_of_file(cell / file);
     entry["outputs"] = outputs;
     return entry;
   }
-  const fs::path record_file = cell / stage.folder / "record.json";
-  if (fs::is_regular_file(record_file)) {
-    const ordered_json record = ordered_json::parse(read_text(record_file));
-    for (const auto& [key, value] : record.items()) {
-      if (!entry.contains(key)) entry[key] = value;
-    }
+  const fs::path record_file = record_file_of(cell, stage);
+  if (!is_own_file(record_file)) return entry;
+  const JsonRecord record(record_file, "a record of mbtfm run", "delete it to run the stage again");
+  for (const auto& [key, value] : record.members()) {
+    if (!entry.contains(key)) entry[key] = value.json();
+  }
+  if (const auto effects = record.find("effects")) {
+    for (const JsonRecord& effect : effects->list()) effect.expect_object();
   }
   return entry;
 }
@@ -77,34 +97,33 @@ ordered_json images_in(const fs::path& cell) {
   return images;
 }
 
-bool is_one_of(const ordered_json& entry, const std::vector<std::string>& states) {
-  return entry.is_object() && std::find(states.begin(), states.end(), entry.value("state", "")) != states.end();
+bool is_done_state(const std::string& state) {
+  const auto is = [&](StageState s) { return state == name_of(s); };
+  return is(StageState::must_run) || is(StageState::up_to_date) || is(StageState::given) || is(StageState::replaced);
 }
 
-bool is_stage_done(const ordered_json& entry) {
-  return is_one_of(entry, {name_of(StageState::must_run), name_of(StageState::up_to_date), name_of(StageState::given),
-                           name_of(StageState::replaced)});
-}
+/// Of entries that stage_entry made.
+bool is_done_entry(const ordered_json& entry) { return is_done_state(entry.at("state")); }
 
 std::string outcome_of(const ordered_json& entries) {
-  const auto has_failed = [](const ordered_json& entry) { return is_one_of(entry, {"failed"}); };
+  const auto has_failed = [](const ordered_json& entry) { return entry.at("state") == "failed"; };
   if (std::any_of(entries.begin(), entries.end(), has_failed)) return "failed";
-  return std::all_of(entries.begin(), entries.end(), is_stage_done) ? "done" : "unfinished";
+  return std::all_of(entries.begin(), entries.end(), is_done_entry) ? "done" : "unfinished";
 }
 
 }  // namespace
 
 void write_run_record(const fs::path& cell, const RunOptions& options, const CellOutcome& outcome) {
   const RunRecordLock lock(cell);
-  ordered_json before = read_run_record(cell);
+  const std::optional<JsonRecord> before = open_run_record(cell);
   ordered_json run, entries;
   ordered_json effects = ordered_json::array();
   for (std::size_t i = 0; i < stages().size(); ++i) {
     const Stage& stage = stages()[i];
-    entries[stage.name] = stage_entry(stage, outcome.stages[i], cell, before["stages"][stage.name]);
+    entries[stage.name] = stage_entry(stage, outcome.stages[i], cell, entry_of(before, stage.name));
     for (ordered_json effect : entries[stage.name].value("effects", ordered_json::array())) {
       effect["stage"] = stage.name;
-      effects.push_back(effect);
+      effects.push_back(std::move(effect));
     }
   }
   run["program"] = "mbtfm";
@@ -113,37 +132,44 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["outcome"] = outcome_of(entries);
   run["threads"] = options.threads;
   if (!options.preset.empty()) run["preset"] = options.preset;
-  run["converged"] = std::all_of(entries.begin(), entries.end(),
-                                 [](const ordered_json& entry) { return entry.value("converged", true); });
+  run["converged"] =
+      std::all_of(entries.begin(), entries.end(), [](const ordered_json& entry) { return entry.at("converged"); });
   run["images"] = images_in(cell);
   run["effects"] = std::move(effects);
+  // Of a fit that has not ended in this run, the old file may be what is to be replaced.
+  const bool has_fit = is_done_entry(entries[stages().back().name]);
   run["stages"] = std::move(entries);
   const fs::path fit_file = cell / "4_fit/fit.json";
-  if (fs::is_regular_file(fit_file)) {
-    const ordered_json fit = ordered_json::parse(read_text(fit_file));
-    if (fit.contains("error_budget")) run["error_budget"] = fit["error_budget"];
+  if (has_fit && is_own_file(fit_file)) {
+    const JsonRecord fit(fit_file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
+    if (const auto budget = fit.find("error_budget")) run["error_budget"] = budget->json();
   }
   write_whole(cell / "run.json", run.dump(1) + "\n");
 }
 
 bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {
-  if (!fs::is_regular_file(cell / "run.json")) return false;
+  const fs::path file = cell / "run.json";
+  if (!is_own_file(file)) return false;
   // The line as we write it, outside of any string, as these hold no line breaks: spares parsing thousands of files.
-  if (read_text(cell / "run.json").find("\n \"outcome\": \"done\",") != std::string::npos) return true;
-  const ordered_json run = read_run_record(cell);
-  if (!run.contains("stages")) return false;
+  if (is_own_text(file) && read_text(file).find("\n \"outcome\": \"done\",") != std::string::npos) return true;
+  const std::optional<JsonRecord> run = open_run_record(cell);
   return std::all_of(stages().begin(), stages().end(), [&](const Stage& stage) {
-    return !is_asked(stage, options.only) || is_stage_done(run["stages"].value(stage.name, ordered_json()));
+    const auto entry = entry_of(run, stage.name);
+    return !is_asked(stage, options.only) || (entry && is_done_state(entry->text_or("state", "")));
   });
 }
 
+std::string recorded_state(const fs::path& cell, const std::string& stage) {
+  const auto entry = entry_of(open_run_record(cell), stage);
+  return entry ? entry->text_or("state", "") : "";
+}
+
 std::optional<RecordedFailure> recorded_failure(const fs::path& cell) {
-  const ordered_json run = read_run_record(cell);
-  if (!run.contains("stages")) return {};
-  for (const auto& [stage, entry] : run["stages"].items()) {
-    if (!entry.contains("failure")) continue;
-    return RecordedFailure{
-        .stage = stage, .how = entry["failure"].value("how", ""), .message = entry["failure"].value("message", "")};
+  const std::optional<JsonRecord> run = open_run_record(cell);
+  for (const Stage& stage : stages()) {
+    const auto entry = entry_of(run, stage.name);
+    const auto failure = entry ? failure_in(*entry) : std::nullopt;
+    if (failure) return RecordedFailure{.stage = stage.name, .how = failure->how, .message = failure->message};
   }
   return {};
 }

@@ -15,6 +15,9 @@ void write_run_record(const std::filesystem::path& cell, const RunOptions& optio
 /// run.json is there and tells that every stage asked for is done.
 bool run_record_tells_of(const std::filesystem::path& cell, const RunOptions& options);
 
+/// The state of a stage that run.json tells of; empty where it tells of none.
+std::string recorded_state(const std::filesystem::path& cell, const std::string& stage);
+
 /// "segment", "exit code 3", …: the failure that run.json tells of; empty where it tells of none.
 struct RecordedFailure {
   std::string stage, how, message;

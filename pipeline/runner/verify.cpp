@@ -1,11 +1,14 @@
 #include "pipeline/runner/verify.h"
 
 #include <algorithm>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/json_record.h"
+#include "pipeline/contract/own_files.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -21,46 +24,77 @@ struct KnownFile {
   std::string sha256;
 };
 
-ordered_json read_run_json(const fs::path& file) {
-  if (!fs::is_regular_file(file)) {
+JsonRecord open_run_json(const fs::path& file) {
+  if (!is_file(file))
     throw InputError(file.string(), "a run.json of mbtfm run", "none", "run the cell first: mbtfm run");
-  }
-  try {
-    ordered_json run = ordered_json::parse(read_text(file));
-    run.at("stages");
-    return run;
-  } catch (const ordered_json::exception& error) {
-    throw InputError(file.string(), "a run.json of mbtfm run", error.what());
-  }
+  return JsonRecord(file, "a run.json of mbtfm run", "run the cell again: mbtfm run");
 }
 
 /// A stage's record lists files relative to its folder; of what the user gave, a hash by path in the cell folder.
-void add_files(const std::string& kind, const Stage& stage, const ordered_json& entry, std::vector<KnownFile>& files) {
-  const ordered_json list = entry.value(kind + "s", ordered_json::array());
-  if (list.is_object()) {
-    for (const auto& [path, sha256] : list.items()) files.push_back({stage.name, kind, path, sha256});
+void add_files(const std::string& kind, const Stage& stage, const JsonRecord& entry, std::vector<KnownFile>& files) {
+  const auto all = entry.find(kind + "s");
+  if (!all) return;
+  if (all->json().is_object()) {
+    for (const auto& [path, sha256] : all->members()) files.push_back({stage.name, kind, path, sha256.text()});
     return;
   }
-  for (const ordered_json& file : list) {
-    const fs::path path = fs::path(stage.folder) / file.at("file").get<std::string>();
-    files.push_back({stage.name, kind, path.lexically_normal(), file.at("sha256")});
+  for (const JsonRecord& file : all->list()) {
+    const fs::path path = fs::path(stage.folder) / file.at("file").text();
+    files.push_back({stage.name, kind, path.lexically_normal(), file.at("sha256").text()});
   }
 }
 
-std::vector<KnownFile> files_in(const ordered_json& run) {
+/// @throws InputError where a file that is called an output does not lie in the stage's folder
+std::vector<KnownFile> files_in(const JsonRecord& run, const fs::path& run_json) {
   std::vector<KnownFile> files;
   for (const Stage& stage : stages()) {
-    const ordered_json entry = run["stages"].value(stage.name, ordered_json::object());
-    add_files("input", stage, entry, files);
-    add_files("output", stage, entry, files);
+    const auto entry = run.at("stages").find(stage.name);
+    if (!entry) continue;
+    add_files("input", stage, *entry, files);
+    add_files("output", stage, *entry, files);
+    for (const KnownFile& file : files) {
+      if (file.stage == stage.name && file.kind == "output")
+        output_file(run_json.parent_path(), stage, file.path, run_json.string());
+    }
   }
   return files;
 }
 
-void compare(const KnownFile& known, const fs::path& folder, Verification& found) {
+/// The files that settings name: they may lie anywhere.
+std::vector<fs::path> named_images(const fs::path& cell) {
+  const ImageNames names = read_image_names(cell);
+  std::vector<fs::path> files;
+  for (const Stage& stage : stages()) {
+    for (const auto& inputs : {images_of(stage, names), stage.optional_images}) {
+      for (const ImageInput& image : inputs) {
+        for (fs::path& file : match_image(cell, name_of_image(names, image.key)).files)
+          files.push_back(std::move(file));
+      }
+    }
+  }
+  return files;
+}
+
+/// Does the file lie in the folder, or do the settings name it? Others are not even looked at.
+bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector<fs::path>& images) {
+  std::error_code error;
+  const fs::path file = fs::weakly_canonical(folder / name, error);
+  const auto is_same = [&](const fs::path& image) { return fs::weakly_canonical(image, error) == file; };
+  if (!error && std::any_of(images.begin(), images.end(), is_same)) return true;
+  try {
+    inside(folder, name, "");
+    return true;
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+void compare(const KnownFile& known, const fs::path& folder, const std::vector<fs::path>& images, Verification& found) {
   ++found.n_files;
   const std::string name = known.path.generic_string(), role = " (" + known.kind + " of " + known.stage + ")";
-  if (!fs::is_regular_file(folder / known.path)) {
+  if (!may_be_read(known.path, folder, images)) {
+    found.differences.push_back(name + " is outside of the cell folder, and no setting names it: not read" + role);
+  } else if (!is_file(folder / known.path)) {
     found.differences.push_back(name + " is gone" + role);
   } else if (sha256_of_file(folder / known.path) != known.sha256) {
     found.differences.push_back(name + " differs" + role);
@@ -72,10 +106,12 @@ bool is_output(const KnownFile& file, const std::vector<KnownFile>& files) {
                      [&](const KnownFile& other) { return other.kind == "output" && other.path == file.path; });
 }
 
-bool is_given(const ordered_json& entry) {
-  const std::string state = entry.value("state", "");
+bool is_given(const std::optional<JsonRecord>& entry) {
+  const std::string state = entry ? entry->text_or("state", "") : "";
   return state == name_of(StageState::given) || state == name_of(StageState::replaced);
 }
+
+bool is_given(const JsonRecord& run, const std::string& stage) { return is_given(run.at("stages").find(stage)); }
 
 void add_values(const ordered_json& table, std::string& text) {
   for (const auto& [key, value] : table.items()) {
@@ -83,11 +119,23 @@ void add_values(const ordered_json& table, std::string& text) {
   }
 }
 
+/// The images that a run had, by key of [images].
+std::map<std::string, fs::path> images_in(const JsonRecord& run, const fs::path& inputs) {
+  std::map<std::string, fs::path> images;
+  const auto list = run.find("images");
+  if (!list) return images;
+  for (const auto& [key, file] : list->members()) images[key] = (inputs / file.text()).lexically_normal();
+  return images;
+}
+
 /// cell.toml of the parameters that the stages had, and of the images where they lie.
-std::string toml_of(const ordered_json& run, const fs::path& inputs, const fs::path& out) {
+std::string toml_of(const JsonRecord& run, const fs::path& inputs, const fs::path& out) {
   ordered_json all = ordered_json::object();
-  for (const auto& [stage, entry] : run["stages"].items()) {
-    if (!is_given(entry)) all.merge_patch(entry.value("parameters", ordered_json::object()));
+  for (const auto& [stage, entry] : run.at("stages").members()) {
+    const auto parameters = entry.find("parameters");
+    if (!parameters || is_given(entry)) continue;
+    parameters->expect_object();
+    all.merge_patch(parameters->json());
   }
   std::string text;
   add_values(all, text);
@@ -97,21 +145,20 @@ std::string toml_of(const ordered_json& run, const fs::path& inputs, const fs::p
     add_values(values, text);
   }
   text += "\n[images]\n";
-  const ordered_json images = run.value("images", ordered_json::object());
-  for (const auto& [key, file] : images.items()) {
-    const fs::path path = (inputs / file.get<std::string>()).lexically_normal();
-    if (fs::exists(path)) text += key + " = " + ordered_json(fs::proximate(path, out).generic_string()).dump() + "\n";
+  for (const auto& [key, file] : images_in(run, inputs)) {
+    if (is_file(file)) text += key + " = " + ordered_json(fs::proximate(file, out).generic_string()).dump() + "\n";
   }
   return text;
 }
 
 /// The new folder: inputs where they lie, what the user gave copied.
-void prepare(const ordered_json& run, const std::vector<KnownFile>& files, const fs::path& inputs,
-             const fs::path& out) {
+void prepare(const JsonRecord& run, const std::vector<KnownFile>& files, const fs::path& inputs, const fs::path& out) {
+  std::vector<fs::path> images;
+  for (const auto& [key, file] : images_in(run, inputs)) images.push_back(file);
   Verification of_inputs;
   for (const KnownFile& file : files) {
-    const bool was_given = file.kind == "output" && is_given(run["stages"][file.stage]);
-    if (was_given || (file.kind == "input" && !is_output(file, files))) compare(file, inputs, of_inputs);
+    const bool was_given = file.kind == "output" && is_given(run, file.stage);
+    if (was_given || (file.kind == "input" && !is_output(file, files))) compare(file, inputs, images, of_inputs);
   }
   if (!of_inputs.differences.empty()) {
     throw InputError(inputs.string(), "the inputs of the run", of_inputs.differences.front(),
@@ -119,7 +166,7 @@ void prepare(const ordered_json& run, const std::vector<KnownFile>& files, const
   }
   fs::create_directories(out);
   for (const KnownFile& file : files) {
-    if (file.kind != "output" || !is_given(run["stages"][file.stage])) continue;
+    if (file.kind != "output" || !is_given(run, file.stage)) continue;
     fs::create_directories((out / file.path).parent_path());
     fs::copy_file(inputs / file.path, out / file.path);
   }
@@ -129,16 +176,22 @@ void prepare(const ordered_json& run, const std::vector<KnownFile>& files, const
 }  // namespace
 
 Verification verify_cell(const fs::path& cell) {
-  const ordered_json run = read_run_json(cell / "run.json");
+  check_cell_folder(cell);
+  const fs::path run_json = cell / "run.json";
+  if (!is_own_file(run_json) && is_file(run_json))
+    throw InputError(run_json.string(), "a file of the cell's own", "a link");
+  const JsonRecord run = open_run_json(run_json);
+  const std::vector<fs::path> images = named_images(cell);
   Verification found;
-  for (const KnownFile& file : files_in(run)) compare(file, cell, found);
+  for (const KnownFile& file : files_in(run, run_json)) compare(file, cell, images, found);
   const Settings settings = read_settings(cell / "cell.toml");
   for (const Stage& stage : stages()) {
-    const ordered_json entry = run["stages"].value(stage.name, ordered_json::object());
+    const auto entry = run.at("stages").find(stage.name);
     if (is_given(entry)) continue;
-    if (!entry.contains("run") || !entry["run"].value("finished", false)) {
+    const auto of_runner = entry ? entry->find("run") : std::nullopt;
+    if (!of_runner || !of_runner->is_true_or("finished", false)) {
       found.differences.push_back("stage " + stage.name + " has not ended");
-    } else if (entry["run"].at("settings").dump() != ordered_json::parse(settings.at(stage.name)).dump()) {
+    } else if (of_runner->at("settings").json().dump() != ordered_json::parse(settings.at(stage.name)).dump()) {
       found.differences.push_back("cell.toml differs (parameters of " + stage.name + ")");
     }
   }
@@ -147,19 +200,19 @@ Verification verify_cell(const fs::path& cell) {
 
 Verification repeat_run(const fs::path& run_json, const fs::path& inputs, const fs::path& out,
                         const RunOptions& options, const std::function<void(const std::string&)>& note) {
-  const ordered_json run = read_run_json(run_json);
-  if (run.value("outcome", "") != "done") {
-    throw InputError(run_json.string(), "a run that ended", "outcome '" + run.value("outcome", "unknown") + "'");
-  }
-  if (fs::exists(out)) throw InputError(out.string(), "a new folder to repeat the run in", "one that is there");
-  if (run.value("version", "") != options.version)
-    note("the run is of version " + run.value("version", "unknown") + ", this is " + options.version);
-  const std::vector<KnownFile> files = files_in(run);
+  check_cell_folder(inputs);
+  const JsonRecord run = open_run_json(run_json);
+  const std::string outcome = run.text_or("outcome", "unknown"), version = run.text_or("version", "unknown");
+  if (outcome != "done") throw InputError(run_json.string(), "a run that ended", "outcome '" + outcome + "'");
+  if (fs::exists(fs::symlink_status(out)))
+    throw InputError(out.string(), "a new folder to repeat the run in", "one that is there");
+  if (version != options.version) note("the run is of version " + version + ", this is " + options.version);
+  const std::vector<KnownFile> files = files_in(run, run_json);
   prepare(run, files, inputs, out);
   run_cell(out, options);
   Verification found;
   for (const KnownFile& file : files) {
-    if (file.kind == "output") compare(file, out, found);
+    if (file.kind == "output") compare(file, out, {}, found);
   }
   return found;
 }

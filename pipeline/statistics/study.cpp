@@ -5,6 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/statistics/conditions.h"
@@ -14,7 +15,7 @@ namespace fs = std::filesystem;
 namespace {
 
 std::optional<DisplacementField> field_where_there(const Path& file) {
-  if (!fs::is_regular_file(file)) return std::nullopt;
+  if (!is_own_file(file)) return std::nullopt;
   return read_displacement(file);
 }
 
@@ -45,7 +46,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell) {
   for (const std::string& file : files_of_a_cell()) {
-    if (!fs::is_regular_file(cell / file)) return "no fit: " + file + " is not there";
+    if (!is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }
   return {};
 }
@@ -99,7 +100,8 @@ const std::vector<std::string>& further_files_of_a_cell() {
 }
 
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads) {
-  const std::vector<Path> folders = runner::find_cells(folder);
+  const runner::FoundCells found = runner::find_cells(folder);
+  const std::vector<Path>& folders = found.cells;
   std::vector<std::string> names;
   for (const Path& cell : folders) {
     const std::string name = cell.lexically_relative(folder).generic_string();
@@ -111,9 +113,15 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   parallel_for(static_cast<int>(folders.size()), threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     reasons[i] = notes[i].reason_to_exclude;
-    if (reasons[i].empty()) reasons[i] = obstacle(folders[i]);
     if (!reasons[i].empty()) return;
-    read[i] = read_study_cell(folders[i], names[i], parameters);
+    try {
+      check_cell_folder(folders[i]);
+      reasons[i] = obstacle(folders[i]);
+      if (reasons[i].empty()) read[i] = read_study_cell(folders[i], names[i], parameters);
+    } catch (const InputError& error) {
+      reasons[i] = error.what();  // that cell's matter, not the study's
+    }
+    if (!reasons[i].empty()) return;
     if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
   });
   Study study;
@@ -126,6 +134,8 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     study.cells.push_back(std::move(*read[i]));
     condition_of_cell.push_back(notes[i].condition);
   }
+  for (const runner::SkippedFolder& s : found.skipped)
+    study.left_out.push_back({s.folder.lexically_relative(folder).generic_string(), "", "cannot be read: " + s.why});
   if (study.cells.empty()) no_cell_left(folder, study.left_out);
   number_conditions(study, condition_of_cell);
   return study;

@@ -33,6 +33,7 @@ struct StudyCell {
   std::vector<Direction> directions;
 };
 
+/// A cell that cannot be used, or a folder that cannot be searched for cells.
 struct LeftOutCell {
   std::string name, condition, reason;
 };
@@ -49,7 +50,8 @@ const std::vector<std::string>& further_files_of_a_cell();
 
 /// @param table  column `cell` (a cell's folder), any columns of conditions, and `exclude` with the reason why a cell
 ///               must not enter, empty for those that do; or none
-/// @throws InputError where no cell is left, a file is malformed, or the table names a cell that is not there
+/// A cell whose files are malformed, or lead out of it, is left out.
+/// @throws InputError where no cell is left, or the table is malformed or names a cell that is not there
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads);
 
 /// A fibre whose tension could be identified.

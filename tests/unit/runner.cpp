@@ -194,6 +194,16 @@ TEST_F(Runner, keeps_an_output_that_was_changed_by_hand) {
   EXPECT_EQ(started(), "fit network segment");
 }
 
+TEST_F(Runner, a_cell_is_not_done_before_the_run_record_tells_what_was_changed_by_hand) {
+  started();
+  write_text(cell_ / "report.html", "");
+  EXPECT_TRUE(is_done(cell_, options_, look_at_cell(cell_, options_)));
+  write_text(cell_ / "4_fit/tensions.csv", "by hand");
+  EXPECT_FALSE(is_done(cell_, options_, look_at_cell(cell_, options_)));
+  started();
+  EXPECT_TRUE(is_done(cell_, options_, look_at_cell(cell_, options_)));
+}
+
 TEST_F(Runner, takes_given_outputs_without_images) {
   for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"}) {
     fs::create_directories(cell_ / "1_segment");
@@ -452,7 +462,7 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   write_text(folder / "a/inner/cell.toml", "");  // part of a, not a cell
   make_executable(folder / "mbtfm",
                   "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
-  const auto cells = find_cells(folder.path());
+  const auto cells = find_cells(folder.path()).cells;
   ASSERT_EQ(cells.size(), 3u);
   const auto outcomes = run_batch(cells, {.program = folder / "mbtfm",
                                           .arguments = {},

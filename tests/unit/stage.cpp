@@ -91,6 +91,34 @@ TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
   }
 }
 
+TEST_F(Stage, links_in_the_place_of_outputs_are_replaced_not_followed) {
+  write_text(folder_ / "precious", "precious");
+  fs::create_directories(folder_ / "out/deep");
+  const fs::path record = folder_ / "record.json";
+  for (const fs::path& output : {folder_ / "out/a.csv", folder_ / "out/deep/b.csv", record}) {
+    fs::create_symlink(folder_ / "precious", output);
+    fs::create_symlink(folder_ / "precious", temporary_name(output));
+  }
+  EXPECT_EQ(run(files_and({"--record", record.string()}), write_two), 0);
+  EXPECT_EQ(read_text(folder_ / "precious"), "precious");
+  for (const fs::path& output : {folder_ / "out/a.csv", folder_ / "out/deep/b.csv", record})
+    EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(output))) << output;
+}
+
+TEST_F(Stage, a_folder_among_the_outputs_that_is_a_link_is_refused) {
+  fs::create_directories(folder_ / "elsewhere");
+  fs::create_directories(folder_ / "out");
+  fs::create_symlink("../elsewhere", folder_ / "out/deep");
+  EXPECT_EQ(run(files(), write_two), 3);
+  EXPECT_TRUE(fs::is_empty(folder_ / "elsewhere"));
+  EXPECT_FALSE(fs::exists(folder_ / "out/a.csv"));
+  fs::rename(folder_ / "out", folder_ / "real");
+  fs::remove(folder_ / "real/deep");
+  fs::create_symlink("real", folder_ / "out");  // the folder that --out names may be one
+  EXPECT_EQ(run(files(), write_two), 0);
+  EXPECT_EQ(read_text(folder_ / "real/deep/b.csv"), "b");
+}
+
 TEST_F(Stage, what_has_not_converged_is_written_and_marked) {
   EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string()}),
                 [](const Example& e, StageContext& context) {
