@@ -98,7 +98,7 @@ FitSummary read_fit_summary(const Path& file) {
     for_each_member(summary, [&](const char* name, auto& member) { json.at(name).get_to(member); });
     for (const auto& [name, value] : json.items()) {
       bool is_named = false;
-      for_each_member(summary, [&](const char* known, auto&) { is_named = is_named || name == known; });
+      for_each_member(summary, [&, &name = name](const char* known, auto&) { is_named = is_named || name == known; });
       if (name == "error_budget") summary.error_budget = budget_of(value);
       if (!is_named && value.is_primitive() && !value.is_null()) summary.more.emplace_back(name, value_of(value));
     }
