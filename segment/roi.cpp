@@ -25,8 +25,9 @@ constexpr RoiShape kShapes[] = {
 
 // Beyond it a float has lost the fractions of pixels, and no image goes there.
 constexpr double kFarthest_px = 1 << 21;
-// Of the line through a spline's nodes: the curve gets a point every two pixels.
-constexpr double kLongestSpline_px = 1 << 20;
+// Of the line through a spline's nodes, drawn by hand: twice around an image of 2^14 pixels a side. The curve gets a
+// point every two pixels.
+constexpr double kLongestSpline_px = 1 << 17;
 
 /// Big-endian numbers at places of a string; a place beyond its end is an InputError.
 class Bytes {
