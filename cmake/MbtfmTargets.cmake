@@ -4,7 +4,7 @@
 add_library(mbtfm_options INTERFACE)
 target_include_directories(mbtfm_options INTERFACE ${CMAKE_SOURCE_DIR})
 # -Wno-restrict: GCC 12 sees overlapping copies in std::string concatenation that are not there (GCC PR 105651)
-target_compile_options(mbtfm_options INTERFACE -Wall -Wextra -Wshadow -Wno-restrict $<$<BOOL:${MBTFM_STRICT}>:-Werror>)
+target_compile_options(mbtfm_options INTERFACE -Wall -Wextra -Wshadow $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<BOOL:${MBTFM_STRICT}>:-Werror>)
 
 function(mbtfm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PUBLIC;PRIVATE")

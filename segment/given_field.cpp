@@ -34,6 +34,9 @@ double scale_of(const TrackParameters& parameters) {
   throw UsageError("length_unit = px needs pixel_size_um: give it in cell.toml or as --pixel_size_um");
 }
 
+// A metre: what lies beyond is damage, or in another unit, and its squares would not be numbers.
+constexpr double kFarthest_um = 1e6;
+
 struct GivenField {
   DisplacementField field;
   bool has_sigma = false;
@@ -43,20 +46,23 @@ GivenField read_rows(const std::filesystem::path& file, const TrackParameters& p
   const CsvTable table(with_commas(read_text(file)), file.string());
   table.require({p.x_column, p.y_column, p.ux_column, p.uy_column});
   const double scale = scale_of(p), first = p.length_unit == "px" ? 0.5 : 0;
+  const Range within = Range::between(-kFarthest_um / scale, kFarthest_um / scale);
   GivenField given{.field = {}, .has_sigma = table.has(p.sigma_column)};
   std::set<std::pair<double, double>> taken;
   for (int row = 0; row < table.n_rows(); ++row) {
     Bead bead;
-    bead.position_um = {scale * (table.number(row, p.x_column) + first),
-                        scale * (table.number(row, p.y_column) + first)};
+    bead.position_um = {scale * (table.number(row, p.x_column, within) + first),
+                        scale * (table.number(row, p.y_column, within) + first)};
     if (table.has("flag")) bead.flag = table.text(row, "flag");
     const bool lacks = is_missing(table.text(row, p.ux_column)) || is_missing(table.text(row, p.uy_column)) ||
                        (given.has_sigma && is_missing(table.text(row, p.sigma_column)));
     if (lacks) {
       bead.flag = "not a number";
     } else {
-      bead.displacement_um = {scale * table.number(row, p.ux_column), scale * table.number(row, p.uy_column)};
-      if (given.has_sigma) bead.sigma_um = scale * table.number(row, p.sigma_column, Range::not_negative());
+      bead.displacement_um = {scale * table.number(row, p.ux_column, within),
+                              scale * table.number(row, p.uy_column, within)};
+      if (given.has_sigma)
+        bead.sigma_um = scale * table.number(row, p.sigma_column, Range::between(0, kFarthest_um / scale));
     }
     if (!taken.emplace(bead.position_um.x, bead.position_um.y).second) bead.flag = "duplicate";
     given.field.push_back(bead);

@@ -46,6 +46,7 @@ Polygon area_um(const RoiSet& set, const Roi& roi, const Field& field) {
     throw InputError(where, "an area: polygon, freehand, traced, oval, ellipse, rectangle or composite",
                      std::string(name_of(roi.shape)));
   }
+  if (roi.is_spline) require_inside(roi.points_px, field, where);  // before it is drawn
   const Polygon polygon_px = area_px(roi);
   require_inside(polygon_px, field, where);
   Polygon polygon_um = in_um(polygon_px, field.pixel_um);
@@ -177,6 +178,7 @@ Fibre drawn_fibre(const RoiSet& set, const Roi& roi, const Field& field) {
     throw InputError(where, "a line: straight, segmented or freehand", std::string(name_of(roi.shape)),
                      is_area(roi.shape) ? "areas belong to adhesions.zip or outline.roi" : "");
   }
+  if (roi.is_spline) require_inside(roi.points_px, field, where);  // before it is drawn
   const Polyline line = line_px(roi);
   require_inside(line, field, where);
   Fibre fibre;

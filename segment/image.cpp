@@ -51,20 +51,34 @@ std::string head_of(const std::filesystem::path& file) {
 
 }  // namespace
 
+namespace {
+
+constexpr std::uint64_t kAlways_bytes = 1u << 28;
+constexpr std::uint64_t kPacking = 16;  // camera noise keeps real images from packing below a third
+constexpr const char* kTooLarge = "an image of a size that the file's bytes can fill";
+constexpr const char* kDamaged = "the file is probably damaged: copy or export it again";
+
+bool can_fill(const std::filesystem::path& file, std::uint64_t n_bytes) {
+  return n_bytes <= kAlways_bytes || n_bytes / kPacking <= std::filesystem::file_size(file);
+}
+
+std::string in_bytes_of(const std::filesystem::path& file) {
+  return " in " + std::to_string(std::filesystem::file_size(file)) + " bytes";
+}
+
+}  // namespace
+
 void require_plausible_size(const std::filesystem::path& file, std::uint64_t width, std::uint64_t height) {
-  constexpr std::uint64_t kAlways = 1u << 26;
-  constexpr std::uint64_t kPacking = 16;
   const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
   if (width == 0 || height == 0) throw InputError(file.string(), "an image of at least one pixel", size);
   constexpr std::uint64_t kLongest = 1u << 30;  // so that products of two sides cannot overflow
-  if (width <= kLongest && height <= kLongest) {
-    const std::uint64_t n_pixels = width * height;
-    if (n_pixels <= kAlways) return;
-    if (n_pixels * sizeof(float) / kPacking <= std::filesystem::file_size(file)) return;
-  }
-  throw InputError(file.string(), "an image of a size that the file's bytes can fill",
-                   size + " in " + std::to_string(std::filesystem::file_size(file)) + " bytes",
-                   "the file is probably damaged: copy or export it again");
+  if (width <= kLongest && height <= kLongest && can_fill(file, width * height * sizeof(float))) return;
+  throw InputError(file.string(), kTooLarge, size + in_bytes_of(file), kDamaged);
+}
+
+void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_bytes) {
+  if (can_fill(file, n_bytes)) return;
+  throw InputError(file.string(), kTooLarge, std::to_string(n_bytes) + " of them" + in_bytes_of(file), kDamaged);
 }
 
 void declare(ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {

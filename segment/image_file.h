@@ -24,6 +24,11 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
 /// @throws InputError
 void require_plausible_size(const std::filesystem::path& file, std::uint64_t width, std::uint64_t height);
 
+/// The same of the bytes that an image, a block of it or a stack of slices takes once decoded: up to 2^28 always, more
+/// than that a sixteenth of them in the file.
+/// @throws InputError
+void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_bytes);
+
 /// The image's calibration as its TIFF tags tell it.
 struct TiffCalibration {
   std::string description;                      ///< ImageDescription; empty: none

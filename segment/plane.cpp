@@ -128,6 +128,9 @@ Neighbours::Neighbours(std::vector<Vec2> points, double cell) : points_(std::mov
     left_ = std::min(left_, p.x), top_ = std::min(top_, p.y);
     last = {std::max(last.x, p.x), std::max(last.y, p.y)};
   }
+  // no more cells than some for each point, however far apart the points are: of a line, or with one astray
+  const double width = last.x - left_, height = last.y - top_, most = 16.0 * static_cast<double>(points_.size());
+  cell_ = std::max({cell_, std::sqrt(width / most) * std::sqrt(height), width / most, height / most});
   nx_ = 1 + static_cast<int>((last.x - left_) / cell_);
   ny_ = 1 + static_cast<int>((last.y - top_) / cell_);
   const auto cell_of = [&](Vec2 p) {

@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::segment {
@@ -22,6 +23,12 @@ constexpr RoiShape kShapes[] = {
     RoiShape::polyline, RoiShape::point /* "none" */, RoiShape::freehand, RoiShape::traced, RoiShape::angle,
     RoiShape::point};
 
+// Beyond it a float has lost the fractions of pixels, and no image goes there.
+constexpr double kFarthest_px = 1 << 21;
+// Of the line through a spline's nodes, drawn by hand: twice around an image of 2^14 pixels a side. The curve gets a
+// point every two pixels.
+constexpr double kLongestSpline_px = 1 << 17;
+
 /// Big-endian numbers at places of a string; a place beyond its end is an InputError.
 class Bytes {
  public:
@@ -36,6 +43,12 @@ class Bytes {
   double real(std::size_t at) const {
     const float value = std::bit_cast<float>(number(at, 4));
     if (!std::isfinite(value)) throw InputError(where_, "finite coordinates", "NaN or infinity");
+    return value;
+  }
+  double coordinate(std::size_t at) const {
+    const double value = real(at);
+    if (std::abs(value) > kFarthest_px)
+      refuse("coordinates up to " + std::to_string(std::lround(kFarthest_px)) + " pixels", brief(value));
     return value;
   }
   [[noreturn]] void refuse(const std::string& expected, const std::string& found) const {
@@ -109,7 +122,7 @@ std::vector<Vec2> points_in(const Bytes& bytes, bool is_sub_pixel, Vec2 corner) 
   points.reserve(n);
   for (std::size_t i = 0; i < n; ++i) {
     if (is_sub_pixel) {
-      points.push_back({bytes.real(n_shorts + 4 * i), bytes.real(n_shorts + 4 * (n + i))});
+      points.push_back({bytes.coordinate(n_shorts + 4 * i), bytes.coordinate(n_shorts + 4 * (n + i))});
     } else {
       const std::size_t at = kCoordinates + 2 * i;
       points.push_back(corner +
@@ -134,7 +147,7 @@ std::vector<Polygon> paths_in(const Bytes& bytes) {
     Polygon nodes;
     if (n_points > 1) nodes.push_back(paths.back().back());
     for (std::size_t k = 0; k < n_points; ++k, i += 2)
-      nodes.push_back({bytes.real(kCoordinates + 4 * i), bytes.real(kCoordinates + 4 * i + 4)});
+      nodes.push_back({bytes.coordinate(kCoordinates + 4 * i), bytes.coordinate(kCoordinates + 4 * i + 4)});
     append_curve(paths.back(), nodes);
   }
   return paths;
@@ -155,7 +168,9 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
   const bool is_box = roi.shape == RoiShape::rectangle || roi.shape == RoiShape::oval;
   const bool is_sub_pixel =
       (bytes.number(kOptions, 2) & kSubPixel) != 0 && bytes.whole(kVersion) >= (is_box ? 223 : 222);
-  const auto reals = [&](int i) { return Vec2{bytes.real(kFloats + 8 * i), bytes.real(kFloats + 8 * i + 4)}; };
+  const auto reals = [&](int i) {
+    return Vec2{bytes.coordinate(kFloats + 8 * i), bytes.coordinate(kFloats + 8 * i + 4)};
+  };
   const Vec2 corner{static_cast<double>(bytes.whole(kLeft)), static_cast<double>(bytes.whole(kTop))};
   const Vec2 far_corner{static_cast<double>(bytes.whole(kRight)), static_cast<double>(bytes.whole(kBottom))};
   switch (roi.shape) {
@@ -181,6 +196,10 @@ void read_geometry(Roi& roi, const Bytes& bytes) {
     default:
       roi.points_px = points_in(bytes, is_sub_pixel, corner);
       roi.is_spline = (bytes.number(kOptions, 2) & kSpline) != 0;
+      if (roi.is_spline && length_um(roi.points_px) > kLongestSpline_px) {
+        bytes.refuse("a spline of at most " + std::to_string(std::lround(kLongestSpline_px)) + " pixels",
+                     "one of " + brief(length_um(roi.points_px)));
+      }
   }
 }
 

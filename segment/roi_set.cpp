@@ -4,6 +4,7 @@
 #include <memory>
 #include <set>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "segment/roi.h"
 
@@ -12,8 +13,10 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kLargestRoi = 1u << 24;  // bytes: a million points, beyond anything drawn
-constexpr std::size_t kLargestSet = 1u << 28;  // bytes of all ROIs together
+constexpr std::size_t kLargestRoi = 1u << 24;   // bytes: a million points, beyond anything drawn
+constexpr std::size_t kLargestSet = 1u << 28;   // bytes of all ROIs together
+constexpr std::size_t kMostRois = 1u << 16;     // beyond anything drawn; each may be drawn with 360 corners
+constexpr double kLongestSplines_px = 1 << 24;  // of all ROIs together: a point every two pixels
 constexpr const char* kExpected = "an ImageJ ROI (.roi) or a set of them (.zip)";
 
 struct Discard {
@@ -57,6 +60,7 @@ std::vector<Roi> read_zip(const fs::path& file) {
   if (!archive) refuse_damaged(file.string(), message_of(code));
   std::vector<Roi> rois;
   std::size_t n_bytes = 0;
+  double splines_px = 0;
   const zip_int64_t n_entries = zip_get_num_entries(archive.get(), 0);
   for (zip_int64_t i = 0; i < n_entries; ++i) {
     const auto index = static_cast<zip_uint64_t>(i);
@@ -70,6 +74,11 @@ std::vector<Roi> read_zip(const fs::path& file) {
     if (n_bytes > kLargestSet)
       refuse_damaged(file.string(), "more than " + std::to_string(kLargestSet) + " bytes in it");
     rois.push_back(decode_roi(bytes, where));
+    if (rois.size() > kMostRois)
+      refuse_damaged(file.string(), "more than " + std::to_string(kMostRois) + " ROIs in it");
+    if (rois.back().is_spline) splines_px += length_um(rois.back().points_px);
+    if (splines_px > kLongestSplines_px)
+      refuse_damaged(file.string(), "splines of " + brief(splines_px) + " pixels in it");
     if (rois.back().name.empty()) rois.back().name = name.stem().string();
   }
   if (rois.empty()) throw InputError(file.string(), kExpected, "a zip archive without a .roi in it");

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <set>
 
 #include "pipeline/contract/errors.h"
 #include "segment/image_file.h"
@@ -60,6 +61,9 @@ Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
     for (std::size_t i = 0; i < planes.size(); ++i) s.pages[planes[i]] = static_cast<int>(i);
     return s;
   }
+  std::vector<std::size_t> place_of(planes.size());  // of a plane in the order stored
+  for (std::size_t i = 0; i < planes.size(); ++i) place_of[planes[i]] = i;
+  std::size_t n_assigned = 0;
   for (const OmePages& p : ome.pages) {
     const bool is_here =
         (p.uuid.empty() && p.file_name.empty()) || (!p.uuid.empty() && p.uuid == ome.uuid) || p.file_name == file_name;
@@ -67,9 +71,14 @@ Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
     if (p.first_channel >= s.n_channels || p.first_slice >= s.n_slices || p.first_frame >= s.n_frames)
       throw InvalidData("OME-XML", "TiffData of a plane that is there", "one beyond the dimensions");
     const int first = (p.first_frame * s.n_slices + p.first_slice) * s.n_channels + p.first_channel;
-    auto at = std::find(planes.begin(), planes.end(), first);
     int page = p.first_page;
-    for (int n = 0; at != planes.end() && (!p.n_planes || n < *p.n_planes); ++n) s.pages[*at++] = page++;
+    std::size_t at = place_of[first];
+    for (int n = 0; at < planes.size() && (!p.n_planes || n < *p.n_planes); ++n) {
+      // a plane may be told of twice; a damaged file tells of all of them over and over
+      if (++n_assigned > 2 * planes.size())
+        throw InvalidData("OME-XML", "TiffData that tell of each plane once", "the same planes over and over");
+      s.pages[planes[at++]] = page++;
+    }
   }
   return s;
 }
@@ -186,6 +195,8 @@ std::vector<int> chosen_pages(const Stack& s, const PlaneChoice& choice, const s
     }
     pages.push_back(*page);
   }
+  if (std::set(pages.begin(), pages.end()).size() != pages.size())
+    throw InputError(file, "a page of its own for each slice", "the same page for several");
   return pages;
 }
 

@@ -43,6 +43,7 @@ class Reader {
     (stack.n_channels > 1 ? of_page : of_stack).channel.clear();
     const std::vector<int> pages = chosen_pages(stack, of_stack, file_.string());
     Image image = read_page(pages.front(), of_page);
+    require_plausible_bytes(file_, pages.size() * image.pixels.size() * std::max(1, layout_.bits / 8));
     for (std::size_t i = 1; i < pages.size(); ++i) project(image, read_page(pages[i], of_page));
     return image;
   }
@@ -278,6 +279,8 @@ class Reader {
         static_cast<std::uint64_t>(block_bytes) < needed * block_height || samples > 64) {
       fail("a readable image");
     }
+    require_plausible_bytes(file_, static_cast<std::uint64_t>(block_bytes));
+    require_plausible_bytes(file_, samples * block_width * sizeof(float));
     std::vector<unsigned char> block(static_cast<std::size_t>(block_bytes));
     std::vector<float> row(samples * block_width);
     for (std::uint32_t top = 0; top < layout_.height; top += block_height) {

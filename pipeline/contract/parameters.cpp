@@ -11,6 +11,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/toml_depth.h"
 
 namespace mbtfm {
 
@@ -190,6 +191,7 @@ void read_toml(ParameterList& list, const std::filesystem::path& file) {
 }
 
 void read_toml(ParameterList& list, std::string_view text, const std::string& name) {
+  expect_shallow_keys(text, name);
   toml::table root;
   try {
     root = toml::parse(text);

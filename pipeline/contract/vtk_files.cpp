@@ -10,15 +10,17 @@
 #include <vtkPolyData.h>
 #include <vtkUnstructuredGrid.h>
 #include <vtkXMLPolyDataWriter.h>
-#include <vtkXMLUnstructuredGridReader.h>
 #include <vtkXMLUnstructuredGridWriter.h>
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/vtk_errors.h"
+#include "pipeline/contract/vtu_file.h"
 
 namespace mbtfm {
 
@@ -122,65 +124,36 @@ vtkNew<vtkDoubleArray> double_array(const GridArray& values) {
   return array;
 }
 
-vtkDataArray* array_of(vtkDataSetAttributes* attributes, const char* name, vtkIdType n, const Path& file,
-                       const char* kind) {
-  vtkDataArray* array = attributes->GetArray(name);
-  if (array == nullptr)
-    throw InputError(file.string(), std::string(kind) + " array '" + name + "'", "none of that name");
-  if (array->GetNumberOfTuples() != n || array->GetNumberOfComponents() != 1) {
-    throw InputError(file.string() + ": array '" + name + "'", std::to_string(n) + " single values",
-                     std::to_string(array->GetNumberOfTuples()) + " of " +
-                         std::to_string(array->GetNumberOfComponents()) + " components");
-  }
-  return array;
+/// An id or the number of a vertex. @throws InputError
+int whole_number(double value, const std::string& where) {
+  constexpr double kLargest = std::numeric_limits<int>::max();
+  if (value == std::floor(value) && std::abs(value) <= kLargest) return static_cast<int>(value);
+  throw InputError(where, "whole numbers", shortest(value));
 }
 
-vtkNew<vtkUnstructuredGrid> read_grid(const Path& file) {
-  const std::string text = read_text(file);
-  if (text.find("</VTKFile>") == std::string::npos) {
-    throw InputError(file.string(), "a VTK XML file that ends with </VTKFile>", "an early end or another format");
-  }
-  vtkNew<vtkXMLUnstructuredGridReader> reader;
-  const VtkErrors errors;
-  reader->SetReadFromInputString(true);
-  reader->SetInputString(text);
-  reader->Update();
-  if (reader->GetErrorCode() != 0 || !errors.text().empty()) {
-    throw InputError(file.string(), "an unstructured grid (.vtu)", errors.text());
-  }
-  vtkNew<vtkUnstructuredGrid> grid;
-  grid->ShallowCopy(reader->GetOutput());
-  if (grid->GetPoints() == nullptr) throw InputError(file.string(), "an unstructured grid (.vtu)", "no points");
-  return grid;
+std::vector<int> whole_numbers(const VtuFile& vtu, VtuSection section, const std::string& array, const Path& file) {
+  std::vector<int> numbers;
+  for (const double value : vtu.scalars(section, array))
+    numbers.push_back(whole_number(value, file.string() + ": array '" + array + "'"));
+  return numbers;
 }
 
-Network network_of(vtkUnstructuredGrid* grid, const Path& file) {
-  const vtkIdType n_points = grid->GetNumberOfPoints();
-  const vtkIdType n_cells = grid->GetNumberOfCells();
-  vtkDataArray* adhesion = array_of(grid->GetPointData(), "adhesion_id", n_points, file, "point");
-  vtkDataArray* fibre = array_of(grid->GetCellData(), "fibre_id", n_cells, file, "cell");
-  vtkDataArray* rest = array_of(grid->GetCellData(), "rest_length_um", n_cells, file, "cell");
-  const bool has_share = grid->GetCellData()->GetArray("share") != nullptr;
-  vtkDataArray* share = has_share ? array_of(grid->GetCellData(), "share", n_cells, file, "cell") : nullptr;
+Network network_of(const VtuFile& vtu, const Path& file) {
   Network network;
-  for (vtkIdType v = 0; v < n_points; ++v) {
-    const double* p = grid->GetPoint(v);
-    network.vertices_um.push_back({p[0], p[1]});
-    network.adhesion_id.push_back(static_cast<int>(adhesion->GetTuple1(v)));
-  }
-  for (vtkIdType k = 0; k < n_cells; ++k) {
-    vtkIdType n_ends = 0;
-    const vtkIdType* ends = nullptr;
-    grid->GetCellPoints(k, n_ends, ends);
-    if (grid->GetCellType(k) != VTK_LINE || n_ends != 2) {
-      throw InputError(file.string() + ": cell " + std::to_string(k), "a line of two points",
-                       "cell type " + std::to_string(grid->GetCellType(k)));
-    }
-    network.links.push_back({.vertex_a = static_cast<int>(ends[0]),
-                             .vertex_b = static_cast<int>(ends[1]),
-                             .fibre_id = static_cast<int>(fibre->GetTuple1(k)),
-                             .rest_length_um = rest->GetTuple1(k),
-                             .share = share ? share->GetTuple1(k) : 1.0});
+  const std::vector<double> xyz_um = vtu.coordinates(), ends = vtu.line_ends();
+  for (std::size_t at = 0; at < xyz_um.size(); at += 3) network.vertices_um.push_back({xyz_um[at], xyz_um[at + 1]});
+  network.adhesion_id = whole_numbers(vtu, VtuSection::point_data, "adhesion_id", file);
+  const std::vector<int> fibre_id = whole_numbers(vtu, VtuSection::cell_data, "fibre_id", file);
+  const std::vector<double> rest_um = vtu.scalars(VtuSection::cell_data, "rest_length_um");
+  std::vector<double> share(fibre_id.size(), 1.0);
+  if (vtu.has(VtuSection::cell_data, "share")) share = vtu.scalars(VtuSection::cell_data, "share");
+  for (std::size_t k = 0; k < fibre_id.size(); ++k) {
+    const std::string where = file.string() + ": cell " + std::to_string(k);
+    network.links.push_back({.vertex_a = whole_number(ends[2 * k], where),
+                             .vertex_b = whole_number(ends[2 * k + 1], where),
+                             .fibre_id = fibre_id[k],
+                             .rest_length_um = rest_um[k],
+                             .share = share[k]});
   }
   try {
     check(network);
@@ -192,10 +165,7 @@ Network network_of(vtkUnstructuredGrid* grid, const Path& file) {
 
 }  // namespace
 
-Network read_network(const Path& file) {
-  const vtkNew<vtkUnstructuredGrid> grid = read_grid(file);
-  return network_of(grid, file);
-}
+Network read_network(const Path& file) { return network_of(VtuFile(read_text(file), file.string()), file); }
 
 void write_network(const Path& file, const Network& network) {
   check(network);
@@ -204,12 +174,8 @@ void write_network(const Path& file, const Network& network) {
 }
 
 ContractedNetwork read_contracted_network(const Path& file) {
-  const vtkNew<vtkUnstructuredGrid> grid = read_grid(file);
-  ContractedNetwork contracted{.network = network_of(grid, file), .link_force_nN = {}};
-  const vtkIdType n_cells = grid->GetNumberOfCells();
-  vtkDataArray* force = array_of(grid->GetCellData(), "force_nN", n_cells, file, "cell");
-  for (vtkIdType k = 0; k < n_cells; ++k) contracted.link_force_nN.push_back(force->GetTuple1(k));
-  return contracted;
+  const VtuFile vtu(read_text(file), file.string());
+  return {.network = network_of(vtu, file), .link_force_nN = vtu.scalars(VtuSection::cell_data, "force_nN")};
 }
 
 void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,

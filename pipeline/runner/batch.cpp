@@ -166,7 +166,7 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
   }
   for (const auto& [key, same] : cells_by_settings) {
     const auto stage =
-        std::find_if(stages().begin(), stages().end(), [&](const Stage& s) { return s.name == key.first; });
+        std::find_if(stages().begin(), stages().end(), [&, &key = key](const Stage& s) { return s.name == key.first; });
     try {
       check_parameters(*stage, same.front()->outcome.cell / "cell.toml", options.run, [](std::string_view) {});
     } catch (const StageFailed& error) {

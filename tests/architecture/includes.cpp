@@ -36,7 +36,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"png", {"segment"}},
     {"jpeglib", {"segment"}},
     {"zip", {"segment"}},
-    {"expat", {"segment"}},
+    {"expat", {"segment", "pipeline/contract"}},
     {"CGAL/", {"network"}},
     {"Eigen/", {"network", "substrate", "mbtfm", "samples", "pipeline", "pipeline/numerics"}},
     {"fftw3", {"mbtfm"}},

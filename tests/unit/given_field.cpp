@@ -76,12 +76,24 @@ TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
   EXPECT_EQ(std::count_if(field.begin(), field.end(), [](const Bead& b) { return b.flag.empty(); }), 63);
 }
 
+/// The search for neighbours takes memory for the points, not for the ways between them.
+TEST(GivenField, points_on_a_line_and_points_astray_are_read) {
+  const test::TemporaryFolder folder;
+  for (const bool is_line : {true, false}) {
+    CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
+    for (int i = 0; i < 40; ++i) csv.add(1.0 * (i % 20)).add(is_line ? 0.0 : i / 20).add(0.1).add(0.01 * i).end_row();
+    csv.add(9e5).add(is_line ? 0.0 : 9e5).add(0.1).add(0.1).end_row();
+    EXPECT_EQ(read_given_field(write(folder, csv.str()), {}).size(), 41u);
+  }
+}
+
 TEST(GivenField, what_is_wrong_with_a_file_is_said) {
   const test::TemporaryFolder folder;
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,u,v\n1,2,3,4\n"), {}), InputError);
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\nNaN,2,3,4\n"), {}), InputError);
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1,2,NaN,4\n"), {}), InputError);
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n"), {}), InputError);
+  EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1e200,2,3,4\n"), {}), InputError);
   TrackParameters pixels;
   pixels.length_unit = "px";
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1,2,3,4\n"), pixels), UsageError);

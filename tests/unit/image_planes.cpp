@@ -130,6 +130,19 @@ TEST(ImagePlanes, a_plane_in_another_file_of_an_ome_set_is_an_error) {
   EXPECT_NE(refusal(folder / "a.ome.tif", {.channel = "2"}).find("another file of the set"), std::string::npos);
 }
 
+TEST(ImagePlanes, ome_tells_of_each_plane_once_and_each_slice_has_a_page_of_its_own) {
+  const TemporaryFolder folder;
+  const std::string one_slice = "SizeC='1' SizeZ='3' SizeT='1'";
+  write_pages(folder / "same.tif", 3,
+              ome(one_slice, "<TiffData IFD='0' FirstZ='0' PlaneCount='2'/><TiffData IFD='1' FirstZ='2'/>"));
+  EXPECT_NE(refusal(folder / "same.tif", {}).find("the same page for several"), std::string::npos);
+  EXPECT_EQ(value_of(folder / "same.tif", {.z = "3"}), 1);
+  std::string again;
+  for (int i = 0; i < 100; ++i) again += "<TiffData/>";
+  write_pages(folder / "again.tif", 3, ome(one_slice, again));
+  EXPECT_NE(refusal(folder / "again.tif", {}).find("over and over"), std::string::npos);
+}
+
 TEST(ImagePlanes, channels_are_called_by_name_and_listed_where_none_was_chosen) {
   const TemporaryFolder folder;
   const fs::path file = folder / "a.ome.tif";

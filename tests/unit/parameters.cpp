@@ -82,6 +82,14 @@ TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refuse
   EXPECT_NE(message_of("[network]\ncount = [1, 2]\n").find("array"), std::string::npos);
 }
 
+TEST(Parameters, a_key_of_very_many_parts_is_refused_before_it_is_taken_apart) {
+  constexpr int kParts = 200000;  // took down 8 MB of stack
+  std::string key = "a";
+  for (int i = 1; i < kParts; ++i) key += ".a";
+  for (const std::string& text : {key + " = 1\n", "\n[" + key + "]\n", "x = {" + key + " = 1}\n"})
+    EXPECT_NE(message_of(text).find("dots on a line"), std::string::npos);
+}
+
 TEST(Parameters, a_gel_needs_its_modulus_and_a_poisson_ratio_below_one_half) {
   Gel gel;
   ParameterList list;

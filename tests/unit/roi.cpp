@@ -128,6 +128,19 @@ TEST(Roi, a_spline_passes_its_nodes_and_turns_nowhere_sharply) {
   }
 }
 
+TEST(Roi, a_spline_longer_than_any_image_is_refused_before_it_is_drawn) {
+  constexpr std::size_t kOptions = 51;
+  constexpr char kSpline = 1;
+  const auto spline = [&](double reach_px) {
+    std::string bytes = encode_roi(polygon("outline", {{0, 0}, {reach_px, 0}, {0, reach_px}, {reach_px, 1}}));
+    bytes[kOptions] = static_cast<char>(bytes[kOptions] | kSpline);
+    return bytes;
+  };
+  EXPECT_EQ(decode_roi(spline(3000), "here").points_px.size(), 4u);
+  for (const double reach_px : {6e4, 1e7, 1e20, 3e38})
+    EXPECT_THROW(decode_roi(spline(reach_px), "here"), InputError) << reach_px;
+}
+
 std::string error_of(const fs::path& file) {
   try {
     read_rois(file);

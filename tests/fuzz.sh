@@ -1,0 +1,37 @@
+#!/usr/bin/env bash
+# Reads damaged files with every reader, under the address and undefined-behaviour sanitizers: with clang and its
+# libFuzzer where they are installed (Debian: clang, libclang-rt-14-dev), else with GCC and the suite's own loop.
+#   tests/fuzz.sh [FAMILY]...      csv, field, vtu, settings, records, image, ome, roi; all without one
+# MBTFM_FUZZ_INPUTS: how many inputs by family (a million). What breaks a reader is kept in the build folder's tests/.
+set -euo pipefail
+cd "$(dirname "$0")/.."
+families=("$@")
+[ $# -gt 0 ] || families=(csv field vtu settings records image ome roi)
+inputs=${MBTFM_FUZZ_INPUTS:-1000000}
+export UBSAN_OPTIONS=print_stacktrace=1
+
+if echo 'extern "C" int LLVMFuzzerTestOneInput(const char*, unsigned long) { return 0; }' |
+    clang++ -x c++ -fsanitize=fuzzer - -o /dev/null 2>/dev/null; then
+  build=build-fuzz
+  cmake --preset fuzz >/dev/null
+else
+  build=build-asan
+  cmake --preset asan-ubsan >/dev/null
+fi
+
+failed=()
+for family in "${families[@]}"; do
+  echo "== $family"
+  if [ $build = build-fuzz ]; then
+    cmake --build $build --target "fuzzer_$family"
+    export MBTFM_FUZZ_CORPUS=$build/tests/corpus-$family
+    mkdir -p "$MBTFM_FUZZ_CORPUS"
+    # libFuzzer reads its corpus after the target has put the samples there
+    "$build/tests/fuzzer_$family" -runs="$inputs" -timeout=5 -malloc_limit_mb=1024 -rss_limit_mb=2048 -max_len=131072 \
+      -print_final_stats=1 -verbosity=0 -artifact_prefix="$build/tests/$family-" "$MBTFM_FUZZ_CORPUS" || failed+=("$family")
+  else
+    cmake --build $build --target "fuzz_read_$family"
+    MBTFM_FUZZ_INPUTS=$inputs "$build/tests/fuzz_read_$family" || failed+=("$family")
+  fi
+done
+[ ${#failed[@]} -eq 0 ] || { echo "broken: ${failed[*]}" >&2; exit 1; }

@@ -1,0 +1,53 @@
+/// The tables between stages.
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/files.h"
+#include "tests/fuzz/target.h"
+#include "tests/support/fake_tables.h"
+
+namespace mbtfm::fuzz {
+
+namespace fs = std::filesystem;
+
+const char* const kFamily = "csv";
+const int kInputs = 25000;
+
+namespace {
+
+/// A cell's tables by name, whole, in the folder `whole`; in `damaged-NAME` one of them is the input.
+const std::vector<std::string>& cell_tables() {
+  static const std::vector<std::string> names = [] {
+    test::write_cell(folder() / "whole");
+    put("input.csv", "");
+    for (const std::string& damaged : kCellFiles) {
+      const fs::path inside = folder() / ("damaged-" + damaged);
+      fs::create_directory(inside);
+      for (const std::string& name : kCellFiles)
+        fs::create_symlink(name == damaged ? folder() / "input.csv" : folder() / "whole" / name, inside / name);
+    }
+    return kCellFiles;
+  }();
+  return names;
+}
+
+}  // namespace
+
+std::vector<std::string> samples() {
+  std::vector<std::string> texts;
+  for (const std::string& name : cell_tables()) texts.push_back(bytes_of(folder() / "whole" / name));
+  for (const fs::path& file : test::write_tables(folder() / "whole")) texts.push_back(bytes_of(file));
+  return texts;
+}
+
+}  // namespace mbtfm::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
+  using namespace mbtfm;
+  const auto& tables = fuzz::cell_tables();
+  const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
+  fuzz::answer([&] { read_displacement(file); });
+  fuzz::answer([&] { read_points(file); });
+  fuzz::answer([&] { read_tensions(file); });
+  fuzz::answer([&] { read_adhesion_forces(file); });
+  for (const std::string& name : tables) fuzz::answer([&] { read_cell(fuzz::folder() / ("damaged-" + name)); });
+  return 0;
+}

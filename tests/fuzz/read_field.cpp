@@ -1,0 +1,32 @@
+/// Displacement fields of other programs.
+#include "segment/given_field.h"
+#include "tests/fuzz/target.h"
+#include "tests/support/fake_tables.h"
+
+namespace mbtfm::fuzz {
+
+const char* const kFamily = "field";
+const int kInputs = 60000;
+
+std::vector<std::string> samples() {
+  std::string spreadsheet = "i;x_um;y_um;ux_um;uy_um\n", line = "x_um\ty_um\tux_um\tuy_um\tsigma_um\n";
+  for (int i = 0; i < 25; ++i) {
+    const std::string place = std::to_string(i % 5) + ";" + std::to_string(i / 5);
+    spreadsheet += std::to_string(i) + ";" + place + ";0." + std::to_string(i) + (i == 7 ? ";NaN\n" : ";-0.25\n");
+    line += std::to_string(10 * i) + "\t3\t1e-3\t0.5\t0.1\n";
+  }
+  return {bytes_of(test::write_tables(folder() / "whole").front()), spreadsheet, line};
+}
+
+}  // namespace mbtfm::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
+  using namespace mbtfm;
+  const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
+  segment::TrackParameters in_pixels;
+  in_pixels.length_unit = "px";
+  in_pixels.pixel_size_um = 0.1;
+  fuzz::answer([&] { segment::outwardness(segment::read_given_field(file, {})); });
+  fuzz::answer([&] { segment::read_given_field(file, in_pixels); });
+  return 0;
+}

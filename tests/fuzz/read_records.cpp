@@ -1,0 +1,93 @@
+/// What the runner reads of a cell that it finds: record.json, fit.json, run.json, and the hashes it keeps.
+#include "pipeline/contract/files.h"
+#include "pipeline/runner/batch_table.h"
+#include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/run_record.h"
+#include "pipeline/runner/stages.h"
+#include "pipeline/runner/verify.h"
+#include "tests/fuzz/target.h"
+
+namespace mbtfm::fuzz {
+
+const char* const kFamily = "records";
+const int kInputs = 4000;
+
+std::vector<std::string> samples() {
+  const std::string hash(64, 'a');
+  put("whole.json", "");
+  write_fit_summary(
+      folder() / "whole.json",
+      {.relative_l2 = 0.1,
+       .noise_um = 0.02,
+       .total_force_nN = 80,
+       .converged = true,
+       .error_budget = ErrorBudget{.tensions = {{.fibre_id = 1, .tension_nN = 3, .parts_nN = {.mesh = 0.1}}},
+                                   .total_force_nN = 80,
+                                   .total_force_parts_nN = {}},
+       .more = {{"loss", std::string("huber")}, {"n_beads", std::int64_t{200}}, {"is_lost", false}}});
+  return {
+      bytes_of(folder() / "whole.json"),
+      R"({"stage": "fit", "figures": {"relative_l2": 0.1, "n": 3}, "summary": "two fibres", "outputs": [{"file": "fit.json"}],
+ "effects": [{"name": "mesh", "switch": "auto", "on": true, "number": 0.5, "why": "it matters", "seconds": 1}],
+ "run": {"finished": true, "converged": true, "version": "0.1.0", "settings": {"gel": {"thickness_um": 60}},
+  "inputs": {"3_network/network.vtu": ")" +
+          hash + R"("}, "outputs": {"4_fit/fit.json": ")" + hash + R"("},
+  "command": ["mbtfm-fit"], "seconds": 1.5, "peak_memory_MB": 30}})",
+      R"({"version": "0.1.0", "outcome": "failed", "failure": {"stage": "fit", "how": "exit code 3", "message": "m"},
+ "stages": {"fit": {"status": "run", "run": {"finished": true, "settings": {}, "inputs": {"a.csv": ")" +
+          hash + R"("},
+  "outputs": {"4_fit/fit.json": ")" +
+          hash + R"("}}}}})",
+      hash + " 20 1700000000000000000 1700000000000000000 65 1234 cell.toml\n" + hash + " 1 2 3 4 5 a b.csv\n"};
+}
+
+namespace {
+
+const std::string kToml = "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\n";
+
+/// A cell in which the input is the file of this name.
+std::filesystem::path cell_with(const std::string& name, std::string_view input) {
+  const std::string cell = "cell-with-" + std::filesystem::path(name).filename().string();
+  if (!std::filesystem::exists(folder() / cell / "cell.toml")) put(cell + "/cell.toml", kToml);
+  put(cell + "/" + name, input);
+  return folder() / cell;
+}
+
+/// No stage was run.
+runner::CellOutcome untouched() {
+  runner::CellOutcome outcome;
+  for (const runner::Stage& stage : runner::stages()) outcome.stages.emplace_back().stage = stage.name;
+  return outcome;
+}
+
+}  // namespace
+}  // namespace mbtfm::fuzz
+
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
+  using namespace mbtfm;
+  const std::string_view input = fuzz::text_of(bytes, n);
+  runner::RunOptions options;
+  options.version = "0.1.0";
+
+  const auto run = fuzz::cell_with("run.json", input);
+  fuzz::answer([&] { runner::recorded_failure(run); });
+  fuzz::answer([&] { runner::run_record_tells_of(run, options); });
+  fuzz::answer([&] { runner::verify_cell(run); });
+
+  const auto recorded = fuzz::cell_with("4_fit/record.json", input);
+  fuzz::answer([&] { runner::write_run_record(recorded, options, runner::look_at_cell(recorded, options)); });
+  fuzz::answer([&] { runner::last_summary(recorded, {}); });
+  fuzz::answer([&] {
+    runner::BatchCell cell;
+    cell.cell = recorded;
+    runner::write_batch_table(fuzz::folder() / "batch.csv", fuzz::folder(), {cell}, {});
+  });
+
+  const auto fitted = fuzz::cell_with("4_fit/fit.json", input);
+  fuzz::answer([&] { read_fit_summary(fitted / "4_fit/fit.json"); });
+  fuzz::answer([&] { runner::write_run_record(fitted, options, fuzz::untouched()); });
+
+  const auto hashed = fuzz::cell_with(".mbtfm.hashes", input);
+  fuzz::answer([&] { runner::HashCache(hashed).hash({"cell.toml"}); });
+  return 0;
+}

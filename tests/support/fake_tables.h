@@ -1,0 +1,94 @@
+/// The files of a small made-up cell, for tests of their readers.
+#pragma once
+
+#include <filesystem>
+#include <vector>
+
+#include "pipeline/contract/files.h"
+
+namespace mbtfm::test {
+
+inline Cell small_cell() {
+  const auto adhesion = [](int id, Vec2 place_um) {
+    return Adhesion{.adhesion_id = id,
+                    .position_um = place_um,
+                    .area_um2 = 0.5,
+                    .major_axis_um = 1.2,
+                    .minor_axis_um = 0.53,
+                    .angle_rad = 0.1 * id,
+                    .eccentricity = 0.9,
+                    .mean_intensity = 812.5};
+  };
+  Cell cell;
+  cell.adhesions = {adhesion(1, {10, 10}), adhesion(2, {20.25, 12}), adhesion(7, {15, 1.0 / 3 + 20})};
+  cell.fibres = {{.fibre_id = 1,
+                  .type = FibreType::ventral,
+                  .width_um = 0.6,
+                  .start_adhesion_id = 1,
+                  .end_adhesion_id = 2,
+                  .mean_intensity = 950,
+                  .confidence = 1,
+                  .points_um = {{10, 10}, {15, 11.5}, {20.25, 12}},
+                  .type_confidence = 0.9,
+                  .type_reason = "start held, end held; \"both\""},
+                 {.fibre_id = 4,
+                  .type = FibreType::arc,
+                  .width_um = 0.8,
+                  .start_adhesion_id = {},
+                  .end_adhesion_id = {},
+                  .mean_intensity = 40,
+                  .confidence = 0.5,
+                  .points_um = {{12, 14}, {14, 16}},
+                  .type_confidence = 1,
+                  .type_reason = ""}};
+  cell.outline_um = {{5, 5}, {25, 5}, {25, 25}, {5, 25}};
+  cell.holes_um = {{{16, 6}, {17, 6}, {16.5, 7}}};
+  return cell;
+}
+
+/// Of enough vertices that its arrays fill many blocks of 64 bytes.
+inline Network small_network() {
+  Network network;
+  constexpr int kVertices = 41;
+  for (int v = 0; v < kVertices; ++v) {
+    network.vertices_um.push_back({v / 3.0, 50 - v * v / 7.0});
+    network.adhesion_id.push_back(v % 5 == 0 ? 1 + v / 5 : 0);
+    if (v == 0) continue;
+    network.links.push_back({.vertex_a = v - 1, .vertex_b = v, .fibre_id = v % 3, .rest_length_um = 1 + v / 9.0});
+  }
+  return network;
+}
+
+/// kCellFiles
+inline void write_cell(const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  const Cell cell = small_cell();
+  write_adhesions(folder / "adhesions.csv", cell.adhesions);
+  write_fibres(folder / "fibres.csv", folder / "fibre_points.csv", cell.fibres);
+  write_outline(folder / "outline.csv", cell.outline_um, cell.holes_um);
+}
+
+/// The other tables. @returns their paths
+inline std::vector<std::filesystem::path> write_tables(const std::filesystem::path& folder) {
+  std::filesystem::create_directories(folder);
+  DisplacementField field;
+  for (int i = 0; i < 20; ++i) {
+    field.push_back({.position_um = {1.5 * i, 30.0 - i * i / 13.0},
+                     .displacement_um = {0.1 * i, -1e-7 * i},
+                     .sigma_um = 0.02,
+                     .flag = i == 3 ? "neighbours disagree" : ""});
+  }
+  write_displacement(folder / "displacement.csv", field);
+  write_tensions(folder / "tensions.csv",
+                 {{.fibre_id = 0, .tension_nN = 0.06, .low_nN = 0.03, .high_nN = 0.09},
+                  {.fibre_id = 1, .tension_nN = 4.2, .low_nN = {}, .high_nN = {}, .identifiable = false}},
+                 small_cell().fibres);
+  write_adhesion_forces(
+      folder / "adhesion_forces.csv",
+      {{.adhesion_id = 1, .force_nN = {-2.9, 0.1}, .sigma_nN = 0.3, .connected = true, .moment_nN_um = 0.02},
+       {.adhesion_id = 7, .force_nN = {2.9, -0.1}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}}},
+      small_cell().adhesions);
+  return {folder / "displacement.csv", folder / "tensions.csv", folder / "adhesion_forces.csv"};
+}
+
+}  // namespace mbtfm::test

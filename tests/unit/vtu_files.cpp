@@ -1,0 +1,162 @@
+/// network.vtu as others write it, and damaged.
+#include <gtest/gtest.h>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/files.h"
+#include "tests/support/fake_tables.h"
+#include "tests/support/temporary_folder.h"
+#include "tests/support/vtu_variants.h"
+
+namespace mbtfm {
+namespace {
+
+using test::TemporaryFolder;
+
+std::string written(const TemporaryFolder& folder) {
+  write_network(folder / "written.vtu", test::small_network());
+  return read_text(folder / "written.vtu");
+}
+
+Network read_back(const TemporaryFolder& folder, const std::string& text) {
+  write_text(folder / "read.vtu", text);
+  return read_network(folder / "read.vtu");
+}
+
+std::string refusal(const TemporaryFolder& folder, const std::string& text) {
+  try {
+    read_back(folder, text);
+  } catch (const InputError& error) {
+    return error.what() + std::string("; ") + error.hint;
+  }
+  return "read";
+}
+
+std::string with(std::string text, const std::string& old, const std::string& now) {
+  const std::size_t at = text.find(old);
+  EXPECT_NE(at, text.npos) << old;
+  return at == text.npos ? text : text.replace(at, old.size(), now);
+}
+
+void expect_same(const Network& read, const Network& truth) {
+  EXPECT_TRUE(read.vertices_um == truth.vertices_um);
+  EXPECT_EQ(read.adhesion_id, truth.adhesion_id);
+  ASSERT_EQ(read.links.size(), truth.links.size());
+  for (std::size_t k = 0; k < truth.links.size(); ++k) {
+    EXPECT_EQ(read.links[k].vertex_a, truth.links[k].vertex_a);
+    EXPECT_EQ(read.links[k].vertex_b, truth.links[k].vertex_b);
+    EXPECT_EQ(read.links[k].fibre_id, truth.links[k].fibre_id);
+    EXPECT_EQ(read.links[k].rest_length_um, truth.links[k].rest_length_um);
+    EXPECT_EQ(read.links[k].share, truth.links[k].share);
+  }
+}
+
+TEST(VtuFiles, a_network_reads_the_same_however_vtk_stores_it) {
+  const TemporaryFolder folder;
+  const std::string whole = written(folder);
+  for (const test::VtuVariant& variant : test::vtu_variants()) {
+    SCOPED_TRACE(variant.name());
+    // VTK's text has eleven digits and more: here enough for the doubles to come back
+    const Network read = read_back(folder, test::stored_as(whole, variant));
+    ASSERT_EQ(read.links.size(), test::small_network().links.size());
+    if (variant.mode != test::VtuMode::ascii) expect_same(read, test::small_network());
+  }
+}
+
+TEST(VtuFiles, a_compression_that_is_not_known_is_refused_by_its_name) {
+  const TemporaryFolder folder;
+  const std::string lzma = test::stored_as(written(folder), {.compressor = vtkXMLWriterBase::LZMA});
+  EXPECT_NE(refusal(folder, lzma).find("vtkLZMADataCompressor"), std::string::npos) << refusal(folder, lzma);
+}
+
+/// As meshio writes it: 64-bit sizes, no padding of numbers, another order of the sections, Float32 labels allowed.
+TEST(VtuFiles, text_written_by_hand_and_in_pieces_is_read) {
+  const TemporaryFolder folder;
+  const auto piece = [](int first_adhesion) {
+    return R"(<Piece NumberOfPoints="3" NumberOfCells="2"><Points><DataArray type="Float64" Name="Points"
+      NumberOfComponents="3" format="ascii">0 0 0  1 0.5 0  2 1e0 0</DataArray></Points>
+      <Cells><DataArray type="Int64" Name="connectivity" format="ascii">0 1 1 2</DataArray>
+      <DataArray type="Int32" Name="offsets" format="ascii">2 4</DataArray>
+      <DataArray type="UInt8" Name="types" format="ascii">3 3</DataArray></Cells>
+      <PointData><DataArray type="Float32" Name="adhesion_id" format="ascii">)" +
+           std::to_string(first_adhesion) + R"( 0 0</DataArray></PointData>
+      <CellData><DataArray type="Int64" Name="fibre_id" NumberOfComponents="1" format="ascii">0 2</DataArray>
+      <DataArray type="Float64" Name="rest_length_um" format="ascii">1 1.5</DataArray></CellData></Piece>)";
+  };
+  const Network read = read_back(folder, "<VTKFile type=\"UnstructuredGrid\" version=\"0.1\"><UnstructuredGrid>" +
+                                             piece(4) + piece(9) + "</UnstructuredGrid></VTKFile>");
+  EXPECT_EQ(read.adhesion_id, (std::vector<int>{4, 0, 0, 9, 0, 0}));
+  ASSERT_EQ(read.links.size(), 4u);
+  EXPECT_EQ(read.links[2].vertex_a, 3);
+  EXPECT_EQ(read.links[3].fibre_id, 2);
+  EXPECT_EQ(read.links[3].share, 1);
+  EXPECT_EQ(read.vertices_um[4], (Vec2{1, 0.5}));
+}
+
+TEST(VtuFiles, what_a_file_claims_is_compared_with_what_it_holds) {
+  const TemporaryFolder folder;
+  const std::string whole = written(folder);
+  const std::string points = "NumberOfPoints=\"41\"", cells = "NumberOfCells=\"40\"";
+  for (const auto& [changed, expected] : std::vector<std::pair<std::string, std::string>>{
+           {with(whole, points, "NumberOfPoints=\"42\""), "blocks of"},
+           {with(whole, points, "NumberOfPoints=\"-1\""), "a number of points or cells"},
+           {with(whole, points, "NumberOfPoints=\"4000000000\""), "as the file can hold"},
+           {with(whole, points, "NumberOfPoints=\"18446744073709551615\""), "as the file can hold"},
+           {with(whole, cells, "NumberOfCells=\"39\""), "blocks of"},
+           {with(whole, cells, "NumberOfCells=\"99999999999\""), "as the file can hold"},
+           {with(whole, "offset=\"0\"", "offset=\"99999999\""), "within the appended data"},
+           {with(whole, "offset=\"0\"", "offset=\"-8\""), "within the appended data"},
+           {with(whole, "type=\"Int32\"", "type=\"Float16\""), "a type of VTK"},
+           {with(whole, "type=\"Int32\"", "type=\"Int64\""), "blocks of"},
+           {with(whole, "NumberOfComponents=\"3\"", "NumberOfComponents=\"2\""), "3 components"},
+           {with(whole, "format=\"appended\"", "format=\"telepathy\""), "ascii, binary or appended"},
+           {with(whole, "UnstructuredGrid", "PolyData"), "unstructured grid"},
+           {with(whole, "fibre_id", "fibre_ID"), "cell array 'fibre_id'"}}) {
+    EXPECT_NE(refusal(folder, changed).find(expected), std::string::npos)
+        << expected << ": " << refusal(folder, changed);
+  }
+}
+
+TEST(VtuFiles, sizes_of_blocks_are_compared_with_the_array) {
+  const TemporaryFolder folder;
+  const std::string whole = written(folder);
+  const std::size_t begin = whole.find('_', whole.find("<AppendedData")) + 1;
+  for (const std::size_t word : {0, 1, 2, 3}) {  // blocks, their size, the last one's, the first one's packed size
+    for (const std::uint32_t value : {0u, 1u, 0x7FFFFFFFu, 0xFFFFFFFFu}) {
+      std::string changed = whole;
+      if (word == 0 && value == 1) continue;  // as it is
+      if (word == 2 && value == 0) continue;  // VTK's word for: full
+      for (int k = 0; k < 4; ++k) changed[begin + 4 * word + k] = static_cast<char>(value >> 8 * k);
+      EXPECT_NE(refusal(folder, changed), "read") << "word " << word << " set to " << value;
+    }
+  }
+}
+
+TEST(VtuFiles, a_cell_is_a_line_between_points_of_the_file) {
+  const TemporaryFolder folder;
+  const std::string text = test::stored_as(written(folder), {.mode = test::VtuMode::ascii});
+  const auto in_array = [&](const std::string& name, const std::string& first) {
+    const std::size_t tag = text.find("Name=\"" + name + "\""),
+                      at = text.find_first_of("0123456789", text.find('>', tag));
+    std::string changed = text;
+    return changed.replace(at, text.find_first_of(" \n", at) - at, first);
+  };
+  EXPECT_EQ(refusal(folder, in_array("types", "3")), "read");
+  for (const auto& [array, value] : std::vector<std::pair<std::string, std::string>>{{"types", "5"},
+                                                                                     {"offsets", "3"},
+                                                                                     {"offsets", "-2"},
+                                                                                     {"connectivity", "41"},
+                                                                                     {"connectivity", "0.5"},
+                                                                                     {"connectivity", "nan"},
+                                                                                     {"fibre_id", "99999999999"},
+                                                                                     {"fibre_id", "1.5"},
+                                                                                     {"rest_length_um", "nan"},
+                                                                                     {"rest_length_um", "0"},
+                                                                                     {"adhesion_id", "-1"},
+                                                                                     {"types", "1e300"}}) {
+    EXPECT_NE(refusal(folder, in_array(array, value)), "read") << array << ": " << value;
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm
