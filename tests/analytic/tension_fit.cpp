@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "mbtfm/ensemble.h"
+#include "mbtfm/robust.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -120,6 +123,57 @@ TEST(TensionFit, beads_outside_the_region_do_not_count) {
   // 0.05 of noise, a hundred beads a tension
   EXPECT_LE((test::values_of(result) - scene.tensions_nN).norm(), 0.2 * scene.tensions_nN.norm());
   EXPECT_LE(relative_l2(scene.data, result.forces_nN), 1);
+}
+
+/// Variance of least squares over that of this loss, of many beads whose residuals are Gaussian in the plane:
+/// <(psi' + psi/r)/2>² / <psi²/2> over Rayleigh's distribution of their lengths, where by parts the slope is <psi r/2>.
+double efficiency(const std::string& loss) {
+  constexpr double kStep = 1e-3;
+  double slope = 0, psi_squared = 0;
+  for (double r = kStep / 2; r < 10; r += kStep) {
+    const double share = kStep * r * std::exp(-0.5 * r * r), psi = r * robust_weight(loss, r);
+    slope += share * psi * r / 2;
+    psi_squared += share * psi * psi / 2;
+  }
+  return slope * slope / psi_squared;
+}
+
+TEST(RobustLoss, costs_the_efficiency_it_says_where_the_noise_is_Gaussian_in_the_plane) {
+  EXPECT_NEAR(efficiency("squares"), 1, 1e-6);
+  EXPECT_NEAR(efficiency("huber"), 0.95, 5e-4);  // what is stated, to its last digit
+  EXPECT_NEAR(efficiency("tukey"), 0.95, 5e-4);
+  EXPECT_NEAR(efficiency("l1"), std::numbers::pi / 4, 5e-4);
+}
+
+TEST(RobustLoss, lets_one_bead_pull_no_harder_than_a_bound) {
+  // w r: rises no more beyond huber's bound, and comes back to zero for tukey
+  for (const double r : {2.0, 10.0, 1e6}) {
+    EXPECT_NEAR(r * robust_weight("huber", r), 100 * robust_weight("huber", 100), 1e-9);
+    EXPECT_NEAR(r * robust_weight("l1", r), 1, 1e-9);
+  }
+  EXPECT_EQ(robust_weight("tukey", 10), 0);
+}
+
+TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
+  // Beads that nothing pulls: the covariance is this over the sum of the weights, and over that of least squares it is
+  // one over the efficiency. The scale by the median is known to 1/sqrt(n) (Rayleigh), its square to twice that.
+  constexpr Eigen::Index kBeads = 40000;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 0.2);
+  LinearData data;
+  data.weight_per_um = Eigen::VectorXd::Ones(2 * kBeads);
+  data.displacement_um.resize(2 * kBeads);
+  for (double& u : data.displacement_um) u = normal(random);
+  data.compliance_um_per_nN = Eigen::MatrixXd::Zero(2 * kBeads, 2);
+  data.n_used = 2 * kBeads;
+  const Eigen::VectorXd no_forces = Eigen::VectorXd::Zero(2);
+  for (const std::string loss : {"squares", "huber", "tukey"}) {
+    double weights = 0;
+    for (Eigen::Index b = 0; b < kBeads; ++b)
+      weights += robust_weight(loss, data.displacement_um.segment<2>(2 * b).norm() / 0.2) / kBeads;
+    const double variance = misfit_variance(data, no_forces, 1, loss) / weights;
+    EXPECT_NEAR(variance * efficiency(loss) / 0.04, 1, 4 * 2 / std::sqrt(1.0 * kBeads)) << loss;
+  }
 }
 
 TEST(BoundedQuadratic, its_minimum_fulfils_the_conditions_of_Karush_Kuhn_and_Tucker) {
