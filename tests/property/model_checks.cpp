@@ -12,7 +12,7 @@ namespace {
 test::TensionScene one_fibre(double tension_nN, int n_beads) {
   Cell cell = test::round_cell(8, 6);
   test::add_ventral(cell, 1, 4);
-  return test::scene_of(cell, Eigen::Vector2d(0.3, tension_nN), n_beads, 0.1, 3);
+  return test::scene_of(cell, Eigen::Vector2d(0.3, tension_nN), n_beads, 0.02, 3);
 }
 
 std::vector<ModelScore> scores(test::TensionScene& scene) {
@@ -39,7 +39,7 @@ TEST(ModelScores, BIC_prefers_the_network_alone_where_it_is_alone_and_AIC_does_s
   constexpr int kDraws = 100;
   int n_by_aic = 0, n_by_bic = 0;
   for (unsigned draw = 0; draw < kDraws; ++draw) {
-    test::measure(scene, 0.1, 100 + draw);
+    test::measure(scene, 0.02, 100 + draw);
     const std::vector<ModelScore> models = scores(scene);
     ASSERT_EQ(models[0].name, "no-fibres");
     ASSERT_EQ(models[1].name, "full");
@@ -56,7 +56,7 @@ TEST(ModelScores, BIC_finds_a_fibre_that_pulls_once_the_beads_are_many) {
   int n_found = 0;
   test::TensionScene scene = one_fibre(2, 2000);
   for (unsigned draw = 0; draw < 10; ++draw) {
-    test::measure(scene, 0.1, 300 + draw);
+    test::measure(scene, 0.02, 300 + draw);
     const std::vector<ModelScore> models = scores(scene);
     n_found += models[1].bic < models[0].bic && models[1].bic < models[2].bic;
   }
