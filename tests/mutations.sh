@@ -63,18 +63,17 @@ failed_test() {
   sed -n 's/^\[  FAILED  \] \([^ ,]*\).*/\1/p' "$work/test.log" | grep -m 1 . || echo "$target ended with status $status"
 }
 
-# A test proves nothing of a fault where it fails without one: prints which does; false where none does. What has passed
+# A test proves nothing of a fault where it fails without one: prints which does; false where it passes. What has passed
 # once is known by the program that was run.
 fails_without() {
-  local test failed known
-  touch "$work/passed"
-  for test in "$@"; do
-    build "${test%%:*}" || { echo "${test%%:*} does not build without any fault"; return; }
-    known="$test $(sha256sum <"$work/source/build/tests/${test%%:*}")"
-    grep -qxF -- "$known" "$work/passed" && continue
-    if failed=$(failed_test "$test"); then echo "${test%%:*} fails without any fault: $failed"; return; fi
+  local failed known
+  [ -z "${passed[$1]:-}" ] || return 1
+  build "${1%%:*}" || { echo "${1%%:*} does not build without any fault"; return; }
+  known="$1 $(sha256sum <"$work/source/build/tests/${1%%:*}")"
+  if ! grep -qxF -- "$known" "$work/passed"; then
+    if failed=$(failed_test "$1"); then echo "${1%%:*} fails without any fault: $failed"; return; fi
     echo "$known" >>"$work/passed"
-  done
+  fi
   return 1
 }
 
@@ -84,21 +83,24 @@ plant() {
     exit 3 if (() = $text =~ /\Q$old\E/g) != 1; $text =~ s/\Q$old\E/$new/; open(my $out, ">", $file); print $out $text' "$@"
 }
 
-# Prints what became of fault $1.
+# Sets `outcome` to what became of fault $1.
 try_fault() {
-  local i=$1 test failed outcome='survived'
+  local i=$1 test failed
   local file=$work/source/${files[i]}
-  cp "$file" "$work/original"
-  if ! plant "$file" "${olds[i]}" "${news[i]}"; then
-    outcome='stale: the old text is not there once'
-  else
-    for test in ${seen_by[i]}; do
-      if ! build "${test%%:*}"; then outcome='does not build'; break; fi
-      if failed=$(failed_test "$test"); then outcome="caught by ${test%%:*}: $failed"; break; fi
-    done
-  fi
-  cp "$work/original" "$file"
-  echo "$outcome"
+  outcome=survived
+  for test in ${seen_by[i]}; do
+    if failed=$(fails_without "$test"); then outcome=$failed; return; fi
+    passed[$test]=yes
+    cp "$file" "$work/original"
+    if ! plant "$file" "${olds[i]}" "${news[i]}"; then outcome='stale: the old text is not there once'; return; fi
+    if ! build "${test%%:*}"; then
+      outcome='does not build'
+    elif failed=$(failed_test "$test"); then
+      outcome="caught by ${test%%:*}: $failed"
+    fi
+    cp "$work/original" "$file"
+    [ "$outcome" = survived ] || return 0
+  done
 }
 
 read_list
@@ -109,11 +111,12 @@ if [ "${1:-}" = --list ]; then
 fi
 mapfile -t which < <(chosen "$@")
 [ ${#which[@]} -gt 0 ] || { echo "no fault is named so: tests/mutations.sh --list" >&2; exit 2; }
+declare -A passed
 copy_sources
+touch "$work/passed"
 table=() n_caught=0 n_excused=0
 for i in "${which[@]}"; do
-  read -ra tests <<<"${seen_by[i]}"
-  outcome=$(fails_without "${tests[@]}") || outcome=$(try_fault "$i")
+  try_fault "$i"
   case $outcome in
     caught*) n_caught=$((n_caught + 1)) ;;
     survived) [ -z "${excuses[i]}" ] || { outcome="no fault: ${excuses[i]}"; n_excused=$((n_excused + 1)); } ;;

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "mbtfm/ensemble.h"
+#include "mbtfm/noise.h"
 #include "mbtfm/robust.h"
 #include "tests/support/tension_scene.h"
 
@@ -123,6 +124,68 @@ TEST(TensionFit, beads_outside_the_region_do_not_count) {
   // 0.05 of noise, a hundred beads a tension
   EXPECT_LE((test::values_of(result) - scene.tensions_nN).norm(), 0.2 * scene.tensions_nN.norm());
   EXPECT_LE(relative_l2(scene.data, result.forces_nN), 1);
+}
+
+TEST(Intervals, errors_make_the_sum_of_magnitudes_as_much_too_large_as_they_do_on_average) {
+  // Three forces that answer to four tensions of a known covariance; errors of some per cent, each draw and its
+  // opposite, so that only what is even in them is left.
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&](int rows, int columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }).eval();
+  };
+  const Eigen::VectorXd forces = 10 * drawn(6, 1);
+  const Eigen::MatrixXd D = drawn(6, 4), root = 0.2 * drawn(4, 4);
+  constexpr int kDraws = 20000;
+  double sum = 0, squares = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd change = D * (root * drawn(4, 1));
+    const double more = 0.5 * (total_nN(forces + change) + total_nN(forces - change)) - total_nN(forces);
+    sum += more / kDraws;
+    squares += more * more / kDraws;
+  }
+  const double standard_error = std::sqrt((squares - sum * sum) / kDraws);
+  // to second order in errors of a tenth: a hundredth
+  EXPECT_NEAR(magnitude_bias_nN(forces, D, root * root.transpose()), sum, 4 * standard_error + 0.02 * sum);
+}
+
+TEST(Intervals, by_percentiles_leave_one_draw_in_forty_out_on_either_side) {
+  std::mt19937_64 random(8);
+  std::exponential_distribution<double> skewed;
+  std::vector<double> deviations;
+  for (int i = 0; i < 4001; ++i) deviations.push_back(skewed(random) - 1);
+  const Sides sides = percentiles_95(deviations);
+  const auto share = [&](const auto& is_out) {
+    return static_cast<double>(std::count_if(deviations.begin(), deviations.end(), is_out)) / 4001;
+  };
+  EXPECT_NEAR(share([&](double d) { return d < -sides.below; }), 0.025, 2.0 / 4001);
+  EXPECT_NEAR(share([&](double d) { return d > sides.above; }), 0.025, 2.0 / 4001);
+}
+
+TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_whatever_outliers_do) {
+  // A cell of 20 um; beads far from it have noise of 0.05 um, one in ten of them goes astray, and those near it are
+  // moved by what no force explains.
+  constexpr double kSigma_um = 0.05;
+  const Polygon outline = {{-10, -10}, {10, -10}, {10, 10}, {-10, 10}};
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0, kSigma_um);
+  const auto of = [&](int n_far, double astray) {
+    DisplacementField beads;
+    for (int i = 0; i < n_far + 4000; ++i) {
+      const double angle = 0.01 * i, radius = i < n_far ? 40 : 5;
+      const double x = noise(random), y = noise(random);
+      beads.push_back({.position_um = radius * Vec2{std::cos(angle), std::sin(angle)},
+                       .displacement_um = {x + (i < n_far && i % 10 == 0 ? astray : 0), y + (i < n_far ? 0 : 1)},
+                       .flag = {}});
+    }
+    const LinearData data = reduce(beads, Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 2));
+    return noise_level(beads, data, Eigen::VectorXd::Zero(2), outline, 10).sigma_um;
+  };
+  // The median of n magnitudes tells a standard deviation to 1.17 / sqrt(n); four of those.
+  EXPECT_NEAR(of(10000, 0), kSigma_um, 4 * 1.17 / std::sqrt(20000.0) * kSigma_um);
+  // one component in twenty beyond all others moves the median by as much as 0.05 / 2 of the distribution: 6 %
+  EXPECT_NEAR(of(10000, 10), kSigma_um, 0.08 * kSigma_um);
+  EXPECT_GT(of(20, 0), 2 * kSigma_um);  // too few are far: all count
 }
 
 /// Variance of least squares over that of this loss, of many beads whose residuals are Gaussian in the plane:

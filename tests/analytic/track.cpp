@@ -155,6 +155,26 @@ TEST(Track, swapped_images_have_the_inverse_turn_and_growth_and_mirrored_ones_th
   expect_recovered(tracked_similarity(pair), {-truth.turn_rad, truth.growth, {0, 0}});
 }
 
+TEST(Track, the_far_fields_noise_is_the_standard_deviation_of_what_beads_there_are_off_by) {
+  const auto peaks = test::ring_of_adhesions(384, 4);
+  const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 2950, .brightness = 400, .seed = 6});
+  const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+  std::vector<double> errors;
+  for (const Bead& bead : tracking.field) {
+    const Vec2 place = bead.position_um - Vec2{0.5, 0.5};
+    const double inside = std::min({place.x, place.y, 383 - place.x, 383 - place.y});
+    if (!bead.flag.empty() || inside > 0.12 * 384) continue;
+    const Vec2 error = bead.displacement_um - test::displacement(peaks, place);
+    errors.push_back(std::abs(error.x)), errors.push_back(std::abs(error.y));
+  }
+  ASSERT_GT(errors.size(), 1000u);
+  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
+  const double sigma = errors[errors.size() / 2] / 0.6745;
+  // the forces inside that are fitted along with the drift take a few of some thousand degrees of freedom away, and the
+  // drift's own error is in the errors: a fifth
+  EXPECT_NEAR(tracking.noise_um / sigma, 1, 0.2);
+}
+
 TEST(Track, beads_are_found_to_a_tenth_of_a_pixel) {
   const auto pair = draw_bead_pair({}, {.width = 256, .n_beads = 250, .brightness_spread = 0.2});
   const auto beads = detect_beads(pair.relaxed);

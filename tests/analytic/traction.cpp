@@ -100,6 +100,50 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
   EXPECT_LE(before, 1e-12);  // tanh(1000): rounding
 }
 
+TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) {
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 30};
+  const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
+  const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
+  const WaveCompliance longest = wave_compliance(gel, GelModel::layer, 1e-6);  // of 2e5 thicknesses
+  EXPECT_NEAR(spectrum.across_um_per_kPa()[0] / longest.across_um_per_kPa, 1, 1e-6);
+  EXPECT_NEAR(spectrum.along_um_per_kPa()[0] / longest.along_um_per_kPa, 1, 1e-6);
+}
+
+TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_noise) {
+  // scattered beads of unequal errors, on a lattice four times as fine: chi² of 2 n numbers, four standard deviations
+  constexpr int kBeads = 4000;
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> place(0, 60), error(0.01, 0.05);
+  std::normal_distribution<double> normal;
+  DisplacementField beads;
+  for (int i = 0; i < kBeads; ++i) {
+    const double x = place(random), y = place(random), sigma = error(random), u = normal(random), v = normal(random);
+    beads.push_back({.position_um = {x, y}, .displacement_um = {sigma * u, sigma * v}, .sigma_um = sigma, .flag = {}});
+  }
+  const LatticeProblem problem(
+      beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+  EXPECT_GT(static_cast<double>(problem.field().n_nodes()), 2.0 * kBeads);
+  EXPECT_NEAR(problem.data_squared() / problem.n_data() / *problem.stated_variance(), 1, 4 / std::sqrt(1.0 * kBeads));
+}
+
+TEST(Tractions, that_swirl_around_an_adhesions_centre_have_a_moment_of_their_sense) {
+  // from +x towards +y, the sense of every angle: a force of 2 nN along y, 0.5 um to the right of the centre, and its
+  // opposite to the left
+  const std::vector<Adhesion> adhesions = {{.adhesion_id = 7,
+                                            .position_um = {10, 10},
+                                            .area_um2 = 1,
+                                            .major_axis_um = 2,
+                                            .minor_axis_um = 2,
+                                            .angle_rad = 0,
+                                            .eccentricity = 0,
+                                            .mean_intensity = 1}};
+  const std::vector<Patch> patches = {{{10.5, 10}, 0.5, {0, 4}, {}}, {{9.5, 10}, 0.5, {0, -4}, {}}};
+  const std::vector<AdhesionForce> forces = forces_by_adhesion(patches, adhesions, 0.1);
+  EXPECT_NEAR(norm(forces.front().force_nN), 0, 1e-12);
+  EXPECT_NEAR(*forces.front().moment_nN_um, 2, 1e-12);
+}
+
 TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_the_other_way) {
   // An L: above the corner the misfit grows with lambda², below it the tractions do with 1/lambda². The other way round
   // there is no such place.
