@@ -65,8 +65,8 @@ TEST(FitSummary, surface_tension_of_a_regular_network_is_root_three_times_tensio
   const LinearData data = reduce({}, Eigen::MatrixXd(0, 4));
   const FitSummary summary = summary_of(fit, data, {.cell = cell, .network = {}, .beads = {}}, networks, {});
   const double expected = std::sqrt(3.0) * kTension_nN / kEdge_um;
-  // of 9 side² links the 6 side of the border count whole, and half of each belongs outside
-  EXPECT_NEAR(summary.network_surface_tension_nN_per_um, expected, 0.5 * 6 / (9.0 * kSide) * expected);
+  // beside 9 side² links there are half as many more as the border has, 6 side, since these count whole
+  EXPECT_NEAR(summary.network_surface_tension_nN_per_um, (1 + 3.0 / (9 * kSide)) * expected, 1e-9 * expected);
 }
 
 }  // namespace
