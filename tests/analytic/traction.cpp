@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "mbtfm/force_correction.h"
 #include "mbtfm/fttc.h"
 #include "mbtfm/panel.h"
 #include "pipeline/contract/errors.h"
@@ -226,6 +227,49 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
                 seconds.count());
     EXPECT_TRUE(r.report.converged);
     EXPECT_LE(error, most[row++]);
+  }
+}
+
+/// Forces with what the penalty takes put right, for a lambda and a probe's that do not depend on the data. On a
+/// complete periodic lattice the solver is there in one step.
+std::vector<AdhesionForce> corrected_forces(const DisplacementField& beads, const EllipseScene& scene) {
+  constexpr double kLambda = 0.4, kByGcv = 0.3, kGrow_um = 2;
+  const LatticeProblem problem(
+      beads, scene.gel,
+      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1, .basis = Basis::waves, .threads = 1});
+  TikhonovSolver solver(problem);
+  solver.solve(kLambda, 1e-9);
+  const NodeField displacements = problem.displaced(solver.solution());
+  const PenalisedTractions penalised{.problem = problem,
+                                     .displacements = displacements,
+                                     .tikhonov_lambda = kLambda,
+                                     .lambda_by_gcv = kByGcv,
+                                     .variance = 1};
+  WaveField corrected = taken_by_penalty(penalised);
+  corrected.x += solver.solution().x;
+  corrected.y += solver.solution().y;
+  return forces_of(penalised, tractions_kPa(problem, corrected, ReadOut::points, 0), scene.adhesions, kGrow_um, 1);
+}
+
+TEST(ForceCorrection, a_corrected_forces_variance_adds_up_its_answers_to_every_datum) {
+  const EllipseScene scene = ellipse_scene(16, 0.05, 3);
+  DisplacementField beads = scene.field;
+  for (Bead& b : beads) b.sigma_um = 1;
+  const std::vector<AdhesionForce> forces = corrected_forces(beads, scene);
+  std::vector<double> variances(forces.size(), 0);
+  for (Bead& b : beads) b.displacement_um = {};
+  for (Bead& b : beads) {
+    for (double Vec2::*component : {&Vec2::x, &Vec2::y}) {
+      b.displacement_um.*component = 1;
+      const std::vector<AdhesionForce> answers = corrected_forces(beads, scene);
+      b.displacement_um.*component = 0;
+      for (std::size_t a = 0; a < forces.size(); ++a) {
+        variances[a] += std::pow(dot(answers[a].force_nN, direction_of(forces[a].force_nN)), 2);
+      }
+    }
+  }
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    EXPECT_NEAR(*forces[a].sigma_nN / std::sqrt(variances[a]), 1, 1e-6) << "adhesion " << a;
   }
 }
 
