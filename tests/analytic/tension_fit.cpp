@@ -162,6 +162,34 @@ TEST(Intervals, by_percentiles_leave_one_draw_in_forty_out_on_either_side) {
   EXPECT_NEAR(share([&](double d) { return d > sides.above; }), 0.025, 2.0 / 4001);
 }
 
+TEST(Intervals, of_few_degrees_of_freedom_are_Students_on_either_side) {
+  constexpr double kStudent = 3.182446, kNormal = 1.959964;  // 97.5 % of 3 degrees and of many, from tables
+  const Interval even = interval_95({.value = 10, .standard_error = 1, .degrees = 3});
+  EXPECT_NEAR(even.low, 10 - kStudent, 1e-5);
+  EXPECT_NEAR(even.high, 10 + kStudent, 1e-5);
+  const Interval uneven = interval_95({.value = 10, .standard_error = 1, .degrees = 3, .sides_95 = Sides{2, 4}});
+  EXPECT_NEAR(uneven.low, 10 - 2 * kStudent / kNormal, 1e-5);
+  EXPECT_NEAR(uneven.high, 10 + 4 * kStudent / kNormal, 1e-5);
+}
+
+TEST(NoiseVariance, of_few_beads_counts_what_independent_forces_follow) {
+  // 24 components, of which 8 forces take 8; over draws of noise alone the mean is the noise's
+  constexpr int kBeads = 12, kForces = 8, kDraws = 2000;
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  const Eigen::MatrixXd G = Eigen::MatrixXd::NullaryExpr(2 * kBeads, kForces, [&] { return normal(random); });
+  double mean = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    DisplacementField beads(kBeads);
+    for (Bead& b : beads) {
+      const double x = normal(random);
+      b.displacement_um = {0.2 * x, 0.2 * normal(random)};
+    }
+    mean += noise_variance(reduce(beads, G)) / kDraws;
+  }
+  EXPECT_NEAR(mean / 0.04, 1, 4 * std::sqrt(2.0 / (2 * kBeads - kForces) / kDraws));
+}
+
 TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_whatever_outliers_do) {
   // A cell of 20 um; beads far from it have noise of 0.05 um, one in ten of them goes astray, and those near it are
   // moved by what no force explains.

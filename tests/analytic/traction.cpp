@@ -328,6 +328,29 @@ TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) 
   }
 }
 
+TEST(AdhesionForces, of_few_beads_tell_the_noise_by_what_forces_leave_of_it) {
+  // 20 components of noise alone, of which two forces follow 4
+  EllipseScene scene = ellipse_scene(16, 0, 3);
+  scene.adhesions.resize(2);
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> place(0, 64);
+  std::normal_distribution<double> noise(0, 0.1);
+  constexpr int kDraws = 400;
+  double mean = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    TractionInputs inputs = inputs_of(scene);
+    inputs.beads.clear();
+    for (int i = 0; i < 10; ++i) {
+      const double x = place(random), y = place(random), u = noise(random), v = noise(random);
+      inputs.beads.push_back({.position_um = {x, y}, .displacement_um = {u, v}, .sigma_um = 0, .flag = {}});
+    }
+    const Reconstruction r = reconstruct(inputs, half_space("adhesion-forces"), 1);
+    ASSERT_EQ(r.figures.front().first, "residual_variance_um2");
+    mean += std::get<double>(r.figures.front().second) / kDraws;
+  }
+  EXPECT_NEAR(mean / 0.01, 1, 4 * std::sqrt(2.0 / 16 / kDraws));
+}
+
 TEST(AdhesionForces, sensitivities_are_what_a_wrong_ellipse_does) {
   const EllipseScene scene = ellipse_scene(64, 0.02, 3);
   const Reconstruction before = reconstruct(inputs_of(scene), half_space("adhesion-forces"), 2);

@@ -120,6 +120,21 @@ TEST(Study, holes_are_not_of_a_cells_area) {
   EXPECT_NEAR(figures_of(cell).cell_area_um2, whole - 6, 1e-9);
 }
 
+TEST(Study, cells_drawn_as_they_are_have_their_own_mean_and_median) {
+  const Study study = test::simulated_study({.n_cells = 7, .seed = 3});
+  const std::vector<CellWeights> draws(200, CellWeights(study.cells.size(), 1));
+  int n_odd = 0;
+  for (const Summary& s : summarise(sample_tensions(study), {}, draws)) {
+    EXPECT_NEAR(s.mean_interval->low, s.plain.mean, 1e-9);
+    EXPECT_NEAR(s.mean_interval->high, s.plain.mean, 1e-9);
+    if (s.n % 2 == 0) continue;  // the median of a draw is one of its values
+    ++n_odd;
+    EXPECT_EQ(s.median_interval->low, s.plain.median);
+    EXPECT_EQ(s.median_interval->high, s.plain.median);
+  }
+  EXPECT_GE(n_odd, 1);
+}
+
 TEST(Study, every_adhesion_is_in_one_bin_of_its_area) {
   Study study;
   study.conditions = {""};
