@@ -121,7 +121,8 @@ TEST(Mesh, edges_along_an_adhesions_rim_enclose_its_area) {
     for (const double edge_um : {0.2, 0.5, 1.0}) {
       const int n_edges = std::max(3, static_cast<int>(std::lround(perimeter_um(adhesion) / edge_um)));
       const double drawn = std::abs(signed_area_um2(evenly_resampled(rim_um(adhesion, edge_um), n_edges)));
-      // the finer line that the edges are taken from cuts corners too: 32 of them and more, 1 - sinc(2 pi / 32) of a disc
+      // the finer line that the edges are taken from cuts corners too: 32 of them and more, 1 - sinc(2 pi / 32) of a
+      // disc
       EXPECT_NEAR(drawn / adhesion.area_um2, 1, 0.03) << "aspect " << aspect << ", edge " << edge_um;
     }
   }

@@ -72,7 +72,9 @@ TEST(Layer, equals_independent_values_of_a_point_force_in_every_row) {
 
 TEST(DiscRule, averages_powers_up_to_its_degree) {
   // <x^2i y^2k> over the unit disc: (2i-1)!! (2k-1)!! / (2^n (n+1)!), n = i + k
-  const auto odd_factorial = [](int n) { return n == 0 ? 1.0 : std::tgamma(2 * n) / std::tgamma(n) / std::pow(2, n - 1); };
+  const auto odd_factorial = [](int n) {
+    return n == 0 ? 1.0 : std::tgamma(2 * n) / std::tgamma(n) / std::pow(2, n - 1);
+  };
   for (const int degree : {3, 5, 7, 11}) {
     for (int i = 0; 2 * i <= degree; ++i) {
       for (int k = 0; 2 * (i + k) <= degree; ++k) {

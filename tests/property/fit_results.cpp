@@ -20,8 +20,7 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
   EXPECT_NEAR(summary.noise_um, scene.beads.front().sigma_um, 0.1 * scene.beads.front().sigma_um);
   // of 8000 components; the noise level by the median of those far away is good to some per cent
   EXPECT_NEAR(summary.expected_relative_l2 / summary.relative_l2, 1, 0.1);
-  EXPECT_NEAR(summary.fibre_force_nN + summary.network_force_nN, summary.total_force_nN,
-              1e-9 * summary.total_force_nN);
+  EXPECT_NEAR(summary.fibre_force_nN + summary.network_force_nN, summary.total_force_nN, 1e-9 * summary.total_force_nN);
 }
 
 /// A hexagon of so many edges a side on a regular triangulation, each edge a link of share 1.

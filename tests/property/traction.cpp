@@ -85,7 +85,8 @@ TEST(Tractions, know_no_length_but_the_scenes_own) {
     TractionParameters parameters = parameters_of(method);
     parameters.lambda_um_per_kPa = 1;  // smooths by tens of per cent, so that a lambda in another unit shows
     const TractionInputs inputs = full_inputs_of(scene);
-    TractionInputs larger = mapped(inputs, [](Vec2 v) { return kTwice * v; }, {32, 32}, 0, 1);
+    TractionInputs larger = mapped(
+        inputs, [](Vec2 v) { return kTwice * v; }, {32, 32}, 0, 1);
     for (Bead& b : larger.beads) b.sigma_um *= kTwice;
     for (Adhesion& a : larger.adhesions) {
       a.area_um2 *= kTwice * kTwice;

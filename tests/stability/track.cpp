@@ -136,8 +136,7 @@ TEST(TrackStability, a_bead_that_vanished_is_not_matched_with_a_stranger_far_awa
   int n_vanished = 0, n_matched = 0;
   for (std::uint64_t seed = 1; seed <= 8; ++seed) {
     const auto pair = test::draw_bead_pair(
-        peaks,
-        {.width = 256, .n_beads = 150, .brightness_spread = 0.25, .jitter = 0.6, .lost = 0.2, .seed = seed});
+        peaks, {.width = 256, .n_beads = 150, .brightness_spread = 0.25, .jitter = 0.6, .lost = 0.2, .seed = seed});
     const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
     const Neighbours truth(pair.positions, 8);
     for (const Bead& bead : tracking.field) {

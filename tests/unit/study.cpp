@@ -113,7 +113,12 @@ TEST(Study, the_error_of_a_tension_is_that_of_the_side_zero_does_not_cut) {
 }
 
 TEST(Study, holes_are_not_of_a_cells_area) {
-  StudyCell cell{.name = "a", .condition = 0, .cell = test::round_cell(), .forces = {}, .tensions = {}, .fit = {},
+  StudyCell cell{.name = "a",
+                 .condition = 0,
+                 .cell = test::round_cell(),
+                 .forces = {},
+                 .tensions = {},
+                 .fit = {},
                  .directions = {}};
   const double whole = figures_of(cell).cell_area_um2;
   cell.cell.holes_um = {{{30, 30}, {32, 30}, {32, 33}, {30, 33}}};
@@ -139,15 +144,20 @@ TEST(Study, every_adhesion_is_in_one_bin_of_its_area) {
   Study study;
   study.conditions = {""};
   for (int c = 0; c < 2; ++c) {
-    StudyCell cell{.name = std::to_string(c), .condition = 0, .cell = test::round_cell(), .forces = {},
-                   .tensions = {}, .fit = {}, .directions = {}};
+    StudyCell cell{.name = std::to_string(c),
+                   .condition = 0,
+                   .cell = test::round_cell(),
+                   .forces = {},
+                   .tensions = {},
+                   .fit = {},
+                   .directions = {}};
     cell.cell.adhesions.clear();
     for (int i = 1; i <= 100; ++i) {
       cell.cell.adhesions.emplace_back();
       cell.cell.adhesions.back().adhesion_id = i;
       cell.cell.adhesions.back().area_um2 = 0.1 * (1 + i % 37);
-      cell.forces.push_back({.adhesion_id = i, .force_nN = {1, 0}, .sigma_nN = {}, .connected = i % 2 == 0,
-                             .moment_nN_um = {}});
+      cell.forces.push_back(
+          {.adhesion_id = i, .force_nN = {1, 0}, .sigma_nN = {}, .connected = i % 2 == 0, .moment_nN_um = {}});
     }
     study.cells.push_back(std::move(cell));
   }
