@@ -228,12 +228,12 @@ std::vector<FarField> far_fields(const std::vector<Vec2>& positions, const std::
   for (std::size_t i = 0; i < kinds.size(); ++i) {
     FarField& result = results[i];
     const auto about_own_motion = [&](const std::vector<int>& some) {
-      const double rms = rms_about(positions, displacements, some,
-                                   fitted_motion(positions, displacements, some, centre, scale, kinds[i]));
-      return std::sqrt(std::max(0.0, rms * rms - noise * noise));
+      return rms_about(positions, displacements, some,
+                       fitted_motion(positions, displacements, some, centre, scale, kinds[i]));
     };
+    const auto beyond_noise = [&](double rms) { return std::sqrt(std::max(0.0, rms * rms - noise * noise)); };
     const double everywhere = about_own_motion(all);
-    result.is_at_rest = !frame.empty() && about_own_motion(frame) < kQuieter * everywhere;
+    result.is_at_rest = !frame.empty() && beyond_noise(about_own_motion(frame)) < kQuieter * beyond_noise(everywhere);
     std::optional<WholeTurn>& turn = result.is_at_rest ? turn_of_frame : turn_of_all;
     if (!turn) turn = whole_turn(positions, displacements, result.is_at_rest ? frame : all, centre, scale);
     result.turn_rad = turn->turn_rad;

@@ -113,8 +113,12 @@ TEST(Cables, a_link_of_twice_the_share_acts_like_two) {
   Network net = network_of(vertices, {1, 2, 3, 0}, {{0, 3, 1}, {1, 3, 0}, {2, 3, 0}});
   net.links[0].share = 2;
   const CableNetwork one(net, {});
-  // eps depends on the mean rest length, which differs: 1e-10 of the forces
-  for (int v = 0; v < 3; ++v) EXPECT_LE(norm(force_on(one, {1, 0.8}, v) - force_on(two, {1, 0.8}, v)), 1e-7);
+  const std::vector<double> short_of_rest{1, 0.8}, stretched{6, 0.1};
+  EXPECT_GT(one.equilibrium(stretched).link_force_nN[0], 2 * 2 * 0.1) << "it is to be pulled beyond its rest length";
+  for (const auto& tensions : {short_of_rest, stretched}) {
+    // eps depends on the mean rest length, which differs: 1e-10 of the forces
+    for (int v = 0; v < 3; ++v) EXPECT_LE(norm(force_on(one, tensions, v) - force_on(two, tensions, v)), 1e-7);
+  }
 }
 
 /// Radius of the circle nearest to the points (Kåsa, IEEE Trans. Instrum. Meas. 25 (1976) 8).

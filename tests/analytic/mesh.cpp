@@ -4,8 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "network/adhesions.h"
 #include "network/links.h"
 #include "network/mesh.h"
+#include "network/polyline.h"
 #include "network/triangulation.h"
 #include "tests/support/valid_network.h"
 
@@ -102,6 +104,26 @@ TEST(Mesh, edges_grow_from_what_is_resolved_no_faster_than_wanted) {
           std::min(1.5, 0.1 * std::numbers::pi + growth * std::max(0.0, norm(middle - a.position_um) - 0.4));
       EXPECT_LE(link.rest_length_um, 1.8 * wanted) << "growth " << growth;
       EXPECT_GE(link.rest_length_um, 0.5 * wanted) << "growth " << growth;
+    }
+  }
+}
+
+TEST(Mesh, edges_along_an_adhesions_rim_enclose_its_area) {
+  for (const double aspect : {1.0, 2.0, 5.0}) {
+    const Adhesion adhesion{.adhesion_id = 1,
+                            .position_um = {3, 4},
+                            .area_um2 = std::numbers::pi / 4 * aspect,
+                            .major_axis_um = aspect,
+                            .minor_axis_um = 1,
+                            .angle_rad = 0.4,
+                            .eccentricity = 0,
+                            .mean_intensity = 1};
+    for (const double edge_um : {0.2, 0.5, 1.0}) {
+      const int n_edges = std::max(3, static_cast<int>(std::lround(perimeter_um(adhesion) / edge_um)));
+      const double drawn = std::abs(signed_area_um2(evenly_resampled(rim_um(adhesion, edge_um), n_edges)));
+      // the finer line that the edges are taken from cuts corners too: 32 of them and more, 1 - sinc(2 pi / 32) of a
+      // disc
+      EXPECT_NEAR(drawn / adhesion.area_um2, 1, 0.03) << "aspect " << aspect << ", edge " << edge_um;
     }
   }
 }

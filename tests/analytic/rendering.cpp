@@ -97,6 +97,22 @@ TEST(Blur, does_not_depend_on_the_number_of_threads) {
   EXPECT_EQ(blurred(noise, 0.5, 1).pixels, blurred(noise, 0.5, 3).pixels);
 }
 
+TEST(SmoothNoise, has_mean_zero_and_standard_deviation_one_whatever_its_reach) {
+  for (const double sigma_um : {0.3, 0.8}) {
+    Random random(5, Stream::optics);
+    const Image noise = smooth_noise(400, 0.1, sigma_um, random, 2);
+    double mean = 0, squares = 0;
+    for (const float value : noise.pixels) {
+      mean += value / 160000;
+      squares += value * value / 160000;
+    }
+    // independent over an area of 4 pi sigma²; a variance of n such is known to sqrt(2/n), four of those
+    const double n = 40 * 40 / (4 * std::numbers::pi * sigma_um * sigma_um);
+    EXPECT_NEAR(mean, 0, 4 / std::sqrt(n)) << sigma_um;
+    EXPECT_NEAR(squares - mean * mean, 1, 4 * std::sqrt(2 / n)) << sigma_um;
+  }
+}
+
 TEST(Coverage, is_the_area_of_the_polygon) {
   const Polygon triangle{{1.03, 1.51}, {5.27, 2.11}, {2.49, 5.83}};
   const Image image = coverage_of(triangle, 64, 0.1);

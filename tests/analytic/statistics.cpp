@@ -207,6 +207,24 @@ TEST(ClusteredRanks, a_cell_counted_twice_over_changes_nothing) {
   EXPECT_NEAR(clustered_rank_test(values).p_value, once.p_value, 1e-12);
 }
 
+TEST(ClusteredRanks, hold_their_level_for_few_cells_that_are_alike) {
+  // five cells of six values, no difference between groups: p is even in [0, 1], which F's degrees of freedom decide
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal;
+  constexpr int kDraws = 8000;
+  int n_below_5 = 0, n_below_20 = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<ClusteredValue> values;
+    for (int i = 0; i < 30; ++i) values.push_back({normal(random), i % 2, i / 6});
+    const double p = clustered_rank_test(values).p_value;
+    n_below_5 += p < 0.05;
+    n_below_20 += p < 0.2;
+  }
+  // four standard deviations of a share of as many draws
+  EXPECT_NEAR(n_below_5 / (1.0 * kDraws), 0.05, 4 * std::sqrt(0.05 * 0.95 / kDraws));
+  EXPECT_NEAR(n_below_20 / (1.0 * kDraws), 0.2, 4 * std::sqrt(0.2 * 0.8 / kDraws));
+}
+
 TEST(Bootstrap, draws_keep_the_strata_and_the_seed) {
   const auto draws = draw_cells({0, 0, 0, 1, 1}, 50, 3);
   for (const CellWeights& w : draws) {
@@ -255,6 +273,15 @@ TEST(Shares, fibres_that_agree_within_cells_count_as_cells) {
   EXPECT_DOUBLE_EQ(share.value, 0.4);
   EXPECT_LE(share.n_effective, 10);
   EXPECT_GT(share.n_effective, 5);
+}
+
+TEST(Shares, of_one_fibre_a_cell_vary_as_a_mean_of_as_many_numbers_does) {
+  // p (1 − p) / (n − 1), from the squares about the mean; and Student's t in the place of the normal's 1.96
+  constexpr int kCells = 6;
+  std::vector<CellCount> cells(kCells, {.n = 1, .n_with = 0});
+  cells[0].n_with = cells[1].n_with = 1;
+  const double t = 2.570582;  // 97.5 % of 5 degrees of freedom, from tables
+  EXPECT_NEAR(share_over_cells(cells).n_effective, (kCells - 1) * std::pow(1.959964 / t, 2), 1e-4);
 }
 
 TEST(Deconvolution, finds_the_share_of_two_sharp_values_behind_wide_errors) {

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "substrate/layer.h"
+#include "substrate/layer_vertical.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -66,6 +67,44 @@ TEST(Layer, equals_independent_values_of_a_point_force_in_every_row) {
     // the rows are good to 1e-9, the table to 1e-12 of the half-space's field
     EXPECT_LT(relative_difference(value, reference), 1e-8)
         << "nu " << row[1] << " h " << row[2] << " r " << norm(offset);
+  }
+}
+
+TEST(DiscRule, averages_powers_up_to_its_degree) {
+  // <x^2i y^2k> over the unit disc: (2i-1)!! (2k-1)!! / (2^n (n+1)!), n = i + k
+  const auto odd_factorial = [](int n) {
+    return n == 0 ? 1.0 : std::tgamma(2 * n) / std::tgamma(n) / std::pow(2, n - 1);
+  };
+  for (const int degree : {3, 5, 7, 11}) {
+    for (int i = 0; 2 * i <= degree; ++i) {
+      for (int k = 0; 2 * (i + k) <= degree; ++k) {
+        double sum = 0;
+        for (const DiscPoint& p : disc_rule(degree)) {
+          sum += p.weight * std::pow(p.position.x, 2 * i) * std::pow(p.position.y, 2 * k);
+        }
+        const int n = i + k;
+        const double exact = odd_factorial(i) * odd_factorial(k) / (std::pow(2, n) * std::tgamma(n + 2));
+        EXPECT_NEAR(sum, exact, 1e-13) << "degree " << degree << ", x^" << 2 * i << " y^" << 2 * k;
+      }
+    }
+  }
+}
+
+TEST(Layer, beyond_its_reach_nothing_is_left_of_the_half_spaces_field) {
+  const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.3, .thickness_um = 2};
+  const Layer layer(gel);
+  const LayerVertical vertical(gel);
+  const Ellipse disc{.centre_um = {}, .semi_major_um = 0.5, .semi_minor_um = 0.5, .angle_rad = 0};
+  for (const double thicknesses : {39.0, 41.0, 200.0}) {
+    const double r = thicknesses * gel.thickness_um;
+    const Vec2 offset = r * Vec2{std::cos(0.7), std::sin(0.7)};
+    Sym2 sum = layer.point_correction_um_per_nN(offset);
+    const Sym2 half_space = cerruti_surface(gel, offset);
+    sum += half_space;
+    EXPECT_LT(std::abs(sum.xx) + std::abs(sum.xy) + std::abs(sum.yy), 1e-10 * half_space.xx) << r;
+    const double whole = vertical.vertical_um({offset}, {disc}, {{1, 0}}, 1).front();
+    const double of_half_space = half_space_vertical_um(gel, {offset}, {disc}, {{1, 0}}, 1).front();
+    EXPECT_LT(std::abs(whole), 1e-4 * std::abs(of_half_space)) << r;  // the table's 1e-6 of the field near the force
   }
 }
 

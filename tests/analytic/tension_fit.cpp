@@ -2,7 +2,11 @@
 
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "mbtfm/ensemble.h"
+#include "mbtfm/noise.h"
+#include "mbtfm/robust.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -120,6 +124,147 @@ TEST(TensionFit, beads_outside_the_region_do_not_count) {
   // 0.05 of noise, a hundred beads a tension
   EXPECT_LE((test::values_of(result) - scene.tensions_nN).norm(), 0.2 * scene.tensions_nN.norm());
   EXPECT_LE(relative_l2(scene.data, result.forces_nN), 1);
+}
+
+TEST(Intervals, errors_make_the_sum_of_magnitudes_as_much_too_large_as_they_do_on_average) {
+  // Three forces that answer to four tensions of a known covariance; errors of some per cent, each draw and its
+  // opposite, so that only what is even in them is left.
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  const auto drawn = [&](int rows, int columns) {
+    return Eigen::MatrixXd::NullaryExpr(rows, columns, [&] { return normal(random); }).eval();
+  };
+  const Eigen::VectorXd forces = 10 * drawn(6, 1);
+  const Eigen::MatrixXd D = drawn(6, 4), root = 0.2 * drawn(4, 4);
+  constexpr int kDraws = 20000;
+  double sum = 0, squares = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    const Eigen::VectorXd change = D * (root * drawn(4, 1));
+    const double more = 0.5 * (total_nN(forces + change) + total_nN(forces - change)) - total_nN(forces);
+    sum += more / kDraws;
+    squares += more * more / kDraws;
+  }
+  const double standard_error = std::sqrt((squares - sum * sum) / kDraws);
+  // to second order in errors of a tenth: a hundredth
+  EXPECT_NEAR(magnitude_bias_nN(forces, D, root * root.transpose()), sum, 4 * standard_error + 0.02 * sum);
+}
+
+TEST(Intervals, by_percentiles_leave_one_draw_in_forty_out_on_either_side) {
+  std::mt19937_64 random(8);
+  std::exponential_distribution<double> skewed;
+  std::vector<double> deviations;
+  for (int i = 0; i < 4001; ++i) deviations.push_back(skewed(random) - 1);
+  const Sides sides = percentiles_95(deviations);
+  const auto share = [&](const auto& is_out) {
+    return static_cast<double>(std::count_if(deviations.begin(), deviations.end(), is_out)) / 4001;
+  };
+  EXPECT_NEAR(share([&](double d) { return d < -sides.below; }), 0.025, 2.0 / 4001);
+  EXPECT_NEAR(share([&](double d) { return d > sides.above; }), 0.025, 2.0 / 4001);
+}
+
+TEST(Intervals, of_few_degrees_of_freedom_are_Students_on_either_side) {
+  constexpr double kStudent = 3.182446, kNormal = 1.959964;  // 97.5 % of 3 degrees and of many, from tables
+  const Interval even = interval_95({.value = 10, .standard_error = 1, .degrees = 3});
+  EXPECT_NEAR(even.low, 10 - kStudent, 1e-5);
+  EXPECT_NEAR(even.high, 10 + kStudent, 1e-5);
+  const Interval uneven = interval_95({.value = 10, .standard_error = 1, .degrees = 3, .sides_95 = Sides{2, 4}});
+  EXPECT_NEAR(uneven.low, 10 - 2 * kStudent / kNormal, 1e-5);
+  EXPECT_NEAR(uneven.high, 10 + 4 * kStudent / kNormal, 1e-5);
+}
+
+TEST(NoiseVariance, of_few_beads_counts_what_independent_forces_follow) {
+  // 24 components, of which 8 forces take 8; over draws of noise alone the mean is the noise's
+  constexpr int kBeads = 12, kForces = 8, kDraws = 2000;
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  const Eigen::MatrixXd G = Eigen::MatrixXd::NullaryExpr(2 * kBeads, kForces, [&] { return normal(random); });
+  double mean = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    DisplacementField beads(kBeads);
+    for (Bead& b : beads) {
+      const double x = normal(random);
+      b.displacement_um = {0.2 * x, 0.2 * normal(random)};
+    }
+    mean += noise_variance(reduce(beads, G)) / kDraws;
+  }
+  EXPECT_NEAR(mean / 0.04, 1, 4 * std::sqrt(2.0 / (2 * kBeads - kForces) / kDraws));
+}
+
+TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_whatever_outliers_do) {
+  // A cell of 20 um; beads far from it have noise of 0.05 um, one in ten of them goes astray, and those near it are
+  // moved by what no force explains.
+  constexpr double kSigma_um = 0.05;
+  const Polygon outline = {{-10, -10}, {10, -10}, {10, 10}, {-10, 10}};
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> noise(0, kSigma_um);
+  const auto of = [&](int n_far, double astray) {
+    DisplacementField beads;
+    for (int i = 0; i < n_far + 4000; ++i) {
+      const double angle = 0.01 * i, radius = i < n_far ? 40 : 5;
+      const double x = noise(random), y = noise(random);
+      beads.push_back({.position_um = radius * Vec2{std::cos(angle), std::sin(angle)},
+                       .displacement_um = {x + (i < n_far && i % 10 == 0 ? astray : 0), y + (i < n_far ? 0 : 1)},
+                       .flag = {}});
+    }
+    const LinearData data = reduce(beads, Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 2));
+    return noise_level(beads, data, Eigen::VectorXd::Zero(2), outline, 10).sigma_um;
+  };
+  // The median of n magnitudes tells a standard deviation to 1.17 / sqrt(n); four of those.
+  EXPECT_NEAR(of(10000, 0), kSigma_um, 4 * 1.17 / std::sqrt(20000.0) * kSigma_um);
+  // one component in twenty beyond all others moves the median by as much as 0.05 / 2 of the distribution: 6 %
+  EXPECT_NEAR(of(10000, 10), kSigma_um, 0.08 * kSigma_um);
+  EXPECT_GT(of(20, 0), 2 * kSigma_um);  // too few are far: all count
+}
+
+/// Variance of least squares over that of this loss, of many beads whose residuals are Gaussian in the plane:
+/// <(psi' + psi/r)/2>² / <psi²/2> over Rayleigh's distribution of their lengths, where by parts the slope is <psi r/2>.
+double efficiency(const std::string& loss) {
+  constexpr double kStep = 1e-3;
+  double slope = 0, psi_squared = 0;
+  for (double r = kStep / 2; r < 10; r += kStep) {
+    const double share = kStep * r * std::exp(-0.5 * r * r), psi = r * robust_weight(loss, r);
+    slope += share * psi * r / 2;
+    psi_squared += share * psi * psi / 2;
+  }
+  return slope * slope / psi_squared;
+}
+
+TEST(RobustLoss, costs_the_efficiency_it_says_where_the_noise_is_Gaussian_in_the_plane) {
+  EXPECT_NEAR(efficiency("squares"), 1, 1e-6);
+  EXPECT_NEAR(efficiency("huber"), 0.95, 5e-4);  // what is stated, to its last digit
+  EXPECT_NEAR(efficiency("tukey"), 0.95, 5e-4);
+  EXPECT_NEAR(efficiency("l1"), std::numbers::pi / 4, 5e-4);
+}
+
+TEST(RobustLoss, lets_one_bead_pull_no_harder_than_a_bound) {
+  // w r: rises no more beyond huber's bound, and comes back to zero for tukey
+  for (const double r : {2.0, 10.0, 1e6}) {
+    EXPECT_NEAR(r * robust_weight("huber", r), 100 * robust_weight("huber", 100), 1e-9);
+    EXPECT_NEAR(r * robust_weight("l1", r), 1, 1e-9);
+  }
+  EXPECT_EQ(robust_weight("tukey", 10), 0);
+}
+
+TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
+  // Beads that nothing pulls: the covariance is this over the sum of the weights, and over that of least squares it is
+  // one over the efficiency. The scale by the median is known to 1/sqrt(n) (Rayleigh), its square to twice that.
+  constexpr Eigen::Index kBeads = 40000;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 0.2);
+  LinearData data;
+  data.weight_per_um = Eigen::VectorXd::Ones(2 * kBeads);
+  data.displacement_um.resize(2 * kBeads);
+  for (double& u : data.displacement_um) u = normal(random);
+  data.compliance_um_per_nN = Eigen::MatrixXd::Zero(2 * kBeads, 2);
+  data.n_used = 2 * kBeads;
+  const Eigen::VectorXd no_forces = Eigen::VectorXd::Zero(2);
+  for (const std::string loss : {"squares", "huber", "tukey"}) {
+    double weights = 0;
+    for (Eigen::Index b = 0; b < kBeads; ++b)
+      weights += robust_weight(loss, data.displacement_um.segment<2>(2 * b).norm() / 0.2) / kBeads;
+    const double variance = misfit_variance(data, no_forces, 1, loss) / weights;
+    EXPECT_NEAR(variance * efficiency(loss) / 0.04, 1, 4 * 2 / std::sqrt(1.0 * kBeads)) << loss;
+  }
 }
 
 TEST(BoundedQuadratic, its_minimum_fulfils_the_conditions_of_Karush_Kuhn_and_Tucker) {

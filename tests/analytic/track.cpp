@@ -3,6 +3,8 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
+#include "segment/far_field.h"
+#include "segment/local_motion.h"
 #include "tests/support/tracking_accuracy.h"
 
 namespace mbtfm::segment {
@@ -153,6 +155,77 @@ TEST(Track, swapped_images_have_the_inverse_turn_and_growth_and_mirrored_ones_th
     for (int j = 0; j < 384; ++j) std::reverse(&image->at(0, j), &image->at(0, j) + 384);
   }
   expect_recovered(tracked_similarity(pair), {-truth.turn_rad, truth.growth, {0, 0}});
+}
+
+TEST(Track, the_noise_is_what_beads_step_by_on_their_own_beside_a_cell_and_where_nothing_else_moves) {
+  constexpr double kStep = 0.6;  // px
+  for (const bool has_cell : {true, false}) {
+    const auto peaks = has_cell ? test::ring_of_adhesions(384, 4) : std::vector<test::Peak>{};
+    const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 2500, .jitter = kStep, .seed = 1});
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    // the forces in the picture that are fitted to a thousand beads of the frame follow 286 of their 2000 steps'
+    // components at most (7 %), and what beads tell of each other takes as much; the beads' own error adds a per cent
+    EXPECT_EQ(tracking.has_far_field, has_cell);
+    EXPECT_GT(tracking.noise_um, 0.8 * kStep) << (has_cell ? "cell" : "nothing");
+    EXPECT_LT(tracking.noise_um, 1.05 * kStep) << (has_cell ? "cell" : "nothing");
+  }
+}
+
+TEST(FarField, a_turns_standard_error_is_its_scatter) {
+  constexpr double kSide = 300, kNoise = 0.3;
+  constexpr int kDraws = 120;
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> place(0, kSide - 1);
+  std::normal_distribution<double> noise(0, kNoise);
+  const auto peaks = test::ring_of_adhesions(kSide, 6);
+  std::vector<Vec2> positions;
+  for (int i = 0; i < 1500; ++i) {
+    const double x = place(random);
+    positions.push_back({x, place(random)});
+  }
+  double mean = 0, squares = 0, stated = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    std::vector<Vec2> displacements;
+    for (const Vec2 p : positions) {
+      const double x = noise(random);
+      displacements.push_back(test::displacement(peaks, p) + Vec2{x, noise(random)});
+    }
+    const FarField far =
+        far_fields(positions, displacements, kSide, kSide, 0.12 * kSide, {Drift::rotation}, kNoise).front();
+    ASSERT_TRUE(far.is_at_rest);
+    mean += far.drift.turn_rad / kDraws;
+    squares += far.drift.turn_rad * far.drift.turn_rad / kDraws;
+    stated += far.turn_sigma_rad * far.turn_sigma_rad / kDraws;
+  }
+  EXPECT_NEAR((squares - mean * mean) / stated, 1, 4 * std::sqrt(2.0 / kDraws));  // of a variance of so many draws
+}
+
+TEST(LocalMotion, its_spread_is_the_standard_deviation_of_a_component_about_an_affine_motion) {
+  constexpr double kNoise = 0.3;
+  constexpr int kDraws = 2000;
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> place(-20, 20);
+  std::normal_distribution<double> noise(0, kNoise);
+  for (const int n : {12, 20, 36}) {
+    double spread = 0, squares = 0;
+    for (int draw = 0; draw < kDraws; ++draw) {
+      std::vector<Vec2> positions;
+      std::vector<Motion> motions;
+      std::vector<int> others;
+      for (int i = 0; i < n; ++i) {
+        const double x = place(random), y = place(random), ux = noise(random), uy = noise(random);
+        positions.push_back({x, y});
+        motions.push_back({.u = {3 + 0.1 * x + ux, -0.05 * y + uy}});
+        others.push_back(i);
+      }
+      const auto local = local_motion({0, 0}, others, positions, motions);
+      spread += local->spread_px / kNoise / kDraws;
+      const Vec2 missed = local->motion.u - Vec2{3, 0};
+      squares += 0.5 * dot(missed, missed) / (kNoise * kNoise * local->noise_share) / kDraws;
+    }
+    EXPECT_NEAR(spread, 1, 0.02) << n;   // of so many medians: four standard errors
+    EXPECT_NEAR(squares, 1, 0.15) << n;  // what the noise makes of the motion; weights that follow the data add some
+  }
 }
 
 TEST(Track, beads_are_found_to_a_tenth_of_a_pixel) {

@@ -5,6 +5,7 @@
 #include <functional>
 #include <random>
 
+#include "mbtfm/force_correction.h"
 #include "mbtfm/fttc.h"
 #include "mbtfm/panel.h"
 #include "pipeline/contract/errors.h"
@@ -100,6 +101,50 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
   EXPECT_LE(before, 1e-12);  // tanh(1000): rounding
 }
 
+TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) {
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 30};
+  const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
+  const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
+  const WaveCompliance longest = wave_compliance(gel, GelModel::layer, 1e-6);  // of 2e5 thicknesses
+  EXPECT_NEAR(spectrum.across_um_per_kPa()[0] / longest.across_um_per_kPa, 1, 1e-6);
+  EXPECT_NEAR(spectrum.along_um_per_kPa()[0] / longest.along_um_per_kPa, 1, 1e-6);
+}
+
+TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_noise) {
+  // scattered beads of unequal errors, on a lattice four times as fine: chi² of 2 n numbers, four standard deviations
+  constexpr int kBeads = 4000;
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> place(0, 60), error(0.01, 0.05);
+  std::normal_distribution<double> normal;
+  DisplacementField beads;
+  for (int i = 0; i < kBeads; ++i) {
+    const double x = place(random), y = place(random), sigma = error(random), u = normal(random), v = normal(random);
+    beads.push_back({.position_um = {x, y}, .displacement_um = {sigma * u, sigma * v}, .sigma_um = sigma, .flag = {}});
+  }
+  const LatticeProblem problem(
+      beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+  EXPECT_GT(static_cast<double>(problem.field().n_nodes()), 2.0 * kBeads);
+  EXPECT_NEAR(problem.data_squared() / problem.n_data() / *problem.stated_variance(), 1, 4 / std::sqrt(1.0 * kBeads));
+}
+
+TEST(Tractions, that_swirl_around_an_adhesions_centre_have_a_moment_of_their_sense) {
+  // from +x towards +y, the sense of every angle: a force of 2 nN along y, 0.5 um to the right of the centre, and its
+  // opposite to the left
+  const std::vector<Adhesion> adhesions = {{.adhesion_id = 7,
+                                            .position_um = {10, 10},
+                                            .area_um2 = 1,
+                                            .major_axis_um = 2,
+                                            .minor_axis_um = 2,
+                                            .angle_rad = 0,
+                                            .eccentricity = 0,
+                                            .mean_intensity = 1}};
+  const std::vector<Patch> patches = {{{10.5, 10}, 0.5, {0, 4}, {}}, {{9.5, 10}, 0.5, {0, -4}, {}}};
+  const std::vector<AdhesionForce> forces = forces_by_adhesion(patches, adhesions, 0.1);
+  EXPECT_NEAR(norm(forces.front().force_nN), 0, 1e-12);
+  EXPECT_NEAR(*forces.front().moment_nN_um, 2, 1e-12);
+}
+
 TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_the_other_way) {
   // An L: above the corner the misfit grows with lambda², below it the tractions do with 1/lambda². The other way round
   // there is no such place.
@@ -185,6 +230,49 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
   }
 }
 
+/// Forces with what the penalty takes put right, for a lambda and a probe's that do not depend on the data. On a
+/// complete periodic lattice the solver is there in one step.
+std::vector<AdhesionForce> corrected_forces(const DisplacementField& beads, const EllipseScene& scene) {
+  constexpr double kLambda = 0.4, kByGcv = 0.3, kGrow_um = 2;
+  const LatticeProblem problem(
+      beads, scene.gel,
+      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1, .basis = Basis::waves, .threads = 1});
+  TikhonovSolver solver(problem);
+  solver.solve(kLambda, 1e-9);
+  const NodeField displacements = problem.displaced(solver.solution());
+  const PenalisedTractions penalised{.problem = problem,
+                                     .displacements = displacements,
+                                     .tikhonov_lambda = kLambda,
+                                     .lambda_by_gcv = kByGcv,
+                                     .variance = 1};
+  WaveField corrected = taken_by_penalty(penalised);
+  corrected.x += solver.solution().x;
+  corrected.y += solver.solution().y;
+  return forces_of(penalised, tractions_kPa(problem, corrected, ReadOut::points, 0), scene.adhesions, kGrow_um, 1);
+}
+
+TEST(ForceCorrection, a_corrected_forces_variance_adds_up_its_answers_to_every_datum) {
+  const EllipseScene scene = ellipse_scene(16, 0.05, 3);
+  DisplacementField beads = scene.field;
+  for (Bead& b : beads) b.sigma_um = 1;
+  const std::vector<AdhesionForce> forces = corrected_forces(beads, scene);
+  std::vector<double> variances(forces.size(), 0);
+  for (Bead& b : beads) b.displacement_um = {};
+  for (Bead& b : beads) {
+    for (double Vec2::*component : {&Vec2::x, &Vec2::y}) {
+      b.displacement_um.*component = 1;
+      const std::vector<AdhesionForce> answers = corrected_forces(beads, scene);
+      b.displacement_um.*component = 0;
+      for (std::size_t a = 0; a < forces.size(); ++a) {
+        variances[a] += std::pow(dot(answers[a].force_nN, direction_of(forces[a].force_nN)), 2);
+      }
+    }
+  }
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    EXPECT_NEAR(*forces[a].sigma_nN / std::sqrt(variances[a]), 1, 1e-6) << "adhesion " << a;
+  }
+}
+
 void expect_forces_err_as_stated(const TractionParameters& parameters, double noise) {
   // Against the truth, as what the penalty takes is put right. 8 forces of 5 seeds: three standard deviations of the
   // mean of 40 numbers of variance one, and of that of their squares.
@@ -238,6 +326,29 @@ TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) 
     EXPECT_GT(sum, 0.52);
     EXPECT_LT(sum, 1.48);
   }
+}
+
+TEST(AdhesionForces, of_few_beads_tell_the_noise_by_what_forces_leave_of_it) {
+  // 20 components of noise alone, of which two forces follow 4
+  EllipseScene scene = ellipse_scene(16, 0, 3);
+  scene.adhesions.resize(2);
+  std::mt19937_64 random(12);
+  std::uniform_real_distribution<double> place(0, 64);
+  std::normal_distribution<double> noise(0, 0.1);
+  constexpr int kDraws = 400;
+  double mean = 0;
+  for (int draw = 0; draw < kDraws; ++draw) {
+    TractionInputs inputs = inputs_of(scene);
+    inputs.beads.clear();
+    for (int i = 0; i < 10; ++i) {
+      const double x = place(random), y = place(random), u = noise(random), v = noise(random);
+      inputs.beads.push_back({.position_um = {x, y}, .displacement_um = {u, v}, .sigma_um = 0, .flag = {}});
+    }
+    const Reconstruction r = reconstruct(inputs, half_space("adhesion-forces"), 1);
+    ASSERT_EQ(r.figures.front().first, "residual_variance_um2");
+    mean += std::get<double>(r.figures.front().second) / kDraws;
+  }
+  EXPECT_NEAR(mean / 0.01, 1, 4 * std::sqrt(2.0 / 16 / kDraws));
 }
 
 TEST(AdhesionForces, sensitivities_are_what_a_wrong_ellipse_does) {

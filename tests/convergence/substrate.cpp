@@ -6,6 +6,7 @@
 #include "substrate/elastic_system.h"
 #include "substrate/ellipse_load.h"
 #include "substrate/half_space.h"
+#include "substrate/stated_error.h"
 #include "tests/support/substrate_scene.h"
 
 namespace mbtfm::substrate {
@@ -180,6 +181,24 @@ TEST(Split, equals_the_layer_on_a_wide_block) {
                                            compliance(gel, test::model_named("layer"), points, ellipses)),
               3e-4)
         << "fine, thickness " << thickness;
+  }
+}
+
+TEST(Split, states_an_error_that_falls_as_its_own_does) {
+  const auto points = test::scattered_points(600, 25);
+  const auto ellipses = test::scattered_ellipses(4, 20);
+  const Gel gel = gel_of(0.49, 30);
+  const Eigen::MatrixXd layer = compliance(gel, test::model_named("layer"), points, ellipses);
+  for (const int cells : {2, 3, 4}) {
+    SubstrateParameters parameters = test::model_named("split");
+    parameters.cells_per_thickness = cells;
+    parameters.margin_thicknesses = 6;  // beyond which the sides change nothing here
+    const auto split = make_substrate(gel, parameters, 2);
+    const double error = test::mean_column_difference(split->compliance_um_per_nN(points, ellipses), layer);
+    const double stated = stated_error(parameters, split->figures());
+    std::printf("split with %d cells: error %.2g, stated %.2g\n", cells, error, stated);
+    EXPECT_LE(error, 1.2 * stated) << cells << " cells";
+    EXPECT_GE(error, 0.5 * stated) << cells << " cells";
   }
 }
 

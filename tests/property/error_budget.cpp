@@ -187,5 +187,39 @@ TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
   EXPECT_LT(std::sqrt(difference), 0.1 * bias.tail(bias.size() - 1).norm());
 }
 
+/// A fit that is stopped early is off by what was left to go. (Near a bound the part is larger than that: it takes the
+/// whole step, which the bound would have cut.)
+TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
+  Cell cell = test::round_cell(14, 16);
+  for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
+  const auto scene = [&] { return test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.02, 7); };
+  TensionScene whole = scene();
+  const Eigen::VectorXd end = test::values_of(test::fit_own_network(whole, {.loss = "squares"}));
+  int n_compared = 0;
+  for (int steps = 1; steps < 6; ++steps) {
+    Fitted early{scene(), {}, {}};
+    early.networks.emplace_back(early.scene.cables.network());
+    early.fit = fit_ensemble(early.networks, early.scene.data, early.scene.adhesion_ids,
+                             {.loss = "squares", .n_meshes = 1, .max_steps = steps}, 2, {});
+    const Eigen::VectorXd left = test::values_of(early.fit) - end;
+    // further off the misfit bends, and nearer the whole fit's own last step counts
+    if (left.norm() > 0.1 * end.norm() || left.norm() < 1e-4 * end.norm()) continue;
+    const ErrorBudget budget = error_budget({.fit = early.fit,
+                                             .data = early.scene.data,
+                                             .networks = early.networks,
+                                             .cell = cell,
+                                             .beads = early.scene.beads,
+                                             .gel = kGel,
+                                             .segmentation = kExact},
+                                            2);
+    double stated = 0;
+    for (const auto& tension : budget.tensions) stated += std::pow(tension.parts_nN.solver, 2);
+    // to first order: the forces' answer to tensions bends by some per cent over so short a step
+    EXPECT_NEAR(std::sqrt(stated) / left.norm(), 1, 0.2) << "after " << steps << " steps";
+    ++n_compared;
+  }
+  EXPECT_GE(n_compared, 1);
+}
+
 }  // namespace
 }  // namespace mbtfm::inverse

@@ -99,6 +99,21 @@ TEST(Experiment, the_gel_moves_towards_the_middle_of_a_cell_that_contracts) {
   EXPECT_GT(pinch, 0) << "forces are those of the cell on the gel";
 }
 
+TEST(Experiment, its_network_has_the_surface_tension_asked_for_on_any_mesh) {
+  for (const double edge_um : {0.7, 1.4}) {
+    ScenarioParameters p = small_scenario();
+    p.mechanics.simulation_edge_length_um = edge_um;
+    const Experiment e = simulate(p, 2);
+    double sum = 0;  // half the trace of the network's stress times its area
+    for (const Link& link : e.network.links) {
+      if (link.fibre_id == 0) sum += 0.5 * link.share * e.tensions.front().tension_nN * link.rest_length_um;
+    }
+    const double tension = sum / std::abs(signed_area_um2(e.cell.outline_um));
+    // fibres take the place of some per cent of the network's links, and so do links at the border
+    EXPECT_NEAR(tension / p.tension.surface_tension_nN_per_um, 1, 0.15) << "edge " << edge_um;
+  }
+}
+
 TEST(Beads, keep_their_distance_or_say_that_they_cannot) {
   ScenarioParameters p = small_scenario();
   p.bead_distance_um = 0.8;

@@ -94,6 +94,54 @@ TEST(ModelError, follows_the_misfit_but_is_no_less_than_one_more_meshs) {
   EXPECT_NEAR(three_times, 3.0 / std::sqrt(1 + 1.0 / 8), 0.5);
 }
 
+TEST(ModelError, is_at_least_how_far_one_more_mesh_lies_from_the_mean_of_these) {
+  for (const int n_meshes : {2, 5}) {
+    double stated = 0, observed = 0;
+    constexpr int kDraws = 200;
+    for (unsigned seed = 1; seed <= kDraws; ++seed) {
+      Model model(seed);
+      const std::vector<MeshForces> meshes = model.meshes(n_meshes);
+      Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(Model::kForces);
+      for (const MeshForces& mesh : meshes) mean_nN += mesh.forces_nN / n_meshes;
+      const ModelError error = model_error(meshes, model.data(0), 1);
+      stated += error.least_phi_nN / error.phi_nN * error.force_variance_nN2.sum();
+      observed += (model.forces(1) - mean_nN).squaredNorm();
+    }
+    // of both the mean of 200 sums of 60 squares, sqrt(2/60) each, not all of one size: to 2 %
+    EXPECT_NEAR(stated / observed, 1, 0.08) << n_meshes << " meshes";
+  }
+}
+
+/// The error of the total: what the fit makes of forces that are not the model's, less what they are.
+TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_models) {
+  Cell cell = test::round_cell(14, 16);
+  for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
+  TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.01, 7, {.seed = 5});
+  std::vector<network::CableNetwork> networks;  // twice the same, and not the cell's: only the misfit tells of errors
+  for (int i = 0; i < 2; ++i) networks.emplace_back(network::generate_network(cell, {.seed = 1}).network);
+  const auto fitted = [&](const Eigen::VectorXd& more_nN) {
+    DisplacementField beads = scene.beads;
+    const Eigen::VectorXd more_um = scene.compliance_um_per_nN * more_nN;
+    for (std::size_t b = 0; b < beads.size(); ++b) {
+      const auto row = 2 * static_cast<Eigen::Index>(b);
+      beads[b].displacement_um += Vec2{more_um[row], more_um[row + 1]};
+    }
+    LinearData data = reduce(beads, scene.compliance_um_per_nN);
+    return fit_ensemble(networks, data, scene.adhesion_ids, {.loss = "squares"}, 2, {});
+  };
+  const Eigen::Index n = scene.compliance_um_per_nN.cols();
+  const EnsembleFit fit = fitted(Eigen::VectorXd::Zero(n));
+  const Eigen::VectorXd along = directions_of(fit.forces_nN);
+  double variance = 0;
+  for (Eigen::Index k = 0; k < n; ++k) {
+    const double deviation = std::sqrt(fit.model_error->force_variance_nN2[k]);
+    const EnsembleFit other = fitted(deviation * Eigen::VectorXd::Unit(n, k));
+    variance += std::pow(other.total_force_nN.value - fit.total_force_nN.value - deviation * along[k], 2);
+  }
+  // linear about the fit: forces bend by some per cent over a deviation, and fits stop short by a part of the noise
+  EXPECT_NEAR(std::sqrt(variance) / fit.total_force_nN.from_model(), 1, 0.15);
+}
+
 TEST(ModelError, that_is_none_leaves_the_data_as_they_are) {
   Model model(1);
   const std::vector<MeshForces> meshes(3, {model.D * model.tensions, model.D});

@@ -153,6 +153,24 @@ TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   EXPECT_EQ(written(known), written(whole));  // the same bytes
 }
 
+TEST(Series, time_begins_with_the_first_frame) {
+  std::vector<FrameFit> fits(2);
+  for (FrameFit& fit : fits) {
+    fit.tensions.resize(1);
+    fit.sigmas_nN = {0.1};
+  }
+  fits[0].frame = 1;
+  fits[1].frame = 4;
+  const test::TemporaryFolder folder;
+  write_frames(folder / "frames.csv", fits, 30);
+  write_tracks(folder / "tracks.csv", fits, {}, 30);
+  for (const char* name : {"frames.csv", "tracks.csv"}) {
+    const CsvTable table(folder / name);
+    EXPECT_EQ(table.number(0, "time_s"), 0) << name;
+    EXPECT_EQ(table.number(1, "time_s"), 90) << name;
+  }
+}
+
 TEST(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
   const test::TemporaryFolder folder;
   Series series = make_series(2);

@@ -77,6 +77,35 @@ TEST(Tractions, a_mirrored_scene_has_mirrored_forces) {
   expect_mapped_forces([](Vec2 v) { return Vec2{v.x, -v.y}; }, 0, -1);
 }
 
+TEST(Tractions, know_no_length_but_the_scenes_own) {
+  // Twice as large in every length, lambda's too: tractions stay, forces grow fourfold.
+  constexpr double kTwice = 2;
+  const EllipseScene scene = ellipse_scene(48, 0.03, 4);
+  for (const char* method : {"fttc", "trpf", "bem"}) {
+    TractionParameters parameters = parameters_of(method);
+    parameters.lambda_um_per_kPa = 1;  // smooths by tens of per cent, so that a lambda in another unit shows
+    const TractionInputs inputs = full_inputs_of(scene);
+    TractionInputs larger = mapped(
+        inputs, [](Vec2 v) { return kTwice * v; }, {32, 32}, 0, 1);
+    for (Bead& b : larger.beads) b.sigma_um *= kTwice;
+    for (Adhesion& a : larger.adhesions) {
+      a.area_um2 *= kTwice * kTwice;
+      a.major_axis_um *= kTwice;
+      a.minor_axis_um *= kTwice;
+    }
+    const Reconstruction one = reconstruct(inputs, parameters, 1);
+    parameters.lambda_um_per_kPa = kTwice;
+    parameters.element_um *= kTwice;
+    parameters.grow_um *= kTwice;
+    const Reconstruction two = reconstruct(larger, parameters, 1);
+    for (std::size_t a = 0; a < one.forces.size(); ++a) {
+      const Vec2 expected = kTwice * kTwice * one.forces[a].force_nN;
+      // as above; and the disc that stands for a point does not grow: (0.1 um over the beads' distance)²
+      EXPECT_NEAR(norm(two.forces[a].force_nN - expected), 0, 0.01 * norm(expected)) << method << " " << a;
+    }
+  }
+}
+
 TEST(Tractions, forces_are_found_on_gels_of_any_compressibility) {
   // Without noise the errors left are those of the lattice and of the ellipses' rims: the same for every gel.
   const EllipseScene scene = ellipse_scene(64, 0);

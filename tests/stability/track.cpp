@@ -129,6 +129,27 @@ TEST(TrackStability, sparse_beads_that_scatter_by_many_widths_are_matched) {
                  test::two_digits(100 * n_strangers / n_good) + " % of them wrong");
 }
 
+TEST(TrackStability, a_bead_that_vanished_is_not_matched_with_a_stranger_far_away) {
+  test::hard_case("loose beads far apart, one in five in one of the images only",
+                  "nine in ten of those that vanished are known to have no partner");
+  const auto peaks = test::ring_of_adhesions(256, 4);
+  int n_vanished = 0, n_matched = 0;
+  for (std::uint64_t seed = 1; seed <= 8; ++seed) {
+    const auto pair = test::draw_bead_pair(
+        peaks, {.width = 256, .n_beads = 150, .brightness_spread = 0.25, .jitter = 0.6, .lost = 0.2, .seed = seed});
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, {}, 2);
+    const Neighbours truth(pair.positions, 8);
+    for (const Bead& bead : tracking.field) {
+      if (!truth.within(bead.position_um - Vec2{0.5, 0.5}, 2, 1).empty()) continue;
+      ++n_vanished;
+      n_matched += bead.flag.empty();
+    }
+  }
+  ASSERT_GE(n_vanished, 100);
+  EXPECT_LE(n_matched, 0.1 * n_vanished);
+  test::came_out(std::to_string(n_vanished - n_matched) + " of " + std::to_string(n_vanished));
+}
+
 /// Where beads scatter so, many registrations run off; one that did once asked for more memory than there is.
 TEST(TrackStability, beads_that_are_lost_stay_in_the_picture) {
   test::hard_case("dense beads that each move by two fifths of their distance",

@@ -31,6 +31,12 @@ TEST(Accuracy, is_relative_to_the_fibres_tensions) {
   EXPECT_FALSE(relative_error(budget(0.3, {})).is_complete);
 }
 
+TEST(Accuracy, what_no_computing_removes_adds_up_in_squares) {
+  ErrorBudget b = budget(0.3, 0);
+  for (TensionError& t : b.tensions) t.parts_nN.segmentation = 0.4;
+  EXPECT_NEAR(relative_error(b).unavoidable, 0.5 * std::sqrt(2.0) / 5, 1e-12);
+}
+
 TEST(Accuracy, is_asked_for_as_a_share_or_in_per_cent) {
   EXPECT_DOUBLE_EQ(parse_accuracy("1%"), 0.01);
   EXPECT_DOUBLE_EQ(parse_accuracy("2.5 %"), 0.025);

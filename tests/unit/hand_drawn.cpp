@@ -88,6 +88,16 @@ TEST(HandDrawn, an_adhesions_intensity_is_its_height_above_its_surroundings) {
   EXPECT_NEAR(found.front().mean_intensity, 300, 1e-9);
 }
 
+TEST(HandDrawn, pixels_within_an_area_are_those_whose_centres_are) {
+  Image image = test::even_image(256, 256, 100);
+  for (int j = 40; j < 46; ++j)
+    for (int i = 50; i < 70; ++i) image.at(i, j) = 400;
+  // a third of a pixel larger on each side: still no further centre is in it
+  const Roi drawn = area({{49.7, 39.7}, {70.3, 39.7}, {70.3, 46.3}, {49.7, 46.3}});
+  const auto found = hand_drawn_adhesions(set_of({drawn}), Channel{"paxillin.tif", image}, kField);
+  EXPECT_NEAR(found.front().mean_intensity, 300, 1e-9);
+}
+
 TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_ends) {
   const std::vector<Adhesion> adhesions = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
   const std::vector<Vec2> tied = {{50, 50}, {150, 50}}, loose = {{80, 200}, {180, 200}};

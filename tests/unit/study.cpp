@@ -10,7 +10,9 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/statistics/conditions.h"
 #include "pipeline/statistics/png.h"
+#include "pipeline/statistics/relations.h"
 #include "pipeline/statistics/study_files.h"
+#include "pipeline/statistics/summaries.h"
 #include "tests/support/fake_cell.h"
 #include "tests/support/simulated_study.h"
 #include "tests/support/temporary_folder.h"
@@ -108,6 +110,64 @@ TEST(Study, the_error_of_a_tension_is_that_of_the_side_zero_does_not_cut) {
   EXPECT_NEAR(*standard_error_nN({.tension_nN = 4, .low_nN = 2, .high_nN = 6}), 4 / (2 * 1.96), 1e-4);
   EXPECT_NEAR(*standard_error_nN({.tension_nN = 1, .low_nN = 0, .high_nN = 5}), 4 / 1.96, 1e-3);
   EXPECT_FALSE(standard_error_nN({.tension_nN = 1, .low_nN = {}, .high_nN = {}}));
+}
+
+TEST(Study, holes_are_not_of_a_cells_area) {
+  StudyCell cell{.name = "a",
+                 .condition = 0,
+                 .cell = test::round_cell(),
+                 .forces = {},
+                 .tensions = {},
+                 .fit = {},
+                 .directions = {}};
+  const double whole = figures_of(cell).cell_area_um2;
+  cell.cell.holes_um = {{{30, 30}, {32, 30}, {32, 33}, {30, 33}}};
+  EXPECT_NEAR(figures_of(cell).cell_area_um2, whole - 6, 1e-9);
+}
+
+TEST(Study, cells_drawn_as_they_are_have_their_own_mean_and_median) {
+  const Study study = test::simulated_study({.n_cells = 7, .seed = 3});
+  const std::vector<CellWeights> draws(200, CellWeights(study.cells.size(), 1));
+  int n_odd = 0;
+  for (const Summary& s : summarise(sample_tensions(study), {}, draws)) {
+    EXPECT_NEAR(s.mean_interval->low, s.plain.mean, 1e-9);
+    EXPECT_NEAR(s.mean_interval->high, s.plain.mean, 1e-9);
+    if (s.n % 2 == 0) continue;  // the median of a draw is one of its values
+    ++n_odd;
+    EXPECT_EQ(s.median_interval->low, s.plain.median);
+    EXPECT_EQ(s.median_interval->high, s.plain.median);
+  }
+  EXPECT_GE(n_odd, 1);
+}
+
+TEST(Study, every_adhesion_is_in_one_bin_of_its_area) {
+  Study study;
+  study.conditions = {""};
+  for (int c = 0; c < 2; ++c) {
+    StudyCell cell{.name = std::to_string(c),
+                   .condition = 0,
+                   .cell = test::round_cell(),
+                   .forces = {},
+                   .tensions = {},
+                   .fit = {},
+                   .directions = {}};
+    cell.cell.adhesions.clear();
+    for (int i = 1; i <= 100; ++i) {
+      cell.cell.adhesions.emplace_back();
+      cell.cell.adhesions.back().adhesion_id = i;
+      cell.cell.adhesions.back().area_um2 = 0.1 * (1 + i % 37);
+      cell.forces.push_back(
+          {.adhesion_id = i, .force_nN = {1, 0}, .sigma_nN = {}, .connected = i % 2 == 0, .moment_nN_um = {}});
+    }
+    study.cells.push_back(std::move(cell));
+  }
+  int n = 0;
+  for (const AreaBin& bin : bin_by_area(study, draw_cells(study, {}))) {
+    n += bin.n_adhesions;
+    EXPECT_LE(bin.low_um2, bin.mean_area_um2);
+    EXPECT_LE(bin.mean_area_um2, bin.high_um2);
+  }
+  EXPECT_EQ(n, 200);
 }
 
 /// A cell of two adhesions that face each other, a straight fibre between them, beads that move inwards.

@@ -1,0 +1,260 @@
+/// What the criteria for lambda are defined to be, against the definitions themselves: leaving data out, a Gaussian's
+/// density, the error of the tractions. Each on linear problems small enough to be solved outright.
+#include <gtest/gtest.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "mbtfm/dense_problem.h"
+#include "mbtfm/regularisation.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+constexpr int kN = 40;
+
+/// A bell of this width around each datum, on a ring: every datum has the same surroundings.
+MatrixXd ring_of_bells(double width) {
+  MatrixXd G(kN, kN);
+  for (int i = 0; i < kN; ++i) {
+    for (int j = 0; j < kN; ++j) {
+      const int apart = std::min((i - j + kN) % kN, (j - i + kN) % kN);
+      G(i, j) = std::exp(-0.5 * std::pow(apart / width, 2));
+    }
+  }
+  return G;
+}
+
+/// Two waves of traction.
+VectorXd some_tractions() {
+  VectorXd t(kN);
+  for (int i = 0; i < kN; ++i) {
+    const double turn = 2 * std::numbers::pi * i / kN;
+    t[i] = std::sin(turn) + 0.5 * std::cos(3 * turn);
+  }
+  return t;
+}
+
+VectorXd noise_of(double sigma, int n, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, sigma);
+  VectorXd noise(n);
+  for (double& e : noise) e = normal(random);
+  return noise;
+}
+
+/// The tractions as a linear map of the data.
+MatrixXd solver_of(const MatrixXd& G, double lambda) {
+  const MatrixXd normal = G.transpose() * G + lambda * lambda * MatrixXd::Identity(G.cols(), G.cols());
+  return normal.ldlt().solve(G.transpose());
+}
+
+std::vector<ScanPoint> scan_of(const MatrixXd& G, const VectorXd& u) {
+  std::vector<ScanPoint> points;
+  for (const double lambda : lambdas_between(10, 1e-2)) {
+    const MatrixXd K = solver_of(G, lambda);
+    const VectorXd t = K * u;
+    points.push_back({.lambda = lambda,
+                      .misfit = (u - G * t).squaredNorm(),
+                      .norm = t.squaredNorm(),
+                      .degrees = (G * K).trace(),
+                      .removable_misfit = {}});
+  }
+  return points;
+}
+
+LambdaScan judged(const MatrixXd& G, const VectorXd& u, double variance) {
+  return judge(scan_of(G, u), kN, kN, variance, [](double) { return 0; });
+}
+
+/// Mean square of the error with which the others predict each datum.
+double error_of_prediction(const MatrixXd& G, const VectorXd& u, double lambda) {
+  double sum = 0;
+  for (int left_out = 0; left_out < kN; ++left_out) {
+    MatrixXd others = G;
+    others.row(left_out).setZero();
+    const double predicted = G.row(left_out).dot(solver_of(others, lambda) * u);
+    sum += std::pow(u[left_out] - predicted, 2) / kN;
+  }
+  return sum;
+}
+
+TEST(Criteria, cross_validation_leaves_out_each_datum_where_all_are_alike) {
+  const MatrixXd G = ring_of_bells(2);
+  const VectorXd u = G * some_tractions() + noise_of(0.5, kN, 1);
+  const LambdaScan scan = judged(G, u, 0.25);
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const double error = error_of_prediction(G, u, scan.points[i].lambda);
+    EXPECT_NEAR(scan.gcv[i], error, 1e-9 * error) << "lambda " << scan.points[i].lambda;  // rounding, at 1e3 of G
+  }
+  // and its lambda is the one that predicts best, between the points of the scan too: as far as its spline follows
+  // a minimum as wide as the scan's step
+  double least = 1e300, best = 0;
+  for (double lambda = 10; lambda > 1e-2; lambda /= 1.02) {
+    const double error = error_of_prediction(G, u, lambda);
+    if (error < least) least = error, best = lambda;
+  }
+  EXPECT_NEAR(std::log(scan.by_gcv / best), 0, std::log(1.1));  // an eighth of the scan's step
+  EXPECT_LE(error_of_prediction(G, u, scan.by_gcv), 1.001 * least);
+}
+
+TEST(Criteria, a_lambda_that_cross_validation_does_not_choose_predicts_worse_on_average) {
+  // by this factor to either side, in each draw: beyond chance, three standard errors of the mean difference
+  constexpr int kDraws = 200;
+  const MatrixXd G = ring_of_bells(2);
+  const VectorXd truth = G * some_tractions();
+  for (const double factor : {0.4, 2.5}) {
+    double worse = 0, squares = 0;
+    for (unsigned draw = 0; draw < kDraws; ++draw) {
+      const VectorXd u = truth + noise_of(0.5, kN, 100 + draw);
+      const auto error_at = [&](double lambda) { return (G * (solver_of(G, lambda) * u) - truth).squaredNorm(); };
+      const double chosen = judged(G, u, 0.25).by_gcv, difference = error_at(factor * chosen) - error_at(chosen);
+      worse += difference / kDraws;
+      squares += difference * difference / kDraws;
+    }
+    EXPECT_GT(worse, 3 * std::sqrt((squares - worse * worse) / kDraws)) << "factor " << factor;
+  }
+}
+
+TEST(Criteria, evidence_is_the_density_of_the_data_where_tractions_are_Gaussian) {
+  // u is Gaussian with the covariance a (1 + G Gᵀ / lambda²), whose scale a is as the data have it
+  const MatrixXd G = ring_of_bells(2);
+  const VectorXd u = G * some_tractions() + noise_of(0.5, kN, 2);
+  const LambdaScan scan = judged(G, u, 0.25);
+  const auto log_density = [&](double lambda) {
+    const MatrixXd C = MatrixXd::Identity(kN, kN) + G * G.transpose() / (lambda * lambda);
+    const Eigen::LLT<MatrixXd> root(C);
+    const double log_determinant = 2 * root.matrixLLT().diagonal().array().log().sum();
+    return -0.5 * kN * std::log(u.dot(root.solve(u))) - 0.5 * log_determinant;
+  };
+  // the determinant is summed by trapezia: off by h²/6 times the change of the slope of `degrees` in log lambda
+  const double h = std::log(scan.points[0].lambda / scan.points[1].lambda);
+  double steepest = 0;
+  for (std::size_t i = 1; i < scan.points.size(); ++i) {
+    steepest = std::max(steepest, (scan.points[i].degrees - scan.points[i - 1].degrees) / h);
+  }
+  for (std::size_t i = 1; i < scan.points.size(); ++i) {
+    const double rise = log_density(scan.points[i].lambda) - log_density(scan.points[0].lambda);
+    EXPECT_NEAR(scan.evidence[i] - scan.evidence[0], rise, h * h / 6 * steepest) << "lambda " << scan.points[i].lambda;
+  }
+}
+
+TEST(Criteria, risk_is_the_squared_error_of_the_tractions_on_average_up_to_a_constant) {
+  constexpr int kDraws = 400;
+  constexpr double kSigma = 0.05;
+  const MatrixXd G = ring_of_bells(0.6);  // steep enough for each traction to show in the data
+  const VectorXd t = some_tractions();
+  std::vector<double> sums, squares, lambdas;
+  for (unsigned draw = 0; draw < kDraws; ++draw) {
+    const VectorXd u = G * t + noise_of(kSigma, kN, 1000 + draw);
+    const LambdaScan scan = judged(G, u, kSigma * kSigma);
+    sums.resize(scan.points.size(), 0), squares.resize(scan.points.size(), 0), lambdas.resize(scan.points.size(), 0);
+    double first = 0;
+    for (std::size_t i = 0; i < scan.points.size(); ++i) {
+      const double lambda = scan.points[i].lambda;
+      const double constant = scan.risk[i] - (solver_of(G, lambda) * u - t).squaredNorm();
+      if (i == 0) first = constant;
+      sums[i] += (constant - first) / kDraws;
+      squares[i] += std::pow(constant - first, 2) / kDraws;
+      lambdas[i] = lambda;
+    }
+  }
+  for (std::size_t i = 1; i < sums.size(); ++i) {
+    const double standard_error = std::sqrt((squares[i] - sums[i] * sums[i]) / kDraws);
+    EXPECT_LE(std::abs(sums[i]), 4 * standard_error) << "lambda " << lambdas[i];
+  }
+}
+
+TEST(Criteria, do_not_depend_on_the_unit_of_the_displacements) {
+  const MatrixXd G = ring_of_bells(2);
+  const VectorXd u = G * some_tractions() + noise_of(0.5, kN, 3);
+  const LambdaScan one = judged(G, u, 0.25), other = judged(G, 1000 * u, 1e6 * 0.25);
+  for (const char* criterion : {"risk", "gcv", "evidence"}) {
+    EXPECT_NEAR(chosen_lambda(other, criterion) / chosen_lambda(one, criterion), 1, 1e-9) << criterion;
+  }
+  EXPECT_EQ(one.by_l_curve.has_value(), other.by_l_curve.has_value());
+}
+
+TEST(Criteria, the_variance_that_residuals_tell_is_that_of_the_data) {
+  const MatrixXd G = ring_of_bells(2);
+  constexpr int kDraws = 400;
+  for (const double lambda : {0.3, 1.0, 3.0}) {
+    const MatrixXd H = G * solver_of(G, lambda);
+    double mean = 0, squares = 0;
+    for (unsigned draw = 0; draw < kDraws; ++draw) {
+      const VectorXd e = noise_of(0.5, kN, 2000 + draw);
+      const VectorXd r = e - H * e;
+      const double variance = robust_variance({r.begin(), r.end()}, H.trace(), (H * H).trace());
+      mean += variance / kDraws;
+      squares += variance * variance / kDraws;
+    }
+    const double standard_error = std::sqrt((squares - mean * mean) / kDraws);
+    // the median of n magnitudes lies high by about 1 / n of its square; and chance
+    EXPECT_NEAR(mean, 0.25, 0.25 * 3 / kN + 3 * standard_error) << "lambda " << lambda;
+  }
+}
+
+/// Beads of unequal errors, and loads that they answer to in no particular way.
+struct Loaded {
+  DisplacementField beads;
+  MatrixXd G;
+};
+
+Loaded loaded(int n_beads, int n_loads) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  Loaded scene{{}, MatrixXd(2 * n_beads, n_loads)};
+  for (double& g : scene.G.reshaped()) g = normal(random);
+  for (int i = 0; i < n_beads; ++i) {
+    const double x = normal(random), y = normal(random);
+    scene.beads.push_back(
+        {.position_um = {1.0 * i, 0}, .displacement_um = {x, y}, .sigma_um = 1 + 0.1 * i, .flag = {}});
+  }
+  return scene;
+}
+
+DenseProblem problem_of(const Loaded& scene, const DisplacementField& beads) {
+  const Compliance answers = [&scene](const std::vector<Vec2>& at) {
+    MatrixXd rows(2 * static_cast<Eigen::Index>(at.size()), scene.G.cols());
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      rows.middleRows(2 * static_cast<Eigen::Index>(i), 2) =
+          scene.G.middleRows(2 * static_cast<Eigen::Index>(std::lround(at[i].x)), 2);
+    }
+    return rows;
+  };
+  return DenseProblem(beads, answers, scene.G.cols(), {}, 0);
+}
+
+TEST(DenseProblem, its_degrees_of_freedom_and_covariance_are_those_of_its_answers_to_the_data) {
+  constexpr int kBeads = 9, kLoads = 6;
+  const Loaded scene = loaded(kBeads, kLoads);
+  const LambdaScan scan = problem_of(scene, scene.beads).scan();
+  for (const std::size_t at : {std::size_t{1}, scan.points.size() / 2}) {
+    const double lambda = scan.points[at].lambda;
+    double degrees = 0;
+    MatrixXd covariance = MatrixXd::Zero(kLoads, kLoads);
+    for (int component = 0; component < 2 * kBeads; ++component) {
+      DisplacementField one = scene.beads;  // displaced by its standard error in this component, all else still
+      for (Bead& b : one) b.displacement_um = {};
+      Bead& bead = one[static_cast<std::size_t>(component / 2)];
+      (component % 2 == 0 ? bead.displacement_um.x : bead.displacement_um.y) = bead.sigma_um;
+      const VectorXd answer = problem_of(scene, one).solve(lambda);
+      degrees += scene.G.row(component).dot(answer) / bead.sigma_um;
+      covariance += answer * answer.transpose();
+    }
+    EXPECT_NEAR(scan.points[at].degrees, degrees, 1e-9 * degrees);
+    // one datum of weight 1 has the variance that the errors state for the mean weight
+    double mean_weight = 0;
+    for (const Bead& b : scene.beads) mean_weight += 1 / (b.sigma_um * b.sigma_um) / kBeads;
+    const MatrixXd stated = problem_of(scene, scene.beads).covariance(lambda, 1 / mean_weight);
+    EXPECT_LE((stated - covariance).norm(), 1e-9 * covariance.norm());
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse

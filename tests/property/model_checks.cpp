@@ -1,0 +1,67 @@
+/// Which model the criteria prefer, over many draws of the beads' noise.
+#include "mbtfm/model_checks.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+/// One fibre, pulling with this.
+test::TensionScene one_fibre(double tension_nN, int n_beads) {
+  Cell cell = test::round_cell(8, 6);
+  test::add_ventral(cell, 1, 4);
+  return test::scene_of(cell, Eigen::Vector2d(0.3, tension_nN), n_beads, 0.02, 3);
+}
+
+std::vector<ModelScore> scores(test::TensionScene& scene) {
+  const EnsembleFit fit = test::fit_own_network(scene, {.loss = "squares"});
+  return compare_models(fit, scene.data, scene.cables, scene.adhesion_ids);
+}
+
+TEST(ModelScores, a_parameter_costs_AIC_two_and_BIC_the_logarithm_of_the_number_of_data) {
+  for (const int n_beads : {300, 1200}) {
+    test::TensionScene scene = one_fibre(2, n_beads);
+    for (const ModelScore& model : scores(scene)) {
+      EXPECT_NEAR((model.aic - model.chi_squared) / model.n_parameters, 2, 1e-9) << model.name;
+      // twice as many displacement components as beads
+      EXPECT_NEAR((model.bic - model.chi_squared) / model.n_parameters, std::log(2.0 * n_beads), 1e-9) << model.name;
+    }
+  }
+}
+
+TEST(ModelScores, BIC_prefers_the_network_alone_where_it_is_alone_and_AIC_does_so_less_often) {
+  // A fibre that pulls like the network is none. A parameter too many lowers chi² by the square of a normal variable,
+  // so AIC takes it where that is above 2, in 16 % of the draws, however many the beads; BIC where it is above
+  // ln 1000, in 0.9 %. Of 100 draws more than 4 are that with a chance of 1 in 500, and fewer than 6 of AIC's 16.
+  test::TensionScene scene = one_fibre(0.3, 500);
+  constexpr int kDraws = 100;
+  int n_by_aic = 0, n_by_bic = 0;
+  for (unsigned draw = 0; draw < kDraws; ++draw) {
+    test::measure(scene, 0.02, 100 + draw);
+    const std::vector<ModelScore> models = scores(scene);
+    ASSERT_EQ(models[0].name, "no-fibres");
+    ASSERT_EQ(models[1].name, "full");
+    n_by_aic += models[1].aic < models[0].aic;
+    n_by_bic += models[1].bic < models[0].bic;
+  }
+  EXPECT_GE(n_by_aic, 6);
+  EXPECT_LE(n_by_aic, 28);
+  EXPECT_LE(n_by_bic, 4);
+}
+
+TEST(ModelScores, BIC_finds_a_fibre_that_pulls_once_the_beads_are_many) {
+  // Its chi² grows with the beads, its price with their logarithm.
+  int n_found = 0;
+  test::TensionScene scene = one_fibre(2, 2000);
+  for (unsigned draw = 0; draw < 10; ++draw) {
+    test::measure(scene, 0.02, 300 + draw);
+    const std::vector<ModelScore> models = scores(scene);
+    n_found += models[1].bic < models[0].bic && models[1].bic < models[2].bic;
+  }
+  EXPECT_EQ(n_found, 10);
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
