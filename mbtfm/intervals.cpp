@@ -51,8 +51,8 @@ Eigen::VectorXd freedom_of(const LocalMisfit& local, double variance, double hal
   return freedom;
 }
 
-/// H⁻¹ with tensions held as much as they lack freedom: f (f H f + (1 − f²) diag H)⁻¹ f. Without the held ones where all
-/// are 0 or 1.
+/// H⁻¹ with tensions held as much as they lack freedom: f (f H f + (1 − f²) diag H)⁻¹ f. Without the held ones where
+/// all are 0 or 1.
 Eigen::MatrixXd held_inverse(const Eigen::MatrixXd& H, const Eigen::VectorXd& freedom) {
   Eigen::MatrixXd held = freedom.asDiagonal() * H * freedom.asDiagonal();
   held.diagonal() = H.diagonal();
@@ -105,8 +105,8 @@ double shift_at(const LocalMisfit& local, int i, double wanted, double first, do
   return shift;
 }
 
-/// At the solution the gradient of a free tension is zero, and of a held one not negative, but for the last step's rest;
-/// and directions that no bead feels must not make it singular.
+/// At the solution the gradient of a free tension is zero, and of a held one not negative, but for the last step's
+/// rest; and directions that no bead feels must not make it singular.
 LocalMisfit at_minimum(LocalMisfit local) {
   local.H.diagonal() += 1e-12 * local.H.diagonal();
   for (Eigen::Index k = 0; k < local.g.size(); ++k) {

@@ -22,9 +22,9 @@ struct LocalMisfit {
 LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian);
 
 /// K = H⁻¹: how the tensions follow −g. Those that the data press against zero by three standard errors or more are
-/// held: they do not move, and the others as without them; by one or less they are free. Between, they pass from the one
-/// to the other smoothly, so that nothing jumps where the data change by rounding. A direction of which no bead tells
-/// anything moves far.
+/// held: they do not move, and the others as without them; by one or less they are free. Between, they pass from the
+/// one to the other smoothly, so that nothing jumps where the data change by rounding. A direction of which no bead
+/// tells anything moves far.
 Eigen::MatrixXd response_of(const LocalMisfit& local, double variance);
 
 /// K Var(g) K: of both errors (the sandwich; White, Econometrica 50 (1982) 1).
@@ -53,11 +53,11 @@ double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd
 struct Sides {
   double below = 0, above = 0;
 };
-/// 95 % interval of each tension: where the least misfit over all other tensions >= 0 has risen by 1.96² variances. Ends
-/// at a bound; where no tension meets one on the way it is 1.96 standard errors to either side (profile likelihood;
-/// Venzon & Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit). With an error of the model the rise is that
-/// which makes this so again (Chandler & Bate, Biometrika 94 (2007) 167). Continuous in the misfit. Infinite above where
-/// no bead feels a tension.
+/// 95 % interval of each tension: where the least misfit over all other tensions >= 0 has risen by 1.96² variances.
+/// Ends at a bound; where no tension meets one on the way it is 1.96 standard errors to either side (profile
+/// likelihood; Venzon & Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit). With an error of the model the
+/// rise is that which makes this so again (Chandler & Bate, Biometrika 94 (2007) 167). Continuous in the misfit.
+/// Infinite above where no bead feels a tension.
 std::vector<Sides> profiles_95(const LocalMisfit& local, double variance);
 
 /// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance drawn anew, less

@@ -103,7 +103,10 @@ Axis drawable(Axis axis) {
 }  // namespace
 
 Chart::Chart(std::string title, Axis x, Axis y)
-    : title_(std::move(title)), x_(drawable(std::move(x))), y_(drawable(std::move(y))), frame_height_px_(kFrameHeight_px) {}
+    : title_(std::move(title)),
+      x_(drawable(std::move(x))),
+      y_(drawable(std::move(y))),
+      frame_height_px_(kFrameHeight_px) {}
 
 void Chart::subtitle(std::string text, std::string colour) {
   subtitle_ = std::move(text);

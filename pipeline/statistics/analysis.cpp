@@ -67,8 +67,9 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
   if (tensions.sample.n_without_error > 0) {
     warnings.push_back(
         tensions.sample.n_without_error < n_tensions
-            ? fmt::format("{} of {} tensions have no error bar; their error is taken to be as large as that of the others.",
-                          tensions.sample.n_without_error, n_tensions)
+            ? fmt::format(
+                  "{} of {} tensions have no error bar; their error is taken to be as large as that of the others.",
+                  tensions.sample.n_without_error, n_tensions)
             : "No tension has an error bar: what is scatter of the fibres and what error cannot be told.");
   }
   for (const Summary& s : tensions.summaries) {

@@ -110,9 +110,7 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
   const double step_above = std::max(step, (widest - threshold) / kPoints);
   const int n_above = static_cast<int>(std::ceil((widest - threshold) / step_above + 0.5));
   const int n_points = n_below + n_above;
-  const auto point = [&](int k) {
-    return k < n_below ? k * step : threshold + (k - n_below + 0.5) * step_above;
-  };
+  const auto point = [&](int k) { return k < n_below ? k * step : threshold + (k - n_below + 0.5) * step_above; };
   const boost::math::normal normal;
   std::vector<std::vector<double>> kernel;
   for (std::size_t i = 0; i < values.size(); ++i) {

@@ -59,8 +59,8 @@ void check_scatter(const Design& design) {
   const VectorXd means = (design.X.transpose() * design.y).cwiseQuotient(n);
   constexpr double kRounding = 1e-12;  // of the values
   const double scatter = (design.y - design.X * means).cwiseAbs().maxCoeff();
-  const bool has_errors = std::any_of(design.rows.begin(), design.rows.end(),
-                                      [](const Observation& o) { return o.error_variance > 0; });
+  const bool has_errors =
+      std::any_of(design.rows.begin(), design.rows.end(), [](const Observation& o) { return o.error_variance > 0; });
   if (has_errors || scatter > kRounding * design.y.cwiseAbs().maxCoeff()) return;
   throw InvalidData("the sample", "values that differ within a group, or errors", "neither");
 }
@@ -84,8 +84,9 @@ std::vector<Block> blocks_of(const std::vector<Observation>& rows) {
 
 bool has_group_of_two_cells(const std::vector<Observation>& rows) {
   std::map<int, int> cell_of;  // the first of each group
-  return std::any_of(rows.begin(), rows.end(),
-                     [&](const Observation& o) { return cell_of.try_emplace(o.group, o.cell).first->second != o.cell; });
+  return std::any_of(rows.begin(), rows.end(), [&](const Observation& o) {
+    return cell_of.try_emplace(o.group, o.cell).first->second != o.cell;
+  });
 }
 
 std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
@@ -157,8 +158,9 @@ class Covariance {
     VectorXd residual = VectorXd::Zero(design.n_kinds());
     for (std::size_t k = 0; k < design.components.size(); ++k) {
       const Component& c = design.components[k];
-      (c.term == Term::cell ? of_cell : c.term == Term::cell_kind ? of_cell_kind : residual[c.kind]) =
-          v[static_cast<Index>(k)];
+      (c.term == Term::cell        ? of_cell
+       : c.term == Term::cell_kind ? of_cell_kind
+                                   : residual[c.kind]) = v[static_cast<Index>(k)];
     }
     for (Index i = 0; i < weight_.size(); ++i) {
       const Observation& o = design.rows[static_cast<std::size_t>(i)];
@@ -408,8 +410,7 @@ MixedFit fit_mixed_model(std::vector<Observation> observations) {
     if (next) s = std::move(*next);
     d = derivatives_at(design, s);
     // half of what a full Newton step promises
-    const double promise =
-        0.5 * newton_step(d, s.v, lower, free_ones(s.v, lower, d.gradient)).dot(d.gradient);
+    const double promise = 0.5 * newton_step(d, s.v, lower, free_ones(s.v, lower, d.gradient)).dot(d.gradient);
     fit.converged = gain < kTolerance && promise < kTolerance;
   }
   fit.mean = s.mean;

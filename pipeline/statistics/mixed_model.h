@@ -22,13 +22,13 @@ struct Observation {
 /// two kinds or no kind two observations in a cell: it could not be told from the others. Both are left out where no
 /// group has two cells: the groups' means take up all that cells differ by.
 struct MixedFit {
-  Eigen::VectorXd mean;               ///< by group
-  Eigen::MatrixXd covariance;         ///< of the means
+  Eigen::VectorXd mean;                      ///< by group
+  Eigen::MatrixXd covariance;                ///< of the means
   std::optional<double> cell_variance;       ///< of a; none where a is left out
   std::optional<double> cell_kind_variance;  ///< of b; none where b is left out
   /// of e, by kind; none of a kind that has no two observations in any group
   std::vector<std::optional<double>> residual_variance;
-  double log_likelihood = 0;          ///< restricted
+  double log_likelihood = 0;  ///< restricted
   int n_cells = 0, n_observations = 0;
   bool converged = false;
   // for Satterthwaite's degrees of freedom
@@ -38,8 +38,8 @@ struct MixedFit {
 
 /// Average-information REML (Gilmour, Thompson & Cullis, Biometrics 51, 1440 (1995)) with the known error variances on
 /// the diagonal; variances are held at zero where the likelihood falls on leaving it.
-/// @throws InvalidData for fewer than two cells, a group without observations, values that are all equal, or that differ
-/// neither within a group nor by errors
+/// @throws InvalidData for fewer than two cells, a group without observations, values that are all equal, or that
+/// differ neither within a group nor by errors
 MixedFit fit_mixed_model(std::vector<Observation> observations);
 
 /// A weighted sum of the group means, with Student's t at Satterthwaite's degrees of freedom.

@@ -148,9 +148,9 @@ std::vector<std::string> lines(const Analysis& analysis) {
                            : c.size == "cell_area_um2"     ? "µm² of cell"
                                                            : "fibre";
     const std::string error = c.line.slope_error ? " ± " + readable(*c.line.slope_error) : "";
-    std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
-                                   readable(c.line.slope), error, by,
-                                   c.line.slope_error ? fmt::format("{} cells", c.line.n) : "a single cell: no error");
+    std::string text =
+        fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition), readable(c.line.slope),
+                    error, by, c.line.slope_error ? fmt::format("{} cells", c.line.n) : "a single cell: no error");
     if (c.line.correlation) text += ", r = " + readable(*c.line.correlation);
     list.push_back(capitalised(text + ")."));
   }
@@ -160,7 +160,8 @@ std::vector<std::string> lines(const Analysis& analysis) {
 std::vector<std::string> directions(const Analysis& analysis) {
   std::vector<std::string> list;
   if (analysis.directions.empty()) {
-    list.push_back("No direction is known: no fibre ends on an adhesion, and no beads near one moved by more than noise.");
+    list.push_back(
+        "No direction is known: no fibre ends on an adhesion, and no beads near one moved by more than noise.");
   }
   for (const DirectionSummary& s : analysis.directions) {
     std::string text = fmt::format("{}{} differ by {:.0f}° in the mean", prefix_of(s.condition),

@@ -47,12 +47,13 @@ Table types_table(const Study& study, const Analysis& analysis) {
                {"SD without error (nN)", true}},
               {}};
   for (const Summary& s : analysis.tensions.summaries) {
-    table.rows.push_back({html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells),
-                          std::to_string(s.n), s.model ? readable(s.model->estimate) : "–",
-                          interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-                          readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
-                          number_text(s.plain.standard_deviation),
-                          number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
+    table.rows.push_back(
+        {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
+         s.model ? readable(s.model->estimate) : "–",
+         interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
+         readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
+         number_text(s.plain.standard_deviation),
+         number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
   }
   if (!has_conditions(study)) {
     table.columns.erase(table.columns.begin());

@@ -208,14 +208,16 @@ TEST(MixedModel, scatter_that_the_errors_explain_leaves_a_mean_weighted_by_them)
 
 /// One cell a condition: the conditions' means hold all that the cells differ by.
 TEST(MixedModel, what_the_groups_means_take_up_is_no_variance_between_cells) {
-  const MixedFit fit = fit_mixed_model({{.value = 1}, {.value = 2}, {.value = 7, .cell = 1, .group = 1},
-                                        {.value = 9, .cell = 1, .group = 1}});
+  const MixedFit fit = fit_mixed_model(
+      {{.value = 1}, {.value = 2}, {.value = 7, .cell = 1, .group = 1}, {.value = 9, .cell = 1, .group = 1}});
   EXPECT_FALSE(fit.cell_variance);
   EXPECT_TRUE(fit.residual_variance[0]);
 }
 
 TEST(MixedModel, kinds_without_two_values_in_a_group_have_no_scatter_that_could_be_told) {
-  const MixedFit fit = fit_mixed_model({{.value = 1}, {.value = 2, .cell = 1}, {.value = 1.5, .cell = 2},
+  const MixedFit fit = fit_mixed_model({{.value = 1},
+                                        {.value = 2, .cell = 1},
+                                        {.value = 1.5, .cell = 2},
                                         {.value = 7, .cell = 2, .kind = 2, .group = 1}});
   ASSERT_EQ(fit.residual_variance.size(), 3u);
   EXPECT_TRUE(fit.residual_variance[0]);

@@ -1,5 +1,6 @@
 /// Other processors, other libraries and other numbers of beads to a block round differently. What a fit reports must
 /// not depend on that: tensions and the ends of their intervals are continuous in the data.
+/// MBTFM_CASES=N takes as many seeds; MBTFM_PRINT=1 prints how far each case moves, in standard errors.
 #include <gtest/gtest.h>
 
 #include <cstdio>
@@ -15,12 +16,14 @@ using test::TensionScene;
 
 struct Case {
   std::string name;
+  double noise = 0;
   TensionScene scene;
   std::vector<network::CableNetwork> networks;
 };
 
 Case of_reference(const std::string& name, double noise, unsigned seed) {
   Case c{name + ", noise " + std::to_string(noise) + ", seed " + std::to_string(seed),
+         noise,
          test::tension_scene(name, 1000, noise, seed),
          {}};
   c.networks.emplace_back(c.scene.cables.network());
@@ -34,6 +37,7 @@ Case of_round_cell(int n_meshes, double noise, unsigned seed) {
   Eigen::VectorXd tensions = test::thesis_tensions_nN(cell.fibres.size(), seed);
   for (Eigen::Index i = 1; i < tensions.size(); i += 2) tensions[i] = 0;
   Case c{std::to_string(n_meshes) + " meshes, noise " + std::to_string(noise) + ", seed " + std::to_string(seed),
+         noise,
          test::scene_of(cell, tensions, 600, noise, seed),
          {}};
   for (int m = 0; m < n_meshes; ++m) {
@@ -60,7 +64,8 @@ Answer answer_of(const Case& c, double relative, unsigned seed) {
   LinearData data = reduce(beads, c.scene.compliance_um_per_nN);
   const EnsembleFit fit = fit_ensemble(c.networks, data, c.scene.adhesion_ids, {.loss = "squares"}, 2, {});
   const auto n = static_cast<Eigen::Index>(fit.tensions_nN.size());
-  Answer answer{.value = Eigen::VectorXd(n), .error = Eigen::VectorXd(n), .low = Eigen::VectorXd(n), .high = Eigen::VectorXd(n)};
+  Answer answer{
+      .value = Eigen::VectorXd(n), .error = Eigen::VectorXd(n), .low = Eigen::VectorXd(n), .high = Eigen::VectorXd(n)};
   for (Eigen::Index i = 0; i < n; ++i) {
     const Estimate& e = fit.tensions_nN[static_cast<std::size_t>(i)];
     const Interval interval = interval_95(e);
@@ -77,10 +82,13 @@ Answer answer_of(const Case& c, double relative, unsigned seed) {
 }
 
 /// The beads' error is `noise` of the largest displacement. A relative change of 1e-7 of N displacements is at most
-/// 1e-7 √(2N) / noise of their errors together, in any direction, and a tension follows by no more than that part of its
-/// standard error: 5e-5 for 1 000 beads and noise 0.1. Twenty times that leaves room for interval ends, which follow the
-/// tensions, and the errors' own change.
-constexpr double kContinuous = 1e-3;
+/// 1e-7 √(2N) / noise of their errors together, in any direction, and a tension follows by no more than that part of
+/// its standard error: 4e-5 for 1 000 beads and noise 0.1. Five times that leaves room for interval ends, which follow
+/// the tensions and their errors, and for the model's bending.
+double largest_change(const Case& c) {
+  constexpr double kRelative = 1e-7, kRoom = 5;
+  return kRoom * kRelative * std::sqrt(2.0 * static_cast<double>(c.scene.beads.size())) / c.noise;
+}
 
 void expect_continuous(const Case& c) {
   const Answer base = answer_of(c, 0, 0);
@@ -103,15 +111,15 @@ void expect_continuous(const Case& c) {
   if (std::getenv("MBTFM_PRINT"))
     std::printf("%-45s at bound %2d of %2d: value %.1e end %.1e error %.1e sums %.1e\n", c.name.c_str(), n_at_bound,
                 static_cast<int>(base.value.size()), worst_value, worst_end, worst_error, worst_sum);
-  EXPECT_LT(worst_value, kContinuous) << c.name;
-  EXPECT_LT(worst_end, kContinuous) << c.name;
-  EXPECT_LT(worst_error, kContinuous) << c.name;
-  EXPECT_LT(worst_sum, kContinuous) << c.name;
+  EXPECT_LT(worst_value, largest_change(c)) << c.name;
+  EXPECT_LT(worst_end, largest_change(c)) << c.name;
+  EXPECT_LT(worst_error, largest_change(c)) << c.name;
+  EXPECT_LT(worst_sum, largest_change(c)) << c.name;
 }
 
 TEST(Continuity, tensions_and_interval_ends_follow_the_data) {
   const char* more = std::getenv("MBTFM_CASES");
-  const unsigned n = more ? static_cast<unsigned>(std::atoi(more)) : 2;
+  const unsigned n = more ? static_cast<unsigned>(std::atoi(more)) : 1;
   for (const double noise : {0.05, 0.15, 0.3}) {
     for (unsigned seed = 1; seed <= n; ++seed) {
       for (const std::string name : {"case_21", "case_22"}) expect_continuous(of_reference(name, noise, seed));

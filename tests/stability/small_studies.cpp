@@ -22,30 +22,29 @@ bool are_all() { return std::getenv("MBTFM_ALL_STUDIES") != nullptr; }
 const StudyParameters kFewDraws{.bootstrap_draws = 200};
 
 /// Columns of a table that hold words.
-const std::set<std::string> kWords = {"cell",  "condition", "reason",  "type",    "kind",      "quantity", "component",
-                                      "force", "size",      "remark",  "question", "within",   "test",     "unit",
-                                      "group_a", "group_b", "effect_is", "relation"};
+const std::set<std::string> kWords = {"cell",      "condition", "reason",  "type",    "kind",      "quantity",
+                                      "component", "force",     "size",    "remark",  "question",  "within",
+                                      "test",      "unit",      "group_a", "group_b", "effect_is", "relation"};
 
 /// An estimate with the columns of its interval. Sums, means and medians of what has no negative values have none.
 struct Bounded {
   std::string value, low, high;
   bool is_positive = true;
 };
-const std::vector<Bounded> kIntervals = {
-    {"mean", "mean_low", "mean_high"},
-    {"model_mean", "model_low", "model_high"},
-    {"median", "median_low", "median_high"},
-    {"mean_nN", "mean_low_nN", "mean_high_nN"},
-    {"model_mean_nN", "model_low_nN", "model_high_nN"},
-    {"median_nN", "median_low_nN", "median_high_nN"},
-    {"fraction_above_1_nN", "fraction_above_1_nN_low", "fraction_above_1_nN_high"},
-    {"fraction_above_5_nN", "fraction_above_5_nN_low", "fraction_above_5_nN_high"},
-    {"slope", "slope_low", "slope_high"},
-    {"mean_force_nN", "low_nN", "high_nN"},
-    {"tension_nN", "low_nN", "high_nN"},
-    {"mean_angle_deg", "low_deg", "high_deg"},
-    {"mean_cosine", "cosine_low", "cosine_high", false},
-    {"effect", "effect_low", "effect_high", false}};
+const std::vector<Bounded> kIntervals = {{"mean", "mean_low", "mean_high"},
+                                         {"model_mean", "model_low", "model_high"},
+                                         {"median", "median_low", "median_high"},
+                                         {"mean_nN", "mean_low_nN", "mean_high_nN"},
+                                         {"model_mean_nN", "model_low_nN", "model_high_nN"},
+                                         {"median_nN", "median_low_nN", "median_high_nN"},
+                                         {"fraction_above_1_nN", "fraction_above_1_nN_low", "fraction_above_1_nN_high"},
+                                         {"fraction_above_5_nN", "fraction_above_5_nN_low", "fraction_above_5_nN_high"},
+                                         {"slope", "slope_low", "slope_high"},
+                                         {"mean_force_nN", "low_nN", "high_nN"},
+                                         {"tension_nN", "low_nN", "high_nN"},
+                                         {"mean_angle_deg", "low_deg", "high_deg"},
+                                         {"mean_cosine", "cosine_low", "cosine_high", false},
+                                         {"effect", "effect_low", "effect_high", false}};
 
 std::vector<std::string> header_of(const std::string& text) {
   std::istringstream line(text.substr(0, text.find('\n')));

@@ -12,7 +12,7 @@ struct StudySettings {
   int n_cells = 20;
   int n_conditions = 1;
   double mean_fibres_by_type = 4;  ///< a cell may lack a type
-  double offset_nN = 10;   ///< that zero does not cut the scatter
+  double offset_nN = 10;           ///< that zero does not cut the scatter
   bool types_differ = true;
   double condition_effect_nN = 0;  ///< from each condition to the next
   double cell_sd_nN = 1;           ///< shared by the fibres of a cell

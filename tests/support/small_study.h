@@ -16,7 +16,7 @@ struct Lack {
   double fibres_by_type = 4;
   bool has_types_alike = false;
   double cell_sd_nN = 0, fibre_sd_nN = 0, error_nN = 0;
-  double offset_nN = 10;             ///< small: many tensions end at zero
+  double offset_nN = 10;              ///< small: many tensions end at zero
   double share_without_interval = 0;  ///< of the tensions
   double share_uncertain = 0;         ///< not identifiable
   double share_of_empty_cells = 0;    ///< without fibres
