@@ -20,7 +20,7 @@ struct Estimate {
   double noise = 0;           ///< from the beads
   double standard_error = 0;  ///< from the beads and the error of the model; noise, where there is but one mesh
   double degrees = 1e6;       ///< of freedom that the standard error has: few where few adhesions' errors make it
-  std::optional<Sides> sides_95 = {};  ///< where the 95 % interval is not 1.96 times it, but for the degrees
+  std::optional<Sides> sides_95 = {};  ///< of the 95 % interval, but for the degrees; none: 1.96 times the error
   /// The part of the standard error that is the model's.
   double from_model() const { return std::sqrt(std::max(0.0, standard_error * standard_error - noise * noise)); }
 };
@@ -69,7 +69,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
                          const Progress& progress, const SolvedMisfit& solved_misfit = {},
                          const Trial* start = nullptr);
 
-/// 95 % interval of a positive quantity, by Student's t.
+/// 95 % interval of a positive quantity, by Student's t. `high` is infinite where no bead feels it.
 struct Interval {
   double low = 0, high = 0;
 };

@@ -47,7 +47,7 @@ std::vector<Tension> tensions_of(const EnsembleFit& fit) {
     tensions.push_back({.fibre_id = fit.fibre_ids[i],
                         .tension_nN = e.value,
                         .low_nN = interval.low,
-                        .high_nN = interval.high,
+                        .high_nN = std::isfinite(interval.high) ? std::optional(interval.high) : std::nullopt,
                         .identifiable = e.standard_error < scale});
   }
   return tensions;

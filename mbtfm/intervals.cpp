@@ -3,6 +3,7 @@
 #include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <random>
 
@@ -13,9 +14,8 @@ namespace mbtfm::inverse {
 
 namespace {
 
-constexpr double kNormal95 = 1.959963984540054;  // two-sided 95 % of a normal variable
-// A tension is held at zero where chance would press it there this hard once in forty.
-constexpr double kHeldBeyond = kNormal95;
+// Standard errors by which a tension is pressed against zero where it is half held: chance does so once in forty.
+constexpr double kHalfHeld = 2;
 // What chance presses against zero is to be counted in full where a bias is taken off: this leaves out a hundredth of
 // it.
 constexpr double kPressedByMoreThanChance = 3;
@@ -36,54 +36,90 @@ Eigen::MatrixXd sandwich(const LocalMisfit& local, double variance, const Eigen:
   return variance * K + K * local.model_variance * K;
 }
 
-/// Those that the data do not press against zero by more than so many standard errors.
-std::vector<int> free_tensions(const LocalMisfit& local, double variance, double limit) {
+/// By tension: 1 where it is free, 0 where the data press it against zero by a standard error more than `half_held`,
+/// and smooth in between.
+Eigen::VectorXd freedom_of(const LocalMisfit& local, double variance, double half_held) {
   const Eigen::MatrixXd K = inverse_of(local.H);
   const Eigen::MatrixXd covariance = sandwich(local, variance, K);
-  std::vector<int> free;
-  for (int i = 0; i < static_cast<int>(local.g.size()); ++i) {
+  Eigen::VectorXd freedom = Eigen::VectorXd::Ones(local.g.size());
+  for (Eigen::Index i = 0; i < freedom.size(); ++i) {
+    if (local.tensions_nN[i] > 0) continue;
     // without its bound t_i would go to −K_ii g_i
-    const bool is_held = local.tensions_nN[i] <= 0 && local.g[i] * K(i, i) > limit * std::sqrt(covariance(i, i));
-    if (!is_held) free.push_back(i);
+    const double pressed = local.g[i] * K(i, i) / std::max(std::sqrt(covariance(i, i)), 1e-300);
+    const double share = std::clamp((half_held + 1 - pressed) / 2, 0.0, 1.0);
+    freedom[i] = share * share * (3 - 2 * share);
   }
-  return free;
+  return freedom;
 }
 
-/// Least rise of 2 Phi where tension i changes by `shift` and the others follow as they may.
-double rise(const LocalMisfit& local, int i, double shift) {
+/// H⁻¹ with tensions held as much as they lack freedom: f (f H f + (1 − f²) diag H)⁻¹ f. Without the held ones where
+/// all are 0 or 1.
+Eigen::MatrixXd held_inverse(const Eigen::MatrixXd& H, const Eigen::VectorXd& freedom) {
+  Eigen::MatrixXd held = freedom.asDiagonal() * H * freedom.asDiagonal();
+  held.diagonal() = H.diagonal();
+  return freedom.asDiagonal() * inverse_of(held) * freedom.asDiagonal();
+}
+
+/// Of 2 Phi where a tension changes and the others follow as they may.
+struct Rise {
+  double value = 0, slope = 0;
+};
+
+/// The least rise where tension i changes by `shift`. Its slope is that at fixed others, which are at their minimum.
+Rise rise(const LocalMisfit& local, int i, double shift) {
   std::vector<int> others(local.g.size());
   std::iota(others.begin(), others.end(), 0);
   others.erase(others.begin() + i);
   const Eigen::VectorXd column = local.H.col(i);
-  double sum = 2 * local.g[i] * shift + local.H(i, i) * shift * shift;
-  if (others.empty()) return sum;
+  Rise rise{.value = 2 * local.g[i] * shift + local.H(i, i) * shift * shift,
+            .slope = 2 * (local.g[i] + local.H(i, i) * shift)};
+  if (others.empty()) return rise;
   const Eigen::MatrixXd H = local.H(others, others);
   const Eigen::VectorXd g = local.g(others) + shift * column(others);
   const Eigen::VectorXd low = -local.tensions_nN(others);
   const Eigen::VectorXd s = bounded_quadratic_minimum(H, g, low);
-  return sum + 2 * g.dot(s) + s.dot(H * s);
+  rise.value += 2 * g.dot(s) + s.dot(H * s);
+  rise.slope += 2 * column(others).dot(s);
+  return rise;
 }
 
-/// Where sqrt(rise) reaches `wanted` on the way from 0 to `first` and beyond, but not past `end`.
+/// Where sqrt(rise) reaches `wanted` on the way from 0 to `first` and beyond, but not past `end`. By Newton's method on
+/// the root, which is straight but where a tension meets its bound; to rounding, as an end that is found roughly would
+/// jump with the number of steps.
 double shift_at(const LocalMisfit& local, int i, double wanted, double first, double end) {
-  const auto height = [&](double shift) { return std::sqrt(std::max(0.0, rise(local, i, shift))); };
-  double inner = 0, outer = first;
-  if (std::abs(outer) >= std::abs(end)) outer = end;
-  for (int k = 0; k < 60 && height(outer) < wanted; ++k) {
-    if (outer == end) return end;
-    inner = outer;
-    outer = std::abs(2 * outer) < std::abs(end) ? 2 * outer : end;
+  double inner = 0, outer = end, shift = std::abs(first) < std::abs(end) ? first : end;
+  constexpr int kMaxSteps = 200;  // halving alone needs 60
+  constexpr double kRounding = 1e-12;
+  for (int k = 0; k < kMaxSteps; ++k) {
+    const Rise at = rise(local, i, shift);
+    const double height = std::sqrt(std::max(0.0, at.value));
+    if (std::abs(height - wanted) <= kRounding * wanted) break;
+    if (height < wanted && shift == end) return end;
+    (height < wanted ? inner : outer) = shift;
+    const double newton = shift + (wanted - height) * 2 * height / at.slope;
+    const bool is_between = std::abs(newton) > std::abs(inner) && std::abs(newton) < std::abs(outer);
+    const double beyond = std::abs(outer) < std::abs(4 * shift) ? (inner + outer) / 2 : 2 * shift;
+    const double next = is_between && newton * first > 0 ? newton : std::abs(beyond) < std::abs(end) ? beyond : end;
+    if (std::abs(next - shift) <= kRounding * std::abs(shift)) break;
+    shift = next;
   }
-  for (int k = 0; k < 40; ++k) {
-    const double low = height(inner), high = height(outer);
-    if (high - wanted <= 1e-3 * wanted) return outer;
-    // sqrt(rise) is nearly straight; half-way where it is not
-    const double share = k % 2 == 0 && high > low ? (wanted - low) / (high - low) : 0.5;
-    const double middle = inner + share * (outer - inner);
-    (height(middle) < wanted ? inner : outer) = middle;
-    if (std::abs(outer - inner) <= 1e-3 * std::abs(outer)) break;
+  return shift;
+}
+
+/// At the solution the gradient of a free tension is zero, and of a held one not negative, but for the last step's
+/// rest; and directions that no bead feels must not make it singular.
+LocalMisfit at_minimum(LocalMisfit local) {
+  local.H.diagonal() += 1e-12 * local.H.diagonal();
+  for (Eigen::Index k = 0; k < local.g.size(); ++k) {
+    local.g[k] = local.tensions_nN[k] > 0 ? 0 : std::max(0.0, local.g[k]);
   }
-  return outer;
+  return local;
+}
+
+/// Whether no tension meets its bound where tension i goes `half` to either side and the others follow it.
+bool is_unbounded(const LocalMisfit& local, const Eigen::MatrixXd& K, int i, double half) {
+  const Eigen::VectorXd follow = half / K(i, i) * K.col(i).cwiseAbs();
+  return (local.tensions_nN.array() > follow.array()).all();
 }
 
 }  // namespace
@@ -95,10 +131,7 @@ LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
 }
 
 Eigen::MatrixXd response_of(const LocalMisfit& local, double variance) {
-  const std::vector<int> free = free_tensions(local, variance, kHeldBeyond);
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(local.H.rows(), local.H.cols());
-  if (!free.empty()) K(free, free) = inverse_of(local.H(free, free));
-  return K;
+  return held_inverse(local.H, freedom_of(local, variance, kHalfHeld));
 }
 
 Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance) {
@@ -106,14 +139,10 @@ Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance) {
 }
 
 Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance) {
-  Eigen::VectorXd past = Eigen::VectorXd::Zero(local.g.size());
-  const std::vector<int> free = free_tensions(local, variance, kPressedByMoreThanChance);
-  if (free.empty()) return past;
   Eigen::VectorXd pressed = Eigen::VectorXd::Zero(local.g.size());  // a free tension's gradient is a last step's rest
   for (Eigen::Index i = 0; i < pressed.size(); ++i)
     if (local.tensions_nN[i] <= 0) pressed[i] = std::max(0.0, local.g[i]);
-  past(free) = -inverse_of(local.H(free, free)) * pressed(free);
-  return past;
+  return -held_inverse(local.H, freedom_of(local, variance, kPressedByMoreThanChance)) * pressed;
 }
 
 Eigen::VectorXd bending_bias_nN(const TensionProblem& problem, const Trial& solution, const Eigen::MatrixXd& jacobian,
@@ -151,19 +180,25 @@ double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd
   return bias;
 }
 
-Sides profile_95(const LocalMisfit& local, double variance, int i) {
-  if (!(local.H(i, i) > 0)) return {.below = local.tensions_nN[i], .above = 1e300};
-  LocalMisfit safe = local;  // directions that no bead feels must not make it singular
-  safe.H.diagonal() += 1e-12 * local.H.diagonal();
-  // At the solution the gradient of a free tension is zero, and of a held one not negative, but for the last step's
-  // rest.
-  for (Eigen::Index k = 0; k < safe.g.size(); ++k) safe.g[k] = safe.tensions_nN[k] > 0 ? 0 : std::max(0.0, safe.g[k]);
+std::vector<Sides> profiles_95(const LocalMisfit& local, double variance) {
+  const LocalMisfit minimum = at_minimum(local);
   const Eigen::MatrixXd K = inverse_of(local.H);
-  const double half = kNormal95 * std::sqrt(sandwich(local, variance, K)(i, i));
-  const double wanted = half / std::sqrt(K(i, i)), first = half * (1 + 1e-6);
-  const double t = local.tensions_nN[i];
-  return {.below = t > 0 ? -shift_at(safe, i, wanted, -first, -t) : 0,
-          .above = shift_at(safe, i, wanted, first, 1e300)};
+  const Eigen::MatrixXd covariance = sandwich(local, variance, K);
+  constexpr double kAnywhere = std::numeric_limits<double>::infinity();
+  std::vector<Sides> profiles;
+  for (int i = 0; i < static_cast<int>(local.g.size()); ++i) {
+    const double t = local.tensions_nN[i], half = kNormal95 * std::sqrt(covariance(i, i));
+    const double wanted = half / std::sqrt(K(i, i));
+    if (!(local.H(i, i) > 0)) {
+      profiles.push_back({.below = t, .above = kAnywhere});
+    } else if (is_unbounded(local, K, i, half)) {
+      profiles.push_back({.below = half, .above = half});
+    } else {
+      profiles.push_back({.below = t > 0 ? -shift_at(minimum, i, wanted, -half, -t) : 0,
+                          .above = shift_at(minimum, i, wanted, half, kAnywhere)});
+    }
+  }
+  return profiles;
 }
 
 Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const FitParameters& parameters,

@@ -9,6 +9,8 @@
 
 namespace mbtfm::inverse {
 
+inline constexpr double kNormal95 = 1.959963984540054;  ///< two-sided 95 % of a normal variable
+
 /// Around a solution t: 2 Phi(t + s) ≈ 2 Phi(t) + 2 gᵀ s + sᵀ H s, in units of a variance (see misfit_variance). By the
 /// noise alone g has that variance times H.
 struct LocalMisfit {
@@ -19,8 +21,10 @@ struct LocalMisfit {
 };
 LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian);
 
-/// K = H⁻¹: how the tensions follow −g. Those that the data press against zero by more than two standard errors are
-/// held: they do not move, and the others as without them. A direction of which no bead tells anything moves far.
+/// K = H⁻¹: how the tensions follow −g. Those that the data press against zero by three standard errors or more are
+/// held: they do not move, and the others as without them; by one or less they are free. Between, they pass from the
+/// one to the other smoothly, so that nothing jumps where the data change by rounding. A direction of which no bead
+/// tells anything moves far.
 Eigen::MatrixXd response_of(const LocalMisfit& local, double variance);
 
 /// K Var(g) K: of both errors (the sandwich; White, Econometrica 50 (1982) 1).
@@ -28,8 +32,8 @@ Eigen::MatrixXd covariance_nN2(const LocalMisfit& local, double variance);
 
 /// From the solution to where the misfit would be least without the bounds. Estimates that end at a bound are biased
 /// towards the inside, and those of other tensions with them; sums over many tensions are not where each is counted
-/// from there (without bounds least squares are unbiased). Tensions that more than
-/// chance presses against zero (three standard errors) stay there.
+/// from there (without bounds least squares are unbiased). Tensions that more than chance presses against zero (two
+/// standard errors; none by four) stay there.
 Eigen::VectorXd past_bounds_nN(const LocalMisfit& local, double variance);
 
 /// Mean error of the tensions by the bending of forces that are not linear in them (Box, J. R. Stat. Soc. B 33 (1971)
@@ -49,11 +53,12 @@ double magnitude_bias_nN(const Eigen::VectorXd& forces_nN, const Eigen::MatrixXd
 struct Sides {
   double below = 0, above = 0;
 };
-/// 95 % interval of tension i: where the least misfit over all other tensions >= 0 has risen by 1.96² variances. Ends
-/// at a bound; where no tension is near one it is 1.96 standard errors to either side (profile likelihood; Venzon &
-/// Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit). With an error of the model the rise is that which
-/// makes this so again (Chandler & Bate, Biometrika 94 (2007) 167).
-Sides profile_95(const LocalMisfit& local, double variance, int i);
+/// 95 % interval of each tension: where the least misfit over all other tensions >= 0 has risen by 1.96² variances.
+/// Ends at a bound; where no tension meets one on the way it is 1.96 standard errors to either side (profile
+/// likelihood; Venzon & Moolgavkar, Appl. Statist. 37 (1988) 87, on the local misfit). With an error of the model the
+/// rise is that which makes this so again (Chandler & Bate, Biometrika 94 (2007) 167). Continuous in the misfit.
+/// Infinite above where no bead feels a tension.
+std::vector<Sides> profiles_95(const LocalMisfit& local, double variance);
 
 /// Parametric bootstrap: fits to displacements that the solution gives, with noise of this variance drawn anew, less
 /// the solution. One column a draw; the draws' random numbers follow from their index.

@@ -30,6 +30,7 @@ StageReport statistics(const StudyParameters& parameters, StageContext& context)
   const std::vector<Figure> figures = figures_of(study, analysis, parameters);
   constexpr double kPixels = 2;  // by unit of the drawing: sharp in print at 8 cm for each chart (300 dpi)
   for (const Figure& figure : figures) {
+    if (figure.charts.empty()) continue;  // its caption in the report says why
     const std::string svg = svg_of(figure);
     write_text(context.output("out", "figures/" + figure.name + ".svg"), svg);
     write_png(context.output("out", "figures/" + figure.name + ".png"), svg, kPixels);

@@ -42,11 +42,16 @@ double round_below(double value) {
 }
 
 std::vector<double> ticks(double low, double high) {
+  if (!(high > low) || !std::isfinite(high - low)) return {};
   const double fine = round_below((high - low) / 5);
   const double step = (high - low) / fine <= 5 ? fine : round_below(2.5 * fine);
   std::vector<double> list;
-  for (double t = std::ceil(low / step) * step; t <= high + 1e-9 * step; t += step)
+  const double first = std::ceil(low / step) * step;
+  const int n = static_cast<int>((high - first) / step + 1e-9) + 1;  // counted: a step may be lost beside large values
+  for (int i = 0; i < n; ++i) {
+    const double t = first + i * step;
     list.push_back(std::abs(t) < step / 2 ? 0 : t);
+  }
   return list;
 }
 
@@ -82,11 +87,26 @@ double share(const Axis& axis, double value) {
 }
 
 namespace {
+
 constexpr double kFrameHeight_px = 236;
+
+/// With room between its ends: values that are all equal, or none, have no place else.
+Axis drawable(Axis axis) {
+  const bool is_linear = axis.scale == Scale::linear;
+  const bool is_range = std::isfinite(axis.low) && std::isfinite(axis.high) && axis.low != axis.high;
+  if (is_range && (is_linear || (axis.low > 0 && axis.high > 0))) return axis;
+  if (!std::isfinite(axis.low) || (!is_linear && axis.low <= 0)) axis.low = is_linear ? 0 : 1;
+  axis.high = is_linear ? axis.low + std::max(1.0, std::abs(axis.low)) : 10 * axis.low;
+  return axis;
 }
 
+}  // namespace
+
 Chart::Chart(std::string title, Axis x, Axis y)
-    : title_(std::move(title)), x_(std::move(x)), y_(std::move(y)), frame_height_px_(kFrameHeight_px) {}
+    : title_(std::move(title)),
+      x_(drawable(std::move(x))),
+      y_(drawable(std::move(y))),
+      frame_height_px_(kFrameHeight_px) {}
 
 void Chart::subtitle(std::string text, std::string colour) {
   subtitle_ = std::move(text);

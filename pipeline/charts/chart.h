@@ -16,7 +16,8 @@ std::string html_escaped(std::string_view text);
 std::string readable(double value);
 /// Round number (1, 2 or 5 times a power of ten) nearest below. @param value  > 0
 double round_below(double value);
-/// Multiples of the smallest step of 1, 2 or 5 times a power of ten that gives no more than six of them.
+/// Multiples of the smallest step of 1, 2 or 5 times a power of ten that gives no more than six of them; none where
+/// high <= low or either is not finite.
 std::vector<double> ticks(double low, double high);
 
 /// Colours that differ in lightness and to colour-blind eyes (Okabe & Ito 2008), for curves in turn.
@@ -63,7 +64,8 @@ struct Mark {
   Vec2 shift_px = {};    ///< of an arrow, in a frame of the SVG's width; in pages it grows with the frame
 };
 
-/// One frame with two axes. What reaches beyond the frame is cut off.
+/// One frame with two axes. What reaches beyond the frame is cut off. An axis whose ends are equal or not finite gets
+/// some other end.
 class Chart {
  public:
   Chart(std::string title, Axis x, Axis y);

@@ -95,6 +95,7 @@ Chart distribution_of(const Sample& sample, const std::string& label) {
     if (o.value > 0) low = std::min(low, o.value);
     high = std::max(high, o.value);
   }
+  if (high == 0) low = high = 1;  // all are zero: on the lower end of any axis
   // forces reach down to nothing; three decades below the largest hold all that one would look at
   low = std::max(low, 1e-3 * high);
   std::vector<Histogram> all;
@@ -193,6 +194,7 @@ Figure directions(const Analysis& analysis) {
     chart.level(1.0 / n_bins_of(all), "stroke:#555;stroke-dasharray:4 3");
     figure.charts.push_back(chart);
   }
+  if (figure.charts.empty()) figure.caption = "no direction is known.";
   return figure;
 }
 
@@ -200,7 +202,12 @@ Figure directions(const Analysis& analysis) {
 
 std::vector<Figure> adhesion_figures_of(const Analysis& analysis) {
   std::vector<Figure> figures;
-  if (!analysis.adhesion_forces.sample.values.empty()) {
+  if (analysis.adhesion_forces.sample.values.empty()) {
+    figures.push_back({.name = "adhesion_distributions",
+                       .title = "Area and force of the adhesions",
+                       .caption = "no cell has an adhesion with a force.",
+                       .charts = {}});
+  } else {
     figures.push_back(adhesion_distributions(analysis));
     figures.push_back(force_by_area(analysis));
   }

@@ -15,8 +15,10 @@ namespace {
 using charts::readable;
 
 Measure measure(Sample sample, const std::vector<CellWeights>& draws) {
-  Measure m{.sample = std::move(sample), .model = {}, .summaries = {}, .comparisons = {}};
-  m.model = model_of(m.sample);
+  Measure m{.sample = std::move(sample), .model = {}, .obstacle = {}, .summaries = {}, .comparisons = {}};
+  ModelResult result = model_of(m.sample);
+  m.model = std::move(result.model);
+  m.obstacle = std::move(result.obstacle);
   m.summaries = summarise(m.sample, m.model, draws);
   m.comparisons = compare(m.sample, m.model);
   return m;
@@ -61,17 +63,21 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
                     "tensions.",
                     study.cells.size() - with.size()));
   }
+  const int n_tensions = static_cast<int>(tensions.sample.values.size());
   if (tensions.sample.n_without_error > 0) {
     warnings.push_back(
-        fmt::format("{} tensions have no error bar; their error is taken for zero.", tensions.sample.n_without_error));
+        tensions.sample.n_without_error < n_tensions
+            ? fmt::format(
+                  "{} of {} tensions have no error bar; their error is taken to be as large as that of the others.",
+                  tensions.sample.n_without_error, n_tensions)
+            : "No tension has an error bar: what is scatter of the fibres and what error cannot be told.");
   }
   for (const Summary& s : tensions.summaries) {
-    const double variance = s.plain.standard_deviation * s.plain.standard_deviation;
-    if (s.n > 2 && s.without_error.reliability < 0.5 && variance > 0) {
+    if (s.n > 2 && s.typical_error && s.without_error->reliability < 0.5 && *s.plain.standard_deviation > 0) {
       warnings.push_back(
           fmt::format("{}more than half of the scatter of the tensions of {} fibres is the error of "
                       "their measurement (typically {} nN).",
-                      prefix_of(s.condition), kind_for_people(s.kind), readable(s.typical_error)));
+                      prefix_of(s.condition), kind_for_people(s.kind), readable(*s.typical_error)));
     }
     if (!s.model || !s.mean_interval) continue;
     if (std::abs(s.model->estimate - s.plain.mean) > 2 * s.model->standard_error) {
@@ -123,7 +129,7 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   Analysis a;
   a.tensions = measure(sample_tensions(study), draws);
   a.tensions_by_cell = summarise_by_cell(a.tensions.sample, study);
-  a.shares = shares_above(a.tensions.sample, {parameters.weak_tension_nN, parameters.strong_tension_nN});
+  a.shares = shares_above(a.tensions.sample, thresholds_nN(parameters));
   a.adhesion_forces = measure(sample_adhesion_forces(study), draws);
   a.adhesion_areas = measure(sample_adhesion_areas(study), draws);
   for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));

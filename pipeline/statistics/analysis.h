@@ -14,6 +14,7 @@ namespace mbtfm::statistics {
 struct Measure {
   Sample sample;
   std::optional<SampleModel> model;
+  std::string obstacle;  ///< why there is no model; empty: there is one
   std::vector<Summary> summaries;
   std::vector<Comparison> comparisons;
 };

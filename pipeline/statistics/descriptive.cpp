@@ -24,13 +24,13 @@ double sum_of(const std::vector<double>& values) { return std::accumulate(values
 Description describe(std::vector<double> values) {
   need_values(values);
   std::sort(values.begin(), values.end());
-  Description d;
+  Description d{.standard_deviation = {}};
   d.n = static_cast<int>(values.size());
   d.mean = sum_of(values) / d.n;
   d.median = (values[(values.size() - 1) / 2] + values[values.size() / 2]) / 2;
   double squares = 0;
   for (const double v : values) squares += (v - d.mean) * (v - d.mean);
-  d.standard_deviation = d.n > 1 ? std::sqrt(squares / (d.n - 1)) : 0;
+  if (d.n > 1) d.standard_deviation = std::sqrt(squares / (d.n - 1));
   return d;
 }
 
@@ -88,7 +88,9 @@ LineThroughOrigin line_through_origin(const std::vector<double>& x, const std::v
 }
 
 Deconvolved deconvolved_moments(const std::vector<double>& values, const std::vector<double>& error_variances) {
-  const double variance = std::pow(describe(values).standard_deviation, 2);
+  const std::optional<double> deviation = describe(values).standard_deviation;
+  if (!deviation) throw InvalidData("a sample", "at least two values", "one");
+  const double variance = *deviation * *deviation;
   const double error = sum_of(error_variances) / static_cast<double>(values.size());
   const double left = std::max(0.0, variance - error);
   return {.standard_deviation = std::sqrt(left), .reliability = variance > 0 ? left / variance : 0};
@@ -104,14 +106,19 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
   const double widest = std::max(largest, threshold);
   const int n_below = std::max(1, static_cast<int>(std::lround(kPoints * threshold / widest)));
   const double step = threshold / (n_below - 0.5);
-  const int n_points = static_cast<int>(std::ceil(widest / step)) + 1;
+  // a threshold far below all values must not make the grid above it endless
+  const double step_above = std::max(step, (widest - threshold) / kPoints);
+  const int n_above = static_cast<int>(std::ceil((widest - threshold) / step_above + 0.5));
+  const int n_points = n_below + n_above;
+  const auto point = [&](int k) { return k < n_below ? k * step : threshold + (k - n_below + 0.5) * step_above; };
   const boost::math::normal normal;
   std::vector<std::vector<double>> kernel;
   for (std::size_t i = 0; i < values.size(); ++i) {
-    const double sigma = std::max(std::sqrt(error_variances[i]), step / 2);  // no finer than the grid
+    const double grid = values[i] > threshold ? step_above : step;
+    const double sigma = std::max(std::sqrt(error_variances[i]), grid / 2);  // no finer than the grid
     std::vector<double> row;
     for (int k = 0; k < n_points; ++k) {
-      const double z = (values[i] - k * step) / sigma;
+      const double z = (values[i] - point(k)) / sigma;
       row.push_back((values[i] > 0 ? std::exp(-z * z / 2) / sigma : cdf(normal, z) + 1e-300) + 1e-300);
     }
     kernel.push_back(std::move(row));
@@ -127,7 +134,7 @@ double deconvolved_fraction_above(const std::vector<double>& values, const std::
   }
   constexpr double kNothing = 1e-9;  // what EM leaves where it would end at zero
   const double above = std::accumulate(mass.begin() + n_below, mass.end(), 0.0);
-  return above > kNothing ? above : 0;
+  return above > kNothing ? std::min(above, 1.0) : 0;
 }
 
 }  // namespace mbtfm::statistics

@@ -9,7 +9,7 @@ namespace mbtfm::statistics {
 struct Description {
   int n = 0;
   double mean = 0, median = 0;
-  double standard_deviation = 0;  ///< with n − 1; 0 for n = 1
+  std::optional<double> standard_deviation;  ///< with n − 1; none of one value
 };
 /// @throws InvalidData where there is no value
 Description describe(std::vector<double> values);
@@ -48,11 +48,12 @@ struct LineThroughOrigin {
 /// @throws InvalidData where no x differs from zero
 LineThroughOrigin line_through_origin(const std::vector<double>& x, const std::vector<double>& y);
 
-/// What the values would be without their measurement errors, which are independent of them.
+/// What the values would be without their measurement errors, which are independent of them; two values at least.
 struct Deconvolved {
   double standard_deviation = 0;  ///< √(variance − mean error variance), 0 where the errors explain all scatter
   double reliability = 0;         ///< share of the variance that is not error, 0 to 1
 };
+/// @throws InvalidData for fewer than two values
 Deconvolved deconvolved_moments(const std::vector<double>& values, const std::vector<double>& error_variances);
 
 /// Share above a threshold without the blur of the errors: the distribution that makes the values most likely, given

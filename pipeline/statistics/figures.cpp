@@ -153,7 +153,7 @@ Figure strong_fibres(const Analysis& analysis, const StudyParameters& parameters
                     "the cells do). Cross: the share without the blur of the measurement’s error.",
                 .charts = {},
                 .n_columns = 2};
-  for (const double threshold : {parameters.weak_tension_nN, parameters.strong_tension_nN}) {
+  for (const double threshold : thresholds_nN(parameters)) {
     Chart chart("Above " + readable(threshold) + " nN", kind_axis(sample),
                 Axis{.label = "share of the fibres (%)", .low = 0, .high = end_below_keys(100, n_keys_of(sample))});
     chart.subtitle(counts_by_kind(sample), "#555");
@@ -270,7 +270,12 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
 
 std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   std::vector<Figure> figures;
-  if (!analysis.tensions.sample.values.empty()) {
+  if (analysis.tensions.sample.values.empty()) {
+    figures.push_back({.name = "tensions_by_type",
+                       .title = "Tension of each fibre",
+                       .caption = "no fibre has a known tension.",
+                       .charts = {}});
+  } else {
     figures.push_back(tensions_by_type(study, analysis));
     figures.push_back(strong_fibres(analysis, parameters));
     figures.push_back(tension_distributions(analysis, parameters));
@@ -278,7 +283,6 @@ std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, con
   figures.push_back(forces_by_cell(study));
   figures.push_back(force_correlations(study, analysis));
   for (Figure& figure : adhesion_figures_of(analysis)) figures.push_back(std::move(figure));
-  std::erase_if(figures, [](const Figure& figure) { return figure.charts.empty(); });
   return figures;
 }
 

@@ -36,7 +36,10 @@ struct Design {
   MatrixXd X;  ///< 1 where the row is of the group
   VectorXd y;
   std::vector<Component> components;
+  std::vector<bool> is_scatter_told;  ///< by kind: a group has two observations of it
   double smallest_residual = 0;
+
+  int n_kinds() const { return static_cast<int>(is_scatter_told.size()); }
 };
 
 void check_data(const std::vector<Observation>& observations) {
@@ -48,6 +51,18 @@ void check_data(const std::vector<Observation>& observations) {
   }
   if (cells.size() < 2) throw InvalidData("the sample", "two cells at least", std::to_string(cells.size()));
   if (values.size() < 2) throw InvalidData("the sample", "values that differ", "all equal");
+}
+
+/// Without scatter within groups and without errors nothing tells how well the means are known.
+void check_scatter(const Design& design) {
+  const VectorXd n = design.X.colwise().sum();
+  const VectorXd means = (design.X.transpose() * design.y).cwiseQuotient(n);
+  constexpr double kRounding = 1e-12;  // of the values
+  const double scatter = (design.y - design.X * means).cwiseAbs().maxCoeff();
+  const bool has_errors =
+      std::any_of(design.rows.begin(), design.rows.end(), [](const Observation& o) { return o.error_variance > 0; });
+  if (has_errors || scatter > kRounding * design.y.cwiseAbs().maxCoeff()) return;
+  throw InvalidData("the sample", "values that differ within a group, or errors", "neither");
 }
 
 std::vector<Block> blocks_of(const std::vector<Observation>& rows) {
@@ -67,18 +82,37 @@ std::vector<Block> blocks_of(const std::vector<Observation>& rows) {
   return blocks;
 }
 
+bool has_group_of_two_cells(const std::vector<Observation>& rows) {
+  std::map<int, int> cell_of;  // the first of each group
+  return std::any_of(rows.begin(), rows.end(), [&](const Observation& o) {
+    return cell_of.try_emplace(o.group, o.cell).first->second != o.cell;
+  });
+}
+
+std::vector<bool> scatter_told(const std::vector<Observation>& rows) {
+  int n_kinds = 0;
+  for (const Observation& o : rows) n_kinds = std::max(n_kinds, o.kind + 1);
+  std::map<std::pair<int, int>, int> n_of;  // group, kind
+  std::vector<bool> is_told(static_cast<std::size_t>(n_kinds), false);
+  for (const Observation& o : rows) {
+    if (++n_of[{o.group, o.kind}] > 1) is_told[static_cast<std::size_t>(o.kind)] = true;
+  }
+  return is_told;
+}
+
 /// The random effects that the design can tell from the scatter and from each other.
 std::vector<Component> components_of(const std::vector<Observation>& rows, const std::vector<Block>& blocks) {
+  const bool has_two_cells = has_group_of_two_cells(rows);
   const bool has_two_in_a_cell = std::any_of(blocks.begin(), blocks.end(), [](const Block& b) { return b.size > 1; });
   const bool has_two_kinds = std::any_of(blocks.begin(), blocks.end(), [](const Block& b) { return b.n_kinds > 1; });
   const bool has_two_of_a_kind =
       std::any_of(blocks.begin(), blocks.end(), [](const Block& b) { return b.size > b.n_kinds; });
   std::vector<Component> components;
-  if (has_two_in_a_cell) components.push_back({.term = Term::cell});
-  if (has_two_kinds && has_two_of_a_kind) components.push_back({.term = Term::cell_kind});
-  int n_kinds = 0;
-  for (const Observation& o : rows) n_kinds = std::max(n_kinds, o.kind + 1);
-  for (int k = 0; k < n_kinds; ++k) components.push_back({.term = Term::residual, .kind = k});
+  if (has_two_cells && has_two_in_a_cell) components.push_back({.term = Term::cell});
+  if (has_two_cells && has_two_kinds && has_two_of_a_kind) components.push_back({.term = Term::cell_kind});
+  std::set<int> kinds;
+  for (const Observation& o : rows) kinds.insert(o.kind);
+  for (const int kind : kinds) components.push_back({.term = Term::residual, .kind = kind});
   return components;
 }
 
@@ -90,6 +124,7 @@ Design design_of(std::vector<Observation> observations) {
                    [](const Observation& a, const Observation& b) { return a.cell < b.cell; });
   design.blocks = blocks_of(design.rows);
   design.components = components_of(design.rows, design.blocks);
+  design.is_scatter_told = scatter_told(design.rows);
   const Index n = static_cast<Index>(design.rows.size());
   int n_groups = 0;
   for (const Observation& o : design.rows) n_groups = std::max(n_groups, o.group + 1);
@@ -102,61 +137,60 @@ Design design_of(std::vector<Observation> observations) {
   for (int g = 0; g < n_groups; ++g) {
     if (design.X.col(g).sum() == 0) throw InvalidData("group " + std::to_string(g), "an observation", "none");
   }
+  check_scatter(design);
   // V must stay invertible where a kind does not scatter and its errors are not known
   constexpr double kSmallest = 1e-8;
   design.smallest_residual = kSmallest * (design.y.array() - design.y.mean()).square().mean();
   return design;
 }
 
-/// Z of a block: a column for the cell, one for each of its kinds; and the variance of each column's effect.
-struct Effects {
-  MatrixXd Z;
-  VectorXd variance;
-};
-Effects effects_of(const Design& design, const Block& block, const VectorXd& v) {
-  Effects effects{.Z = MatrixXd::Zero(block.size, 1 + block.n_kinds), .variance = VectorXd::Zero(1 + block.n_kinds)};
-  effects.Z.col(0).setOnes();
-  for (Index i = 0; i < block.size; ++i) effects.Z(i, 1 + block.kind_column[static_cast<std::size_t>(i)]) = 1;
-  for (std::size_t k = 0; k < design.components.size(); ++k) {
-    if (design.components[k].term == Term::cell) effects.variance[0] = v[static_cast<Index>(k)];
-    if (design.components[k].term == Term::cell_kind)
-      effects.variance.tail(block.n_kinds).setConstant(v[static_cast<Index>(k)]);
-  }
-  return effects;
-}
-
-/// V⁻¹ by blocks (Woodbury): D⁻¹ − D⁻¹ Z (I + L Zᵀ D⁻¹ Z)⁻¹ L Zᵀ D⁻¹.
+/// V⁻¹ by blocks. Z has a column for each kind of the cell, whose effects have the covariance L: a shared by all and b
+/// of each. With A = Zᵀ D⁻¹ Z, which is diagonal, and M = (L + A⁻¹)⁻¹ = Zᵀ V⁻¹ Z,
+///
+///   V⁻¹ = D⁻¹ − D⁻¹ Z A⁻¹ Zᵀ D⁻¹ + D⁻¹ Z A⁻¹ M A⁻¹ Zᵀ D⁻¹:
+///
+/// deviations from the means of cell and kind, and these means. (Woodbury's formula would lose all digits where the
+/// scatter within is small.)
 class Covariance {
  public:
-  Covariance(const Design& design, const VectorXd& v) : design_(&design), d_(design.y.size()) {
-    VectorXd residual = VectorXd::Zero(static_cast<Index>(design.components.size()));
+  Covariance(const Design& design, const VectorXd& v) : design_(&design), weight_(design.y.size()) {
+    double of_cell = 0, of_cell_kind = 0;
+    VectorXd residual = VectorXd::Zero(design.n_kinds());
     for (std::size_t k = 0; k < design.components.size(); ++k) {
-      if (design.components[k].term == Term::residual) residual[design.components[k].kind] = v[static_cast<Index>(k)];
+      const Component& c = design.components[k];
+      (c.term == Term::cell        ? of_cell
+       : c.term == Term::cell_kind ? of_cell_kind
+                                   : residual[c.kind]) = v[static_cast<Index>(k)];
     }
-    for (Index i = 0; i < d_.size(); ++i) {
+    for (Index i = 0; i < weight_.size(); ++i) {
       const Observation& o = design.rows[static_cast<std::size_t>(i)];
-      d_[i] = residual[o.kind] + o.error_variance;
-      log_determinant_ += std::log(d_[i]);
+      weight_[i] = 1 / (residual[o.kind] + o.error_variance);
+      log_determinant_ -= std::log(weight_[i]);
     }
     for (const Block& block : design.blocks) {
-      const Effects effects = effects_of(design, block, v);
-      const MatrixXd scaled = d_.segment(block.first, block.size).cwiseInverse().asDiagonal() * effects.Z;
-      const MatrixXd L = effects.variance.asDiagonal();
-      const Index q = effects.variance.size();
-      const Eigen::PartialPivLU<MatrixXd> inner(MatrixXd::Identity(q, q) + L * effects.Z.transpose() * scaled);
-      log_determinant_ += std::log(std::abs(inner.determinant()));
-      scaled_.push_back(scaled);
-      core_.push_back(inner.solve(L));
+      VectorXd A = VectorXd::Zero(block.n_kinds);
+      for (Index i = 0; i < block.size; ++i) A[column(block, i)] += weight_[block.first + i];
+      MatrixXd of_means = MatrixXd::Constant(block.n_kinds, block.n_kinds, of_cell);
+      of_means.diagonal() += A.cwiseInverse() + VectorXd::Constant(block.n_kinds, of_cell_kind);
+      const Eigen::LLT<MatrixXd> llt(of_means);
+      log_determinant_ += A.array().log().sum() + 2 * llt.matrixLLT().diagonal().array().log().sum();
+      M_.push_back(llt.solve(MatrixXd::Identity(block.n_kinds, block.n_kinds)));
+      A_.push_back(std::move(A));
     }
   }
   double log_determinant() const { return log_determinant_; }
 
   MatrixXd solve(const MatrixXd& m) const {
-    MatrixXd result = d_.cwiseInverse().asDiagonal() * m;
+    MatrixXd result(m.rows(), m.cols());
     for (std::size_t b = 0; b < design_->blocks.size(); ++b) {
       const Block& block = design_->blocks[b];
-      result.middleRows(block.first, block.size) -=
-          scaled_[b] * (core_[b] * (scaled_[b].transpose() * m.middleRows(block.first, block.size)));
+      MatrixXd means = MatrixXd::Zero(block.n_kinds, m.cols());
+      for (Index i = 0; i < block.size; ++i) means.row(column(block, i)) += share(b, i) * m.row(block.first + i);
+      const MatrixXd solved = M_[b] * means;
+      for (Index i = 0; i < block.size; ++i) {
+        const Index row = block.first + i, k = column(block, i);
+        result.row(row) = weight_[row] * (m.row(row) - means.row(k)) + share(b, i) * solved.row(k);
+      }
     }
     return result;
   }
@@ -166,31 +200,29 @@ class Covariance {
     double sum = 0;
     for (std::size_t b = 0; b < design_->blocks.size(); ++b) {
       const Block& block = design_->blocks[b];
-      if (component.term == Term::residual) {
-        for (Index i = 0; i < block.size; ++i) {
-          if (design_->rows[static_cast<std::size_t>(block.first + i)].kind != component.kind) continue;
-          sum += 1 / d_[block.first + i] - (scaled_[b].row(i) * core_[b]).dot(scaled_[b].row(i));
-        }
-      } else {
-        // Zᵀ V⁻¹ Z = A − A core A with A = Zᵀ D⁻¹ Z; Z of this term alone: the first column, or the others
-        MatrixXd A(scaled_[b].cols(), scaled_[b].cols());
-        A.col(0) = scaled_[b].colwise().sum().transpose();
-        for (Index c = 1; c < A.cols(); ++c) A.col(c).setZero();
-        for (Index i = 0; i < block.size; ++i) {
-          A.col(1 + block.kind_column[static_cast<std::size_t>(i)]) += scaled_[b].row(i).transpose();
-        }
-        const MatrixXd inside = A - A.transpose() * core_[b] * A;
-        sum += component.term == Term::cell ? inside(0, 0) : inside.diagonal().tail(A.cols() - 1).sum();
+      if (component.term == Term::cell) sum += M_[b].sum();
+      if (component.term == Term::cell_kind) sum += M_[b].trace();
+      for (Index i = 0; i < block.size && component.term == Term::residual; ++i) {
+        const Index row = block.first + i, k = column(block, i);
+        if (design_->rows[static_cast<std::size_t>(row)].kind != component.kind) continue;
+        sum += weight_[row] * (1 - share(b, i)) + share(b, i) * share(b, i) * M_[b](k, k);
       }
     }
     return sum;
   }
 
  private:
+  static Index column(const Block& block, Index i) { return block.kind_column[static_cast<std::size_t>(i)]; }
+  /// Of a row in the mean of its cell and kind.
+  double share(std::size_t b, Index i) const {
+    const Block& block = design_->blocks[b];
+    return weight_[block.first + i] / A_[b][column(block, i)];
+  }
+
   const Design* design_;
-  VectorXd d_;
-  std::vector<MatrixXd> scaled_;  ///< D⁻¹ Z by block
-  std::vector<MatrixXd> core_;    ///< (I + L Zᵀ D⁻¹ Z)⁻¹ L by block
+  VectorXd weight_;          ///< D⁻¹
+  std::vector<VectorXd> A_;  ///< by block
+  std::vector<MatrixXd> M_;  ///< by block
   double log_determinant_ = 0;
 };
 
@@ -278,17 +310,34 @@ std::vector<Index> free_ones(const VectorXd& v, const VectorXd& lower, const Vec
 
 MatrixXd part(const MatrixXd& m, const std::vector<Index>& which) { return m(which, which); }
 
-VectorXd newton_step(const Derivatives& d, const std::vector<Index>& free) {
-  VectorXd step = VectorXd::Zero(d.gradient.size());
-  if (free.empty()) return step;
-  const VectorXd g = d.gradient(free);
-  const VectorXd of_free = part(d.information, free).completeOrthogonalDecomposition().solve(g);
-  step(free) = of_free;
+/// To the maximum of the likelihood's second order, none below its lower end: what meets it stays there, and the others
+/// move on without it.
+VectorXd newton_step(const Derivatives& d, const VectorXd& v, const VectorXd& lower, std::vector<Index> free) {
+  VectorXd step = VectorXd::Zero(v.size());
+  while (!free.empty()) {
+    const VectorXd g = (d.gradient - d.information * step)(free);
+    const VectorXd of_free = part(d.information, free).completeOrthogonalDecomposition().solve(g);
+    std::vector<Index> left;
+    VectorXd next = step;
+    for (std::size_t i = 0; i < free.size(); ++i) {
+      const Index k = free[i];
+      const bool is_met = v[k] + of_free[static_cast<Index>(i)] < lower[k];
+      next[k] = is_met ? lower[k] - v[k] : of_free[static_cast<Index>(i)];
+      if (!is_met) left.push_back(k);
+    }
+    if (left.size() == free.size()) return next;
+    for (const Index k : left) next[k] = 0;
+    step = next;
+    free = left;
+  }
   return step;
 }
 
-/// A step that never lowers the likelihood (Dempster, Laird & Rubin 1977), for where Newton's overshoots.
-VectorXd em_step(const Design& design, const State& s, const Derivatives& d) {
+/// Uphill, for where Newton's step misses: the residuals may be so small beside their errors that they tell next to
+/// nothing of the curvature. About as long as the expected one wants it, which for n levels of variance w is n / 2 w².
+VectorXd uphill_step(const Design& design, const State& s, const Derivatives& d) {
+  double error = 0;
+  for (const Observation& o : design.rows) error += o.error_variance / static_cast<double>(design.rows.size());
   VectorXd step(d.gradient.size());
   for (Index k = 0; k < step.size(); ++k) {
     const Component& c = design.components[static_cast<std::size_t>(k)];
@@ -296,9 +345,45 @@ VectorXd em_step(const Design& design, const State& s, const Derivatives& d) {
     for (const Block& b : design.blocks) {
       n_levels += c.term == Term::cell ? 1 : c.term == Term::cell_kind ? b.n_kinds : static_cast<double>(b.size);
     }
-    step[k] = 2 * s.v[k] * s.v[k] * d.gradient[k] / n_levels;
+    step[k] = 2 * std::pow(s.v[k] + error, 2) * d.gradient[k] / n_levels;
   }
   return step;
+}
+
+/// The first state along a step that is no worse, none below the lower ends; none where there is none.
+std::optional<State> climb(const Design& design, const State& s, const VectorXd& step, const VectorXd& lower) {
+  constexpr double kShortest = 1e-6;
+  for (double share = 1; share > kShortest; share /= 2) {
+    State next = state_at(design, (s.v + share * step).cwiseMax(lower));
+    if (next.log_likelihood >= s.log_likelihood) return next;
+  }
+  return std::nullopt;
+}
+
+/// Of the estimates of these variances; of none, where all are held at zero, none.
+MatrixXd covariance_of_estimates(const MatrixXd& information, const std::vector<Index>& estimated) {
+  if (estimated.empty()) return {};
+  return part(information, estimated).completeOrthogonalDecomposition().pseudoInverse();
+}
+
+/// The variances into the fit, with what the degrees of freedom need of those that are not held at zero.
+void add_variances(const Design& design, const State& s, const Derivatives& d, const VectorXd& lower, MixedFit& fit) {
+  fit.residual_variance.resize(static_cast<std::size_t>(design.n_kinds()));
+  std::vector<Index> estimated;
+  for (Index k = 0; k < s.v.size(); ++k) {
+    const Component& component = design.components[static_cast<std::size_t>(k)];
+    const bool is_held = s.v[k] <= lower[k];
+    const double variance = is_held ? 0 : s.v[k];
+    const auto kind = static_cast<std::size_t>(component.kind);
+    if (component.term == Term::cell) fit.cell_variance = variance;
+    if (component.term == Term::cell_kind) fit.cell_kind_variance = variance;
+    if (component.term == Term::residual && !design.is_scatter_told[kind]) continue;
+    if (component.term == Term::residual) fit.residual_variance[kind] = variance;
+    if (is_held) continue;
+    estimated.push_back(k);
+    fit.covariance_slopes.push_back(d.mean_slopes[static_cast<std::size_t>(k)]);
+  }
+  fit.variance_covariance = covariance_of_estimates(d.information, estimated);
 }
 
 }  // namespace
@@ -319,21 +404,13 @@ MixedFit fit_mixed_model(std::vector<Observation> observations) {
   constexpr double kTolerance = 1e-9;  // of the log-likelihood: nothing that anyone reads changes
   Derivatives d = derivatives_at(design, s);
   for (int i = 0; i < kMaxSteps && !fit.converged; ++i) {
-    const VectorXd newton = newton_step(d, free_ones(s.v, lower, d.gradient));
-    double gain = -1;
-    for (double share = 1; share > 1e-3 && gain < 0; share /= 2) {
-      State next = state_at(design, (s.v + share * newton).cwiseMax(lower));
-      gain = next.log_likelihood - s.log_likelihood;
-      if (gain >= 0) s = std::move(next);
-    }
-    if (gain < 0) {
-      State next = state_at(design, (s.v + em_step(design, s, d)).cwiseMax(lower));
-      gain = std::max(0.0, next.log_likelihood - s.log_likelihood);
-      s = std::move(next);
-    }
+    std::optional<State> next = climb(design, s, newton_step(d, s.v, lower, free_ones(s.v, lower, d.gradient)), lower);
+    if (!next) next = climb(design, s, uphill_step(design, s, d), lower);
+    const double gain = next ? next->log_likelihood - s.log_likelihood : 0;
+    if (next) s = std::move(*next);
     d = derivatives_at(design, s);
     // half of what a full Newton step promises
-    const double promise = 0.5 * newton_step(d, free_ones(s.v, lower, d.gradient)).dot(d.gradient);
+    const double promise = 0.5 * newton_step(d, s.v, lower, free_ones(s.v, lower, d.gradient)).dot(d.gradient);
     fit.converged = gain < kTolerance && promise < kTolerance;
   }
   fit.mean = s.mean;
@@ -341,19 +418,7 @@ MixedFit fit_mixed_model(std::vector<Observation> observations) {
   fit.log_likelihood = s.log_likelihood;
   fit.n_cells = static_cast<int>(design.blocks.size());
   fit.n_observations = static_cast<int>(design.rows.size());
-  std::vector<double> residual;
-  std::vector<Index> estimated;
-  for (Index k = 0; k < n; ++k) {
-    const Term term = design.components[static_cast<std::size_t>(k)].term;
-    if (term == Term::cell) fit.cell_variance = s.v[k];
-    if (term == Term::cell_kind) fit.cell_kind_variance = s.v[k];
-    if (term == Term::residual) residual.push_back(s.v[k]);
-    if (s.v[k] <= lower[k]) continue;
-    estimated.push_back(k);
-    fit.covariance_slopes.push_back(d.mean_slopes[static_cast<std::size_t>(k)]);
-  }
-  fit.residual_variance = Eigen::Map<VectorXd>(residual.data(), static_cast<Index>(residual.size()));
-  fit.variance_covariance = part(d.information, estimated).completeOrthogonalDecomposition().pseudoInverse();
+  add_variances(design, s, d, lower, fit);
   return fit;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <vector>
 
 namespace mbtfm::statistics {
@@ -18,24 +19,27 @@ struct Observation {
 
 /// y = mean(group) + a(cell) + b(cell, kind) + e(kind) + measurement error, all normal and independent, with the
 /// variances of a, b and of e by kind unknown. a is left out where no cell has two observations, b where no cell has
-/// two kinds or no kind two observations in a cell: it could not be told from the others.
+/// two kinds or no kind two observations in a cell: it could not be told from the others. Both are left out where no
+/// group has two cells: the groups' means take up all that cells differ by.
 struct MixedFit {
-  Eigen::VectorXd mean;               ///< by group
-  Eigen::MatrixXd covariance;         ///< of the means
-  double cell_variance = 0;           ///< of a
-  double cell_kind_variance = 0;      ///< of b
-  Eigen::VectorXd residual_variance;  ///< of e, by kind
-  double log_likelihood = 0;          ///< restricted
+  Eigen::VectorXd mean;                      ///< by group
+  Eigen::MatrixXd covariance;                ///< of the means
+  std::optional<double> cell_variance;       ///< of a; none where a is left out
+  std::optional<double> cell_kind_variance;  ///< of b; none where b is left out
+  /// of e, by kind; none of a kind that has no two observations in any group
+  std::vector<std::optional<double>> residual_variance;
+  double log_likelihood = 0;  ///< restricted
   int n_cells = 0, n_observations = 0;
   bool converged = false;
   // for Satterthwaite's degrees of freedom
-  std::vector<Eigen::MatrixXd> covariance_slopes;  ///< of `covariance` by each variance that is not zero
+  std::vector<Eigen::MatrixXd> covariance_slopes;  ///< of `covariance` by each variance that is not zero; may be none
   Eigen::MatrixXd variance_covariance;             ///< of the estimates of these variances
 };
 
 /// Average-information REML (Gilmour, Thompson & Cullis, Biometrics 51, 1440 (1995)) with the known error variances on
 /// the diagonal; variances are held at zero where the likelihood falls on leaving it.
-/// @throws InvalidData for fewer than two cells, a group without observations, or values that are all equal
+/// @throws InvalidData for fewer than two cells, a group without observations, values that are all equal, or that
+/// differ neither within a group nor by errors
 MixedFit fit_mixed_model(std::vector<Observation> observations);
 
 /// A weighted sum of the group means, with Student's t at Satterthwaite's degrees of freedom.

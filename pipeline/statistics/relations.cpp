@@ -96,7 +96,9 @@ std::vector<double> bin_edges(const std::vector<SizedForce>& adhesions) {
   std::set<double> edges = {areas.front(), areas.back()};
   for (int b = 1; b < n_bins; ++b)
     edges.insert(areas[areas.size() * static_cast<std::size_t>(b) / static_cast<std::size_t>(n_bins)]);
-  return {edges.begin(), edges.end()};
+  std::vector<double> list(edges.begin(), edges.end());
+  if (list.size() == 1) list.push_back(list.front());  // all areas equal: one bin of no width
+  return list;
 }
 
 }  // namespace

@@ -20,13 +20,27 @@ Sample empty_sample(const Study& study, std::string column, std::string name, st
 
 void add(Sample& sample, const StudyCell& cell, int index, int kind, double value,
          const std::optional<double>& standard_error) {
-  if (!standard_error) ++sample.n_without_error;
   const double error = standard_error.value_or(0);
+  if (error == 0) ++sample.n_without_error;
   sample.values.push_back({.value = value,
                            .error_variance = error * error,
                            .cell = index,
                            .kind = kind,
                            .group = sample.group_of(cell.condition, kind)});
+}
+
+/// An unknown error taken for zero would give its value more weight than all others: it is as large as theirs.
+Sample with_typical_errors(Sample sample) {
+  double sum = 0;
+  int n = 0;
+  for (const Observation& o : sample.values) {
+    sum += o.error_variance;
+    n += o.error_variance > 0 ? 1 : 0;
+  }
+  for (Observation& o : sample.values) {
+    if (o.error_variance == 0 && n > 0) o.error_variance = sum / n;
+  }
+  return sample;
 }
 
 template <class Visit>
@@ -60,7 +74,7 @@ Sample sample_tensions(const Study& study) {
     add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()), static_cast<int>(f.fibre->type),
         f.tension->tension_nN, standard_error_nN(*f.tension));
   }
-  return sample;
+  return with_typical_errors(std::move(sample));
 }
 
 Sample sample_adhesion_forces(const Study& study) {
@@ -68,7 +82,7 @@ Sample sample_adhesion_forces(const Study& study) {
   for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double) {
     add(sample, cell, i, f.connected ? 0 : 1, norm(f.force_nN), f.sigma_nN);
   });
-  return sample;
+  return with_typical_errors(std::move(sample));
 }
 
 Sample sample_adhesion_areas(const Study& study) {
@@ -92,6 +106,7 @@ std::vector<Sample> sample_cells(const Study& study) {
   std::vector<Sample> samples;
   for (const Quantity& q : kQuantities) {
     Sample sample = empty_sample(study, q.column, q.name, q.unit, "cells", {"cell"});
+    sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
     for (std::size_t i = 0; i < study.cells.size(); ++i)
       add(sample, study.cells[i], static_cast<int>(i), 0, study.cells[i].fit.*q.member, 0.0);
     samples.push_back(std::move(sample));

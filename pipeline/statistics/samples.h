@@ -16,7 +16,8 @@ struct Sample {
   std::string each;        ///< what is observed, plural: fibres, adhesions, cells
   std::vector<std::string> kinds, conditions;
   std::vector<Observation> values;
-  int n_without_error = 0;  ///< observations whose error is not known; it is taken for zero
+  int n_without_error = 0;  ///< observations whose error is not known: that of the others is taken, or zero if none is
+  bool is_never_negative = true;
 
   int n_kinds() const { return static_cast<int>(kinds.size()); }
   int n_conditions() const { return static_cast<int>(conditions.size()); }

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 
 #include "pipeline/statistics/study_files.h"
 
@@ -22,8 +23,12 @@ std::string capitalised(std::string text) {
   return text;
 }
 
-std::string mean_text(const Summary& s, const std::string& unit) {
-  if (!s.model) return fmt::format("{} {} (a single cell, no interval)", readable(s.plain.mean), unit);
+std::string mean_text(const Summary& s, const Measure& m) {
+  const std::string& unit = m.sample.unit;
+  if (!s.model) {
+    const std::string reason = s.n_cells == 1 ? "there is a single cell" : m.obstacle;
+    return fmt::format("{} {} (no interval: {})", readable(s.plain.mean), unit, reason);
+  }
   return fmt::format("{} {} [95 % CI {} to {}]", readable(s.model->estimate), unit, readable(s.model->low),
                      readable(s.model->high));
 }
@@ -31,16 +36,19 @@ std::string mean_text(const Summary& s, const std::string& unit) {
 /// "ventral fibres carry a tension of 4.1 nN [95 % CI …; the cell as the unit, 12 cells, 80 fibres]".
 std::vector<std::string> means(const Measure& m) {
   std::vector<std::string> list;
+  if (m.summaries.empty()) {
+    list.push_back(fmt::format("No {} of {} is known: nothing can be said of it.", m.sample.name, m.sample.each));
+  }
   for (const Summary& s : m.summaries) {
     std::string text = fmt::format("{}the mean {} of {} is {}", prefix_of(s.condition), m.sample.name,
-                                   plural_of(m.sample, s.kind), mean_text(s, m.sample.unit));
+                                   plural_of(m.sample, s.kind), mean_text(s, m));
     text += fmt::format(", the cell being the unit ({} cells", s.n_cells);
     if (m.sample.each != "cells") text += fmt::format(", {} {}", s.n, m.sample.each);
     text += ")";
-    if (m.sample.each != "cells" && s.typical_error > 0 && s.n > 2) {
+    if (m.sample.each != "cells" && s.typical_error && s.n > 2) {
       text += fmt::format("; they scatter by {} {}, of which {} {} remain without the error of their measurement",
-                          readable(s.plain.standard_deviation), m.sample.unit,
-                          readable(s.without_error.standard_deviation), m.sample.unit);
+                          readable(*s.plain.standard_deviation), m.sample.unit,
+                          readable(s.without_error->standard_deviation), m.sample.unit);
     }
     list.push_back(capitalised(text + "."));
   }
@@ -55,8 +63,32 @@ const Comparison* same_pair(const Measure& m, const Comparison& c, const std::st
   return at == m.comparisons.end() ? nullptr : &*at;
 }
 
+/// How many different ones the summaries have: kinds, or conditions.
+int n_different(const std::vector<Summary>& summaries, std::string Summary::*member) {
+  std::set<std::string> names;
+  for (const Summary& s : summaries) names.insert(s.*member);
+  return static_cast<int>(names.size());
+}
+
+/// A sentence for each question that no test with the cell for the unit could answer.
+void add_unanswered(const Measure& m, Findings& findings) {
+  const auto add = [&](const std::string& question, const std::string& who) {
+    const bool is_answered = std::any_of(m.comparisons.begin(), m.comparisons.end(), [&](const Comparison& c) {
+      return c.question == question && c.test == "mixed model";
+    });
+    if (is_answered) return;
+    findings.sentences.push_back(fmt::format("Whether the {} of {} differs between {} cannot be said: {}.",
+                                             m.sample.name, m.sample.each, who,
+                                             m.model ? "each needs values of two cells" : m.obstacle));
+  };
+  if (n_different(m.summaries, &Summary::kind) > 1)
+    add("between kinds", m.sample.column == "tension_nN" ? "types" : "connected and unconnected ones");
+  if (n_different(m.summaries, &Summary::condition) > 1) add("between conditions", "conditions");
+}
+
 /// A sentence for each pair that the mixed model compares, with those that clearly differ or with the others.
 void add_differences(const Measure& m, Findings& findings) {
+  add_unanswered(m, findings);
   for (const Comparison& c : m.comparisons) {
     if (c.test != "mixed model" || c.group_b.empty() || !c.interval) continue;
     const bool is_of_kinds = c.question == "between kinds";
@@ -110,13 +142,15 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
 std::vector<std::string> lines(const Analysis& analysis) {
   std::vector<std::string> list;
   for (const Correlation& c : analysis.correlations) {
-    if (c.force != "total_force_nN" || !c.line.slope_error) continue;
+    if (c.force != "total_force_nN") continue;
     const std::string by = c.size == "n_adhesions"         ? "adhesion"
                            : c.size == "adhesion_area_um2" ? "µm² of adhesion"
                            : c.size == "cell_area_um2"     ? "µm² of cell"
                                                            : "fibre";
-    std::string text = fmt::format("{}the total force is {} ± {} nN for each {} ({} cells", prefix_of(c.condition),
-                                   readable(c.line.slope), readable(*c.line.slope_error), by, c.line.n);
+    const std::string error = c.line.slope_error ? " ± " + readable(*c.line.slope_error) : "";
+    std::string text =
+        fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition), readable(c.line.slope),
+                    error, by, c.line.slope_error ? fmt::format("{} cells", c.line.n) : "a single cell: no error");
     if (c.line.correlation) text += ", r = " + readable(*c.line.correlation);
     list.push_back(capitalised(text + ")."));
   }
@@ -125,6 +159,10 @@ std::vector<std::string> lines(const Analysis& analysis) {
 
 std::vector<std::string> directions(const Analysis& analysis) {
   std::vector<std::string> list;
+  if (analysis.directions.empty()) {
+    list.push_back(
+        "No direction is known: no fibre ends on an adhesion, and no beads near one moved by more than noise.");
+  }
   for (const DirectionSummary& s : analysis.directions) {
     std::string text = fmt::format("{}{} differ by {:.0f}° in the mean", prefix_of(s.condition),
                                    full_name_of(s.relation), s.mean_angle_deg);

@@ -59,6 +59,12 @@ void number_conditions(Study& study, const std::vector<std::string>& condition_o
   }
 }
 
+/// A file may call identifiable what its interval does not know at all; its square must stay a number.
+bool is_measured(const Tension& t) {
+  constexpr double kAnything_nN = 1e6;  // a cell's whole force is some 1e3
+  return t.identifiable && standard_error_nN(t).value_or(0) < kAnything_nN;
+}
+
 [[noreturn]] void no_cell_left(const Path& folder, const std::vector<LeftOutCell>& left_out) {
   std::string found = "none of " + std::to_string(left_out.size());
   if (!left_out.empty()) found += " (" + left_out.front().name + ": " + left_out.front().reason + ")";
@@ -83,6 +89,11 @@ void declare(ParameterList& list, StudyParameters& parameters) {
   list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
            "draws of cells behind the intervals of means and medians");
   list.add("bootstrap_seed", parameters.bootstrap_seed, "of these draws");
+}
+
+std::vector<double> thresholds_nN(const StudyParameters& parameters) {
+  if (parameters.weak_tension_nN == parameters.strong_tension_nN) return {parameters.weak_tension_nN};
+  return {parameters.weak_tension_nN, parameters.strong_tension_nN};
 }
 
 const std::vector<std::string>& files_of_a_cell() {
@@ -148,7 +159,7 @@ std::vector<MeasuredFibre> measured_fibres(const Study& study) {
     for (const Tension& t : cell.tensions) tension[t.fibre_id] = &t;
     for (const Fibre& fibre : cell.cell.fibres) {
       const auto found = tension.find(fibre.fibre_id);
-      if (found != tension.end() && found->second->identifiable) fibres.push_back({&cell, &fibre, found->second});
+      if (found != tension.end() && is_measured(*found->second)) fibres.push_back({&cell, &fibre, found->second});
     }
   }
   return fibres;
@@ -157,8 +168,10 @@ std::vector<MeasuredFibre> measured_fibres(const Study& study) {
 std::optional<double> standard_error_nN(const Tension& t) {
   constexpr double kQuantile95 = 1.959964;  // of the normal distribution
   if (!t.high_nN) return std::nullopt;
-  if (t.low_nN && *t.low_nN > 0) return (*t.high_nN - *t.low_nN) / (2 * kQuantile95);
-  return std::max(0.0, *t.high_nN - t.tension_nN) / kQuantile95;
+  const bool is_whole = t.low_nN && *t.low_nN > 0;
+  const double error =
+      is_whole ? (*t.high_nN - *t.low_nN) / (2 * kQuantile95) : (*t.high_nN - t.tension_nN) / kQuantile95;
+  return error > 0 ? std::optional(error) : std::nullopt;
 }
 
 }  // namespace mbtfm::statistics

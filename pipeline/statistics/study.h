@@ -21,6 +21,8 @@ struct StudyParameters {
   std::uint64_t bootstrap_seed = 1;
 };
 void declare(ParameterList& list, StudyParameters& parameters);
+/// The tensions above which shares are given, each once.
+std::vector<double> thresholds_nN(const StudyParameters& parameters);
 
 /// A finished cell.
 struct StudyCell {
@@ -54,7 +56,7 @@ const std::vector<std::string>& further_files_of_a_cell();
 /// @throws InputError where no cell is left, or the table is malformed or names a cell that is not there
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads);
 
-/// A fibre whose tension could be identified.
+/// A fibre whose tension could be identified, and is known to within anything that a fibre can carry.
 struct MeasuredFibre {
   const StudyCell* cell = nullptr;
   const Fibre* fibre = nullptr;
@@ -62,7 +64,8 @@ struct MeasuredFibre {
 };
 std::vector<MeasuredFibre> measured_fibres(const Study& study);
 
-/// Half the 95 % interval over its quantile: of the upper half, where zero cuts the lower; none without an interval.
+/// Half the 95 % interval over its quantile: of the upper half, where zero cuts the lower; none without an interval,
+/// or with one of no length.
 std::optional<double> standard_error_nN(const Tension& tension);
 
 }  // namespace mbtfm::statistics

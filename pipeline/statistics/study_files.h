@@ -12,7 +12,7 @@ namespace mbtfm::statistics {
 /// Every table with the name of its file.
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis);
 
-/// Charts that belong together, with a caption.
+/// Charts that belong together, with a caption; without charts the caption says why there are none.
 struct Figure {
   std::string name;  ///< of its files, without the ending
   std::string title, caption;

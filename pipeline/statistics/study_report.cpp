@@ -15,6 +15,8 @@ using report::Table;
 
 std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
 
+std::string number_text(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
+
 std::string interval_text(const std::optional<Interval>& interval) {
   return interval ? readable(interval->low) + " to " + readable(interval->high) : "–";
 }
@@ -23,6 +25,9 @@ bool has_conditions(const Study& study) { return study.conditions.size() > 1 || 
 
 /// The one place where a figure enters the page.
 std::string embedded(const Figure& figure) {
+  if (figure.charts.empty())
+    return "<h3>" + html_escaped(figure.title) + "</h3>\n<p class=\"sub\">Not drawn: " + html_escaped(figure.caption) +
+           "</p>\n";
   std::string html = "<h3>" + html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
   for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
   return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
@@ -42,11 +47,13 @@ Table types_table(const Study& study, const Analysis& analysis) {
                {"SD without error (nN)", true}},
               {}};
   for (const Summary& s : analysis.tensions.summaries) {
-    table.rows.push_back({html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells),
-                          std::to_string(s.n), s.model ? readable(s.model->estimate) : "–",
-                          interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-                          readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
-                          readable(s.plain.standard_deviation), readable(s.without_error.standard_deviation)});
+    table.rows.push_back(
+        {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
+         s.model ? readable(s.model->estimate) : "–",
+         interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
+         readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
+         number_text(s.plain.standard_deviation),
+         number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
   }
   if (!has_conditions(study)) {
     table.columns.erase(table.columns.begin());

@@ -25,8 +25,8 @@ Summary plain_summary(const std::string& condition, const std::string& kind, con
           .n_cells = n_cells_of(own),
           .n = static_cast<int>(own.size()),
           .plain = describe(values),
-          .typical_error = std::sqrt(error),
-          .without_error = deconvolved_moments(values, errors),
+          .typical_error = error > 0 ? std::optional(std::sqrt(error)) : std::nullopt,
+          .without_error = own.size() > 1 ? std::optional(deconvolved_moments(values, errors)) : std::nullopt,
           .mean_interval = {},
           .median_interval = {},
           .model = {}};
@@ -56,12 +56,14 @@ std::optional<Interval> median_interval(std::vector<Observation> own, const std:
   for (const CellWeights& w : draws) {
     double n = 0, seen = 0;
     for (const Observation& o : own) n += w[static_cast<std::size_t>(o.cell)];
-    std::optional<double> median;
-    for (std::size_t i = 0; i < own.size() && !median && n > 0; ++i) {
+    // the middle one, or the mean of the middle two, as of the values themselves
+    std::optional<double> lower, upper;
+    for (std::size_t i = 0; i < own.size() && !upper && n > 0; ++i) {
       seen += w[static_cast<std::size_t>(own[i].cell)];
-      if (2 * seen >= n) median = own[i].value;
+      if (2 * seen >= n && !lower) lower = own[i].value;
+      if (2 * seen > n) upper = own[i].value;
     }
-    medians.push_back(median);
+    medians.push_back(upper ? std::optional((*lower + *upper) / 2) : std::nullopt);
   }
   return bootstrap_interval(std::move(medians), n_cells_of(own));
 }
@@ -74,7 +76,9 @@ std::vector<CellWeights> draw_cells(const Study& study, const StudyParameters& p
   return draw_cells(condition, parameters.bootstrap_draws, parameters.bootstrap_seed);
 }
 
-std::optional<SampleModel> model_of(const Sample& sample) {
+ModelResult model_of(const Sample& sample) {
+  if (sample.values.empty()) return {.model = {}, .obstacle = "there are no " + sample.each};
+  if (n_cells_of(sample.values) < 2) return {.model = {}, .obstacle = "there is a single cell"};
   std::vector<int> index(static_cast<std::size_t>(sample.n_conditions() * sample.n_kinds()), -1);
   for (const Observation& o : sample.values) index[static_cast<std::size_t>(o.group)] = 0;
   int n = 0;
@@ -83,10 +87,10 @@ std::optional<SampleModel> model_of(const Sample& sample) {
   for (Observation& o : data) o.group = index[static_cast<std::size_t>(o.group)];
   try {
     MixedFit fit = fit_mixed_model(std::move(data));
-    if (!fit.converged) return std::nullopt;
-    return SampleModel{.fit = std::move(fit), .index = std::move(index)};
+    if (!fit.converged) return {.model = {}, .obstacle = "the mixed model did not converge"};
+    return {.model = SampleModel{.fit = std::move(fit), .index = std::move(index)}};
   } catch (const InvalidData&) {
-    return std::nullopt;
+    return {.model = {}, .obstacle = "the values do not differ, and have no errors that are known"};
   }
 }
 
@@ -104,6 +108,7 @@ std::vector<Summary> summarise(const Sample& sample, const std::optional<SampleM
       if (model && s.n_cells > 1) {
         const int g = model->index[static_cast<std::size_t>(sample.group_of(condition, kind))];
         s.model = contrast_of(model->fit, Eigen::VectorXd::Unit(model->fit.mean.size(), g));
+        if (sample.is_never_negative) s.model->low = std::max(0.0, s.model->low);
       }
       list.push_back(std::move(s));
     }

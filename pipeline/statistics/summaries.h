@@ -17,11 +17,11 @@ struct Summary {
   std::string cell;  ///< empty: all of the condition
   std::string condition, kind;
   int n_cells = 0, n = 0;
-  Description plain;                                       ///< each observation counts the same
-  double typical_error = 0;                                ///< root mean square of the standard errors
-  Deconvolved without_error;                               ///< the scatter that the measurement's errors leave
+  Description plain;                         ///< each observation counts the same
+  std::optional<double> typical_error;       ///< root mean square of the standard errors; none where none is known
+  std::optional<Deconvolved> without_error;  ///< the scatter that the measurement's errors leave; none of one value
   std::optional<Interval> mean_interval, median_interval;  ///< by the bootstrap of cells; none of one cell
-  std::optional<Contrast> model;                           ///< mean of the mixed model
+  std::optional<Contrast> model;                           ///< mean of the mixed model; none of a group in one cell
 };
 
 /// The mixed model of a sample, by the groups that have observations.
@@ -29,8 +29,11 @@ struct SampleModel {
   MixedFit fit;
   std::vector<int> index;  ///< of a group in the fit, −1: it has no observation
 };
-/// None where it cannot be fitted: one cell, or values that do not differ.
-std::optional<SampleModel> model_of(const Sample& sample);
+struct ModelResult {
+  std::optional<SampleModel> model;
+  std::string obstacle = {};  ///< why there is none, for people: "there is a single cell"
+};
+ModelResult model_of(const Sample& sample);
 
 /// A row for each condition and kind that was observed.
 std::vector<Summary> summarise(const Sample& sample, const std::optional<SampleModel>& model,

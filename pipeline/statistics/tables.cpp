@@ -106,7 +106,8 @@ void add_summary(CsvText& csv, const Summary& s) {
   add(csv, s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt);
   csv.add(s.plain.median);
   add(csv, s.median_interval);
-  csv.add(s.plain.standard_deviation).add(s.typical_error).add(s.without_error.standard_deviation);
+  csv.add(s.plain.standard_deviation).add(s.typical_error);
+  csv.add(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt);
 }
 
 /// Columns of add_summary; `unit` begins with an underscore or is empty.
@@ -172,16 +173,18 @@ std::string summaries_csv(const Analysis& analysis) {
 
 /// The scatter between cells, between the kinds of a cell and within them.
 std::string variances_csv(const Analysis& analysis) {
-  CsvText csv({"quantity", "component", "standard_deviation"});
-  const auto row = [&](const Sample& sample, const std::string& component, double variance) {
-    csv.add(sample.column).add(component).add(std::sqrt(variance)).end_row();
-  };
+  CsvText csv({"quantity", "component", "standard_deviation", "remark"});
   for (const Measure* m : analysis.measures()) {
-    if (!m->model) continue;
-    row(m->sample, "cell", m->model->fit.cell_variance);
-    row(m->sample, "kind in a cell", m->model->fit.cell_kind_variance);
-    for (int k = 0; k < m->model->fit.residual_variance.size(); ++k)
-      row(m->sample, "within: " + m->sample.kinds[static_cast<std::size_t>(k)], m->model->fit.residual_variance[k]);
+    const auto row = [&](const std::string& component, const std::optional<double>& variance) {
+      const char* remark = m->model ? "too few values to tell it from the others" : m->obstacle.c_str();
+      csv.add(m->sample.column).add(component).add(variance ? std::optional(std::sqrt(*variance)) : std::nullopt);
+      csv.add(variance ? *variance > 0 ? "" : "no more than the errors explain" : remark).end_row();
+    };
+    const MixedFit fit = m->model ? m->model->fit : MixedFit{};
+    row("cell", fit.cell_variance);
+    row("kind in a cell", fit.cell_kind_variance);
+    for (std::size_t k = 0; k < m->sample.kinds.size(); ++k)
+      row("within: " + m->sample.kinds[k], k < fit.residual_variance.size() ? fit.residual_variance[k] : std::nullopt);
   }
   return csv.str();
 }

@@ -95,8 +95,8 @@ TEST(StatisticsBesideR, mixed_model_of_lme4_with_the_degrees_of_lmerTest) {
   const MixedFit fit = fit_mixed_model(data);
   EXPECT_TRUE(fit.converged);
   r.expect("lmer.log_likelihood", fit.log_likelihood, kExact);
-  r.expect("lmer.cell_variance", fit.cell_variance, kOptimiser);
-  r.expect("lmer.residual_variance", fit.residual_variance[0], kOptimiser);
+  r.expect("lmer.cell_variance", *fit.cell_variance, kOptimiser);
+  r.expect("lmer.residual_variance", *fit.residual_variance[0], kOptimiser);
   // lmerTest takes the observed information of the variances, we the average of observed and expected: some per cent
   constexpr double kInformation = 0.05;
   for (int g = 0; g < 3; ++g) {
@@ -130,14 +130,14 @@ void expect_nested(const FromR& r, const std::string& name, bool has_errors) {
   r.expect(name + ".log_likelihood", fit.log_likelihood, 1e-6);
   // four variances of 150 fibres: flatter still
   constexpr double kFlat = 3e-3;
-  r.expect(name + ".cell_variance", fit.cell_variance, kFlat);
-  r.expect(name + ".cell_kind_variance", fit.cell_kind_variance, kFlat);
+  r.expect(name + ".cell_variance", *fit.cell_variance, kFlat);
+  r.expect(name + ".cell_kind_variance", *fit.cell_kind_variance, kFlat);
   for (int g = 0; g < 3; ++g) {
     const std::string& type = kTypes[static_cast<std::size_t>(g)];
     const Contrast mean = contrast_of(fit, Eigen::VectorXd::Unit(3, g));
     r.expect(name + ".mean." + type, mean.estimate, kOptimiser);
     r.expect(name + ".error." + type, mean.standard_error, kFlat);
-    r.expect(name + ".residual_variance." + type, fit.residual_variance[g], kFlat);
+    r.expect(name + ".residual_variance." + type, *fit.residual_variance[static_cast<std::size_t>(g)], kFlat);
   }
 }
 
@@ -168,7 +168,7 @@ TEST(MixedModel, balanced_cells_give_the_classical_degrees_of_freedom) {
   for (const Observation& o : data) cell_means[static_cast<std::size_t>(o.cell)] += o.value / 4;
   const Description d = describe(cell_means);
   EXPECT_NEAR(mean.estimate, d.mean, 1e-12);
-  EXPECT_NEAR(mean.standard_error, d.standard_deviation / std::sqrt(7.0), 1e-6);
+  EXPECT_NEAR(mean.standard_error, *d.standard_deviation / std::sqrt(7.0), 1e-6);
   EXPECT_NEAR(mean.degrees, 6, 1e-3);
 }
 
@@ -179,13 +179,55 @@ TEST(MixedModel, one_observation_a_cell_and_kind_is_welchs_test) {
   for (const double v : b) data.push_back({.value = v, .cell = static_cast<int>(data.size()), .kind = 1, .group = 1});
   const Contrast c = contrast_of(fit_mixed_model(data), Eigen::Vector2d(-1, 1));
   const Description da = describe(a), db = describe(b);
-  const double va = da.standard_deviation * da.standard_deviation / 5,
-               vb = db.standard_deviation * db.standard_deviation / 6;
+  const double va = *da.standard_deviation * *da.standard_deviation / 5,
+               vb = *db.standard_deviation * *db.standard_deviation / 6;
   EXPECT_NEAR(c.standard_error, std::sqrt(va + vb), 1e-6);
   EXPECT_NEAR(c.degrees, (va + vb) * (va + vb) / (va * va / 4 + vb * vb / 5), 1e-3);
 }
 
+/// Then all variances are held at zero: the mean is weighted by the errors, which tell how well it is known.
+TEST(MixedModel, scatter_that_the_errors_explain_leaves_a_mean_weighted_by_them) {
+  const std::vector<double> values = {3.1, 2.9, 3.4, 3.0, 2.8}, errors = {1, 2, 4, 1, 3};
+  std::vector<Observation> data;
+  double weight = 0, sum = 0;
+  for (std::size_t i = 0; i < values.size(); ++i) {
+    data.push_back({.value = values[i], .error_variance = errors[i] * errors[i], .cell = static_cast<int>(i / 3)});
+    weight += 1 / data.back().error_variance;
+    sum += values[i] / data.back().error_variance;
+  }
+  const MixedFit fit = fit_mixed_model(data);
+  EXPECT_TRUE(fit.converged);
+  EXPECT_EQ(fit.cell_variance, 0);
+  EXPECT_EQ(fit.residual_variance[0], 0);
+  // what is left of the least scatter, a part in 1e8 of the variance, is far below the errors' squares
+  const Contrast mean = contrast_of(fit, Eigen::VectorXd::Ones(1));
+  EXPECT_NEAR(mean.estimate, sum / weight, 1e-8);
+  EXPECT_NEAR(mean.standard_error, 1 / std::sqrt(weight), 1e-8);
+  EXPECT_EQ(mean.degrees, 4);
+}
+
+/// One cell a condition: the conditions' means hold all that the cells differ by.
+TEST(MixedModel, what_the_groups_means_take_up_is_no_variance_between_cells) {
+  const MixedFit fit = fit_mixed_model(
+      {{.value = 1}, {.value = 2}, {.value = 7, .cell = 1, .group = 1}, {.value = 9, .cell = 1, .group = 1}});
+  EXPECT_FALSE(fit.cell_variance);
+  EXPECT_TRUE(fit.residual_variance[0]);
+}
+
+TEST(MixedModel, kinds_without_two_values_in_a_group_have_no_scatter_that_could_be_told) {
+  const MixedFit fit = fit_mixed_model({{.value = 1},
+                                        {.value = 2, .cell = 1},
+                                        {.value = 1.5, .cell = 2},
+                                        {.value = 7, .cell = 2, .kind = 2, .group = 1}});
+  ASSERT_EQ(fit.residual_variance.size(), 3u);
+  EXPECT_TRUE(fit.residual_variance[0]);
+  EXPECT_FALSE(fit.residual_variance[1]);
+  EXPECT_FALSE(fit.residual_variance[2]);
+}
+
 TEST(MixedModel, what_cannot_be_estimated_is_refused) {
+  EXPECT_THROW(fit_mixed_model({{.value = 1}, {.value = 1, .cell = 1}, {.value = 2, .cell = 1, .group = 1}}),
+               InvalidData);
   EXPECT_THROW(fit_mixed_model({{.value = 1}, {.value = 2}}), InvalidData);
   EXPECT_THROW(fit_mixed_model({{.value = 1}, {.value = 1, .cell = 1}}), InvalidData);
   EXPECT_THROW(fit_mixed_model({{.value = 1, .group = 1}, {.value = 2, .cell = 1, .group = 1}}), InvalidData);
@@ -248,7 +290,7 @@ TEST(Bootstrap, the_interval_of_a_mean_is_students) {
   }
   const Interval interval = *bootstrap_interval(means, 40);
   const Description d = describe(values);
-  const double half = 2.0227 * d.standard_deviation / std::sqrt(40.0);  // t of 39 degrees
+  const double half = 2.0227 * *d.standard_deviation / std::sqrt(40.0);  // t of 39 degrees
   EXPECT_NEAR(interval.low, d.mean - half, 0.07 * half);
   EXPECT_NEAR(interval.high, d.mean + half, 0.07 * half);
 }
@@ -282,6 +324,12 @@ TEST(Shares, of_one_fibre_a_cell_vary_as_a_mean_of_as_many_numbers_does) {
   cells[0].n_with = cells[1].n_with = 1;
   const double t = 2.570582;  // 97.5 % of 5 degrees of freedom, from tables
   EXPECT_NEAR(share_over_cells(cells).n_effective, (kCells - 1) * std::pow(1.959964 / t, 2), 1e-4);
+}
+
+/// Were its points as near to each other as to the threshold, they would fill the memory.
+TEST(Deconvolution, a_threshold_far_below_all_values_has_them_all_above) {
+  EXPECT_NEAR(deconvolved_fraction_above({3, 5, 8}, {0.01, 0.01, 0.01}, 1e-9), 1, 1e-6);
+  EXPECT_NEAR(deconvolved_fraction_above({3, 5, 8}, {0.01, 0.01, 0.01}, 1e9), 0, 1e-6);
 }
 
 TEST(Deconvolution, finds_the_share_of_two_sharp_values_behind_wide_errors) {

@@ -84,7 +84,7 @@ void study_null(int n_simulations, const std::string& folder) {
       const auto settings = strong_cell_effects(n_cells, 1000 + static_cast<std::uint64_t>(i));
       const Study study = test::simulated_study(settings);
       const Sample sample = sample_tensions(study);
-      const auto model = model_of(sample);
+      const auto model = model_of(sample).model;
       add_p_values(sample, model, p_values);
       const double truth = settings.offset_nN + 2.5;
       for (const Summary& s : summarise(sample, model, draw_cells(study, {.bootstrap_draws = 500}))) {
@@ -124,7 +124,7 @@ void study_power(int n_simulations) {
         auto settings = strong_cell_effects(n_cells, 5000 + static_cast<std::uint64_t>(i));
         settings.condition_effect_nN = effect;
         const Sample sample = sample_tensions(test::simulated_study(settings));
-        add_p_values(sample, model_of(sample), p_values);
+        add_p_values(sample, model_of(sample).model, p_values);
       }
       for (const auto& [key, values] : p_values) {
         if (key.first == "between conditions")
@@ -137,7 +137,7 @@ void study_power(int n_simulations) {
 void study_time() {
   for (const int n_cells : {100, 300}) {
     auto settings = strong_cell_effects(n_cells, 1);
-    settings.fibres_by_type = 7;
+    settings.mean_fibres_by_type = 7;
     Study study = test::simulated_study(settings);
     for (StudyCell& c : study.cells) {  // as many adhesions as the thesis' cells have: 170
       while (c.cell.adhesions.size() < 170) {

@@ -310,7 +310,7 @@ TEST(TensionFit, intervals_by_profile_are_1_96_standard_errors_where_no_bound_is
   local.H << 2, 0.8, 0.8, 1;
   const Eigen::MatrixXd covariance = covariance_nN2(local, 1.5);
   for (int i = 0; i < 2; ++i) {
-    const Sides sides = profile_95(local, 1.5, i);
+    const Sides sides = profiles_95(local, 1.5)[static_cast<std::size_t>(i)];
     EXPECT_NEAR(sides.below, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.below);
     EXPECT_NEAR(sides.above, 1.96 * std::sqrt(covariance(i, i)), 2e-3 * sides.above);
   }
@@ -318,7 +318,7 @@ TEST(TensionFit, intervals_by_profile_are_1_96_standard_errors_where_no_bound_is
   const LocalMisfit held{.tensions_nN = Eigen::VectorXd::Zero(1),
                          .H = Eigen::MatrixXd::Constant(1, 1, 4),
                          .g = Eigen::VectorXd::Constant(1, 3)};
-  const Sides sides = profile_95(held, 1, 0);
+  const Sides sides = profiles_95(held, 1).front();
   EXPECT_EQ(sides.below, 0);
   EXPECT_NEAR(sides.above, (-3 + std::sqrt(9 + 4 * 1.96 * 1.96)) / 4, 2e-3 * sides.above);
 }

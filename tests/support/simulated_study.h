@@ -11,8 +11,8 @@ namespace mbtfm::test {
 struct StudySettings {
   int n_cells = 20;
   int n_conditions = 1;
-  int fibres_by_type = 4;  ///< on average; a cell may lack a type
-  double offset_nN = 10;   ///< that zero does not cut the scatter
+  double mean_fibres_by_type = 4;  ///< a cell may lack a type
+  double offset_nN = 10;           ///< that zero does not cut the scatter
   bool types_differ = true;
   double condition_effect_nN = 0;  ///< from each condition to the next
   double cell_sd_nN = 1;           ///< shared by the fibres of a cell
@@ -42,7 +42,7 @@ inline statistics::Study simulated_study(const StudySettings& s) {
     for (const FibreType type : kFibreTypes) {
       const double of_type = s.type_in_cell_sd_nN * normal(random);
       const double mean = s.types_differ ? (type == FibreType::dorsal ? 1.5 : type == FibreType::arc ? 2.5 : 4) : 2.5;
-      const int n = std::poisson_distribution<int>(s.fibres_by_type)(random);
+      const int n = std::poisson_distribution<int>(s.mean_fibres_by_type)(random);
       for (int k = 0; k < n; ++k) {
         const int id = static_cast<int>(cell.cell.fibres.size()) + 1;
         cell.cell.fibres.push_back({.fibre_id = id,

@@ -230,7 +230,7 @@ TEST(Analysis, the_mixed_model_finds_the_means_and_the_scatter_behind_the_errors
     EXPECT_NEAR(s.model->estimate, truth, 4 * s.model->standard_error) << s.condition << s.kind;
     const double scatter =
         std::sqrt(settings.cell_sd_nN * settings.cell_sd_nN + settings.fibre_sd_nN * settings.fibre_sd_nN);
-    EXPECT_NEAR(s.without_error.standard_deviation, scatter, 0.15 * scatter)
+    EXPECT_NEAR(s.without_error->standard_deviation, scatter, 0.15 * scatter)
         << s.kind;  // 100 cells' sd: 7 %, two of it
   }
 }
@@ -245,7 +245,7 @@ TEST(Analysis, tests_by_cell_hold_their_level_where_those_by_fibre_do_not) {
                                                                  .types_differ = false,
                                                                  .type_in_cell_sd_nN = 0.7,
                                                                  .seed = 100 + static_cast<std::uint64_t>(i)}));
-    for (const Comparison& c : compare(sample, model_of(sample))) {
+    for (const Comparison& c : compare(sample, model_of(sample).model)) {
       if (c.question == "between conditions" && c.within == "ventral" && c.p_value < 0.05)
         ++n_rejected[c.test + ", " + name_of(c.unit)];
     }
@@ -277,7 +277,10 @@ void expect_whole(const Study& study) {
   }
   const auto figures = figures_of(study, analysis, parameters);
   EXPECT_FALSE(figures.empty());
-  for (const Figure& figure : figures) EXPECT_EQ(svg_of(figure).find("nan"), std::string::npos) << figure.name;
+  for (const Figure& figure : figures) {
+    if (figure.charts.empty()) continue;
+    EXPECT_EQ(svg_of(figure).find("nan"), std::string::npos) << figure.name;
+  }
   const std::string html = study_html(study, analysis, figures, parameters);
   EXPECT_EQ(html.find("nan "), html.npos);
 }

@@ -1,0 +1,163 @@
+/// Studies of two to six cells in which next to nothing can be known: every table, figure and sentence says so.
+/// MBTFM_ALL_STUDIES=1 reads all of them from folders and makes all pages, too, instead of one in ten.
+#include <gtest/gtest.h>
+
+#include <cctype>
+#include <cmath>
+#include <cstdlib>
+#include <set>
+#include <sstream>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/statistics/study_files.h"
+#include "tests/support/small_study.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm::statistics {
+namespace {
+
+constexpr int kStudies = 300;
+bool are_all() { return std::getenv("MBTFM_ALL_STUDIES") != nullptr; }
+
+const StudyParameters kFewDraws{.bootstrap_draws = 200};
+
+/// Columns of a table that hold words.
+const std::set<std::string> kWords = {"cell",      "condition", "reason",  "type",    "kind",      "quantity",
+                                      "component", "force",     "size",    "remark",  "question",  "within",
+                                      "test",      "unit",      "group_a", "group_b", "effect_is", "relation"};
+
+/// An estimate with the columns of its interval. Sums, means and medians of what has no negative values have none.
+struct Bounded {
+  std::string value, low, high;
+  bool is_positive = true;
+};
+const std::vector<Bounded> kIntervals = {{"mean", "mean_low", "mean_high"},
+                                         {"model_mean", "model_low", "model_high"},
+                                         {"median", "median_low", "median_high"},
+                                         {"mean_nN", "mean_low_nN", "mean_high_nN"},
+                                         {"model_mean_nN", "model_low_nN", "model_high_nN"},
+                                         {"median_nN", "median_low_nN", "median_high_nN"},
+                                         {"fraction_above_1_nN", "fraction_above_1_nN_low", "fraction_above_1_nN_high"},
+                                         {"fraction_above_5_nN", "fraction_above_5_nN_low", "fraction_above_5_nN_high"},
+                                         {"slope", "slope_low", "slope_high"},
+                                         {"mean_force_nN", "low_nN", "high_nN"},
+                                         {"tension_nN", "low_nN", "high_nN"},
+                                         {"mean_angle_deg", "low_deg", "high_deg"},
+                                         {"mean_cosine", "cosine_low", "cosine_high", false},
+                                         {"effect", "effect_low", "effect_high", false}};
+
+std::vector<std::string> header_of(const std::string& text) {
+  std::istringstream line(text.substr(0, text.find('\n')));
+  std::vector<std::string> header;
+  for (std::string column; std::getline(line, column, ',');) header.push_back(column);
+  return header;
+}
+
+/// The fibres' force is a difference.
+bool may_be_negative(const CsvTable& table, int row) {
+  for (const char* column : {"quantity", "force"}) {
+    if (table.has(column) && table.text(row, column) == "fibre_force_nN") return true;
+  }
+  return false;
+}
+
+void expect_intervals(const CsvTable& table, int row, const std::string& name) {
+  for (const Bounded& b : kIntervals) {
+    if (!table.has(b.value) || !table.has(b.low)) continue;
+    const auto value = table.optional_number(row, b.value), low = table.optional_number(row, b.low),
+               high = table.optional_number(row, b.high);
+    EXPECT_EQ(low.has_value(), high.has_value()) << name << " row " << row << " " << b.value;
+    if (!low || !high) continue;
+    // sums in another order: rounding
+    const double rounding = 1e-12 * (std::abs(*low) + std::abs(*high));
+    ASSERT_TRUE(value) << name << " row " << row << " " << b.value;
+    EXPECT_LE(*low, *value + rounding) << name << " row " << row << " " << b.value;
+    EXPECT_GE(*high, *value - rounding) << name << " row " << row << " " << b.value;
+    if (!b.is_positive || may_be_negative(table, row)) continue;
+    EXPECT_GE(*low, 0) << name << " row " << row << " " << b.value;
+  }
+}
+
+void expect_table(const std::string& text, const std::string& name) {
+  const CsvTable table(text, name);
+  const std::vector<std::string> header = header_of(text);
+  for (int row = 0; row < table.n_rows(); ++row) {
+    for (const std::string& column : header) {
+      if (kWords.contains(column)) continue;
+      const auto value = table.optional_number(row, column);  // refuses nan and inf
+      if (!value) continue;
+      const bool is_probability = column == "p" || column == "p_holm" || column.starts_with("fraction_above");
+      EXPECT_TRUE(!is_probability || (*value >= 0 && *value <= 1)) << name << " row " << row << " " << column;
+      // beyond what any quantity of a cell is: a stand-in for infinity
+      EXPECT_LT(std::abs(*value), 1e100) << name << " row " << row << " " << column;
+    }
+    expect_intervals(table, row, name);
+  }
+}
+
+bool says_nan(const std::string& text) {
+  for (const std::string word : {"nan", "inf"}) {
+    for (std::size_t at = text.find(word); at != text.npos; at = text.find(word, at + 1)) {
+      const bool is_begun = at > 0 && std::isalpha(static_cast<unsigned char>(text[at - 1]));
+      const std::size_t end = at + word.size();
+      if (!is_begun && (end == text.size() || !std::isalpha(static_cast<unsigned char>(text[end])))) return true;
+    }
+  }
+  return false;
+}
+
+enum class Page { made, left_out };
+
+void expect_whole(const Study& study, Page page) {
+  const Analysis analysis = analyse(study, kFewDraws);
+  for (const auto& [name, text] : tables_of(study, analysis)) expect_table(text, name);
+  const auto figures = figures_of(study, analysis, kFewDraws);
+  for (const Figure& figure : figures) {
+    EXPECT_FALSE(figure.charts.empty() && figure.caption.empty()) << figure.name;
+    EXPECT_FALSE(!figure.charts.empty() && says_nan(svg_of(figure))) << figure.name;
+  }
+  for (const Findings& findings : findings_of(analysis, kFewDraws)) {
+    EXPECT_FALSE(findings.sentences.empty()) << findings.title;
+    for (const std::string& s : findings.sentences) EXPECT_FALSE(says_nan(s)) << s;
+    for (const std::string& s : findings.unclear) EXPECT_FALSE(says_nan(s)) << s;
+  }
+  for (const std::string& warning : analysis.warnings) EXPECT_FALSE(says_nan(warning)) << warning;
+  if (page == Page::left_out) return;
+  EXPECT_FALSE(study_html(study, analysis, figures, kFewDraws).empty());
+}
+
+TEST(SmallStudies, whatever_lacks_every_number_is_finite_or_its_field_empty) {
+  for (int seed = 1; seed <= kStudies; ++seed) {
+    const test::Lack lack = test::drawn_lack(static_cast<std::uint64_t>(seed));
+    SCOPED_TRACE("seed " + std::to_string(seed) + ": " + lack.str());
+    // a page holds its charts' library, a megabyte: one in ten shows what breaks it
+    expect_whole(test::small_study(lack, static_cast<std::uint64_t>(seed)),
+                 are_all() || seed % 10 == 1 ? Page::made : Page::left_out);
+  }
+}
+
+/// One file, or several, of each second cell gone.
+TEST(SmallStudies, cells_that_lack_files_are_left_out_with_a_reason) {
+  for (int seed = 1; seed <= kStudies; seed += are_all() ? 1 : 10) {
+    const test::Lack lack = test::drawn_lack(static_cast<std::uint64_t>(seed));
+    SCOPED_TRACE("seed " + std::to_string(seed) + ": " + lack.str());
+    const Study whole = test::small_study(lack, static_cast<std::uint64_t>(seed));
+    const test::TemporaryFolder folder;
+    std::mt19937_64 random(static_cast<std::uint64_t>(seed));
+    std::size_t n_damaged = 0;
+    for (const StudyCell& cell : whole.cells) {
+      test::write_finished_cell(folder / cell.name, cell);
+      if (&cell == &whole.cells.front() || random() % 2 == 0) continue;
+      ++n_damaged;
+      const auto& files = files_of_a_cell();
+      std::filesystem::remove(folder / cell.name / files[random() % files.size()]);
+    }
+    const Study read = read_study(folder.path(), kFewDraws, {}, 2);
+    EXPECT_EQ(read.left_out.size(), n_damaged);
+    for (const LeftOutCell& cell : read.left_out) EXPECT_FALSE(cell.reason.empty());
+    expect_whole(read, Page::left_out);
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::statistics
