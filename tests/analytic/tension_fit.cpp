@@ -255,7 +255,7 @@ TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
   data.weight_per_um = Eigen::VectorXd::Ones(2 * kBeads);
   data.displacement_um.resize(2 * kBeads);
   for (double& u : data.displacement_um) u = normal(random);
-  data.compliance_um_per_nN = Eigen::MatrixXd::Zero(2 * kBeads, 2);
+  data.response = substrate::dense_response(Eigen::MatrixXd::Zero(2 * kBeads, 2));
   data.n_used = 2 * kBeads;
   const Eigen::VectorXd no_forces = Eigen::VectorXd::Zero(2);
   for (const std::string loss : {"squares", "huber", "tukey"}) {

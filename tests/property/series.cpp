@@ -101,30 +101,31 @@ TEST(Series, flagged_beads_do_not_count) {
   }
 }
 
-TEST(Series, the_compliance_of_beads_that_the_frames_share_is_found_once) {
+TEST(Series, the_response_of_beads_that_the_frames_share_is_found_once) {
   const Series series = make_series(2);
   int n_calls = 0;
-  const auto compliance = [&](const DisplacementField& beads) -> Eigen::MatrixXd {
+  const auto response = [&](const DisplacementField& beads) {
     ++n_calls;
     Eigen::MatrixXd places(2 * beads.size(), 1);
     for (std::size_t i = 0; i < beads.size(); ++i) {
       places(2 * static_cast<Eigen::Index>(i), 0) = beads[i].position_um.x;
       places(2 * static_cast<Eigen::Index>(i) + 1, 0) = beads[i].position_um.y;
     }
-    return places;
+    return substrate::dense_response(places);
   };
+  const auto column = [](const substrate::SharedResponse& r) { return r->displace(Eigen::MatrixXd::Ones(1, 1)); };
   DisplacementField good;  // as displacement.csv without the beads that its frame flags
   for (std::size_t i = 3; i < series.frames[0].beads.size(); i += 2) good.push_back(series.frames[0].beads[i]);
-  const Compliances shared = compliances_of(good, series.frames, compliance);
+  const Responses shared = responses_of(good, series.frames, response);
   EXPECT_EQ(n_calls, 1);
-  EXPECT_EQ(shared.of_beads, compliance(good));
-  EXPECT_EQ(shared.of_series, compliance(series.frames[0].beads));
+  EXPECT_EQ(column(shared.of_beads), column(response(good)));
+  EXPECT_EQ(column(shared.of_series), column(response(series.frames[0].beads)));
   good.back().position_um.x += 1;  // a field of another origin beside the series
   n_calls = 0;
-  const Compliances apart = compliances_of(good, series.frames, compliance);
+  const Responses apart = responses_of(good, series.frames, response);
   EXPECT_EQ(n_calls, 2);
-  EXPECT_EQ(apart.of_beads, compliance(good));
-  compliances_of(good, {}, compliance);
+  EXPECT_EQ(column(apart.of_beads), column(response(good)));
+  responses_of(good, {}, response);
   EXPECT_EQ(n_calls, 4);
 }
 
