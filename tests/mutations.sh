@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
 # Would the suite see a fault? Plants those of tests/mutations.txt, one at a time, in a copy of the sources, builds the
-# tests that should see each, and tells which does. By hand: all of them take one to two hours.
+# tests that should see each, and tells which does. By hand: it builds some thirty tests before the first fault.
 #   tests/mutations.sh [--list] [NUMBER | FOLDER]...    which faults; none named: all
 # MBTFM_MUTATIONS is the folder of copy and build (build-mutations), CMAKE_BUILD_PARALLEL_LEVEL the compilers at once.
 set -euo pipefail

@@ -108,6 +108,22 @@ TEST(Mesh, edges_grow_from_what_is_resolved_no_faster_than_wanted) {
   }
 }
 
+TEST(Mesh, an_adhesion_covers_what_lies_in_its_ellipse) {
+  const Adhesion adhesion{.adhesion_id = 1,
+                          .position_um = {3, 4},
+                          .area_um2 = std::numbers::pi / 4 * 3,
+                          .major_axis_um = 3,
+                          .minor_axis_um = 1,
+                          .angle_rad = 0.4,
+                          .eccentricity = 0,
+                          .mean_intensity = 1};
+  const Polygon corners = ellipse_corners(adhesion, 10000);  // within 1e-7 of the ellipse
+  for (double y = 2; y < 6; y += 0.0371) {
+    for (double x = 1; x < 5; x += 0.0371)
+      EXPECT_EQ(covers(adhesion, {x, y}), contains(corners, {x, y})) << x << " " << y;
+  }
+}
+
 TEST(Mesh, edges_along_an_adhesions_rim_enclose_its_area) {
   for (const double aspect : {1.0, 2.0, 5.0}) {
     const Adhesion adhesion{.adhesion_id = 1,

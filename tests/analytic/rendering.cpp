@@ -133,6 +133,35 @@ TEST(AdhesionImage, has_half_its_brightness_on_the_ellipse) {
   }
 }
 
+TEST(AdhesionImage, fades_beyond_its_rim_as_a_step_blurred_by_the_rims_standard_deviation) {
+  constexpr double kRim_um = 0.1;
+  const Adhesion disc = make_adhesion({3.2, 3.2}, std::numbers::pi, 1, 0);  // of radius 1
+  Image image = blank_image(256, 0.025);
+  add_ellipse(image, disc, 1, kRim_um, 0);
+  double light = 0, squares = 0;  // of the fall of light along a row: minus its differences beyond the rim
+  for (int column = 128 + 40; column < 128 + 40 + 40; ++column) {
+    const double beyond_um = (column + 1) * 0.025 - 4.2;
+    const double fall = image.at(column, 128) - image.at(column + 1, 128);
+    light += fall;
+    squares += fall * beyond_um * beyond_um;
+  }
+  // half a Gaussian of fall has its variance; the row passes half a pixel beside the centre
+  EXPECT_NEAR(std::sqrt(squares / light), kRim_um, 0.02 * kRim_um);
+}
+
+TEST(Illumination, falls_from_the_centre_to_the_corners_by_the_unevenness_asked_for) {
+  MicroscopeParameters m;
+  m.image_size_px = 100;
+  m.haze = 0;
+  m.unevenness = 0.2;
+  Image even = blank_image(100, m.pixel_size_um);
+  for (float& value : even.pixels) value = 1;
+  const Image light = photons_of(even, m, 1);
+  const double corners = 0.25 * (light.at(0, 0) + light.at(99, 0) + light.at(0, 99) + light.at(99, 99));
+  // the brightest place lies a twentieth of the field off its middle: a hundredth of the fall
+  EXPECT_NEAR(1 - corners / *std::ranges::max_element(light.pixels), 0.2, 0.005);
+}
+
 TEST(Camera, records_offset_gain_and_noise) {
   MicroscopeParameters m;
   m.image_size_px = 200;

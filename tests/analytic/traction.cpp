@@ -110,6 +110,31 @@ TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) 
   EXPECT_NEAR(spectrum.along_um_per_kPa()[0] / longest.along_um_per_kPa, 1, 1e-6);
 }
 
+TEST(SurfaceSpectrum, a_loaded_cell_turned_by_a_quarter_displaces_the_same_turned) {
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.45, .thickness_um = 30};
+  const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
+  for (const Basis basis : {Basis::waves, Basis::cells}) {
+    const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic, basis);
+    const WaveTransform transform(32, 32);
+    const auto displaced = [&](Eigen::ArrayXd NodeField::*component) {
+      NodeField load = transform.no_field();
+      (load.*component)[16 + 32 * 16] = 1;
+      WaveField waves = transform.forward(load);
+      spectrum.displace(waves);
+      return transform.backward(waves);
+    };
+    const NodeField by_x = displaced(&NodeField::x), by_y = displaced(&NodeField::y);
+    const double peak = by_x.x.maxCoeff();
+    for (int q = -8; q <= 8; ++q) {
+      for (int p = -8; p <= 8; ++p) {  // (p, q) turns to (−q, p), x to y and y to −x
+        const Eigen::Index here = 16 + p + 32 * (16 + q), there = 16 - q + 32 * (16 + p);
+        EXPECT_NEAR(by_x.x[here], by_y.y[there], 1e-12 * peak) << p << ", " << q;
+        EXPECT_NEAR(by_x.y[here], -by_y.x[there], 1e-12 * peak) << p << ", " << q;
+      }
+    }
+  }
+}
+
 TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_noise) {
   // scattered beads of unequal errors, on a lattice four times as fine: chi² of 2 n numbers, four standard deviations
   constexpr int kBeads = 4000;

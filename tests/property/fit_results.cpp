@@ -23,6 +23,32 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
   EXPECT_NEAR(summary.fibre_force_nN + summary.network_force_nN, summary.total_force_nN, 1e-9 * summary.total_force_nN);
 }
 
+TEST(AdhesionForces, are_off_by_their_stated_errors_where_the_cells_network_is_another) {
+  Cell cell = test::round_cell(14, 24);
+  for (const auto& [a, b] : {std::pair{1, 13}, {4, 18}, {7, 22}}) test::add_ventral(cell, a, b);
+  double stated = 0, by_beads = 0;
+  int n = 0;
+  for (std::uint64_t seed = 5; seed < 8; ++seed) {
+    test::TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 2000, 0.01, 7, {.seed = 100 + seed});
+    std::vector<network::CableNetwork> networks;
+    for (int m = 0; m < 2; ++m) {
+      networks.emplace_back(network::generate_network(cell, {.seed = 10 * seed + m}).network);
+    }
+    const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {.loss = "squares"}, 2, {});
+    const std::vector<AdhesionForce> forces = forces_of(fit, cell);
+    for (std::size_t a = 0; a < forces.size(); ++a, ++n) {
+      const double truth = scene.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm();
+      const double error = norm(forces[a].force_nN) - truth;
+      stated += std::pow(error / *forces[a].sigma_nN, 2);
+      by_beads += std::pow(error / fit.force_magnitudes_nN[a].noise, 2);
+    }
+  }
+  // errors of adhesions differ by far (a variance of two degrees of freedom each): a factor of three for 72 of them
+  EXPECT_LT(stated / n, 3);
+  EXPECT_GT(stated / n, 1.0 / 3);
+  EXPECT_GT(by_beads / n, 10) << "the beads' noise alone must not explain it for this to tell anything";
+}
+
 /// A hexagon of so many edges a side on a regular triangulation, each edge a link of share 1.
 Network regular_sheet(int side, double edge_um, Polygon& outline_um) {
   Network network;
