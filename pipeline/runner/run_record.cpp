@@ -6,6 +6,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/runner/lock.h"
 
 namespace mbtfm::runner {
@@ -123,7 +124,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
     const ordered_json fit = ordered_json::parse(read_text(fit_file));
     if (fit.contains("error_budget")) run["error_budget"] = fit["error_budget"];
   }
-  write_whole(cell / "run.json", run.dump(1) + "\n");
+  write_whole(cell / "run.json", json_text(run, 1) + "\n");
 }
 
 bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {

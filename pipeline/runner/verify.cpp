@@ -6,6 +6,8 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/json.h"
+#include "pipeline/contract/names.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -60,9 +62,10 @@ std::vector<KnownFile> files_in(const ordered_json& run) {
 void compare(const KnownFile& known, const fs::path& folder, Verification& found) {
   ++found.n_files;
   const std::string name = known.path.generic_string(), role = " (" + known.kind + " of " + known.stage + ")";
-  if (!fs::is_regular_file(folder / known.path)) {
+  const fs::path file = file_shown_as(folder, name);
+  if (!fs::is_regular_file(file)) {
     found.differences.push_back(name + " is gone" + role);
-  } else if (sha256_of_file(folder / known.path) != known.sha256) {
+  } else if (sha256_of_file(file) != known.sha256) {
     found.differences.push_back(name + " differs" + role);
   }
 }
@@ -99,8 +102,8 @@ std::string toml_of(const ordered_json& run, const fs::path& inputs, const fs::p
   text += "\n[images]\n";
   const ordered_json images = run.value("images", ordered_json::object());
   for (const auto& [key, file] : images.items()) {
-    const fs::path path = (inputs / file.get<std::string>()).lexically_normal();
-    if (fs::exists(path)) text += key + " = " + ordered_json(fs::proximate(path, out).generic_string()).dump() + "\n";
+    const fs::path path = file_shown_as(inputs, file.get<std::string>()).lexically_normal();
+    if (fs::exists(path)) text += key + " = " + json_text(fs::proximate(path, out).generic_string()) + "\n";
   }
   return text;
 }
