@@ -6,6 +6,7 @@
 #include "mbtfm/panel.h"
 #include "mbtfm/traction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
 #include "pipeline/contract/parallel.h"
 #include "substrate/ellipse.h"
 
@@ -152,6 +153,13 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
 
 Reconstruction reconstruct_elements(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   if (inputs.outline_um.empty()) throw UsageError("bem: --outline is missing: it needs the area of the cell");
+  const double n = std::abs(signed_area_um2(inputs.outline_um)) / (parameters.element_um * parameters.element_um);
+  constexpr double kMatrices = 3;  // normal equations, eigenvectors, covariance: of two components each way
+  expect_room_for({.what = "the grid of tractions",
+                   .count = n,
+                   .parts = "elements",
+                   .bytes_each = kMatrices * 4 * n * sizeof(double),
+                   .remedy = "choose a larger element_um"});
   const std::vector<Vec2> centres = square_centres(inputs.outline_um, parameters.element_um);
   if (centres.empty()) throw UsageError("bem: no element of element_um fits into the outline");
   check(inputs.gel);

@@ -6,7 +6,9 @@
 #include <numbers>
 #include <random>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
 
 namespace mbtfm::inverse {
 
@@ -92,11 +94,12 @@ Lattice field_of(const DisplacementField& beads, const LatticeOptions& options) 
   const double mean_distance = std::sqrt(size.x * size.y / static_cast<double>(beads.size()));
   const double spacing = options.spacing_um.value_or(of_beads.value_or(0.5 * mean_distance));
   const auto n_along = [&](double length) { return static_cast<double>(std::floor(length / spacing + 0.5)) + 1; };
-  constexpr double kMost = 2.5e7;  // nodes: some GB
-  if (n_along(size.x) * n_along(size.y) * options.padding * options.padding > kMost) {
-    throw UsageError("traction: a spacing of " + std::to_string(spacing) + " um over " + std::to_string(size.x) +
-                     " x " + std::to_string(size.y) + " um takes more nodes than memory: choose a larger spacing_um");
-  }
+  constexpr double kBytes = 300;  // of a node: fields, their transforms, the solver's vectors (measured: 330)
+  expect_room_for({.what = "the lattice of tractions (spacing " + brief(spacing) + " um)",
+                   .count = n_along(size.x) * n_along(size.y) * options.padding * options.padding,
+                   .parts = "nodes",
+                   .bytes_each = kBytes,
+                   .remedy = "choose a larger spacing_um"});
   Lattice field{.origin_um = {},
                 .spacing_um = spacing,
                 .n_columns = static_cast<int>(n_along(size.x)),

@@ -14,17 +14,19 @@ void declare(ParameterList& list, FitParameters& p) {
            {"huber", "tukey", "l1"});
   list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial",
            {"compliance", "per-evaluation"});
-  list.add("region_um", p.region_um, Range::not_negative(),
+  list.add("region_um", p.region_um, Range::zero_or_size_um(),
            "beads further than this outside the outline are left out of the fit (um); unset: none is");
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
            "networks to fit on; tensions are their mean, and two or more tell the error of the model");
-  list.add("tolerance", p.tolerance, Range::positive(), "relative change of the tensions at which the fit stops");
+  list.add("tolerance", p.tolerance, Range::between(1e-15, 1),
+           "relative change of the tensions at which the fit stops");
   list.add("max_steps", p.max_steps, Range::between(1, 100000), "steps of Gauss-Newton at most");
   list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),
            "equilibria solved by a conjugate gradient method at most");
-  list.add("far_distance_um", p.far_distance_um, Range::not_negative(),
+  list.add("far_distance_um", p.far_distance_um, Range::zero_or_size_um(),
            "beads this far outside the outline tell the noise level (um)");
-  list.add("frame_interval_s", p.frame_interval_s, Range::positive(), "time between the frames of a series (s)");
+  list.add("frame_interval_s", p.frame_interval_s, Range::between(1e-6, 1e7),
+           "time between the frames of a series (s)");
   list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
            "parametric bootstrap draws for the intervals; 0: from the misfit's profile");
   list.add("surface_lines", p.surface_lines, Range::between(8, 10000),

@@ -12,21 +12,21 @@ void declare(ParameterList& list, TractionParameters& p) {
   list.add("method", p.method, "how the tractions are found", {"fttc", "sparse", "trpf", "bem", "adhesion-forces"});
   list.add("gel_model", p.gel_model, "elastic model of the gel", {"layer", "half-space"});
   list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)", kCriteria);
-  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
+  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12),
            "regularisation, fixed: |u − G t|² + lambda² |t|² over a lattice (um/kPa); unset: by the criterion");
-  list.add("spacing_um", p.spacing_um, Range::positive(),
+  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
            "fttc, sparse: spacing of the lattice (um); unset: that of beads on a lattice, half the mean distance of "
            "scattered ones");
   list.add("padding", p.padding, Range::between(1, 8),
            "fttc, sparse: period over the field's size; 1: the field is periodic itself");
   list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them",
            {"cells", "points"});
-  list.add("gaussian_um", p.gaussian_um, Range::not_negative(),
+  list.add("gaussian_um", p.gaussian_um, Range::zero_or_size_um(),
            "fttc: the tractions are smoothed by this Gaussian (um)");
-  list.add("element_um", p.element_um, Range::positive(), "bem: side of the elements that cover the cell (um)");
-  list.add("grow_um", p.grow_um, Range::not_negative(),
+  list.add("element_um", p.element_um, Range::mesh_um(), "bem: side of the elements that cover the cell (um)");
+  list.add("grow_um", p.grow_um, Range::zero_or_size_um(),
            "an adhesion's force is that of the tractions on its ellipse grown by this (um)");
-  list.add("shift_error_um", p.shift_error_um, Range::positive(),
+  list.add("shift_error_um", p.shift_error_um, Range::size_um(),
            "adhesion-forces: shift of an ellipse whose effect on its force is reported (um)");
   list.add("size_error", p.size_error, Range::between(0.001, 10),
            "adhesion-forces: the same for both axes too long, by this part");

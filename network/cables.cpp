@@ -63,7 +63,7 @@ CableState state_of(const Cable& cable, const Pull& pull, Vec2 span_um, const Ro
 
 void declare(ParameterList& list, CableParameters& p) {
   list.table("cables");
-  list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::positive(),
+  list.add("axial_stiffness_nN", p.axial_stiffness_nN, Range::force_nN(),
            "force of a cable per strain beyond its rest length (nN)");
   list.add("smoothing", p.smoothing, Range{.low = 1e-9, .high = 1e-2},
            "length over which the kink of a collapsed cable is rounded off (mean edge lengths)");

@@ -15,6 +15,7 @@
 #include "network/parts.h"
 #include "network/relax.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
 
 namespace mbtfm::network {
 namespace {
@@ -102,11 +103,18 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
   result.n_triangles = static_cast<int>(mesh.triangulation.triangles.size());
 }
 
+/// Before any vertex is made: those that an even mesh of the cell takes are the fewest.
+void expect_room_for_mesh(const Cell& cell, const NetworkParameters& parameters) {
+  double area_um2 = std::abs(signed_area_um2(cell.outline_um));
+  for (const Polygon& hole : cell.holes_um) area_um2 -= std::abs(signed_area_um2(hole));
+  expect_room_for_vertices(area_um2 / area_of_vertex_um2(parameters.edge_length_um));
+}
+
 }  // namespace
 
 void declare(ParameterList& list, NetworkParameters& parameters) {
   list.table("network");
-  list.add("edge_length_um", parameters.edge_length_um, Range::positive(), "mean cable length (um)");
+  list.add("edge_length_um", parameters.edge_length_um, Range::mesh_um(), "mean cable length (um)");
   list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
            "growth of the edge length with distance from what is resolved finer");
   list.add("seed", parameters.seed, "of the first placement of the vertices");
@@ -123,13 +131,14 @@ void declare(ParameterList& list, NetworkParameters& parameters) {
            "what an adhesion holds: its rim, which the mesh resolves; every vertex that happens to lie in its ellipse; "
            "or the one at its centre",
            {"rim", "ellipse", "centre"});
-  list.add("rim_points", parameters.rim_points, Range{.low = 3}, "vertices round an adhesion's rim, at least");
+  list.add("rim_points", parameters.rim_points, Range::between(3, 1000), "vertices round an adhesion's rim, at least");
   list.add("free_fibre_ends", parameters.free_fibre_ends,
            "edge length where a fibre ends freely: as elsewhere, or the fibre's width", {"point", "width"});
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {
   check(cell);
+  expect_room_for_mesh(cell, parameters);
   Random random(parameters.seed);
   const Boundary boundary(cell, parameters.edge_length_um);
   const Frame frame = build_frame(cell, boundary, parameters, random);

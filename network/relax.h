@@ -17,6 +17,11 @@ struct RelaxedMesh {
   Report report;
 };
 
+/// That a vertex of an even triangular mesh has to itself.
+double area_of_vertex_um2(double edge_um);
+/// @throws OutOfMemory where a mesh of so many vertices takes more memory than there is
+void expect_room_for_vertices(double count);
+
 /// Fill the frame with vertices and relax them: in turns, each vertex goes to the centroid of its triangles, weighted
 /// by area over h², and edges flip to a constrained Delaunay triangulation. This lowers an energy in each half step and
 /// comes to rest within tens of sweeps, where distmesh's springs wander on. The frame's vertices stay, but those that
@@ -24,7 +29,7 @@ struct RelaxedMesh {
 /// @param seeds  as NetworkParameters::seeds
 /// Sources: Chen & Holst, Comput. Methods Appl. Mech. Eng. 200:967 (2011), centroidal patch triangulation; Persson &
 /// Strang, SIAM Review 46:329 (2004), for h and the sliding. Constrained edges and walls are ours.
-/// @throws InvalidData where lines of the frame cross
+/// @throws InvalidData where lines of the frame cross, OutOfMemory
 RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, const std::string& seeds, Random& random);
 
 }  // namespace mbtfm::network

@@ -5,10 +5,13 @@
 #include <algorithm>
 #include <cstdio>
 #include <cstdlib>
+#include <iostream>
 #include <map>
 #include <optional>
+#include <sstream>
 #include <utility>
 
+#include "pipeline/contract/console.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
 #include "pipeline/contract/own_files.h"
@@ -139,7 +142,7 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
 int batch(const CommandLine& line) {
   const std::vector<fs::path> cells = cells_of(line);
   if (line.only_list) {
-    std::fputs(runner::list_cells(cells, run_options(line), line.threads).c_str(), stdout);
+    print(runner::list_cells(cells, run_options(line), line.threads));
     return kDone;
   }
   const auto outcomes = line.only_table
@@ -162,8 +165,8 @@ int batch(const CommandLine& line) {
 }
 
 int tell(const runner::Verification& found, const std::string& what) {
-  for (const std::string& difference : found.differences) std::printf("%s\n", difference.c_str());
-  if (found.differences.empty()) std::printf("%s: %d files, all as run.json tells\n", what.c_str(), found.n_files);
+  for (const std::string& difference : found.differences) print(difference + "\n");
+  if (found.differences.empty()) print(what + ": " + std::to_string(found.n_files) + " files, all as run.json tells\n");
   return found.differences.empty() ? kDone : kFailed;
 }
 
@@ -222,7 +225,7 @@ int cost_study(const CommandLine& line) {
 }
 
 int compare(const CommandLine& line) {
-  std::fputs(report::comparison_text(line.folder).c_str(), stdout);
+  print(report::comparison_text(line.folder));
   return kDone;
 }
 
@@ -248,9 +251,13 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   command->add_option("--accuracy", line.accuracy, "the cheapest preset that finds the tensions to this error, as 5%")
       ->excludes(preset);
   // one value a flag: else the folder that follows would be taken for another
-  command->add_option("--only", line.only, "run this stage only, or these: segment, track, network, fit")
+  command
+      ->add_option("--only", line.only,
+                   "run this stage only: segment, track, network or fit; several with commas: segment,network")
+      ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--redo", line.redo, "run this stage, or these, even if up to date or changed by hand")
+  command->add_option("--redo", line.redo, "run this stage even if up to date or changed by hand; several with commas")
+      ->delimiter(',')
       ->allow_extra_args(false);
   command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
@@ -267,6 +274,11 @@ int start(int argc, char** argv) {
   CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
   app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done, 1 some cells failed, 2 wrong flag, 3 bad input, 4 not converged (outputs are there, "
+      "marked), "
+      "5 cannot write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, "
+      "130 interrupted, 128 + n killed by signal n.");
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
@@ -308,7 +320,10 @@ int start(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? kDone : kUsage;
+    std::ostringstream help;
+    const int code = app.exit(error, help, std::cerr);
+    print(help.str());
+    return code == 0 ? kDone : kUsage;
   }
   if (run_command->parsed()) return run(line);
   if (batch_command->parsed()) return batch(line);

@@ -8,6 +8,7 @@
 #include "network/cables.h"
 #include "network/mesh.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
 #include "samples/random.h"
 #include "substrate/compliance.h"
 
@@ -116,6 +117,12 @@ DisplacementField with_noise(DisplacementField field, double noise_um, std::uint
 }  // namespace
 
 std::vector<Vec2> place_beads(const ScenarioParameters& p) {
+  constexpr double kBytes = 300;  // of a bead: its place in the grid, its displacement, its spots in two images
+  expect_room_for({.what = "the field of beads",
+                   .count = static_cast<double>(p.beads),
+                   .parts = "beads",
+                   .bytes_each = kBytes,
+                   .remedy = "choose fewer beads"});
   const double field = field_um(p.microscope);
   // cells of a grid so small that each holds one bead at most; a bead's neighbours lie within two cells
   const double cell_um = std::max(p.bead_distance_um / std::sqrt(2.0), 1e-3 * field);

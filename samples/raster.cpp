@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/memory.h"
 #include "pipeline/contract/parallel.h"
 #include "samples/geometry.h"
 
@@ -63,6 +64,12 @@ std::vector<float> gaussian_kernel(double sigma_px) {
 }  // namespace
 
 Image blank_image(int size_px, double pixel_size_um) {
+  constexpr double kImages = 8;  // at a time: the parts of which a picture is made
+  expect_room_for({.what = "the image",
+                   .count = static_cast<double>(size_px) * size_px,
+                   .parts = "pixels",
+                   .bytes_each = kImages * sizeof(float),
+                   .remedy = "choose a smaller image_size_px"});
   Image image;
   image.width = image.height = size_px;
   image.pixels.assign(static_cast<std::size_t>(size_px) * size_px, 0.0f);

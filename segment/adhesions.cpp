@@ -75,25 +75,25 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
 
 void declare(ParameterList& list, AdhesionParameters& p) {
   list.table("segment");
-  list.add("adhesion_background_um", p.adhesion_background_um, Range::positive(),
+  list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um(),
            "radius of the median that is the background of an adhesion (um)");
-  list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::not_negative(),
+  list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
            "standard deviation of the Gaussian before thresholding (um)");
-  list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::positive(),
+  list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor(),
            "height of an adhesion's brightest pixel over its background (standard deviations of the noise)");
-  list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::positive(),
+  list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor(),
            "least height of its other pixels (standard deviations of the noise)");
   list.add("adhesion_rim_level", p.adhesion_rim_level,
            {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
            "height of the rim as a share of the height near it");
-  list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::positive(), "how near (um)");
+  list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::size_um(), "how near (um)");
   list.add("adhesion_blur_um", p.adhesion_blur_um, {.low = 0, .high = 1, .excludes_low = true},
            "standard deviation of the blurred rim of an adhesion (um); unset: as the widest adhesions show it, between "
            "half a pixel and 0.2 um");
   list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
            "dip between two adhesions that touch, as a share of the fainter one's height");
-  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::positive(), "smallest area (um²)");
-  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::positive(), "largest area (um²)");
+  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2(), "smallest area (um²)");
+  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::area_um2(), "largest area (um²)");
   list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1),
            "least height as a share of the mean height of bright pixels");
 }

@@ -158,30 +158,30 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
 
 void declare(ParameterList& list, FibreParameters& p) {
   list.table("segment");
-  list.add("fibre_width_um", p.fibre_width_um, Range::positive(),
+  list.add("fibre_width_um", p.fibre_width_um, Range::between(1e-3, 100),
            "typical width of a fibre; half to twice of it is found (um)");
-  list.add("fibre_averaging_um", p.fibre_averaging_um, Range::positive(),
+  list.add("fibre_averaging_um", p.fibre_averaging_um, Range::between(1e-3, 10),
            "averaging along the fibre (standard deviation, um)");
-  list.add("fibre_start_noise", p.fibre_start_noise, Range::positive(),
+  list.add("fibre_start_noise", p.fibre_start_noise, Range::factor(),
            "height a fibre reaches somewhere (standard deviations of the filtered noise)");
-  list.add("fibre_follow_noise", p.fibre_follow_noise, Range::positive(),
+  list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor(),
            "height it may fall to (standard deviations of the filtered noise)");
-  list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::positive(),
+  list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::factor(),
            "lines of the meshwork that may pass for fibres, expected number in a cell");
-  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::positive(),
+  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um(),
            "smallest radius of curvature (um)");
-  list.add("fibre_edge_um", p.fibre_edge_um, Range::not_negative(),
+  list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
            "a line along the outline this near to it is the cell's edge, not a fibre (um)");
-  list.add("fibre_edge_height", p.fibre_edge_height, Range::not_negative(),
+  list.add("fibre_edge_height", p.fibre_edge_height, Range::zero_or_factor(),
            "unless it reaches this share of the height of bright fibres");
-  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::not_negative(),
+  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
            "a line that winds this near to the outline is a ruffle, not a fibre (um)");
-  list.add("fibre_gap_um", p.fibre_gap_um, Range::not_negative(), "length over which a fibre may be invisible (um)");
-  list.add("fibre_shortest_um", p.fibre_shortest_um, Range::positive(), "shortest fibre (um)");
+  list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
+  list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um(), "shortest fibre (um)");
   list.add("fibre_side_ratio", p.fibre_side_ratio, Range::between(0, 1),
            "least drop to one side as a share of the drop to the other");
-  list.add("fibre_reach_um", p.fibre_reach_um, Range::positive(), "an end this near to an adhesion is held by it (um)");
-  list.add("fibre_simplify_um", p.fibre_simplify_um, Range::positive(),
+  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(), "an end this near to an adhesion is held by it (um)");
+  list.add("fibre_simplify_um", p.fibre_simplify_um, Range::size_um(),
            "points are left out where the line moves less (um)");
 }
 

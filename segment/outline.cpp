@@ -303,16 +303,16 @@ bool touches_border(const cv::Mat& mask) {
 
 void declare(ParameterList& list, OutlineParameters& p) {
   list.table("segment");
-  list.add("outline_smoothing_um", p.outline_smoothing_um, Range::positive(),
+  list.add("outline_smoothing_um", p.outline_smoothing_um, Range::between(1e-3, 100),
            "smoothing before the outline is looked for (standard deviation, um)");
-  list.add("outline_band_um", p.outline_band_um, Range::positive(),
+  list.add("outline_band_um", p.outline_band_um, Range::between(1e-3, 100),
            "distance over which the brightness inside and outside is compared (um)");
-  list.add("outline_reach_um", p.outline_reach_um, Range::not_negative(),
+  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
            "an adhesion this far outside still belongs to the cell (um)");
-  list.add("outline_spacing_um", p.outline_spacing_um, Range::positive(), "distance of the outline's points (um)");
-  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::positive(), "least area of a cell (um²)");
-  list.add("outline_largest_um2", p.outline_largest_um2, Range::positive(), "greatest area of a cell (um²)");
-  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::positive(),
+  list.add("outline_spacing_um", p.outline_spacing_um, Range::mesh_um(), "distance of the outline's points (um)");
+  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
+  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
+  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
            "least area of a gap in a cell (um²)");
 }
 

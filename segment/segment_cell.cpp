@@ -11,7 +11,7 @@ namespace mbtfm::segment {
 
 void declare(ParameterList& list, SegmentParameters& p) {
   list.table("");
-  list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("segment");
   list.add("binning", p.binning, Range::between(1, kLargestBinning),

@@ -178,7 +178,7 @@ DriftOfAll drift_of_all(const Scene& scene, const Measured& measured, const Trac
 
 void declare(ParameterList& list, TrackParameters& p) {
   list.table("");
-  list.add("pixel_size_um", p.pixel_size_um, Range::positive(),
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
            "side of a pixel in the specimen (um); unset: from the image's own calibration");
   list.table("track");
   declare(list, p.stressed_plane, "stressed", "the stressed bead image");
@@ -186,9 +186,8 @@ void declare(ParameterList& list, TrackParameters& p) {
   list.add(
       "stressed_last", p.stressed_last, {.low = 0},
       "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
-  list.add("detection_snr", p.detection_snr, Range::positive(),
-           "height of a bead over the noise (standard deviations)");
-  list.add("largest_displacement_um", p.largest_displacement_um, Range::not_negative(),
+  list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
+  list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
            "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
   list.add("drift_growth", p.drift_growth,
            "take growth of the whole image by a few per cent for drift, too, beside a turn: a gel that swells");
@@ -197,7 +196,7 @@ void declare(ParameterList& list, TrackParameters& p) {
       "width of the frame along the border that is taken for far from the cell, for the drift (share of the side)");
   list.add("least_similarity", p.least_similarity, Range::between(0, 1),
            "least correlation of a bead's surroundings in both images");
-  list.add("outlier_threshold", p.outlier_threshold, Range::positive(),
+  list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
            "difference from the neighbours that flags a bead (robust standard deviations)");
   list.add("x_column", p.x_column, "column of --displacement: position in the relaxed state");
   list.add("y_column", p.y_column, "column of --displacement");

@@ -26,7 +26,13 @@ MakeMesh* load_mesh_maker() {
   std::fesetenv(&environment);
   void* function = library != nullptr ? dlsym(library, "mbtfm_make_mesh") : nullptr;
   if (function != nullptr) return reinterpret_cast<MakeMesh*>(function);
-  throw InputError(file.string(), "the library that makes finite element meshes", dlerror(),
+  const std::string why = dlerror();
+  const bool wants_memory = why.find("failed to map segment") != why.npos || why.find("allocate memory") != why.npos;
+  if (wants_memory) {
+    throw OutOfMemory("there is no room to load the library that makes finite element meshes (" + why +
+                      "): allow more memory, or take the model 'layer'");
+  }
+  throw InputError(file.string(), "the library that makes finite element meshes", why,
                    "build anew, and keep lib/ beside bin/; the models 'half-space' and 'layer' do without it");
 }
 

@@ -80,7 +80,7 @@ Supernodes analyse(const BlockMatrix& matrix) {
   cholmod_free_factor(&factor, &c);
   cholmod_finish(&c);
   if (supernodes.first.empty()) {
-    throw NotSolved(Report{.reason = "the substrate's equations could not be ordered: out of memory"});
+    throw OutOfMemory("the substrate's equations could not be ordered: out of memory");
   }
   return supernodes;
 }
@@ -105,12 +105,11 @@ Panels<Real> factor_of(const BlockMatrix& matrix, const Supernodes& s, const Fac
   if (needed_GB > memory_limit_GB) {
     // a factor grows at most as the power 4/3 of the unknowns (nested dissection of a cube)
     const auto fitting = static_cast<std::int64_t>(3 * matrix.n * std::pow(memory_limit_GB / needed_GB, 0.75));
-    throw NotSolved(Report{
-        .reason = "the substrate's " + std::to_string(3 * matrix.n) + " unknowns take " + shown_GB(needed_GB) +
-                  " of memory, allowed are " + shown_GB(memory_limit_GB) + ", which a mesh of " +
-                  std::to_string(fitting) +
-                  " unknowns would fit: ask for a coarser one (displacement_tolerance, elements_across_adhesion), "
-                  "allow more (memory_limit_GB), or take the model 'layer'"});
+    throw OutOfMemory("the substrate's " + std::to_string(3 * matrix.n) + " unknowns take " + shown_GB(needed_GB) +
+                      " of memory, allowed are " + shown_GB(memory_limit_GB) + ", which a mesh of " +
+                      std::to_string(fitting) +
+                      " unknowns would fit: ask for a coarser one (displacement_tolerance, elements_across_adhesion), "
+                      "allow more (memory_limit_GB), or take the model 'layer'");
   }
   Panels<Real> panels;
   if (!factorise(matrix, s, options.threads, panels)) {

@@ -1,13 +1,12 @@
 #include "substrate/elastic_system.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <cmath>
 #include <map>
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
 #include "substrate/ellipse_load.h"
 
 namespace mbtfm::substrate {
@@ -67,7 +66,7 @@ std::string extent_of(const GridLines& lines) {
 
 double allowed_GB(double memory_limit_GB) {
   if (memory_limit_GB > 0) return memory_limit_GB;
-  return 0.8e-9 * static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  return 0.8e-9 * memory_bytes();
 }
 
 ElasticSystem::ElasticSystem(const Material& material, BlockMesh mesh, const FactorOptions& options)

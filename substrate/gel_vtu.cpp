@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/memory.h"
 #include "substrate/scene.h"
 
 namespace mbtfm::substrate {
@@ -51,6 +52,12 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
   const double step = std::max(size.x, size.y) / n_lines;
   const std::vector<double> x = graded_lines(scene.low_um.x, scene.high_um.x, step);
   const std::vector<double> y = graded_lines(scene.low_um.y, scene.high_um.y, step);
+  constexpr double kBytes = 300;  // of a point: itself, what it moves by, the same for its file
+  expect_room_for({.what = "the gel's surface in substrate.vtu",
+                   .count = static_cast<double>(x.size()) * static_cast<double>(y.size()),
+                   .parts = "points",
+                   .bytes_each = kBytes,
+                   .remedy = "choose fewer surface_lines"});
   std::vector<Vec2> points;
   for (const double y_um : y) {
     for (const double x_um : x) points.push_back({x_um, y_um});

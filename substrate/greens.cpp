@@ -34,16 +34,16 @@ void declare(ParameterList& list, SubstrateParameters& p) {
            "refined: elements that touch each adhesion, at least");
   list.add("growth", p.growth, Range::between(0.1, 10),
            "refined: largest side of an element over its distance to the nearest adhesion");
-  list.add("side_distance_um", p.side_distance_um, Range::positive(),
+  list.add("side_distance_um", p.side_distance_um, Range::between(1e-3, 1e5),
            "from the adhesions and beads to the gel's own sides (um); unset: they are far away");
   list.add("surface_tilt_deg", p.surface_tilt_deg, Range{.low = 0, .high = 90, .excludes_high = true},
            "of the gel's surface against the image plane; no model takes it, auto says how far it matters");
-  list.add("surface_roughness_um", p.surface_roughness_um, Range::not_negative(),
+  list.add("surface_roughness_um", p.surface_roughness_um, Range::zero_or_size_um(),
            "root mean square height of the gel's surface about its plane (um); likewise");
   list.add("cache_folder", p.cache_folder,
            "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
   list.add("stress", p.stress, "write the stress inside the gel, too (refined)");
-  list.add("memory_limit_GB", p.memory_limit_GB, Range::not_negative(),
+  list.add("memory_limit_GB", p.memory_limit_GB, Range::between(0, 1e6),
            "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
 }
 

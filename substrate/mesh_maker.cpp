@@ -49,11 +49,10 @@ void refine(dealii::Triangulation<3>& triangulation, const std::function<bool(co
     if (is_done) break;
     triangulation.execute_coarsening_and_refinement();
     if (triangulation.n_active_cells() > most_cells) {
-      throw NotSolved(
-          Report{.reason = "the substrate's mesh has more than " + std::to_string(most_cells) +
-                           " elements; one of at most half as many would fit the memory allowed: "
-                           "ask for a coarser one (displacement_tolerance, elements_across_adhesion), allow more "
-                           "(memory_limit_GB), or take the model 'layer'"});
+      throw OutOfMemory("the substrate's mesh has more than " + std::to_string(most_cells) +
+                        " elements; one of at most half as many would fit the memory allowed: "
+                        "ask for a coarser one (displacement_tolerance, elements_across_adhesion), allow more "
+                        "(memory_limit_GB), or take the model 'layer'");
     }
   }
 }

@@ -28,9 +28,8 @@ void check_size(const Extent& scene, double step_um, std::int64_t most_elements)
   const Vec2 size = scene.high_um - scene.low_um;
   const double n = (1 + size.x / step_um) * (1 + size.y / step_um);
   if (n <= static_cast<double>(most_elements)) return;
-  throw NotSolved(Report{.reason = "the gel is so thin beside the scene that it takes more than " +
-                                   std::to_string(most_elements) +
-                                   " elements, the most that the memory allowed takes: take the model 'layer'"});
+  throw OutOfMemory("the gel is so thin beside the scene that it takes more than " + std::to_string(most_elements) +
+                    " elements, the most that the memory allowed takes: take the model 'layer'");
 }
 
 }  // namespace mbtfm::substrate

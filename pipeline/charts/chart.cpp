@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/names.h"
+
 namespace mbtfm::charts {
 
 std::string html_escaped(std::string_view text) {
   std::string safe;
-  for (const char c : text) {
+  for (const char c : shown_name(text)) {
     switch (c) {
       case '&':
         safe += "&amp;";

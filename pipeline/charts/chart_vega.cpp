@@ -9,6 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/json.h"
 
 namespace mbtfm::charts {
 namespace {
@@ -296,7 +297,8 @@ ordered_json axis_of(const std::string& scale, const char* orient, const Axis& a
   result["values"] = values;
   if (!is_upright) result["grid"] = false;
   result["labelOverlap"] = false;
-  result["encode"]["labels"]["update"]["text"] = signal(names.dump() + "[indexof(" + values.dump() + ", datum.value)]");
+  result["encode"]["labels"]["update"]["text"] =
+      signal(json_text(names) + "[indexof(" + json_text(values) + ", datum.value)]");
   return result;
 }
 
@@ -345,7 +347,7 @@ std::string Chart::vega() const {
     for (last = first; last < marks_.size() && go_together(marks_[first], marks_[last]); ++last) continue;
     add_marks(spec, marks_, first, last, axes);
   }
-  return spec.dump();
+  return json_text(spec);
 }
 
 }  // namespace mbtfm::charts

@@ -12,6 +12,7 @@
 #include <unordered_set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/names.h"
 #include "pipeline/contract/own_files.h"
 
 namespace mbtfm {
@@ -167,10 +168,11 @@ CsvText::CsvText(const std::vector<std::string>& header) {
   end_row();
 }
 
-CsvText& CsvText::add(std::string_view value) {
+CsvText& CsvText::add(std::string_view text) {
+  const std::string value = shown_name(text);
   if (is_row_begun_) text_ += ',';
   is_row_begun_ = true;
-  if (value.find_first_of(",\"\r\n") == std::string_view::npos) {
+  if (value.find_first_of(",\"\r\n") == std::string::npos) {
     text_ += value;
     return *this;
   }

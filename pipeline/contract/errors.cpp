@@ -3,6 +3,8 @@
 #include <cstdio>
 #include <filesystem>
 #include <new>
+#include <string_view>
+#include <system_error>
 
 namespace mbtfm {
 
@@ -13,6 +15,20 @@ int tell(const std::string& program, int code, const std::string& message, const
   std::fprintf(stderr, "%s: %s: %s\n", program.c_str(), kind, message.c_str());
   if (!hint.empty()) std::fprintf(stderr, "  hint: %s\n", hint.c_str());
   return code;
+}
+
+constexpr const char* kNeedLess = "fewer threads, a coarser mesh or fewer beads need less";
+
+/// Containers, OpenCV and the threads' library have errors of their own for it.
+bool is_want_of_memory(const std::exception& error) {
+  const auto* system = dynamic_cast<const std::system_error*>(&error);
+  if (system &&
+      (system->code() == std::errc::not_enough_memory || system->code() == std::errc::resource_unavailable_try_again)) {
+    return true;
+  }
+  return dynamic_cast<const std::bad_alloc*>(&error) != nullptr ||
+         dynamic_cast<const std::length_error*>(&error) != nullptr ||  // a vector larger than any memory
+         std::string_view(error.what()).find("Insufficient memory") != std::string_view::npos;
 }
 
 }  // namespace
@@ -27,17 +43,18 @@ int report_current_exception(const std::string& program) {
     return tell(program, kInput, error.what(), error.hint);
   } catch (const InvalidData& error) {
     return tell(program, kInput, error.what());
+  } catch (const OutOfMemory& error) {
+    return tell(program, kResources, error.report.reason);
   } catch (const NotSolved& error) {
-    return tell(program, kNotSolved, std::string("not solved: ") + error.what());
+    return tell(program, kNoAnswer, "not solved: " + error.report.reason);
   } catch (const OutputError& error) {
     return tell(program, kOutput, error.what());
   } catch (const std::filesystem::filesystem_error& error) {
     return tell(program, kOutput, error.what());
   } catch (const Interrupted& error) {
     return tell(program, kInterrupted, error.what());
-  } catch (const std::bad_alloc&) {
-    return tell(program, kNotSolved, "out of memory", "fewer threads, a coarser mesh or fewer beads need less");
   } catch (const std::exception& error) {
+    if (is_want_of_memory(error)) return tell(program, kResources, "out of memory", kNeedLess);
     return tell(program, kBug, error.what(), "please report this with the command and its inputs");
   }
 }

@@ -16,9 +16,10 @@ inline constexpr int kUsage = 2;
 inline constexpr int kInput = 3;
 inline constexpr int kNotSolved = 4;  ///< the outputs are there, marked
 inline constexpr int kOutput = 5;
+inline constexpr int kResources = 6;      ///< out of memory or time; nothing was written
+inline constexpr int kNoAnswer = 7;       ///< ill-posed or not converged; nothing was written
 inline constexpr int kBug = 70;           ///< EX_SOFTWARE of sysexits.h
 inline constexpr int kBusy = 75;          ///< EX_TEMPFAIL of sysexits.h: another run works on the cell
-inline constexpr int kTimedOut = 124;     ///< as of timeout(1)
 inline constexpr int kInterrupted = 130;  ///< as shells count: 128 + SIGINT
 }  // namespace exit_code
 
@@ -48,10 +49,16 @@ struct InvalidData : std::invalid_argument {
         found(std::move(got)) {}
 };
 
-/// Not converged or ill-posed. The outputs are still written, marked as such. Exit code 4.
+/// Not converged or ill-posed. Whoever catches it and still writes outputs marks them and ends with exit code 4; where
+/// nothing catches it, nothing is written: exit code 7.
 struct NotSolved : std::runtime_error {
   Report report;
   explicit NotSolved(Report what) : std::runtime_error(what.reason), report(std::move(what)) {}
+};
+
+/// What is asked for takes more memory than there is, which is known before it is taken. Exit code 6.
+struct OutOfMemory : NotSolved {
+  explicit OutOfMemory(std::string reason) : NotSolved(Report{.reason = std::move(reason)}) {}
 };
 
 /// Cannot write. Exit code 5.
@@ -59,7 +66,7 @@ struct OutputError : std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// Ctrl-C or SIGTERM; what is left undone is said in the message. Exit code 130.
+/// Ctrl-C, SIGTERM or a closed terminal; what is left undone is said in the message. Exit code 130.
 struct Interrupted : std::runtime_error {
   using std::runtime_error::runtime_error;
 };

@@ -114,9 +114,11 @@ void write_fit_summary(const Path& file, const FitSummary& summary, const std::v
   for_each_member(summary, [&](const char* name, const auto& member) { json[name] = member; });
   for (const auto& [name, value] : summary.more) json[name] = json_of(value);
   if (summary.error_budget) json["error_budget"] = json_of_budget(*summary.error_budget, fibres);
-  write_text(file, json.dump(2) + "\n");
+  write_text(file, json_text(json, 2) + "\n");
 }
 
-void write_figures(const Path& file, const Figures& figures) { write_text(file, json_of(figures).dump(2) + "\n"); }
+void write_figures(const Path& file, const Figures& figures) {
+  write_text(file, json_text(json_of(figures), 2) + "\n");
+}
 
 }  // namespace mbtfm

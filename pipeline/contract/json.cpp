@@ -1,5 +1,7 @@
 #include "pipeline/contract/json.h"
 
+#include "pipeline/contract/names.h"
+
 namespace mbtfm {
 
 nlohmann::ordered_json json_of(const Value& value) {
@@ -38,5 +40,25 @@ Effect effect_of(const JsonRecord& record) {
           .change = number("change"),
           .would_change = record.text_or("would_change", "")};
 }
+
+namespace {
+
+nlohmann::ordered_json in_utf8(const nlohmann::ordered_json& json) {
+  if (json.is_string()) return shown_name(json.get_ref<const std::string&>());
+  if (!json.is_structured()) return json;
+  nlohmann::ordered_json escaped = json.is_array() ? nlohmann::ordered_json::array() : nlohmann::ordered_json::object();
+  for (const auto& [key, value] : json.items()) {
+    if (json.is_array()) {
+      escaped.push_back(in_utf8(value));
+    } else {
+      escaped[shown_name(key)] = in_utf8(value);
+    }
+  }
+  return escaped;
+}
+
+}  // namespace
+
+std::string json_text(const nlohmann::ordered_json& json, int indent) { return in_utf8(json).dump(indent); }
 
 }  // namespace mbtfm

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <nlohmann/json.hpp>
+#include <string>
 
 #include "pipeline/contract/json_record.h"
 #include "pipeline/contract/report.h"
@@ -13,5 +14,9 @@ nlohmann::ordered_json json_of(const Figures& figures);
 nlohmann::ordered_json json_of(const Effect& effect);
 /// @throws InputError where it is none
 Effect effect_of(const JsonRecord& record);
+
+/// As text, in lines where indent >= 0. JSON is UTF-8: texts that are not, as names of files may be, tell their
+/// bytes (names.h), keys too.
+std::string json_text(const nlohmann::ordered_json& json, int indent = -1);
 
 }  // namespace mbtfm

@@ -27,7 +27,11 @@ void parallel_for(int n, int threads, const std::function<void(int)>& body) {
     }
   };
   boost::thread_group workers;
-  for (int t = 1; t < std::min(threads, n); ++t) workers.create_thread(work);
+  try {
+    for (int t = 1; t < std::min(threads, n); ++t) workers.create_thread(work);
+  } catch (const boost::thread_resource_error&) {
+    // no more to be had: those there are do all of the work
+  }
   work();
   workers.join_all();
   for (const std::exception_ptr& failure : failures) {

@@ -1,6 +1,5 @@
 #include "pipeline/contract/parameters.h"
 
-#include <toml++/toml.h>
 #include <algorithm>
 #include <array>
 #include <charconv>
@@ -11,7 +10,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/toml_depth.h"
+#include "pipeline/contract/toml.h"
 
 namespace mbtfm {
 
@@ -108,6 +107,25 @@ bool try_set(Parameter& p, const std::string& text) {
                     p.member);
 }
 
+/// "1500 nm are 1.5 um": where the value is beyond the range as it stands, and within it in a unit a thousand times
+/// smaller. Empty where it is not.
+std::string unit_mistaken(const Parameter& p, const std::string& text) {
+  constexpr std::array<std::array<std::string_view, 2>, 3> kUnits = {{{"um", "nm"}, {"kPa", "Pa"}, {"nN", "pN"}}};
+  double value = 0;
+  if (!read_number(text, value) || !(value > p.range.high) || !is_inside(p.range, 1e-3 * value)) return {};
+  for (const auto& [unit, smaller] : kUnits) {
+    if (!p.name.ends_with("_" + std::string(unit))) continue;
+    return "was it meant in " + std::string(smaller) + "? " + text + " " + std::string(smaller) + " are " +
+           shortest(1e-3 * value) + " " + std::string(unit);
+  }
+  return {};
+}
+
+std::string advice_on(const Parameter& p, const std::string& text) {
+  const std::string unit = unit_mistaken(p, text);
+  return unit.empty() ? p.meaning : unit + " (" + p.meaning + ")";
+}
+
 std::string place(const std::string& name, const toml::node& node) {
   return name + ":" + std::to_string(node.source().begin.line);
 }
@@ -191,13 +209,7 @@ void read_toml(ParameterList& list, const std::filesystem::path& file) {
 }
 
 void read_toml(ParameterList& list, std::string_view text, const std::string& name) {
-  expect_shallow_keys(text, name);
-  toml::table root;
-  try {
-    root = toml::parse(text);
-  } catch (const toml::parse_error& error) {
-    throw InputError(name + ":" + std::to_string(error.source().begin.line), "TOML", std::string(error.description()));
-  }
+  const toml::table root = parse_toml(text, name);
   std::map<std::string, std::vector<std::string>> keys_of;  // by table, of this list
   for (const Parameter& p : list.all()) keys_of[p.table].push_back(p.name);
 
@@ -206,7 +218,7 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
       if (p.table != table || p.name != key) continue;
       const std::string where = place(name, node) + ": " + in_table(p);
       const std::string value = spelled(node, where);
-      if (!try_set(p, value)) throw InputError(where, expectation(p), "'" + value + "'", p.meaning);
+      if (!try_set(p, value)) throw InputError(where, expectation(p), "'" + value + "'", advice_on(p, value));
       p.is_set = true;
       return true;
     }
@@ -237,7 +249,11 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
 }
 
 void set_from_text(Parameter& p, const std::string& text) {
-  if (!try_set(p, text)) throw UsageError("--" + p.name + ": expected " + expectation(p) + ", found '" + text + "'");
+  if (!try_set(p, text)) {
+    const std::string unit = unit_mistaken(p, text);
+    throw UsageError("--" + p.name + ": expected " + expectation(p) + ", found '" + text + "'" +
+                     (unit.empty() ? "" : "; " + unit));
+  }
   p.is_set = true;
 }
 
@@ -286,11 +302,11 @@ std::string to_markdown(const ParameterList& list) {
 
 void declare(ParameterList& list, Gel& gel) {
   list.table("gel");
-  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::positive(), "Young's modulus of the gel (kPa)");
+  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the gel (kPa)");
   list.required();
   list.add("poisson_ratio", gel.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true},
            "Poisson's ratio of the gel; 0.49 or 0.499 for an incompressible one");
-  list.add("thickness_um", gel.thickness_um, Range::positive(), "thickness of the gel on its rigid base (um)");
+  list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");
 }
 
 }  // namespace mbtfm

@@ -1,16 +1,15 @@
 #include "pipeline/contract/stage.h"
 
-#include <signal.h>
 #include <sys/resource.h>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
-#include <atomic>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/blas.h"
+#include "pipeline/contract/console.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/effects.h"
 #include "pipeline/contract/hash.h"
@@ -26,18 +25,6 @@ namespace fs = std::filesystem;
 namespace {
 
 using namespace exit_code;
-
-std::atomic<bool> was_interrupted = false;
-extern "C" void note_signal(int) { was_interrupted = true; }
-
-/// The first Ctrl-C asks the work to stop; the second ends it.
-void watch_signals() {
-  struct sigaction action {};
-  action.sa_handler = note_signal;
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
 
 /// What the command line says, before any of it is believed.
 struct CommandLine {
@@ -103,7 +90,7 @@ Progress terminal_progress(const std::string& stage, bool is_quiet) {
   // mbtfm passes on what a stage prints; where it prints on a terminal, it says so
   const bool is_shown = !is_quiet && (isatty(STDERR_FILENO) || std::getenv("MBTFM_TERMINAL") != nullptr);
   return [stage, is_shown, last = -1](double fraction, std::string_view what) mutable {
-    if (was_interrupted) throw Interrupted("interrupted; nothing was written");
+    if (is_stop_asked()) throw Interrupted("interrupted; nothing was written");
     const int percent = static_cast<int>(100 * fraction);
     if (!is_shown || percent == last) return;
     last = percent;
@@ -172,7 +159,7 @@ void write_record(const fs::path& file, const StageDescription& description, con
                                          {"summary", report.summary},
                                          {"figures", json_of(report.figures)},
                                          {"effects", effects}};
-  write_text(context.pending_path(file), record.dump(2) + "\n");
+  write_text(context.pending_path(file), json_text(record, 2) + "\n");
 }
 
 /// Remove what an unfinished run has left: temporary files, and folders made for them that are still empty.
@@ -283,8 +270,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
               const std::function<void(ParameterList&)>& declare_parameters,
               const std::function<StageReport(StageContext&)>& body) {
   const std::string& stage = description.name;
-  restart_with_kernels_of_processor(argv);
-  watch_signals();
+  restart_as_blas_needs(argv);
+  watch_signals(SecondSignal::ends_at_once);
   keep_blas_to_one_thread();
   try {
     ParameterList list;
@@ -294,15 +281,19 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     add_options(app, line, description, list);
     try {
       app.parse(argc, argv);
-    } catch (const CLI::CallForHelp& help) {
-      return app.exit(help);
+    } catch (const CLI::CallForHelp&) {
+      print(app.help());
+      return kDone;
     } catch (const CLI::ParseError& error) {
       throw UsageError(std::string(error.what()) + " (see mbtfm-" + stage + " --help)");
     }
-    if (line.only_version) return std::printf("mbtfm-%s %s\n", stage.c_str(), kVersion) < 0 ? kOutput : kDone;
-    if (line.only_parameters) return std::printf("%s", to_markdown(list).c_str()) < 0 ? kOutput : kDone;
+    if (line.only_version || line.only_parameters) {
+      print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));
+      return kDone;
+    }
     set_parameters(list, line, app);
     if (line.only_check) return kDone;
+    reserve_blas_buffers(line.threads);
     return run(description, list, line, body);
   } catch (...) {
     return report_current_exception("mbtfm-" + stage);

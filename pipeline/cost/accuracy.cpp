@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/json_record.h"
 #include "pipeline/cost/presets.h"
 
@@ -100,7 +101,7 @@ void record_accuracy(const std::filesystem::path& cell, double wanted, const Acc
                      {"met", outcome.is_met},
                      {"preset", outcome.preset},
                      {"verdict", outcome.verdict}};
-  write_whole(file, run.dump(1) + "\n");
+  write_whole(file, json_text(run, 1) + "\n");
 }
 
 }  // namespace mbtfm::cost

@@ -11,6 +11,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/names.h"
 #include "pipeline/contract/own_files.h"
 
 namespace mbtfm::runner {
@@ -78,15 +79,16 @@ Hashes HashCache::hash(const std::vector<std::string>& names) {
     if (!stamp) continue;
     std::unique_lock guard(mutex_);
     if (const auto known = entries_.find(name); known != entries_.end() && known->second.stamp == *stamp) {
-      hashes[name] = known->second.sha256;
+      hashes[shown_name(name)] = known->second.sha256;
       continue;
     }
     const bool is_kept = has_rested(*stamp) && name.find('\n') == std::string::npos;
     guard.unlock();
-    hashes[name] = sha256_of_file(cell_ / name);
+    const std::string sha256 = sha256_of_file(cell_ / name);
+    hashes[shown_name(name)] = sha256;
     if (!is_kept) continue;
     guard.lock();
-    entries_[name] = {.stamp = *stamp, .sha256 = hashes[name]};
+    entries_[name] = {.stamp = *stamp, .sha256 = sha256};
     is_changed_ = true;
   }
   return hashes;

@@ -12,7 +12,7 @@
 
 namespace mbtfm::runner {
 
-/// SHA-256 by path relative to the cell folder.
+/// SHA-256 by path relative to the cell folder, as names.h shows it.
 using Hashes = std::map<std::string, std::string>;
 
 /// The hash is the truth; a file is not read again where its size, its times of content and of state (mtime, ctime, to

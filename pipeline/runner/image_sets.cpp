@@ -2,11 +2,11 @@
 
 #include <algorithm>
 #include <map>
-#include <nlohmann/json.hpp>
 #include <regex>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/own_files.h"
 #include "pipeline/runner/images.h"
 
@@ -88,7 +88,7 @@ std::map<std::string, ImageSet> group_images(const fs::path& folder, const std::
 }
 
 /// A basic string of TOML, whose escapes are those of JSON.
-std::string quoted(const std::string& text) { return nlohmann::json(text).dump(); }
+std::string quoted(const std::string& text) { return json_text(text); }
 
 std::string toml_of(const std::string& settings, const ImageSet& images, const fs::path& folder, const fs::path& cell) {
   std::string text = settings;

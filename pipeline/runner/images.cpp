@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/names.h"
 #include "pipeline/contract/own_files.h"
 
 namespace mbtfm::runner {
@@ -42,7 +43,7 @@ std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
 
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {
   ImageMatch match{.files = {}, .pattern = name_or_glob};
-  const fs::path exact = folder / name_or_glob;
+  const fs::path exact = file_shown_as(folder, name_or_glob);
   if (is_file(exact)) {
     match.files = {exact};
     return match;

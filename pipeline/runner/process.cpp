@@ -8,7 +8,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <cerrno>
 #include <chrono>
 #include <cmath>
@@ -17,6 +16,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "pipeline/contract/console.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 
@@ -34,9 +34,6 @@ constexpr double kGrace_s = 10;
 // Of the output, kept for messages: an error and its hint, never the whole log.
 constexpr std::size_t kTailBytes = 8192;
 
-std::atomic<bool> was_interrupted = false;
-extern "C" void note_interrupt(int) { was_interrupted = true; }
-
 double seconds_since(Clock::time_point start) { return std::chrono::duration<double>(Clock::now() - start).count(); }
 
 /// The child, between fork and exec: only async-signal-safe calls, as other threads of the parent may hold locks.
@@ -46,6 +43,7 @@ double seconds_since(Clock::time_point start) { return std::chrono::duration<dou
   if (getppid() != parent) _exit(kCannotExecute);  // it died before that call
   dup2(output, STDOUT_FILENO);
   dup2(output, STDERR_FILENO);
+  std::signal(SIGPIPE, SIG_DFL);  // ignored by us, and by what we start only if it chooses so
   execv(arguments[0], arguments);
   _exit(kCannotExecute);
 }
@@ -153,15 +151,10 @@ ProcessResult Child::result() {
 
 }  // namespace
 
-void watch_interrupts() {
-  struct sigaction action {};
-  action.sa_handler = note_interrupt;
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
+void watch_interrupts() { watch_signals(SecondSignal::is_noted); }
 
 void throw_if_interrupted() {
-  if (was_interrupted) throw Interrupted("interrupted; finished stages are kept");
+  if (is_stop_asked()) throw Interrupted("interrupted; finished stages are kept");
 }
 
 void print_on(std::string_view text) {
@@ -181,7 +174,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const Process
   auto exceeded = ProcessResult::Limit::none;
   while (!child.has_ended()) {
     child.listen();
-    if (was_interrupted && !asked_to_end) {
+    if (is_stop_asked() && !asked_to_end) {
       asked_to_end = Clock::now();
       child.signal_group(SIGTERM);
     }
@@ -212,7 +205,7 @@ std::string how_it_ended(const ProcessResult& result) {
 }
 
 int exit_code_of(const ProcessResult& result) {
-  if (result.exceeded == ProcessResult::Limit::seconds) return exit_code::kTimedOut;
+  if (result.exceeded != ProcessResult::Limit::none) return exit_code::kResources;
   return result.signal ? 128 + *result.signal : result.exit_code;
 }
 

@@ -11,7 +11,8 @@
 
 namespace mbtfm::runner {
 
-/// From now on Ctrl-C and SIGTERM are noted, not obeyed: running programs are asked to end; no further one is started.
+/// From now on Ctrl-C, SIGTERM and a closed terminal are noted, not obeyed: running programs are asked to end; no
+/// further one is started.
 void watch_interrupts();
 /// @throws Interrupted where Ctrl-C was pressed
 void throw_if_interrupted();
@@ -47,7 +48,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const Process
 /// One line that says how it ended: "exit code 3", "killed by signal 9 (Killed)", "timed out after 60 s", "took too
 /// much memory (4100 MB)".
 std::string how_it_ended(const ProcessResult& result);
-/// As the shell counts: 128 + signal, and 124 (as of timeout(1)) for one that was timed out.
+/// As the shell counts: 128 + signal; for one that was killed for its limits, that of want of resources.
 int exit_code_of(const ProcessResult& result);
 
 /// What a program's output says of its failure: the lines from the first error on, or else the last line.

@@ -7,9 +7,10 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/json_record.h"
 #include "pipeline/contract/own_files.h"
-#include "pipeline/runner/toml_file.h"
+#include "pipeline/contract/toml.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -103,7 +104,7 @@ void write_begun(const fs::path& record_file, const Stage& stage, const std::str
   nlohmann::ordered_json begun = {{"stage", stage.name}};
   if (!record_before.empty()) begun = nlohmann::ordered_json::parse(record_before);
   begun["run"] = {{"finished", false}};
-  write_whole(record_file, begun.dump(1) + "\n");
+  write_whole(record_file, json_text(begun, 1) + "\n");
 }
 
 std::vector<std::string> series_outputs(const fs::path& cell, const Stage& stage) {
@@ -142,11 +143,11 @@ void complete_record(const fs::path& record_file, const StageRecord& record, con
                   {"command", run.command},
                   {"seconds", run.seconds},
                   {"peak_memory_MB", run.peak_memory_MB}};
-  write_whole(record_file, whole.dump(1) + "\n");
+  write_whole(record_file, json_text(whole, 1) + "\n");
 }
 
 Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
-  const toml::table whole = read_toml(toml_file);
+  const toml::table whole = parse_toml(toml_file);
   Settings settings;
   for (const Stage& stage : stages()) {
     toml::table relevant;

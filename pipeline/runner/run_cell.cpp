@@ -72,7 +72,11 @@ void remove_partial_files(const fs::path& folder) {
 }
 
 StageFailure failure_of(const ProcessResult& result) {
-  return {.exit_code = exit_code_of(result), .how = how_it_ended(result), .message = error_in(result.last_output)};
+  const int code = exit_code_of(result);
+  // a stage that did not converge has written; this one has not
+  return {.exit_code = code == exit_code::kNotSolved ? exit_code::kNoAnswer : code,
+          .how = how_it_ended(result),
+          .message = error_in(result.last_output)};
 }
 
 /// Do a part of a stage's work; where that throws, the outcome tells of it, too.
@@ -346,10 +350,12 @@ std::string CellOutcome::not_converged() const {
 
 void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOptions& options, const Sink& sink) {
   const ProcessResult check =
-      run_process({executable_of(stage, options), "--check", "--config", toml_file.string()}, {}, sink);
+      run_process({executable_of(stage, options), "--check", "--config", toml_file.string()}, options.limits, sink);
   if (check.exit_code == 0 && !check.signal) return;
   StageFailure failure = failure_of(check);
-  failure.how = "does not accept cell.toml";
+  const bool is_refusal =
+      !check.signal && (check.exit_code == exit_code::kUsage || check.exit_code == exit_code::kInput);
+  failure.how = is_refusal ? "does not accept cell.toml" : failure.how + " while it read cell.toml";
   throw StageFailed(stage.name, std::move(failure));
 }
 

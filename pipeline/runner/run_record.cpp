@@ -6,6 +6,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/json_record.h"
 #include "pipeline/contract/own_files.h"
 #include "pipeline/runner/lock.h"
@@ -144,7 +145,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
     const JsonRecord fit(fit_file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
     if (const auto budget = fit.find("error_budget")) run["error_budget"] = budget->json();
   }
-  write_whole(cell / "run.json", run.dump(1) + "\n");
+  write_whole(cell / "run.json", json_text(run, 1) + "\n");
 }
 
 bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {

@@ -7,7 +7,9 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/hash.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/json_record.h"
+#include "pipeline/contract/names.h"
 #include "pipeline/contract/own_files.h"
 
 namespace mbtfm::runner {
@@ -92,11 +94,12 @@ bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector
 void compare(const KnownFile& known, const fs::path& folder, const std::vector<fs::path>& images, Verification& found) {
   ++found.n_files;
   const std::string name = known.path.generic_string(), role = " (" + known.kind + " of " + known.stage + ")";
-  if (!may_be_read(known.path, folder, images)) {
+  const fs::path file = file_shown_as(folder, name);
+  if (!may_be_read(file.lexically_relative(folder), folder, images)) {
     found.differences.push_back(name + " is outside of the cell folder, and no setting names it: not read" + role);
-  } else if (!is_file(folder / known.path)) {
+  } else if (!is_file(file)) {
     found.differences.push_back(name + " is gone" + role);
-  } else if (sha256_of_file(folder / known.path) != known.sha256) {
+  } else if (sha256_of_file(file) != known.sha256) {
     found.differences.push_back(name + " differs" + role);
   }
 }
@@ -124,7 +127,8 @@ std::map<std::string, fs::path> images_in(const JsonRecord& run, const fs::path&
   std::map<std::string, fs::path> images;
   const auto list = run.find("images");
   if (!list) return images;
-  for (const auto& [key, file] : list->members()) images[key] = (inputs / file.text()).lexically_normal();
+  for (const auto& [key, file] : list->members())
+    images[key] = file_shown_as(inputs, file.text()).lexically_normal();
   return images;
 }
 
@@ -146,7 +150,7 @@ std::string toml_of(const JsonRecord& run, const fs::path& inputs, const fs::pat
   }
   text += "\n[images]\n";
   for (const auto& [key, file] : images_in(run, inputs)) {
-    if (is_file(file)) text += key + " = " + ordered_json(fs::proximate(file, out).generic_string()).dump() + "\n";
+    if (is_file(file)) text += key + " = " + json_text(fs::proximate(file, out).generic_string()) + "\n";
   }
   return text;
 }

@@ -80,11 +80,11 @@ void declare(ParameterList& list, StudyParameters& parameters) {
            "where a cell's condition is told: `folder` (the first folder below the study's), `folder2` (the one below "
            "that), or the name of a column of --table; empty: one condition");
   list.add("with_not_converged", parameters.with_not_converged, "cells whose fit did not converge enter, too");
-  list.add("weak_tension_nN", parameters.weak_tension_nN, Range::positive(),
+  list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
            "the share of fibres above this tension is given (nN)");
-  list.add("strong_tension_nN", parameters.strong_tension_nN, Range::positive(),
+  list.add("strong_tension_nN", parameters.strong_tension_nN, Range::force_nN(),
            "the share of fibres above this tension is given, too (nN)");
-  list.add("near_adhesion_um", parameters.near_adhesion_um, Range::positive(),
+  list.add("near_adhesion_um", parameters.near_adhesion_um, Range::size_um(),
            "beads this near to an adhesion's centre, or on it, tell which way it moves (um)");
   list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
            "draws of cells behind the intervals of means and medians");

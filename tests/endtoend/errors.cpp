@@ -123,7 +123,7 @@ TEST_F(Errors, a_missing_pixel_size_is_asked_for) {
 
 TEST_F(Errors, a_negative_modulus_is_refused_before_anything_runs) {
   replace_in_toml("youngs_modulus_kPa", "youngs_modulus_kPa = -8.4");
-  expect_error(kInput, {"cell.toml:", "youngs_modulus_kPa", "a number > 0", "-8.4"}, "1_segment");
+  expect_error(kInput, {"cell.toml:", "youngs_modulus_kPa", "a number >= 0.001", "-8.4"}, "1_segment");
 }
 
 TEST_F(Errors, a_poisson_ratio_of_one_half_is_refused_before_anything_runs) {

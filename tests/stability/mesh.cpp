@@ -41,6 +41,23 @@ void expect_valid_with(const std::vector<Fibre>& fibres) {
   }
 }
 
+TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_is_made) {
+  test::hard_case("an edge length of a tenth of a nanometre", "refused with the number of vertices and their memory");
+  try {
+    generate_network(square_cell(), {.edge_length_um = 1e-4});
+    FAIL() << "made";
+  } catch (const OutOfMemory& error) {
+    // 400 um2 over the (sqrt 3 / 2) edge^2 that a vertex of an even mesh has to itself: 4.6e10
+    EXPECT_NE(error.report.reason.find("4.62e+10 vertices"), std::string::npos) << error.report.reason;
+  }
+}
+
+TEST(HardMesh, rims_too_fine_for_memory_are_refused_before_they_are_filled) {
+  test::hard_case("rims finer than a molecule in a coarse mesh", "refused with the number of vertices");
+  // edges of a nanometre all over 400 um2: some 1e9 vertices, though an even mesh of edge_length_um has 200
+  EXPECT_THROW(generate_network(square_cell(), {.edge_growth = 1e-7, .rim_points = 5000}), OutOfMemory);
+}
+
 TEST(HardMesh, crossing_fibres_share_a_vertex) {
   test::hard_case("two fibres cross", "one common vertex at the crossing, both lengths kept");
   expect_valid_with({fibre_along(1, {{3, 10}, {17, 10}}), fibre_along(2, {{10.2, 3}, {9.9, 17}})});

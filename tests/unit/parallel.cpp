@@ -1,11 +1,15 @@
 #include "pipeline/contract/parallel.h"
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <chrono>
 #include <numeric>
 #include <stdexcept>
 #include <string>
+#include <thread>
 #include <vector>
 
 namespace mbtfm {
@@ -32,6 +36,22 @@ TEST(ParallelFor, the_exception_of_the_lowest_index_is_rethrown) {
       EXPECT_STREQ(error.what(), "3");
     }
   }
+}
+
+/// In a process of its own: as many threads as asked for need more address space than there is.
+[[noreturn]] void run_where_threads_are_few() {
+  const rlimit limit{.rlim_cur = 400'000'000, .rlim_max = 400'000'000};  // a thread's stack takes 8 MB
+  setrlimit(RLIMIT_AS, &limit);
+  std::vector<int> visits(2000, 0);
+  parallel_for(2000, 1000, [&](int i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));  // so that they are there together
+    ++visits[i];
+  });
+  _exit(std::count(visits.begin(), visits.end(), 1) == 2000 ? 0 : 1);
+}
+
+TEST(ParallelFor, the_work_is_done_by_those_threads_that_there_are) {
+  EXPECT_EXIT(run_where_threads_are_few(), testing::ExitedWithCode(0), "");
 }
 
 }  // namespace

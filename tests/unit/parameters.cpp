@@ -57,6 +57,51 @@ TEST(Parameters, values_are_read_from_their_table) {
   EXPECT_EQ(e.count, 3) << "what is not given keeps its default";
 }
 
+TEST(Parameters, a_length_in_nanometres_is_recognised) {
+  struct {
+    double edge_length_um = 1.5, stiffness_nN = 1, ratio = 1;
+  } e;
+  ParameterList list;
+  list.table("network");
+  list.add("edge_length_um", e.edge_length_um, Range::mesh_um(), "mean cable length (um)");
+  list.add("stiffness_nN", e.stiffness_nN, Range::force_nN(), "stiffness (nN)");
+  list.add("ratio", e.ratio, Range::between(0, 1), "a ratio");
+  const auto hint_on = [&](const std::string& line) {
+    try {
+      read_toml(list, "[network]\n" + line, "cell.toml");
+    } catch (const InputError& error) {
+      return error.hint;
+    }
+    return std::string("read");
+  };
+  EXPECT_EQ(hint_on("edge_length_um = 1500\n"), "was it meant in nm? 1500 nm are 1.5 um (mean cable length (um))");
+  EXPECT_EQ(hint_on("stiffness_nN = 5e7\n"), "was it meant in pN? 5e+07 pN are 50000 nN (stiffness (nN))");
+  EXPECT_EQ(hint_on("edge_length_um = 1e-300\n"), "mean cable length (um)") << "no unit makes that a length";
+  EXPECT_EQ(hint_on("edge_length_um = 1e9\n"), "mean cable length (um)");
+  EXPECT_EQ(hint_on("ratio = 500\n"), "a ratio") << "has no unit";
+  EXPECT_EQ(hint_on("edge_length_um = 1.5\n"), "read");
+  try {
+    set_from_text(parameter_named(list, "edge_length_um"), "1500");
+    FAIL() << "no error";
+  } catch (const UsageError& error) {
+    EXPECT_NE(std::string(error.what()).find("1500 nm are 1.5 um"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Parameters, text_that_is_no_toml_is_an_input_error_with_its_line_whatever_it_is) {
+  // The first two end toml++ 3.3 by an assertion where it was not built with NDEBUG; the others reach what it declares
+  // unreachable.
+  EXPECT_EQ(message_of("[[# a\n"), "cell.toml: expected TOML, found brackets, quotes or keys that make none | ");
+  EXPECT_EQ(message_of("\xEF\xBB\xBF=pk9\n").find("cell.toml:1: expected TOML, found "), 0u);
+  EXPECT_EQ(message_of("\n\u00B5m = 1\n").find("cell.toml:2: expected TOML, found "), 0u);
+  EXPECT_EQ(message_of("\n\xCE\x94\n").find("cell.toml:2: expected TOML, found "), 0u);
+  const std::string hint = " | save the file as plain text in UTF-8";
+  EXPECT_EQ(message_of(std::string_view("a = 1\nb\0 = 2\n", 13)),
+            "cell.toml:2: expected TOML, a text in UTF-8, found the control character \\x00" + hint);
+  EXPECT_EQ(message_of("# caf\xE9\n"), "cell.toml:1: expected TOML, a text in UTF-8, found the byte \\xE9" + hint);
+  EXPECT_EQ(message_of("# caf\xC3\xA9 \r\n\t\n"), "read");
+}
+
 TEST(Parameters, an_unknown_key_names_the_line_and_the_nearest_known_one) {
   EXPECT_EQ(message_of("[network]\n\nlenght_um = 2\n"),
             "cell.toml:3: expected a known key of [network], found 'lenght_um' | did you mean 'length_um'?");

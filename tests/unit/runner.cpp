@@ -28,7 +28,7 @@ void make_executable(const fs::path& file, const std::string& text) {
 
 // Each output is a line that the stage's inputs decide, but for the segmentation: it is the same for all images, as for
 // two images that differ outside the cell only. With exit-<name> beside it, a stage ends with the code in that file;
-// shell-<name> is run first.
+// shell-<name> is run first, check-<name> where it only reads its parameters.
 constexpr const char* kStageScript = R"sh(#!/bin/sh
 here=$(dirname "$0"); name=$(basename "$0"); name=${name#mbtfm-}; all=""
 while [ $# -gt 0 ]; do
@@ -43,7 +43,7 @@ while [ $# -gt 0 ]; do
     *) [ -f "$2" ] && all="$all $2"; shift 2;;
   esac
 done
-if [ -n "$check" ]; then grep -q refuse_$name "$config" && { echo "mbtfm-$name: error: refused" >&2; exit 2; }; exit 0; fi
+if [ -n "$check" ]; then [ -f "$here/check-$name" ] && . "$here/check-$name"; grep -q refuse_$name "$config" && { echo "mbtfm-$name: error: refused" >&2; exit 2; }; exit 0; fi
 echo $name${kept:+-keeping} >> "$here/calls"
 [ -f "$here/shell-$name" ] && . "$here/shell-$name"
 code=0; [ -f "$here/exit-$name" ] && code=$(cat "$here/exit-$name")
@@ -350,7 +350,7 @@ TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
     started();
     FAIL() << "no error";
   } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 124);
+    EXPECT_EQ(error.failure.exit_code, 6);
     EXPECT_NE(error.failure.how.find("timed out"), std::string::npos);
   }
   EXPECT_EQ(run_process({"/bin/sh", "-c", "sleep 4"}).exit_code, 0);
@@ -366,9 +366,56 @@ TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
     started();
     FAIL() << "no error";
   } catch (const StageFailed& error) {
-    EXPECT_EQ(error.failure.exit_code, 128 + 9);
+    EXPECT_EQ(error.failure.exit_code, 6);
     EXPECT_NE(error.failure.how.find("took too much memory"), std::string::npos) << error.failure.how;
   }
+}
+
+TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
+  write_text(bin_ / "check-network", "sleep 60");
+  options_.limits.seconds = 0.5;
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const StageFailed& error) {
+    EXPECT_EQ(error.failure.exit_code, 6);
+    EXPECT_TRUE(error.failure.how.starts_with("timed out after ")) << error.failure.how;
+    EXPECT_TRUE(error.failure.how.ends_with(" s while it read cell.toml")) << error.failure.how;
+  }
+  EXPECT_EQ(calls(), "") << "nothing runs before every stage has read its parameters";
+}
+
+TEST_F(Runner, a_stage_that_crashes_while_it_reads_its_parameters_is_told_as_that) {
+  write_text(bin_ / "check-fit", "kill -SEGV $$");
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const StageFailed& error) {
+    EXPECT_EQ(error.failure.exit_code, 128 + 11);
+    EXPECT_EQ(error.failure.how, "killed by signal 11 (Segmentation fault) while it read cell.toml");
+  }
+}
+
+TEST_F(Runner, a_stage_that_found_no_answer_and_wrote_nothing_did_not_merely_fail_to_converge) {
+  write_text(bin_ / "shell-network", "exit 4");
+  try {
+    started();
+    FAIL() << "no error";
+  } catch (const StageFailed& error) {
+    EXPECT_EQ(error.failure.exit_code, 7);
+  }
+  EXPECT_EQ(run_record(cell_)["outcome"], "failed");
+}
+
+TEST_F(Runner, an_image_whose_name_is_not_utf8_is_recorded_readably_and_up_to_date) {
+  const std::string name = "actin_caf\xE9.tif";
+  fs::rename(cell_ / "actin.tif", cell_ / name);
+  write_parameters("[images]\nactin = 'actin*.tif'\n");
+  EXPECT_EQ(started(), "fit network segment track");
+  EXPECT_EQ(run_record(cell_)["images"]["actin"], "actin_caf\\xE9.tif");
+  EXPECT_EQ(started(), "");
+  write_parameters("[images]\nactin = 'actin_caf\\xE9.tif'\n");  // named as the record names it
+  EXPECT_EQ(started(), "fit segment track") << "[images] has changed, and is found";
 }
 
 TEST_F(Runner, a_file_that_was_changed_and_given_its_old_times_again_is_noticed) {

@@ -2,6 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <new>
+#include <stdexcept>
+#include <system_error>
+
 #include "pipeline/contract/csv.h"
 #include "tests/support/temporary_folder.h"
 
@@ -75,8 +79,14 @@ TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
       {2, [] { throw UsageError("usage"); }},
       {3, [] { throw InputError("a.csv:3", "a number", "'x'"); }},
       {3, [] { throw InvalidData("adhesion 3", "an area", "none"); }},
-      {4, [] { throw NotSolved(Report{.reason = "reason"}); }},
+      {7, [] { throw NotSolved(Report{.reason = "reason"}); }},
       {5, [] { throw OutputError("disk full"); }},
+      {6, [] { throw OutOfMemory("the mesh would take 70 GB"); }},
+      {6, [] { throw std::bad_alloc(); }},
+      {6, [] { throw std::length_error("vector::_M_default_append"); }},
+      {6, [] { throw std::system_error(std::make_error_code(std::errc::resource_unavailable_try_again)); }},
+      {6,
+       [] { throw std::runtime_error("OpenCV(4.6) alloc.cpp: error: (-4:Insufficient memory) Failed to allocate"); }},
       {70, [] { throw InternalError("bug"); }},
   };
   for (const auto& [code, fail] : failures) {
