@@ -91,33 +91,81 @@ void add_bootstrap(EnsembleFit& all, const std::vector<network::CableNetwork>& n
   }
 }
 
-/// Mean and errors of a quantity that is linear in the tensions about each mesh's solution.
-/// @param value_of  of a mesh; @param gradient_of  by tension
-/// @param along  the quantity by force: its own error is the model's, beside that of the tensions; empty for tensions
+/// Quantities that are linear in the tensions about a mesh's solution.
+struct Quantities {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd gradients;  ///< tensions × quantities
+};
+
+/// Their means over the meshes, and errors.
+/// @param of_mesh  quantities of a mesh
+/// @param along  each by force (forces × quantities): its own error is the model's, beside that of the tensions; empty
+///               for tensions
+template <class OfMesh>
+std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const Eigen::MatrixXd& along = {}) {
+  const auto n_meshes = static_cast<double>(all.meshes.size());
+  Eigen::VectorXd value, noise;
+  Eigen::MatrixXd model;  // variances by force
+  for (const MeshFit& mesh : all.meshes) {
+    const Quantities q = of_mesh(mesh);
+    const Eigen::VectorXd own_noise =
+        q.gradients.cwiseProduct(product(mesh.noise_covariance_nN2, q.gradients)).colwise().sum();
+    if (value.size() == 0) {
+      value = noise = Eigen::VectorXd::Zero(q.values.size());
+      model = Eigen::MatrixXd::Zero(all.model_error ? all.forces_nN.size() : 0, q.values.size());
+    }
+    value += q.values / n_meshes;
+    noise += own_noise / n_meshes;
+    if (model.size() == 0) continue;
+    Eigen::MatrixXd by_force = transposed_product(mesh.by_force, q.gradients);
+    if (along.size() > 0) by_force -= along;
+    model += all.model_error->force_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
+  }
+  std::vector<Estimate> estimates;
+  for (Eigen::Index i = 0; i < value.size(); ++i) {
+    const double from_noise = std::max(0.0, noise[i]);
+    const double variance = from_noise + (model.size() > 0 ? model.col(i).sum() : 0);
+    Estimate estimate{.value = value[i], .noise = std::sqrt(from_noise), .standard_error = std::sqrt(variance)};
+    double squares = 0;  // Welch–Satterthwaite, over the adhesions
+    for (Eigen::Index row = 0; row < model.rows(); row += 2) squares += std::pow(model(row, i) + model(row + 1, i), 2);
+    if (squares > 0) estimate.degrees = std::min(1e6, variance * variance / squares * kDegreesByAdhesion);
+    estimates.push_back(estimate);
+  }
+  return estimates;
+}
+
+/// The same for one quantity.
 template <class ValueOf, class GradientOf>
 Estimate estimate_of(const EnsembleFit& all, const ValueOf& value_of, const GradientOf& gradient_of,
                      const Eigen::VectorXd& along = {}) {
-  const auto n_meshes = static_cast<double>(all.meshes.size());
-  Estimate estimate;
-  double noise = 0;
-  Eigen::VectorXd model = Eigen::VectorXd::Zero(all.model_error ? all.forces_nN.size() : 0);
-  for (const MeshFit& mesh : all.meshes) {
-    estimate.value += value_of(mesh) / n_meshes;
-    const Eigen::VectorXd gradient = gradient_of(mesh);
-    noise += gradient.dot(mesh.noise_covariance_nN2 * gradient) / n_meshes;
-    if (model.size() == 0) continue;
-    Eigen::VectorXd by_force = mesh.by_force.transpose() * gradient;
-    if (along.size() > 0) by_force -= along;
-    model += by_force.cwiseAbs2().cwiseProduct(all.model_error->force_variance_nN2) / n_meshes;
+  const auto of_mesh = [&](const MeshFit& mesh) {
+    return Quantities{Eigen::VectorXd::Constant(1, value_of(mesh)), gradient_of(mesh)};
+  };
+  return estimates_of(all, of_mesh, Eigen::MatrixXd(along)).front();
+}
+
+/// Of the adhesions' forces, along the mean over meshes.
+std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
+  constexpr Eigen::Index kAtOnce = 256;  // adhesions: some MB of numbers
+  const Eigen::Index n = all.forces_nN.size() / 2;
+  std::vector<Estimate> magnitudes;
+  for (Eigen::Index first = 0; first < n; first += kAtOnce) {
+    const Eigen::Index count = std::min(kAtOnce, n - first);
+    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(all.forces_nN.size(), count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const Eigen::Vector2d force = all.forces_nN.segment<2>(2 * (first + k));
+      along.col(k).segment<2>(2 * (first + k)) =
+          force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+    }
+    const Eigen::MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
+    const auto of_mesh = [&](const MeshFit& mesh) {
+      return Quantities{
+          own.transpose() * mesh.fit.trial.forces_nN.segment(2 * first, 2 * count),
+          transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
+    };
+    for (const Estimate& magnitude : estimates_of(all, of_mesh, along)) magnitudes.push_back(magnitude);
   }
-  noise = std::max(0.0, noise);
-  const double variance = noise + model.sum();
-  estimate.noise = std::sqrt(noise);
-  estimate.standard_error = std::sqrt(variance);
-  double squares = 0;  // Welch–Satterthwaite, over the adhesions
-  for (Eigen::Index row = 0; row < model.size(); row += 2) squares += std::pow(model.segment<2>(row).sum(), 2);
-  if (squares > 0) estimate.degrees = std::min(1e6, variance * variance / squares * kDegreesByAdhesion);
-  return estimate;
+  return magnitudes;
 }
 
 /// A tension's interval: the mean of the meshes'.
@@ -188,14 +236,7 @@ void add_estimates(EnsembleFit& all) {
     all.tensions_nN.push_back(sum_of(all, {static_cast<int>(i)}));
     all.tensions_nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
   }
-  for (Eigen::Index row = 0; row < all.forces_nN.size(); row += 2) {
-    const Eigen::Vector2d force = all.forces_nN.segment<2>(row);
-    Eigen::VectorXd along = Eigen::VectorXd::Zero(all.forces_nN.size());
-    along.segment<2>(row) = force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
-    all.force_magnitudes_nN.push_back(estimate_of(
-        all, [&](const MeshFit& mesh) { return along.dot(mesh.fit.trial.forces_nN); },
-        [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, along));
-  }
+  all.force_magnitudes_nN = force_magnitudes_of(all);
   all.total_force_nN = total_force_of(all);
   all.network_force_nN = network_force_of(all);
 }

@@ -97,7 +97,7 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
                          const FitParameters& parameters, int threads, TensionFit fit, const std::string& loss,
                          std::optional<double> fixed_scale) {
   constexpr int kMaxRounds = 20;    // each halves the change at least
-  constexpr double kSettled = 0.1;  // of a standard error, along one direction of all tensions
+  constexpr double kSettled = 0.022;  // of a standard error, mean over the directions: a tenth along one of twenty
   for (int round = 0; round < kMaxRounds; ++round) {
     const Trial last = fit.trial;
     const Eigen::VectorXd& before = last.tensions_nN;
@@ -113,7 +113,9 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     fit.n_evaluations += n_evaluations;
     // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
     const Eigen::VectorXd change = fit.trial.tensions_nN - before;
-    if (data.weight_per_um.cwiseProduct(data.response->displace(derivatives * change)).norm() <= kSettled * scale || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
+    const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
+    const double moved = data.weight_per_um.cwiseProduct(data.response->displace(derivatives * change)).norm();
+    if (moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
   }
   return fit;
 }

@@ -73,8 +73,8 @@ bool is_far(const Square& square, const Ellipse& ellipse) {
 /// The points of a square and what acts on them. Single precision: 6e-8 of numbers that are right to 1e-5.
 struct Block {
   std::vector<Index> points;               ///< of all
-  MatrixXd weights;                        ///< see interpolation()
-  std::shared_ptr<const MatrixXf> far;     ///< 2·nodes × 2·ellipses; zero columns for those near
+  MatrixXf modes;                          ///< 2·points × modes: the fields that far ellipses have in common …
+  std::shared_ptr<const MatrixXf> far;     ///< modes × 2·ellipses: … and how much of each; zero for those near
   std::shared_ptr<const std::vector<Index>> near_columns;
   MatrixXf near;                           ///< 2·points × near columns
 };
@@ -82,10 +82,23 @@ struct Block {
 /// Every second row from `first` on.
 template <class Matrix>
 auto axis_of(Matrix& matrix, Index first) {
-  using Plain = std::conditional_t<std::is_const_v<Matrix>, const typename Matrix::PlainObject, typename Matrix::PlainObject>;
+  using Plain =
+      std::conditional_t<std::is_const_v<Matrix>, const typename Matrix::PlainObject, typename Matrix::PlainObject>;
   return Eigen::Map<Plain, 0, Eigen::Stride<Eigen::Dynamic, 2>>(
-      matrix.data() + first, matrix.rows() / 2, matrix.cols(),
-      Eigen::Stride<Eigen::Dynamic, 2>(matrix.rows(), 2));
+      matrix.data() + first, matrix.rows() / 2, matrix.cols(), Eigen::Stride<Eigen::Dynamic, 2>(matrix.rows(), 2));
+}
+
+/// The fewest directions at the nodes that have all but a hundred thousandth of these fields: 2·nodes × some.
+MatrixXd common_modes(const MatrixXd& at_nodes) {
+  constexpr double kLeftOut = 1e-5;
+  const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(at_nodes * at_nodes.transpose());
+  const VectorXd squares = eigen.eigenvalues().cwiseMax(0.0);
+  Index n_left_out = 0;
+  for (double sum = 0; n_left_out < squares.size(); ++n_left_out) {
+    sum += squares[n_left_out];  // they ascend
+    if (sum > kLeftOut * kLeftOut * squares.sum()) break;
+  }
+  return eigen.eigenvectors().rightCols(squares.size() - n_left_out);
 }
 
 class Blocked final : public Response {
@@ -99,64 +112,65 @@ class Blocked final : public Response {
   MatrixXd displace(const MatrixXd& forces_nN) const override {
     MBTFM_ASSERT(forces_nN.rows() == n_columns_);
     MatrixXd u = MatrixXd::Zero(rows(), forces_nN.cols());
-    over_blocks([&](const Block& block) {
-      const MatrixXd at_nodes = product(block.far->cast<double>(), forces_nN);
-      MatrixXd own = product(block.near.cast<double>(), forces_nN(*block.near_columns, Eigen::all));
-      for (const Index axis : {0, 1}) axis_of(own, axis) += block.weights * axis_of(at_nodes, axis);
-      for (std::size_t p = 0; p < block.points.size(); ++p)
-        u.middleRows<2>(2 * block.points[p]) = own.middleRows<2>(2 * static_cast<Index>(p));
+    parallel_for(static_cast<int>(blocks_.size()), threads_, [&](int b) {
+      const Block& block = blocks_[static_cast<std::size_t>(b)];
+      const MatrixXd own = product(block.modes.cast<double>(), product(block.far->cast<double>(), forces_nN)) +
+                           product(block.near.cast<double>(), forces_nN(*block.near_columns, Eigen::all));
+      u(rows_of(block), Eigen::all) = own;
     });
     return u;
   }
 
   MatrixXd pull_back(const MatrixXd& displacements) const override {
     MBTFM_ASSERT(displacements.rows() == rows());
+    constexpr std::size_t kPieces = 8;  // that sums are made of, whatever the threads
     std::vector<MatrixXd> parts(kPieces, MatrixXd::Zero(n_columns_, displacements.cols()));
     parallel_for(kPieces, threads_, [&](int piece) {
       MatrixXd& sum = parts[static_cast<std::size_t>(piece)];
       for (std::size_t b = static_cast<std::size_t>(piece); b < blocks_.size(); b += kPieces) {
         const Block& block = blocks_[b];
         const MatrixXd own = displacements(rows_of(block), Eigen::all);
-        MatrixXd at_nodes(block.far->rows(), own.cols());
-        for (const Index axis : {0, 1}) axis_of(at_nodes, axis) = block.weights.transpose() * axis_of(own, axis);
-        sum += transposed_product(block.far->cast<double>(), at_nodes);
+        sum += transposed_product(block.far->cast<double>(), transposed_product(block.modes.cast<double>(), own));
         sum(*block.near_columns, Eigen::all) += transposed_product(block.near.cast<double>(), own);
       }
     });
-    MatrixXd sum = std::move(parts.front());
-    for (std::size_t piece = 1; piece < parts.size(); ++piece) sum += parts[piece];
-    return sum;
+    for (std::size_t piece = 1; piece < kPieces; ++piece) parts.front() += parts[piece];
+    return parts.front();
   }
 
-  /// With B the interpolation, F the far and N the near part: Fᵀ (Bᵀ W B) F + Fᵀ (Bᵀ W N) + … + Nᵀ W N. The first takes
-  /// nearly all the time: as squares of (Bᵀ W B)^½ F, many blocks at once.
+  /// With M the modes, F and N the far and the near part: Fᵀ (Mᵀ W M) F + Fᵀ (Mᵀ W N) + … + Nᵀ W N. The first takes
+  /// nearly all the time: as squares of (Mᵀ W M)^½ F, many blocks at once.
   MatrixXd upper_gram(const VectorXd& weight) const override {
+    struct Part {
+      MatrixXd root_far;  ///< (Mᵀ W M)^½ F
+      MatrixXd mixed;     ///< Fᵀ (Mᵀ W N)
+      MatrixXd own;       ///< Nᵀ W N
+    };
     MatrixXd square = MatrixXd::Zero(n_columns_, n_columns_);
-    constexpr std::size_t kAtOnce = 16;
+    constexpr std::size_t kAtOnce = 32;
     for (std::size_t begin = 0; begin < blocks_.size(); begin += kAtOnce) {
-      const std::size_t count = std::min(kAtOnce, blocks_.size() - begin);
-      constexpr Index kRows = 2 * kNodes * kNodes;
-      MatrixXd roots(kRows * static_cast<Index>(count), n_columns_);
-      std::vector<MatrixXd> mixed(count), own(count);
-      parallel_for(static_cast<int>(count), threads_, [&](int i) {
-        const auto at = static_cast<std::size_t>(i);
-        const Block& block = blocks_[begin + at];
+      std::vector<Part> parts(std::min(kAtOnce, blocks_.size() - begin));
+      parallel_for(static_cast<int>(parts.size()), threads_, [&](int i) {
+        const Block& block = blocks_[begin + static_cast<std::size_t>(i)];
+        const VectorXd root = weight(rows_of(block)).cwiseSqrt();
+        const MatrixXd modes = root.asDiagonal() * block.modes.cast<double>();
+        const MatrixXd near = root.asDiagonal() * block.near.cast<double>();
         const MatrixXd far = block.far->cast<double>();
-        const MatrixXd near = block.near.cast<double>();
-        const VectorXd weight_here = weight(rows_of(block));
-        MatrixXd projected(kRows, near.cols());  // Bᵀ W N
-        for (const Index axis : {0, 1}) {
-          const MatrixXd weighted = axis_of(weight_here, axis).col(0).asDiagonal() * block.weights;
-          roots.middleRows(kRows * i + kRows / 2 * axis, kRows / 2) =
-              square_root(block.weights.transpose() * weighted) * axis_of(far, axis);
-          axis_of(projected, axis) = weighted.transpose() * axis_of(near, axis);
-        }
-        mixed[at] = transposed_product(far, projected);
-        own[at] = gram(weight_here.cwiseSqrt().asDiagonal() * near);
+        parts[static_cast<std::size_t>(i)] = {product(square_root(gram(modes)), far),
+                                              transposed_product(far, transposed_product(modes, near)), gram(near)};
       });
+      Index n_rows = 0;
+      for (const Part& part : parts) n_rows += part.root_far.rows();
+      MatrixXd roots(n_rows, n_columns_);
+      n_rows = 0;
+      for (Part& part : parts) {
+        roots.middleRows(n_rows, part.root_far.rows()) = part.root_far;
+        n_rows += part.root_far.rows();
+        part.root_far.resize(0, 0);
+      }
       add_upper_gram(roots, square, threads_);
-      for (std::size_t i = 0; i < count; ++i)
-        add_near(*blocks_[begin + i].near_columns, mixed[i], own[i], square);
+      for (std::size_t i = 0; i < parts.size(); ++i)
+        add_near(*blocks_[begin + i].near_columns, parts[i].mixed, parts[i].own, square);
     }
     return square;
   }
@@ -177,33 +191,25 @@ class Blocked final : public Response {
     std::vector<Block> some;
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       if (kept[b].empty()) continue;
-      std::vector<Index> near_rows;
-      for (const Index p : kept[b]) near_rows.insert(near_rows.end(), {2 * p, 2 * p + 1});
+      std::vector<Index> rows;
+      for (const Index p : kept[b]) rows.insert(rows.end(), {2 * p, 2 * p + 1});
       some.push_back({.points = named[b],
-                      .weights = blocks_[b].weights(kept[b], Eigen::all),
+                      .modes = blocks_[b].modes(rows, Eigen::all),
                       .far = blocks_[b].far,
                       .near_columns = blocks_[b].near_columns,
-                      .near = blocks_[b].near(near_rows, Eigen::all)});
+                      .near = blocks_[b].near(rows, Eigen::all)});
     }
     return std::make_shared<Blocked>(static_cast<Index>(points.size()), n_columns_, std::move(some), threads_);
   }
 
  private:
-  static constexpr int kPieces = 8;  // that sums are made of, whatever the threads
-
-  template <class Body>
-  void over_blocks(const Body& body) const {
-    parallel_for(static_cast<int>(blocks_.size()), threads_,
-                 [&](int b) { body(blocks_[static_cast<std::size_t>(b)]); });
-  }
-
   static std::vector<Index> rows_of(const Block& block) {
     std::vector<Index> rows;
     for (const Index p : block.points) rows.insert(rows.end(), {2 * p, 2 * p + 1});
     return rows;
   }
 
-  /// R with Rᵀ R = A, which may be singular: fewer points than nodes.
+  /// R with Rᵀ R = A, which may be singular: fewer points than modes.
   static MatrixXd square_root(const MatrixXd& A) {
     const Eigen::SelfAdjointEigenSolver<MatrixXd> eigen(A);
     return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();
@@ -272,11 +278,15 @@ Block block_of(const Substrate& model, const std::vector<Vec2>& points_um, std::
     std::vector<Index>& columns = is_away ? far_columns : near_columns;
     columns.insert(columns.end(), {column, column + 1});
   }
-  MatrixXf at_nodes = MatrixXf::Zero(2 * kNodes * kNodes, 2 * static_cast<Index>(ellipses.size()));
-  at_nodes(Eigen::all, far_columns) = model.compliance_um_per_nN(nodes_um(square), far).cast<float>();
+  const MatrixXd at_nodes = model.compliance_um_per_nN(nodes_um(square), far);
+  const MatrixXd common = common_modes(at_nodes), weights = interpolation(square, own_um);
+  MatrixXd modes(2 * static_cast<Index>(own_um.size()), common.cols());
+  for (const Index axis : {0, 1}) axis_of(modes, axis) = weights * axis_of(common, axis);
+  MatrixXf shares = MatrixXf::Zero(common.cols(), 2 * static_cast<Index>(ellipses.size()));
+  shares(Eigen::all, far_columns) = transposed_product(common, at_nodes).cast<float>();
   return {.points = std::move(points),
-          .weights = interpolation(square, own_um),
-          .far = std::make_shared<const MatrixXf>(std::move(at_nodes)),
+          .modes = modes.cast<float>(),
+          .far = std::make_shared<const MatrixXf>(std::move(shares)),
           .near_columns = std::make_shared<const std::vector<Index>>(std::move(near_columns)),
           .near = model.compliance_um_per_nN(own_um, near).cast<float>()};
 }
@@ -288,8 +298,8 @@ SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>&
   std::vector<std::vector<Index>> parts;
   std::vector<Index> all(points_um.size());
   std::iota(all.begin(), all.end(), Index{0});
-  // Far parts take 2·nodes numbers a block and column, near ones grow with a block's area: this makes both alike.
-  const double most = 2 * std::sqrt(static_cast<double>(points_um.size()));
+  // Far parts take some 30 numbers a block and column, near ones grow with a block's area: this makes both alike.
+  const double most = 1.5 * std::sqrt(static_cast<double>(points_um.size()));
   if (!all.empty()) split(points_um, std::move(all), static_cast<std::size_t>(most), parts);
   std::vector<Block> blocks;
   for (std::vector<Index>& part : parts) blocks.push_back(block_of(model, points_um, std::move(part), ellipses));
