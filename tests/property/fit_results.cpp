@@ -23,7 +23,7 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
   EXPECT_NEAR(summary.fibre_force_nN + summary.network_force_nN, summary.total_force_nN, 1e-9 * summary.total_force_nN);
 }
 
-TEST(AdhesionForces, are_off_by_their_stated_errors_where_the_cells_network_is_another) {
+TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_another) {
   Cell cell = test::round_cell(14, 24);
   for (const auto& [a, b] : {std::pair{1, 13}, {4, 18}, {7, 22}}) test::add_ventral(cell, a, b);
   double stated = 0, by_beads = 0;
@@ -43,10 +43,8 @@ TEST(AdhesionForces, are_off_by_their_stated_errors_where_the_cells_network_is_a
       by_beads += std::pow(error / fit.force_magnitudes_nN[a].noise, 2);
     }
   }
-  // errors of adhesions differ by far (a variance of two degrees of freedom each): a factor of three for 72 of them
-  EXPECT_LT(stated / n, 3);
-  EXPECT_GT(stated / n, 1.0 / 3);
-  EXPECT_GT(by_beads / n, 10) << "the beads' noise alone must not explain it for this to tell anything";
+  EXPECT_LT(stated / n, 1 + 4 * std::sqrt(2.0 / n));  // as if each told of itself
+  EXPECT_GT(by_beads / n, 2) << "the beads' noise alone must not explain it for this to tell anything";
 }
 
 /// A hexagon of so many edges a side on a regular triangulation, each edge a link of share 1.
