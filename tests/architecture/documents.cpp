@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <regex>
+#include <sstream>
 
 #include "pipeline/contract/files.h"
 #include "tests/support/program.h"
@@ -47,6 +48,33 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "parameters.md", page);
   EXPECT_EQ(read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+}
+
+/// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.
+TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
+  std::istringstream list(read_text(fs::path(MBTFM_SOURCE_DIR) / "tests/mutations.txt"));
+  std::string name, file, old;
+  int n_faults = 0;
+  const auto expect_once = [&] {
+    if (file.empty()) return;
+    ++n_faults;
+    const std::string source = read_text(fs::path(MBTFM_SOURCE_DIR) / file);
+    const auto at = source.find(old);
+    EXPECT_NE(at, source.npos) << name << ": no longer in " << file;
+    if (at != source.npos) EXPECT_EQ(source.find(old, at + 1), source.npos) << name << ": twice in " << file;
+  };
+  for (std::string line; std::getline(list, line);) {
+    if (line.starts_with("fault: ")) {
+      expect_once();
+      name = line.substr(7);
+      file.clear();
+      old.clear();
+    }
+    if (line.starts_with("in: ")) file = line.substr(4);
+    if (line.starts_with("- ")) old += (old.empty() ? "" : "\n") + line.substr(2);
+  }
+  expect_once();
+  EXPECT_GE(n_faults, 60);
 }
 
 /// Each test of tests/stability says what is hard and what must come out, and has its line in the catalogue.
