@@ -89,6 +89,16 @@ void warn_of_tensions(const Study& study, const Measure& tensions, std::vector<s
   }
 }
 
+void warn_of_networks(const Study& study, std::vector<std::string>& warnings) {
+  const auto n = std::count_if(study.cells.begin(), study.cells.end(),
+                               [](const StudyCell& cell) { return !is_network_known(cell); });
+  if (n == 0) return;
+  warnings.push_back(fmt::format(
+      "The network's tension of {} of {} cells could not be identified: how their total force is shared out "
+      "to network and fibres is not known and does not enter, nor does the network's surface tension.",
+      n, study.cells.size()));
+}
+
 /// Tests by observation that no test by cell bears out.
 void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warnings) {
   constexpr double kLevel = 0.05;
@@ -138,6 +148,7 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   a.directions = summarise_directions(study, draws);
   warn_of_few_cells(study, a.warnings);
   warn_of_tensions(study, a.tensions, a.warnings);
+  warn_of_networks(study, a.warnings);
   for (const Measure* m : a.measures()) warn_of_pseudo_replication(*m, a.warnings);
   return a;
 }

@@ -194,9 +194,11 @@ Figure forces_by_cell(const Study& study) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const FitSummary& fit = cells[i]->fit;
     const double left = static_cast<double>(i) + 0.1, right = left + 0.8;
-    const double network = std::clamp(fit.network_force_nN, 0.0, fit.total_force_nN);
+    const bool is_known = is_network_known(*cells[i]);
+    const double network = is_known ? std::clamp(fit.network_force_nN, 0.0, std::max(0.0, fit.total_force_nN)) : 0;
+    const std::string of_network = is_known ? readable(network) + " nN" : "unknown";
     const std::string hover =
-        fmt::format("{}: {} nN, of the network {} nN", cells[i]->name, readable(fit.total_force_nN), readable(network));
+        fmt::format("{}: {} nN, of the network {}", cells[i]->name, readable(fit.total_force_nN), of_network);
     chart.bar({left, network}, {right, fit.total_force_nN}, "fill:" + condition_colour(cells[i]->condition), hover);
     chart.bar({left, 0}, {right, network}, "fill:#c9ccd1", hover);
   }

@@ -56,6 +56,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
   std::map<int, std::pair<double, double>> products;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     if (study.cells[i].condition != condition) continue;
+    if (force.member != &FitSummary::total_force_nN && !is_network_known(study.cells[i])) continue;
     const int cell = static_cast<int>(i);
     c.cells.push_back(cell);
     c.x.push_back(figures_of(study.cells[i]).*size.member);

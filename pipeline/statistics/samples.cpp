@@ -107,8 +107,10 @@ std::vector<Sample> sample_cells(const Study& study) {
   for (const Quantity& q : kQuantities) {
     Sample sample = empty_sample(study, q.column, q.name, q.unit, "cells", {"cell"});
     sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
-    for (std::size_t i = 0; i < study.cells.size(); ++i)
+    for (std::size_t i = 0; i < study.cells.size(); ++i) {
+      if (q.member != &FitSummary::total_force_nN && !is_network_known(study.cells[i])) continue;
       add(sample, study.cells[i], static_cast<int>(i), 0, study.cells[i].fit.*q.member, 0.0);
+    }
     samples.push_back(std::move(sample));
   }
   return samples;

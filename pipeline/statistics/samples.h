@@ -28,7 +28,8 @@ struct Sample {
 Sample sample_tensions(const Study& study);
 Sample sample_adhesion_forces(const Study& study);
 Sample sample_adhesion_areas(const Study& study);
-/// Total, fibre and network force, surface tension of the network: one value a cell.
+/// Total, fibre and network force, surface tension of the network: one value a cell, all but the first of those whose
+/// network's tension is known.
 std::vector<Sample> sample_cells(const Study& study);
 
 /// What a cell's force may depend on.

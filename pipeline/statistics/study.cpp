@@ -165,6 +165,11 @@ std::vector<MeasuredFibre> measured_fibres(const Study& study) {
   return fibres;
 }
 
+bool is_network_known(const StudyCell& cell) {
+  return std::none_of(cell.tensions.begin(), cell.tensions.end(),
+                      [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
+}
+
 std::optional<double> standard_error_nN(const Tension& t) {
   constexpr double kQuantile95 = 1.959964;  // of the normal distribution
   if (!t.high_nN) return std::nullopt;

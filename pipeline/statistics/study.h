@@ -64,6 +64,10 @@ struct MeasuredFibre {
 };
 std::vector<MeasuredFibre> measured_fibres(const Study& study);
 
+/// Whether the network's tension could be identified. Else its share of the total force, the fibres' and its surface
+/// tension are not known either, whatever numbers the fit gives.
+bool is_network_known(const StudyCell& cell);
+
 /// Half the 95 % interval over its quantile: of the upper half, where zero cuts the lower; none without an interval,
 /// or with one of no length.
 std::optional<double> standard_error_nN(const Tension& tension);

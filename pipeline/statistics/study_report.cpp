@@ -105,8 +105,8 @@ Table cells_table(const Study& study) {
   for (const StudyCell& c : study.cells) {
     table.rows.push_back({html_escaped(c.name), html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
                           std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
-                          readable(c.fit.total_force_nN), readable(c.fit.fibre_force_nN),
-                          readable(c.fit.network_force_nN), readable(c.fit.relative_l2),
+                          readable(c.fit.total_force_nN), is_network_known(c) ? readable(c.fit.fibre_force_nN) : "–",
+                          is_network_known(c) ? readable(c.fit.network_force_nN) : "–", readable(c.fit.relative_l2),
                           readable(c.fit.expected_relative_l2), c.fit.converged ? "yes" : "yes, not converged"});
   }
   for (const LeftOutCell& c : study.left_out) {

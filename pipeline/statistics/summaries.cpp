@@ -77,7 +77,7 @@ std::vector<CellWeights> draw_cells(const Study& study, const StudyParameters& p
 }
 
 ModelResult model_of(const Sample& sample) {
-  if (sample.values.empty()) return {.model = {}, .obstacle = "there are no " + sample.each};
+  if (sample.values.empty()) return {.model = {}, .obstacle = "no value is known"};
   if (n_cells_of(sample.values) < 2) return {.model = {}, .obstacle = "there is a single cell"};
   std::vector<int> index(static_cast<std::size_t>(sample.n_conditions() * sample.n_kinds()), -1);
   for (const Observation& o : sample.values) index[static_cast<std::size_t>(o.group)] = 0;

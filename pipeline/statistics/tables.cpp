@@ -49,8 +49,12 @@ std::string cells_csv(const Study& study) {
     csv.add(static_cast<int>(c.cell.adhesions.size())).add(static_cast<int>(c.cell.fibres.size()));
     for (const FibreType type : kFibreTypes) csv.add(n_of[type]);
     csv.add(figures.cell_area_um2).add(figures.adhesion_area_um2);
-    csv.add(c.fit.total_force_nN).add(c.fit.network_force_nN).add(c.fit.fibre_force_nN).add(network_tension);
-    csv.add(c.fit.network_surface_tension_nN_per_um).add(c.fit.relative_l2).add(c.fit.expected_relative_l2);
+    const auto where_known = [&](double value) { return is_network_known(c) ? std::optional(value) : std::nullopt; };
+    csv.add(c.fit.total_force_nN).add(where_known(c.fit.network_force_nN)).add(where_known(c.fit.fibre_force_nN));
+    csv.add(network_tension)
+        .add(where_known(c.fit.network_surface_tension_nN_per_um))
+        .add(c.fit.relative_l2)
+        .add(c.fit.expected_relative_l2);
     csv.add(c.fit.noise_um).add(c.fit.n_meshes).add(c.fit.converged ? 1 : 0);
     csv.end_row();
   }

@@ -21,7 +21,7 @@ struct Lack {
   double share_uncertain = 0;         ///< not identifiable
   double share_of_empty_cells = 0;    ///< without fibres
   bool are_tensions_equal = false, are_adhesions_equal = false, are_adhesions_missing = false;
-  bool are_adhesion_forces_zero = false, are_forces_equal = false, has_directions = false;
+  bool are_adhesion_forces_zero = false, are_forces_equal = false, are_networks_unknown = false, has_directions = false;
 
   std::string str() const {
     std::ostringstream text;
@@ -30,7 +30,8 @@ struct Lack {
          << ", without interval " << share_without_interval << ", uncertain " << share_uncertain << ", empty "
          << share_of_empty_cells << ", equal: tensions " << are_tensions_equal << " adhesions " << are_adhesions_equal
          << " forces " << are_forces_equal << ", adhesions missing " << are_adhesions_missing << " zero "
-         << are_adhesion_forces_zero << ", directions " << has_directions;
+         << are_adhesion_forces_zero << ", directions " << has_directions << ", networks unknown "
+         << are_networks_unknown;
     return text.str();
   }
 };
@@ -57,6 +58,7 @@ inline Lack drawn_lack(std::uint64_t seed) {
   lack.are_adhesion_forces_zero = once_in(10);
   lack.are_forces_equal = once_in(4);
   lack.has_directions = once_in(2);
+  lack.are_networks_unknown = once_in(4);
   return lack;
 }
 
@@ -78,7 +80,10 @@ inline statistics::Study small_study(const Lack& lack, std::uint64_t seed) {
       cell.tensions.resize(1);
     }
     for (Tension& t : cell.tensions) {
-      if (t.fibre_id == 0) continue;
+      if (t.fibre_id == 0) {
+        t.identifiable = !lack.are_networks_unknown;
+        continue;
+      }
       if (lack.are_tensions_equal) t = {.fibre_id = t.fibre_id, .tension_nN = 3, .low_nN = 3, .high_nN = 3};
       const double half = t.high_nN ? *t.high_nN - t.tension_nN : 0;
       t.tension_nN = std::max(0.0, t.tension_nN);

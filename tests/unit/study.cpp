@@ -106,6 +106,24 @@ TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
                           [](const std::string& w) { return w.find("could not be identified") != w.npos; }));
 }
 
+/// A cell whose fibres and network pull the same adhesions: the fit's share of the network may be anything.
+TEST(Study, forces_of_a_network_that_cannot_be_identified_do_not_enter) {
+  Study study = test::simulated_study({.n_cells = 4});
+  study.cells[0].tensions[0].identifiable = false;
+  study.cells[0].fit.network_force_nN = 3e5;
+  study.cells[0].fit.fibre_force_nN = -3e5;
+  const Analysis analysis = analyse(study, {.bootstrap_draws = 100});
+  for (const Measure& m : analysis.cells)
+    EXPECT_EQ(m.sample.values.size(), m.sample.column == "total_force_nN" ? 4u : 3u) << m.sample.column;
+  for (const Correlation& c : analysis.correlations)
+    EXPECT_EQ(c.line.n, c.force == "total_force_nN" ? 4 : 3) << c.force;
+  const CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
+  EXPECT_FALSE(cells.optional_number(0, "network_force_nN"));
+  EXPECT_TRUE(cells.optional_number(1, "network_force_nN"));
+  EXPECT_TRUE(std::any_of(analysis.warnings.begin(), analysis.warnings.end(),
+                          [](const std::string& w) { return w.find("network's tension of 1 of 4 cells") != w.npos; }));
+}
+
 TEST(Study, the_error_of_a_tension_is_that_of_the_side_zero_does_not_cut) {
   EXPECT_NEAR(*standard_error_nN({.tension_nN = 4, .low_nN = 2, .high_nN = 6}), 4 / (2 * 1.96), 1e-4);
   EXPECT_NEAR(*standard_error_nN({.tension_nN = 1, .low_nN = 0, .high_nN = 5}), 4 / 1.96, 1e-3);
