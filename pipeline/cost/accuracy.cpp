@@ -90,7 +90,8 @@ AccuracyOutcome reach_accuracy(double wanted, const std::function<ErrorBudget(co
 
 void record_accuracy(const std::filesystem::path& cell, double wanted, const AccuracyOutcome& outcome) {
   const std::filesystem::path file = cell / "run.json";
-  nlohmann::ordered_json run = JsonRecord(file, "a run.json of mbtfm run", "run the cell again: mbtfm run").json();
+  nlohmann::ordered_json run =
+      JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run").json();
   const RelativeError& e = outcome.reached;
   run["accuracy"] = {{"wanted", wanted},
                      {"reached", e.total},

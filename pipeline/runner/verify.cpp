@@ -29,7 +29,7 @@ struct KnownFile {
 JsonRecord open_run_json(const fs::path& file) {
   if (!is_file(file))
     throw InputError(file.string(), "a run.json of mbtfm run", "none", "run the cell first: mbtfm run");
-  return JsonRecord(file, "a run.json of mbtfm run", "run the cell again: mbtfm run");
+  return JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run");
 }
 
 /// A stage's record lists files relative to its folder; of what the user gave, a hash by path in the cell folder.

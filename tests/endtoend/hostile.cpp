@@ -415,15 +415,15 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
     EXPECT_EQ(batch.code, way.codes.batch) << batch.output;
     const Outcome run = mbtfm("run --quiet " + cell);
     EXPECT_EQ(run.code, way.codes.run) << run.output;
-    const Outcome table = mbtfm("batch --table " + study);
-    EXPECT_EQ(table.code, way.codes.batch) << table.output;
     if (way.codes.stats) {
       const Outcome stats = test::run_program("mbtfm stats " + study + " --bootstrap_draws 100", "timeout -k 5 60 ");
       EXPECT_EQ(stats.code, *way.codes.stats) << stats.output;
     }
-    for (const Outcome* outcome : {&batch, &list, &table})
-      EXPECT_NE(outcome->output.find(way.is_said), std::string::npos) << outcome->output;
     if (!way.is_said.empty()) {
+      const Outcome table = mbtfm("batch --table " + study);
+      EXPECT_EQ(table.code, way.codes.batch) << table.output;
+      for (const Outcome* outcome : {&batch, &list, &table})
+        EXPECT_NE(outcome->output.find(way.is_said), std::string::npos) << outcome->output;
       const std::string left_out = fs::path(way.is_said).filename().string();
       EXPECT_NE(read_text(scene.study() / "statistics/cells.csv").find(left_out), std::string::npos);
     }

@@ -41,7 +41,7 @@ void collect(const ordered_json& json, const ordered_json::json_pointer& at,
 /// library.
 const std::vector<std::string>& replacements() {
   static const std::vector<std::string> list = {
-      "null", "true", "-7", "1e308", "18446744073709551615", "\"../../../outside\"", "[1, 2]", "{\"a\": 1}"};
+      "null", "true", "-7", "\"../../../outside\"", "1e308", "[1, 2]", "18446744073709551615", "{\"a\": 1}"};
   return list;
 }
 
@@ -119,12 +119,13 @@ class RecordsOfCells : public testing::Test {
       changed[place] = kMark;
       const std::string text = changed.dump();
       const auto at = text.find('"' + std::string(kMark) + '"');
-      for (const std::string& other : replacements()) {
+      for (std::size_t k = 0; k < replacements().size(); ++k) {
+        const std::string& other = replacements()[k];
         write_text(cell_ / file, std::string(text).replace(at, std::string(kMark).size() + 2, other));
-        const std::string what = file + " with " + place.to_string() + " = " + other.substr(0, 30);
+        const std::string what = file + " with " + place.to_string() + " = " + other;
         read_all(what);
-        rewrite_all(what);
-        if (HasFailure()) return;  // one says it
+        if (k % 3 == 0) rewrite_all(what);  // null, a name, a number too large: the slower of the two
+        if (HasFailure()) return;           // one says it
       }
     }
     write_text(cell_ / file, whole);
