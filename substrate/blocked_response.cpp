@@ -139,7 +139,7 @@ class Blocked final : public Response {
   }
 
   /// With M the modes, F and N the far and the near part: Fᵀ (Mᵀ W M) F + Fᵀ (Mᵀ W N) + … + Nᵀ W N. The first takes
-  /// nearly all the time: as squares of (Mᵀ W M)^½ F, many blocks at once.
+  /// nearly all the time: as squares of (Mᵀ W M)^½ F, some blocks at once.
   MatrixXd upper_gram(const VectorXd& weight) const override {
     struct Part {
       MatrixXd root_far;  ///< (Mᵀ W M)^½ F
@@ -147,7 +147,7 @@ class Blocked final : public Response {
       MatrixXd own;       ///< Nᵀ W N
     };
     MatrixXd square = MatrixXd::Zero(n_columns_, n_columns_);
-    constexpr std::size_t kAtOnce = 32;
+    constexpr std::size_t kAtOnce = 8;
     for (std::size_t begin = 0; begin < blocks_.size(); begin += kAtOnce) {
       std::vector<Part> parts(std::min(kAtOnce, blocks_.size() - begin));
       parallel_for(static_cast<int>(parts.size()), threads_, [&](int i) {
@@ -172,6 +172,7 @@ class Blocked final : public Response {
       for (std::size_t i = 0; i < parts.size(); ++i)
         add_near(*blocks_[begin + i].near_columns, parts[i].mixed, parts[i].own, square);
     }
+    fold_up(square);
     return square;
   }
 
@@ -215,18 +216,20 @@ class Blocked final : public Response {
     return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();
   }
 
-  /// square += M Eᵀ + E Mᵀ + E O Eᵀ on and above the diagonal, E picking the near columns.
+  /// square += M Eᵀ + E Mᵀ + E O Eᵀ, E picking the near columns. Column by column, as memory lies: what belongs above the
+  /// diagonal of another column waits below that of its own, until fold_up().
   static void add_near(const std::vector<Index>& near, const MatrixXd& mixed, const MatrixXd& own, MatrixXd& square) {
     for (std::size_t c = 0; c < near.size(); ++c) {
-      const Index column = near[c];
-      for (Index row = 0; row < mixed.rows(); ++row) {
-        const double value = mixed(row, static_cast<Index>(c));  // of (row, column) and of (column, row)
-        if (row <= column) square(row, column) += value;
-        if (row >= column) square(column, row) += value;
-      }
+      const Index column = near[c], at = static_cast<Index>(c);
+      square.col(column) += mixed.col(at);
+      square(column, column) += mixed(column, at);
       for (std::size_t r = 0; r <= c; ++r)  // the near columns ascend
-        square(near[r], column) += own(static_cast<Index>(r), static_cast<Index>(c));
+        square(near[r], column) += own(static_cast<Index>(r), at);
     }
+  }
+  static void fold_up(MatrixXd& square) {
+    for (Index column = 0; column < square.cols(); ++column)
+      for (Index row = 0; row < column; ++row) square(row, column) += square(column, row);
   }
 
   Index n_points_, n_columns_;

@@ -12,6 +12,7 @@
 #include "mbtfm/traction.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/dense.h"
 #include "samples/experiment.h"
 #include "tests/support/chart.h"
 #include "tests/support/tension_scene.h"

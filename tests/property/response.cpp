@@ -55,12 +55,13 @@ class BlockedResponse : public testing::TestWithParam<std::pair<const char*, dou
 };
 
 // Trefethen (2013), theorem 8.2: 4 M rho^-n / (rho − 1) with rho = 3 + 2 sqrt(2), n = 6 and M, the largest value in the
-// complex ellipse half-way to the source, some twice the field (a layer's falls faster: four times): up to 8e-5, for the
+// complex ellipse half-way to the source, some twice the field (a thin layer's falls faster: four times), and what the
+// common modes leave out: up to 1e-4, for the
 // ellipses nearest to a far square.
 TEST_P(BlockedResponse, every_ellipse_s_field_is_the_exact_one_but_for_the_far_field_s_interpolation) {
   const MatrixXd G = whole(*blocked);
   for (Index column = 0; column < G.cols(); ++column)
-    EXPECT_LE((G - exact).col(column).norm(), 8e-5 * exact.col(column).norm()) << column;
+    EXPECT_LE((G - exact).col(column).norm(), 1e-4 * exact.col(column).norm()) << column;
 }
 
 TEST_P(BlockedResponse, pulling_back_is_the_transpose_of_displacing) {
