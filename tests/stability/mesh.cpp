@@ -55,7 +55,8 @@ TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_i
 TEST(HardMesh, rims_too_fine_for_memory_are_refused_before_they_are_filled) {
   test::hard_case("rims finer than a molecule in a coarse mesh", "refused with the number of vertices");
   // edges of a nanometre all over 400 um2: some 1e9 vertices, though an even mesh of edge_length_um has 200
-  EXPECT_THROW(generate_network(square_cell(), {.edge_growth = 1e-7, .rim_points = 5000}), OutOfMemory);
+  EXPECT_THROW(generate_network(square_cell(), {.edge_growth = 1e-7, .adhesion_anchor = "rim", .rim_points = 5000}),
+               OutOfMemory);
 }
 
 TEST(HardMesh, crossing_fibres_share_a_vertex) {
