@@ -26,8 +26,9 @@ for family in "${families[@]}"; do
     cmake --build $build --target "fuzzer_$family"
     export MBTFM_FUZZ_CORPUS=$build/tests/corpus-$family
     mkdir -p "$MBTFM_FUZZ_CORPUS"
-    # libFuzzer reads its corpus after the target has put the samples there
-    "$build/tests/fuzzer_$family" -runs="$inputs" -timeout=5 -malloc_limit_mb=1024 -rss_limit_mb=2048 -max_len=131072 \
+    # libFuzzer reads its corpus after the target has put the samples there. Its clock is the wall's: on a busy machine
+    # an input of a millisecond waits 5 s for the processor. Inputs above 5 s are told and kept, above 60 s they fail.
+    "$build/tests/fuzzer_$family" -runs="$inputs" -timeout=60 -report_slow_units=5 -malloc_limit_mb=1024 -rss_limit_mb=2048 -max_len=131072 \
       -print_final_stats=1 -verbosity=0 -artifact_prefix="$build/tests/$family-" "$MBTFM_FUZZ_CORPUS" || failed+=("$family")
   else
     cmake --build $build --target "fuzz_read_$family"
