@@ -30,8 +30,8 @@ constexpr double kLetGo = 0.01;
 // Of the largest tension: a fibre below this may hang loose in a minimum that the taut one's is lower than.
 constexpr double kSlack = 0.05;
 
-// Of the variance of one component, in 2 Phi: a thirtieth of a standard error, along one direction of them all.
-constexpr double kNegligible = 1e-3;
+// Of the variance of one component, in 2 Phi, by tension: a thirtieth of a standard error along one direction of twenty.
+constexpr double kNegligible = 5e-5;
 // Steps that together must lower Phi by more than that.
 constexpr std::size_t kLastSteps = 3;
 // Of the data, left unexplained: less than any experiment leaves.
@@ -42,9 +42,10 @@ constexpr double kFirstRefusal = 0.3;
 /// What no bead could tell, in Phi; nor exact beads, as forces are known to some 1e-10.
 double negligible(const TensionProblem& problem, double objective) {
   constexpr double kRounding = 1e-20;
+  const double part = kNegligible * problem.n_tensions();
   const ReducedData& data = problem.data();
   const double whole = objective + 0.5 * data.floor_squared;
-  return std::max(kNegligible * whole / static_cast<double>(std::max<Eigen::Index>(1, data.n_components)),
+  return std::max(part * whole / static_cast<double>(std::max<Eigen::Index>(1, data.n_components)),
                   kRounding * data.target.squaredNorm());
 }
 
