@@ -153,7 +153,7 @@ inline SceneOutcome run_scene(const RandomScene& scene, const std::filesystem::p
   if (made.code != 0) return {.faults = {"a simulation"}, .message = made.output};
   write_text(cell / "cell.toml", read_text(cell / "cell.toml") + scene.settings);
   const Outcome run = run_program("mbtfm run " + cell.string(), before);
-  if (run.code == exit_code::kInput || run.code == exit_code::kNotSolved) {
+  if (run.code == exit_code::kInput || run.code == exit_code::kNotSolved || run.code == exit_code::kNoAnswer) {
     // poor images may be refused; adhesions, fibres and displacements of a cell as it was drawn may not
     std::vector<std::string> faults;
     if (!scene.has_images) faults.push_back("an answer where adhesions, fibres and displacements are given");
