@@ -3,6 +3,7 @@
 #include <numbers>
 
 #include <gtest/gtest.h>
+#include <sys/resource.h>
 
 #include "network/adhesions.h"
 #include "pipeline/contract/errors.h"
@@ -54,9 +55,15 @@ TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_i
 
 TEST(HardMesh, rims_too_fine_for_memory_are_refused_before_they_are_filled) {
   test::hard_case("rims finer than a molecule in a coarse mesh", "refused with the number of vertices");
-  // edges of a nanometre all over 400 um2: some 1e9 vertices, though an even mesh of edge_length_um has 200
-  EXPECT_THROW(generate_network(square_cell(), {.edge_growth = 1e-7, .adhesion_anchor = "rim", .rim_points = 5000}),
+  // edges of some 12 nm all over 400 um2: 3e6 vertices and 6 GB, though an even mesh of edge_length_um has 200
+  rlimit before{};
+  getrlimit(RLIMIT_AS, &before);
+  rlimit small = before;
+  small.rlim_cur = rlim_t{2} << 30;
+  setrlimit(RLIMIT_AS, &small);
+  EXPECT_THROW(generate_network(square_cell(), {.edge_growth = 1e-7, .adhesion_anchor = "rim", .rim_points = 200}),
                OutOfMemory);
+  setrlimit(RLIMIT_AS, &before);
 }
 
 TEST(HardMesh, crossing_fibres_share_a_vertex) {
