@@ -159,9 +159,8 @@ std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
     }
     const Eigen::MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
     const auto of_mesh = [&](const MeshFit& mesh) {
-      return Quantities{
-          own.transpose() * mesh.fit.trial.forces_nN.segment(2 * first, 2 * count),
-          transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
+      return Quantities{own.transpose() * mesh.fit.trial.forces_nN.segment(2 * first, 2 * count),
+                        transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
     };
     for (const Estimate& magnitude : estimates_of(all, of_mesh, along)) magnitudes.push_back(magnitude);
   }

@@ -197,8 +197,8 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
                        const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
                        const FitParameters& p, bool is_coupled, StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
-      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p,
-      is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
+      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, is_coupled,
+      context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
       next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);

@@ -30,7 +30,8 @@ constexpr double kLetGo = 0.01;
 // Of the largest tension: a fibre below this may hang loose in a minimum that the taut one's is lower than.
 constexpr double kSlack = 0.05;
 
-// Of the variance of one component, in 2 Phi, by tension: a thirtieth of a standard error along one direction of twenty.
+// Of the variance of one component, in 2 Phi, by tension: a thirtieth of a standard error along one direction of
+// twenty.
 constexpr double kNegligible = 5e-5;
 // Steps that together must lower Phi by more than that.
 constexpr std::size_t kLastSteps = 3;

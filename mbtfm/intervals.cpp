@@ -125,9 +125,7 @@ bool is_unbounded(const LocalMisfit& local, const Eigen::MatrixXd& K, int i, dou
 }  // namespace
 
 LocalMisfit local_misfit(const Trial& trial, const Eigen::MatrixXd& jacobian) {
-  return {.tensions_nN = trial.tensions_nN,
-          .H = gram(jacobian),
-          .g = jacobian.transpose() * trial.residual};
+  return {.tensions_nN = trial.tensions_nN, .H = gram(jacobian), .g = jacobian.transpose() * trial.residual};
 }
 
 Eigen::MatrixXd response_of(const LocalMisfit& local, double variance) {

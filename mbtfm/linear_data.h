@@ -30,8 +30,8 @@ struct LinearData {
   Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::Index n_used = 0;             ///< components of the beads that are used
-  bool has_errors = false;  ///< the beads state their sigma; without, W is 1 and the misfit tells the error
-  ReducedData reduced;      ///< of all that, bead_weight included
+  bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  ReducedData reduced;                 ///< of all that, bead_weight included
 };
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all

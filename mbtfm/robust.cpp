@@ -96,7 +96,7 @@ Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& r
 TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network, const std::vector<int>& adhesion_ids,
                          const FitParameters& parameters, int threads, TensionFit fit, const std::string& loss,
                          std::optional<double> fixed_scale) {
-  constexpr int kMaxRounds = 20;    // each halves the change at least
+  constexpr int kMaxRounds = 20;      // each halves the change at least
   constexpr double kSettled = 0.022;  // of a standard error, mean over the directions: a tenth along one of twenty
   for (int round = 0; round < kMaxRounds; ++round) {
     const Trial last = fit.trial;

@@ -35,7 +35,7 @@ struct Responses {
 /// @param frames  may be none
 /// @param response  by beads
 Responses responses_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
-                           const std::function<substrate::SharedResponse(const DisplacementField&)>& response);
+                       const std::function<substrate::SharedResponse(const DisplacementField&)>& response);
 
 /// What came of a frame.
 struct FrameFit {

@@ -83,8 +83,8 @@ class CableNetwork {
   /// dR/dt = −(B_x − H_xf H_ff⁻¹ B_f), H = d²U/dx², B = d²U/dx dt. At a tension of zero: the derivative from above;
   /// with all tensions zero: the elastic response of the network at rest.
   /// A column without entries belongs to a group whose tension only takes the place of its cables' stretch.
-  Eigen::MatrixXd adhesion_force_derivatives(const std::vector<double>& tensions_nN,
-                                             const Equilibrium& equilibrium, int threads = 1) const;
+  Eigen::MatrixXd adhesion_force_derivatives(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium,
+                                             int threads = 1) const;
   /// The same by held vertex: rows 2i, 2i+1 are the force on held_vertices()[i]. Moments of an adhesion follow from it.
   Eigen::MatrixXd reaction_derivatives(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium,
                                        int threads = 1) const;

@@ -44,8 +44,7 @@ std::array<double, kNodes> polynomials(double t) {
   std::array<double, kNodes> values{};
   for (int k = 0; k < kNodes; ++k) {
     double sum = 0.5;
-    for (int m = 1; m < kNodes; ++m)
-      sum += std::cos(m * angle) * std::cos(m * std::numbers::pi * (k + 0.5) / kNodes);
+    for (int m = 1; m < kNodes; ++m) sum += std::cos(m * angle) * std::cos(m * std::numbers::pi * (k + 0.5) / kNodes);
     values[static_cast<std::size_t>(k)] = 2 * sum / kNodes;
   }
   return values;
@@ -72,11 +71,11 @@ bool is_far(const Square& square, const Ellipse& ellipse) {
 
 /// The points of a square and what acts on them. Single precision: 6e-8 of numbers that are right to 1e-5.
 struct Block {
-  std::vector<Index> points;               ///< of all
-  MatrixXf modes;                          ///< 2·points × modes: the fields that far ellipses have in common …
-  std::shared_ptr<const MatrixXf> far;     ///< modes × 2·ellipses: … and how much of each; zero for those near
+  std::vector<Index> points;            ///< of all
+  MatrixXf modes;                       ///< 2·points × modes: the fields that far ellipses have in common …
+  std::shared_ptr<const MatrixXf> far;  ///< modes × 2·ellipses: … and how much of each; zero for those near
   std::shared_ptr<const std::vector<Index>> near_columns;
-  MatrixXf near;                           ///< 2·points × near columns
+  MatrixXf near;  ///< 2·points × near columns
 };
 
 /// Every second row from `first` on.
@@ -84,8 +83,8 @@ template <class Matrix>
 auto axis_of(Matrix& matrix, Index first) {
   using Plain =
       std::conditional_t<std::is_const_v<Matrix>, const typename Matrix::PlainObject, typename Matrix::PlainObject>;
-  return Eigen::Map<Plain, 0, Eigen::Stride<Eigen::Dynamic, 2>>(
-      matrix.data() + first, matrix.rows() / 2, matrix.cols(), Eigen::Stride<Eigen::Dynamic, 2>(matrix.rows(), 2));
+  return Eigen::Map<Plain, 0, Eigen::Stride<Eigen::Dynamic, 2>>(matrix.data() + first, matrix.rows() / 2, matrix.cols(),
+                                                                Eigen::Stride<Eigen::Dynamic, 2>(matrix.rows(), 2));
 }
 
 /// The fewest directions at the nodes that have all but a hundred thousandth of these fields: 2·nodes × some.
@@ -216,8 +215,8 @@ class Blocked final : public Response {
     return eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.eigenvectors().transpose();
   }
 
-  /// square += M Eᵀ + E Mᵀ + E O Eᵀ, E picking the near columns. Column by column, as memory lies: what belongs above the
-  /// diagonal of another column waits below that of its own, until fold_up().
+  /// square += M Eᵀ + E Mᵀ + E O Eᵀ, E picking the near columns. Column by column, as memory lies: what belongs above
+  /// the diagonal of another column waits below that of its own, until fold_up().
   static void add_near(const std::vector<Index>& near, const MatrixXd& mixed, const MatrixXd& own, MatrixXd& square) {
     for (std::size_t c = 0; c < near.size(); ++c) {
       const Index column = near[c], at = static_cast<Index>(c);

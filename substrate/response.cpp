@@ -58,8 +58,7 @@ class LessAMode final : public Response {
     const VectorXd weighted = weight.cwiseProduct(mode_);
     const VectorXd pulled = whole_->pull_back(weighted);
     const MatrixXd mixed = pulled * share_.transpose();
-    return whole_->upper_gram(weight) - mixed - mixed.transpose() +
-           weighted.dot(mode_) * share_ * share_.transpose();
+    return whole_->upper_gram(weight) - mixed - mixed.transpose() + weighted.dot(mode_) * share_ * share_.transpose();
   }
   SharedResponse at_points(const std::vector<Index>& points) const override {
     std::vector<Index> rows;

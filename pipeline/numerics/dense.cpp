@@ -31,8 +31,7 @@ constexpr int kStrip = 128;  // columns that one thread takes at a time: enough 
 template <class Body>
 void over_strips(Eigen::Index n_columns, int threads, const Body& body) {
   const int n = static_cast<int>(n_columns);
-  parallel_for((n + kStrip - 1) / kStrip, threads,
-               [&](int s) { body(s * kStrip, std::min(kStrip, n - s * kStrip)); });
+  parallel_for((n + kStrip - 1) / kStrip, threads, [&](int s) { body(s * kStrip, std::min(kStrip, n - s * kStrip)); });
 }
 
 MatrixXd general_product(char transpose_a, const MatrixXd& A, const MatrixXd& B, int threads) {

@@ -127,8 +127,7 @@ std::map<std::string, fs::path> images_in(const JsonRecord& run, const fs::path&
   std::map<std::string, fs::path> images;
   const auto list = run.find("images");
   if (!list) return images;
-  for (const auto& [key, file] : list->members())
-    images[key] = file_shown_as(inputs, file.text()).lexically_normal();
+  for (const auto& [key, file] : list->members()) images[key] = file_shown_as(inputs, file.text()).lexically_normal();
   return images;
 }
 

@@ -157,8 +157,8 @@ void compare_series(int n) {
   const inverse::Trial start = inverse::uniform_start({networks.front(), scene.data.reduced, scene.adhesion_ids});
   const auto off = [&] {
     const Effect coupling = inverse::decide_time_coupling(true, "off");
-    inverse::fit_series(frames, networks, substrate::dense_response(scene.compliance_um_per_nN), {}, scene.adhesion_ids, parameters,
-                        coupling.is_on, 1, {}, start);
+    inverse::fit_series(frames, networks, substrate::dense_response(scene.compliance_um_per_nN), {}, scene.adhesion_ids,
+                        parameters, coupling.is_on, 1, {}, start);
   };
   const auto one_by_one = [&] {
     for (const inverse::SeriesFrame& frame : frames) {

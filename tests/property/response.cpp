@@ -30,7 +30,8 @@ Scene uneven_scene() {
   for (int i = 0; i < 150; ++i) s.points.push_back({between(0, 10), between(0, 5)});
   for (int j = 0; j < 30; ++j) {
     const double semi_major = between(0.2, 3);
-    s.ellipses.push_back({{between(-20, 120), between(-20, 100)}, semi_major, semi_major * between(0.2, 1), between(0, 3)});
+    s.ellipses.push_back(
+        {{between(-20, 120), between(-20, 100)}, semi_major, semi_major * between(0.2, 1), between(0, 3)});
   }
   return s;
 }
@@ -40,10 +41,13 @@ MatrixXd random_columns(Index rows, Index columns, unsigned seed) {
   return MatrixXd::Random(rows, columns);
 }
 
-MatrixXd whole(const Response& response) { return response.displace(MatrixXd::Identity(response.cols(), response.cols())); }
+MatrixXd whole(const Response& response) {
+  return response.displace(MatrixXd::Identity(response.cols(), response.cols()));
+}
 
 std::unique_ptr<Substrate> gel(const std::string& model, double thickness_um) {
-  return make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = thickness_um}, {.model = model}, 2);
+  return make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = thickness_um}, {.model = model},
+                     2);
 }
 
 class BlockedResponse : public testing::TestWithParam<std::pair<const char*, double>> {
@@ -99,7 +103,8 @@ TEST_P(BlockedResponse, the_bits_are_the_same_for_any_number_of_threads) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Gels, BlockedResponse,
-                         testing::Values(std::pair{"half-space", 60.0}, std::pair{"layer", 60.0}, std::pair{"layer", 10.0}));
+                         testing::Values(std::pair{"half-space", 60.0}, std::pair{"layer", 60.0},
+                                         std::pair{"layer", 10.0}));
 
 TEST(Response, blocks_of_one_point_and_of_many_at_one_place_are_exact) {
   const auto model = gel("layer", 30);
