@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -12,6 +13,7 @@
 #include "network/planar.h"
 #include "network/polyline.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
 
 namespace mbtfm::network {
 namespace {
@@ -54,6 +56,7 @@ class Builder {
 
   Frame build() {
     refine_where_wanted();
+    expect_room_for_mesh(frame_.size, boundary_);
     add_adhesions();
     for (const Fibre& fibre : cell_.fibres) add_fibre(fibre);
     if (has_rims()) add_rims();
@@ -373,6 +376,36 @@ class Builder {
 };
 
 }  // namespace
+
+double area_of_vertex_um2(double edge_um) { return 0.5 * std::numbers::sqrt3 * edge_um * edge_um; }
+
+void expect_room_for_vertices(double count) {
+  constexpr double kBytes = 1000;  // measured: 1.2 kB of 35 000, 1.0 of 316 000
+  expect_room_for({.what = "the network's mesh",
+                   .count = count,
+                   .parts = "vertices",
+                   .bytes_each = kBytes,
+                   .remedy = "choose a larger edge_length_um (a cell has some thousand vertices as a rule)"});
+}
+
+void expect_room_for_mesh(const SizeField& size, const Boundary& boundary) {
+  const Polygon& outline = boundary.rings().front().polygon();
+  Vec2 low = outline.front(), high = low;
+  for (const Vec2 p : outline) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  // the integral of the vertices' density, by its values at the centres of squares
+  constexpr double kSquares = 1e4;
+  const double step = std::sqrt((high.x - low.x) * (high.y - low.y) / kSquares);
+  double count = 0;
+  for (double y = low.y + 0.5 * step; y < high.y; y += step) {
+    for (double x = low.x + 0.5 * step; x < high.x; x += step) {
+      if (boundary.is_within_outline({x, y})) count += step * step / area_of_vertex_um2(size.at({x, y}));
+    }
+  }
+  expect_room_for_vertices(count);
+}
 
 Frame build_frame(const Cell& cell, const Boundary& boundary, const NetworkParameters& parameters, Random& random) {
   return Builder(cell, boundary, parameters, random).build();

@@ -34,7 +34,15 @@ struct Frame {
   bool slides(int vertex) const { return ring[vertex] >= 0; }
 };
 
-/// @throws InvalidData where an adhesion lies further than an edge length outside the cell, or all of a fibre does
+/// That a vertex of an even triangular mesh has to itself.
+double area_of_vertex_um2(double edge_um);
+/// @throws OutOfMemory where a mesh of so many vertices takes more memory than there is
+void expect_room_for_vertices(double count);
+/// The same for those that the wanted edge lengths ask for inside the outline.
+void expect_room_for_mesh(const SizeField& size, const Boundary& boundary);
+
+/// @throws OutOfMemory, and InvalidData where an adhesion lies further than an edge length outside the cell, or all of
+/// a fibre does
 Frame build_frame(const Cell& cell, const Boundary& boundary, const NetworkParameters& parameters, Random& random);
 
 }  // namespace mbtfm::network

@@ -104,7 +104,7 @@ void measure_quality(const RelaxedMesh& mesh, int n_of_frame, GeneratedNetwork& 
 }
 
 /// Before any vertex is made: those that an even mesh of the cell takes are the fewest.
-void expect_room_for_mesh(const Cell& cell, const NetworkParameters& parameters) {
+void expect_room_for_even_mesh(const Cell& cell, const NetworkParameters& parameters) {
   double area_um2 = std::abs(signed_area_um2(cell.outline_um));
   for (const Polygon& hole : cell.holes_um) area_um2 -= std::abs(signed_area_um2(hole));
   expect_room_for_vertices(area_um2 / area_of_vertex_um2(parameters.edge_length_um));
@@ -138,7 +138,7 @@ void declare(ParameterList& list, NetworkParameters& parameters) {
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {
   check(cell);
-  expect_room_for_mesh(cell, parameters);
+  expect_room_for_even_mesh(cell, parameters);
   Random random(parameters.seed);
   const Boundary boundary(cell, parameters.edge_length_um);
   const Frame frame = build_frame(cell, boundary, parameters, random);

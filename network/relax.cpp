@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <numeric>
 #include <utility>
 
@@ -10,7 +9,6 @@
 #include "network/moving_mesh.h"
 #include "network/seeds.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/memory.h"
 
 namespace mbtfm::network {
 namespace {
@@ -317,41 +315,11 @@ class Relaxation {
   std::vector<Vec2> last_move_um_;
 };
 
-/// The integral of the density of vertices that the size field asks for, by its values at the centres of squares.
-double n_vertices_wanted(const Frame& frame, const Boundary& boundary) {
-  Vec2 low = frame.points_um.front(), high = low;
-  for (const Vec2 p : frame.points_um) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-  }
-  constexpr double kSquares = 1e4;
-  const double step = std::sqrt((high.x - low.x) * (high.y - low.y) / kSquares);
-  double count = 0;
-  for (double y = low.y + 0.5 * step; y < high.y; y += step) {
-    for (double x = low.x + 0.5 * step; x < high.x; x += step) {
-      if (!boundary.is_within_outline({x, y})) continue;
-      count += step * step / area_of_vertex_um2(frame.size.at({x, y}));
-    }
-  }
-  return count;
-}
-
 }  // namespace
-
-double area_of_vertex_um2(double edge_um) { return 0.5 * std::numbers::sqrt3 * edge_um * edge_um; }
-
-void expect_room_for_vertices(double count) {
-  constexpr double kBytes = 1000;  // measured: 1.2 kB of 35 000, 1.0 of 316 000
-  expect_room_for({.what = "the network's mesh",
-                   .count = count,
-                   .parts = "vertices",
-                   .bytes_each = kBytes,
-                   .remedy = "choose a larger edge_length_um (a cell has some thousand vertices as a rule)"});
-}
 
 RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, const std::string& seeds, Random& random) {
   refine_where_lines_are_close(frame);
-  expect_room_for_vertices(n_vertices_wanted(frame, boundary));
+  expect_room_for_mesh(frame.size, boundary);
   std::vector<Vec2> points = frame.points_um;
   const std::vector<Vec2> inner = places_of_seeds(frame, seeds, random);
   points.insert(points.end(), inner.begin(), inner.end());

@@ -17,11 +17,6 @@ struct RelaxedMesh {
   Report report;
 };
 
-/// That a vertex of an even triangular mesh has to itself.
-double area_of_vertex_um2(double edge_um);
-/// @throws OutOfMemory where a mesh of so many vertices takes more memory than there is
-void expect_room_for_vertices(double count);
-
 /// Fill the frame with vertices and relax them: in turns, each vertex goes to the centroid of its triangles, weighted
 /// by area over h², and edges flip to a constrained Delaunay triangulation. This lowers an energy in each half step and
 /// comes to rest within tens of sweeps, where distmesh's springs wander on. The frame's vertices stay, but those that

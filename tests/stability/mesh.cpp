@@ -3,9 +3,9 @@
 #include <numbers>
 
 #include <gtest/gtest.h>
-#include <sys/resource.h>
 
 #include "network/adhesions.h"
+#include "network/frame.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/hard_cells.h"
@@ -53,17 +53,12 @@ TEST(HardMesh, one_that_memory_cannot_hold_is_refused_with_its_count_before_it_i
   }
 }
 
-TEST(HardMesh, rims_too_fine_for_memory_are_refused_before_they_are_filled) {
-  test::hard_case("rims finer than a molecule in a coarse mesh", "refused with the number of vertices");
-  // edges of some 12 nm all over 400 um2: 3e6 vertices and 6 GB, though an even mesh of edge_length_um has 200
-  rlimit before{};
-  getrlimit(RLIMIT_AS, &before);
-  rlimit small = before;
-  small.rlim_cur = rlim_t{2} << 30;
-  setrlimit(RLIMIT_AS, &small);
-  EXPECT_THROW(generate_network(square_cell(), {.edge_growth = 1e-7, .adhesion_anchor = "rim", .rim_points = 200}),
-               OutOfMemory);
-  setrlimit(RLIMIT_AS, &before);
+TEST(HardMesh, edges_too_fine_for_memory_are_refused_before_they_are_filled) {
+  test::hard_case("edge lengths that fall to a tenth of a nanometre", "refused with the number of vertices");
+  const Cell cell = square_cell();
+  SizeField size(1.5, 1e-9, cell.outline_um);
+  size.refine({10, 10}, 1e-4);  // and hardly more anywhere: an even mesh of 1.5 um has 200 vertices, this one 4.6e10
+  EXPECT_THROW(expect_room_for_mesh(size, Boundary(cell, 1.5)), OutOfMemory);
 }
 
 TEST(HardMesh, crossing_fibres_share_a_vertex) {
