@@ -145,7 +145,10 @@ Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& be
     json values = json::parse(text.str());
     for (const Setting& setting : beneath) {
       if (std::find(stage.tables.begin(), stage.tables.end(), setting.table) == stage.tables.end()) continue;
-      values[setting.table][setting.key] = setting.value;
+      json& table = values[setting.table];
+      if (!table.is_null() && !table.is_object())
+        throw InputError(toml_file.string(), "a table [" + setting.table + "]", table.dump());
+      table[setting.key] = setting.value;
     }
     settings[stage.name] = values.dump();
   }
