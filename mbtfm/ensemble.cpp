@@ -339,11 +339,13 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   all.data = data.reduced;
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   const Eigen::VectorXd answer = first.fit.trial.tensions_nN;
+  const int inner = std::max(1, threads / std::max(1, n_meshes - 1));  // the first has only to be described
   parallel_for(n_meshes, threads, [&](int m) {
     const auto i = static_cast<std::size_t>(m);
-    const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit);
-    all.meshes[i] = describe(
-        problem, m == 0 ? std::move(first.fit) : fit_tensions(problem, parameters, 1, scaled_to_data(problem, answer)));
+    const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit, inner);
+    all.meshes[i] = describe(problem, m == 0 ? std::move(first.fit)
+                                             : fit_tensions(problem, parameters, inner,
+                                                            scaled_to_data(problem, answer)));
     tell();
   });
   add_means(all);

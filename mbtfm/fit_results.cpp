@@ -4,24 +4,12 @@
 #include <cmath>
 #include <set>
 
+#include "mbtfm/findings.h"
 #include "mbtfm/noise.h"
 
 namespace mbtfm::inverse {
 
 namespace {
-
-/// |sum of forces| and |sum of torques| over the sums of their magnitudes: rounding only.
-struct Imbalance {
-  double force = 0, torque = 0;
-};
-
-Imbalance imbalance(const EnsembleFit& fit) {
-  Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
-  for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
-  constexpr double kTiny = 1e-300;  // a cell without any force is balanced
-  return {.force = net_nN.norm() / std::max(total_nN(fit.forces_nN), kTiny),
-          .torque = std::abs(fit.torques_nN_um.sum()) / std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
-}
 
 /// Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
 /// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
@@ -91,7 +79,7 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
   s.n_meshes = static_cast<int>(fit.meshes.size());
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
-  const Imbalance balance = imbalance(fit);
+  const Imbalance balance = imbalance_of(fit);
   double mesh_part = 0, noise_part = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
     mesh_part += std::pow(fit.tensions_nN[i].from_model(), 2);

@@ -17,16 +17,16 @@ struct Root {
   Eigen::Index n_felt = 0;
 };
 
-Root root_of(Eigen::MatrixXd A) {
+Root root_of(Eigen::MatrixXd A, int threads) {
   constexpr double kRounding = 1e-13;  // of a normal matrix
   const Eigen::VectorXd diagonal = A.diagonal();
   const double least = kRounding * std::max(diagonal.sum(), 1e-300);
   mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
-  bool is_definite = upper_cholesky(A);
+  bool is_definite = upper_cholesky(A, threads);
   if (!is_definite || A.diagonal().cwiseAbs2().minCoeff() <= least) {
     mirror_lower(A);
     A.diagonal() = diagonal.array() + least;
-    is_definite = upper_cholesky(A);
+    is_definite = upper_cholesky(A, threads);
     MBTFM_ASSERT(is_definite);
   }
   const Eigen::Index n_felt = (A.diagonal().array().square() > 4 * least).count();
@@ -41,11 +41,12 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
   return reduce(beads, substrate::dense_response(std::move(compliance_um_per_nN)), is_used);
 }
 
-LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
-                  const std::vector<bool>& is_used) {
+LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response, const std::vector<bool>& is_used,
+                  int threads) {
   const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
   MBTFM_ASSERT(response->rows() == n_rows);
   LinearData data;
+  data.threads = threads;
   data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
   data.displacement_um.resize(n_rows);
   data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
@@ -68,7 +69,7 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   const Eigen::VectorXd weight = squared_weights(data);
   const Eigen::VectorXd weighted_u = weight.cwiseProduct(data.displacement_um);
   // A = Gᵀ W² G = Cᵀ C; then y = C⁻ᵀ Gᵀ W² u.
-  auto [root, n_felt] = root_of(data.response->upper_gram(weight));
+  auto [root, n_felt] = root_of(data.response->upper_gram(weight), data.threads);
   Eigen::MatrixXd target = data.response->pull_back(weighted_u);
   solve_upper_transposed(root, target);
   data.reduced.target = target;

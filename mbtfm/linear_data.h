@@ -31,6 +31,7 @@ struct LinearData {
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::Index n_used = 0;             ///< components of the beads that are used
   bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  int threads = 1;                     ///< to reduce it with
   ReducedData reduced;                 ///< of all that, bead_weight included
 };
 
@@ -38,7 +39,7 @@ struct LinearData {
 /// @param response  2·beads × 2·adhesions
 /// @param is_used  by bead; empty: all
 LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
-                  const std::vector<bool>& is_used = {});
+                  const std::vector<bool>& is_used = {}, int threads = 1);
 /// The same with the matrix of the response.
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used = {});

@@ -70,7 +70,7 @@ ReducedData whitened(const ReducedData& data, const ModelError& error, int threa
   Eigen::MatrixXd relative = Eigen::MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
   add_upper_outer(C, relative, threads);
   C = *data.compliance;
-  const bool is_definite = upper_cholesky(relative);
+  const bool is_definite = upper_cholesky(relative, threads);
   MBTFM_ASSERT(is_definite);
   solve_upper_transposed(relative, C, threads);
   solve_upper_transposed(relative, target);

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/parallel.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
@@ -61,18 +62,39 @@ struct NormalEquations {
 
 NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& bead_weights,
                                  const Eigen::VectorXd& residual, int threads) {
+  constexpr int kPieces = 8;             // that sums are made of, whatever the threads
   constexpr Eigen::Index kBeads = 4096;  // at a time in double precision
-  NormalEquations sum{Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())};
-  for (Eigen::Index first = 0; first < bead_weights.size(); first += kBeads) {
-    const Eigen::Index count = std::min(kBeads, bead_weights.size() - first);
-    Eigen::VectorXd root(2 * count);
-    for (Eigen::Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
-    const Eigen::MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
-    add_upper_gram(weighted, sum.H, threads);
-    sum.b += weighted.transpose() * root.cwiseProduct(residual.segment(2 * first, 2 * count));
+  std::vector<NormalEquations> sums(kPieces,
+                                    {Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())});
+  parallel_for(kPieces, threads, [&](int piece) {
+    NormalEquations& sum = sums[static_cast<std::size_t>(piece)];
+    for (Eigen::Index first = piece * kBeads; first < bead_weights.size(); first += kPieces * kBeads) {
+      const Eigen::Index count = std::min(kBeads, bead_weights.size() - first);
+      Eigen::VectorXd root(2 * count);
+      for (Eigen::Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
+      const Eigen::MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
+      add_upper_gram(weighted, sum.H, 1);
+      sum.b += weighted.transpose() * root.cwiseProduct(residual.segment(2 * first, 2 * count));
+    }
+  });
+  for (int piece = 1; piece < kPieces; ++piece) {
+    sums.front().H += sums[static_cast<std::size_t>(piece)].H;
+    sums.front().b += sums[static_cast<std::size_t>(piece)].b;
   }
-  mirror_upper(sum.H);
-  return sum;
+  mirror_upper(sums.front().H);
+  return sums.front();
+}
+
+/// J s, by parts of the rows.
+Eigen::VectorXd times(const BeadJacobian& J, const Eigen::VectorXd& s, int threads) {
+  constexpr Eigen::Index kRows = 8192;
+  const Eigen::VectorXf step = s.cast<float>();
+  Eigen::VectorXd moved(J.rows());
+  parallel_for(static_cast<int>((J.rows() + kRows - 1) / kRows), threads, [&](int part) {
+    const Eigen::Index first = part * kRows, count = std::min(kRows, J.rows() - first);
+    moved.segment(first, count) = (J.middleRows(first, count) * step).cast<double>();
+  });
+  return moved;
 }
 
 /// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
@@ -87,7 +109,7 @@ Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& r
     const Eigen::VectorXd next = bounded_quadratic_minimum(H, -b, low);
     const double change = (next - step).norm();
     step = next;
-    weights = weights_of(loss, residual - (J * step.cast<float>()).cast<double>(), scale);
+    weights = weights_of(loss, residual - times(J, step, threads), scale);
     if (change <= 1e-4 * step.norm()) break;
   }
   return weights;

@@ -77,7 +77,8 @@ StageReport report_of(const std::vector<Segmentation>& cells) {
                       {"n_cells_cut_by_border", n_cut},
                       {"n_adhesions", n_adhesions},
                       {"n_fibres", n_fibres}},
-          .effects = {}};
+          .effects = {},
+          .findings = {}};
 }
 
 void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay,

@@ -70,14 +70,13 @@ StageReport report_of(const DisplacementField& field) {
                     {"sigma_um", figures.sigma_um},
                     {"outwardness", outwardness(field)}};
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged in displacement.csv";
-  // chance moves one in ninety beyond three standard errors
-  if (static_cast<double>(figures.n_moving) < 0.02 * static_cast<double>(figures.n_good)) {
-    report.summary += "; WARNING: nothing moves: " + std::to_string(figures.n_moving) + " of " +
-                      std::to_string(figures.n_good) + " beads by more than three standard errors";
-  }
-  // a contracting cell has -0.7 or so; a layer of cells about 0
-  if (outwardness(field) > 0.3) {
-    report.summary += "; WARNING: the gel is pushed outward everywhere: are stressed and relaxed swapped?";
+  const double still = 1 - static_cast<double>(figures.n_moving) / static_cast<double>(std::max<std::int64_t>(1, figures.n_good));
+  for (std::optional<Finding> found :
+       {noticed(FindingKind::nothing_moves, still,
+                "Nothing moves: " + std::to_string(figures.n_moving) + " of " + std::to_string(figures.n_good) +
+                    " beads by more than three standard errors."),
+        noticed(FindingKind::moves_outward, outwardness(field), "The gel is pushed outward everywhere.")}) {
+    if (found) report.findings.push_back(std::move(*found));
   }
   return report;
 }

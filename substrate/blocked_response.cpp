@@ -303,8 +303,11 @@ SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>&
   // Far parts take some 30 numbers a block and column, near ones grow with a block's area: this makes both alike.
   const double most = 1.5 * std::sqrt(static_cast<double>(points_um.size()));
   if (!all.empty()) split(points_um, std::move(all), static_cast<std::size_t>(most), parts);
-  std::vector<Block> blocks;
-  for (std::vector<Index>& part : parts) blocks.push_back(block_of(model, points_um, std::move(part), ellipses));
+  std::vector<Block> blocks(parts.size());
+  parallel_for(static_cast<int>(parts.size()), threads, [&](int b) {
+    const auto i = static_cast<std::size_t>(b);
+    blocks[i] = block_of(model, points_um, std::move(parts[i]), ellipses);
+  });
   return std::make_shared<Blocked>(static_cast<Index>(points_um.size()), 2 * static_cast<Index>(ellipses.size()),
                                    std::move(blocks), threads);
 }

@@ -25,20 +25,61 @@ nlohmann::ordered_json json_of(const Effect& e) {
   return json;
 }
 
+namespace {
+
+std::optional<double> number_in(const JsonRecord& record, const char* key) {
+  const auto member = record.find(key);
+  return member ? std::optional(member->number()) : std::nullopt;
+}
+
+Severity severity_of(const JsonRecord& value) {
+  for (const Severity severity : {Severity::note, Severity::caution, Severity::bad}) {
+    if (value.text() == name_of(severity)) return severity;
+  }
+  value.fail("note, caution or bad");
+}
+
+}  // namespace
+
 Effect effect_of(const JsonRecord& record) {
-  const auto number = [&](const char* key) -> std::optional<double> {
-    const auto member = record.find(key);
-    return member ? std::optional(member->number()) : std::nullopt;
-  };
   return {.name = record.at("name").text(),
           .setting = record.at("switch").text(),
           .is_on = record.at("on").is_true(),
-          .number = number("number"),
-          .threshold = number("threshold"),
+          .number = number_in(record, "number"),
+          .threshold = number_in(record, "threshold"),
           .why = record.at("why").text(),
           .seconds = record.at("seconds").number(),
-          .change = number("change"),
+          .change = number_in(record, "change"),
           .would_change = record.text_or("would_change", "")};
+}
+
+nlohmann::ordered_json json_of(const Finding& f) {
+  nlohmann::ordered_json json = {{"id", f.id}, {"severity", name_of(f.severity)}, {"text", f.text}};
+  if (f.number) json["number"] = *f.number;
+  if (f.threshold) json["threshold"] = *f.threshold;
+  json["number_is"] = f.number_is;
+  json["reason"] = f.reason;
+  json["remedy"] = f.remedy;
+  return json;
+}
+
+Finding finding_of(const JsonRecord& record) {
+  return {.id = record.at("id").text(),
+          .severity = severity_of(record.at("severity")),
+          .text = record.at("text").text(),
+          .number = number_in(record, "number"),
+          .threshold = number_in(record, "threshold"),
+          .number_is = record.text_or("number_is", ""),
+          .reason = record.text_or("reason", ""),
+          .remedy = record.text_or("remedy", "")};
+}
+
+std::vector<Finding> findings_of(const JsonRecord& record) {
+  std::vector<Finding> findings;
+  if (const auto list = record.find("findings")) {
+    for (const JsonRecord& finding : list->list()) findings.push_back(finding_of(finding));
+  }
+  return findings;
 }
 
 namespace {

@@ -10,6 +10,8 @@
 #include <variant>
 #include <vector>
 
+#include "pipeline/contract/findings.h"
+
 namespace mbtfm {
 
 /// How an iteration ended.
@@ -43,6 +45,7 @@ struct StageReport {
   std::string summary;  ///< what was found, and what was skipped, in one line
   Figures figures;
   std::vector<Effect> effects;
+  std::vector<Finding> findings;
 };
 
 /// Told how far a long work has come (0 to 1) and with what; may throw to cancel. May be empty.

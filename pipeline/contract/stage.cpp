@@ -147,6 +147,8 @@ void write_record(const fs::path& file, const StageDescription& description, con
   }
   nlohmann::ordered_json effects = nlohmann::ordered_json::array();
   for (const Effect& e : report.effects) effects.push_back(json_of(e));
+  nlohmann::ordered_json findings = nlohmann::ordered_json::array();
+  for (const Finding& f : report.findings) findings.push_back(json_of(f));
   const nlohmann::ordered_json record = {{"stage", description.name},
                                          {"version", kVersion},
                                          {"parameters", parameters_of(list)},
@@ -158,7 +160,8 @@ void write_record(const fs::path& file, const StageDescription& description, con
                                          {"converged", report.converged},
                                          {"summary", report.summary},
                                          {"figures", json_of(report.figures)},
-                                         {"effects", effects}};
+                                         {"effects", effects},
+                                         {"findings", findings}};
   write_text(context.pending_path(file), json_text(record, 2) + "\n");
 }
 
@@ -200,6 +203,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     if (!line.is_quiet) {
       std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
       for (const Effect& e : report.effects) std::fprintf(stderr, "  %s\n", line_of(e).c_str());
+      for (const Finding& f : report.findings) std::fprintf(stderr, "  %s\n", line_of(f).c_str());
     }
     return kDone;
   } catch (...) {
@@ -215,7 +219,8 @@ StageReport read_report(const fs::path& record_file) {
   StageReport report{.converged = record.at("converged").is_true(),
                      .summary = record.at("summary").text(),
                      .figures = {},
-                     .effects = {}};
+                     .effects = {},
+                     .findings = findings_of(record)};
   for (const auto& [name, value] : record.at("figures").members()) report.figures.emplace_back(name, value.figure());
   for (const JsonRecord& effect : record.at("effects").list()) report.effects.push_back(effect_of(effect));
   return report;

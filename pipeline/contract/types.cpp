@@ -80,9 +80,9 @@ Vec2 nearest_on_boundary_um(const Polygon& polygon, Vec2 point) {
     const Vec2 a = polygon[i];
     const Vec2 b = polygon[(i + 1) % polygon.size()];
     const Vec2 candidate = a + nearest_share(a, b, point) * (b - a);
-    const double distance = norm(point - candidate);
-    if (distance < smallest) {
-      smallest = distance;
+    const Vec2 away = point - candidate;
+    if (const double squared = dot(away, away); squared < smallest) {
+      smallest = squared;
       nearest = candidate;
     }
   }

@@ -39,8 +39,8 @@ MatrixXd general_product(char transpose_a, const MatrixXd& A, const MatrixXd& B,
   const int m = static_cast<int>(is_transposed ? A.cols() : A.rows());
   const int k = static_cast<int>(is_transposed ? A.rows() : A.cols());
   MBTFM_ASSERT(B.rows() == k);
-  MatrixXd C = MatrixXd::Zero(m, B.cols());
-  if (C.size() == 0 || k == 0) return C;
+  if (m == 0 || k == 0 || B.cols() == 0) return MatrixXd::Zero(m, B.cols());
+  MatrixXd C(m, B.cols());
   const int lda = static_cast<int>(A.rows());
   over_strips(B.cols(), threads, [&](int begin, int count) {
     dgemm_(&transpose_a, "N", &m, &count, &k, &kOne, A.data(), &lda, B.col(begin).data(), &k, &kZero,
@@ -114,12 +114,26 @@ MatrixXd gram(const MatrixXd& A, int threads) {
   return square;
 }
 
-bool upper_cholesky(MatrixXd& A) {
+bool upper_cholesky(MatrixXd& A, int threads) {
   const int n = static_cast<int>(A.rows());
-  if (n == 0) return true;
-  int info = 0;
-  dpotrf_("U", &n, A.data(), &n, &info);
-  return info == 0;
+  constexpr int kPanel = 512;  // rows that are eliminated at once
+  constexpr double kLess = -1;
+  for (int first = 0; first < n; first += kPanel) {
+    const int rows = std::min(kPanel, n - first), next = first + rows;
+    int info = 0;
+    dpotrf_("U", &rows, &A(first, first), &n, &info);
+    if (info != 0) return false;
+    over_strips(n - next, threads, [&](int begin, int count) {
+      dtrsm_("L", "U", "T", "N", &rows, &count, &kOne, &A(first, first), &n, &A(first, next + begin), &n);
+    });
+    over_strips(n - next, threads, [&](int begin, int count) {
+      const double *panel = &A(first, next), *strip = &A(first, next + begin);
+      if (begin > 0)
+        dgemm_("T", "N", &begin, &count, &rows, &kLess, panel, &n, strip, &n, &kOne, &A(next, next + begin), &n);
+      dsyrk_("U", "T", &count, &rows, &kLess, strip, &n, &kOne, &A(next + begin, next + begin), &n);
+    });
+  }
+  return true;
 }
 
 void multiply_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrmm_, 'N', U, B, threads); }

@@ -27,7 +27,7 @@ void clear_below_diagonal(Eigen::MatrixXd& square);
 
 /// A = Uᵀ U with U upper triangular. Of A, what is below the diagonal neither counts nor changes.
 /// @return whether A is positive definite; if not, its upper half is spoiled
-bool upper_cholesky(Eigen::MatrixXd& A);
+bool upper_cholesky(Eigen::MatrixXd& A, int threads = 1);
 
 /// B = U B for the upper triangle U.
 void multiply_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "pipeline/report/numbers.h"
+#include "pipeline/report/page.h"
 #include "pipeline/report/tension_plot.h"
 #include "pipeline/report/tension_table.h"
 
@@ -24,20 +25,19 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return fmt::format("{} {}", n, n == 1 ? one : many);
 }
 
-Finding what(const CellResults& results) {
+std::string what(const CellResults& results) {
   int n_by_type[3] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
-  return {
-      Level::fact,
-      fmt::format("{} ({} dorsal, {}, {} ventral) and {}. The cell pulls with {} nN in total, summed over its "
-                  "adhesions: {} nN by the fibres, {} nN by the actin network.",
-                  counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
-                  counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
-                  counted(results.cell.adhesions.size(), "adhesion", "adhesions"), readable(results.fit.total_force_nN),
-                  readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN))};
+  return fmt::format(
+      "{} ({} dorsal, {}, {} ventral) and {}. The cell pulls with {} nN in total, summed over its adhesions: {} nN by "
+      "the fibres, {} nN by the actin network.",
+      counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
+      counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
+      counted(results.cell.adhesions.size(), "adhesion", "adhesions"), readable(results.fit.total_force_nN),
+      readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN));
 }
 
-Finding truth(const CellResults& results) {
+std::string truth(const CellResults& results) {
   const Comparison& comparison = *results.comparison;
   std::string text = fmt::format(
       "This cell was simulated, so the truth is known. Over the {} found, the tensions deviate from it by {} (root of "
@@ -55,16 +55,13 @@ Finding truth(const CellResults& results) {
     text += fmt::format("; the total force deviates by {}",
                         percent(comparison.total_force_nN / *comparison.true_total_force_nN - 1));
   }
-  return {Level::fact, text + "."};
+  return text + ".";
 }
 
 /// The displacement that the model explains, against what the noise would allow.
-Finding quality(const FitSummary& fit) {
+std::string quality(const FitSummary& fit) {
   if (!(fit.expected_relative_l2 > 0)) {
-    return {Level::caution,
-            fmt::format("The model leaves {} of the displacement unexplained (relative L2). The noise of the beads is "
-                        "not known, so it cannot be told what share of it is noise.",
-                        percent(fit.relative_l2))};
+    return fmt::format("The model leaves {} of the displacement unexplained (relative L2).", percent(fit.relative_l2));
   }
   const double left2 = std::pow(fit.relative_l2, 2), noise2 = std::pow(fit.expected_relative_l2, 2);
   std::string text;
@@ -87,91 +84,82 @@ Finding quality(const FitSummary& fit) {
         " These are large because relative L2 counts every bead, also the many far from the cell that move less "
         "than their noise.";
   }
-  // Up to half of the noise, the model's error adds less than an eighth to what is left.
-  return {left2 < 1.25 * noise2 ? Level::good : Level::caution, text};
+  return text;
 }
 
-std::vector<Finding> doubts(const CellResults& results) {
-  std::vector<Finding> list;
-  int n_unidentifiable = 0, n_wide = 0, n_zero = 0, n_missing = 0;
-  for (const Fibre& fibre : results.cell.fibres) n_missing += results.tensions.contains(fibre.fibre_id) ? 0 : 1;
-  for (const FibreRow& row : fibre_rows(results)) {
-    const Tension& t = row.tension;
-    if (!t.identifiable) ++n_unidentifiable;
-    if (t.identifiable && t.low_nN && t.high_nN && *t.high_nN - *t.low_nN > 2 * t.tension_nN) ++n_wide;
-    if (t.tension_nN == 0) ++n_zero;
+/// Sentences on outputs that are not what a stage made of its inputs.
+std::vector<std::string> on_outputs(const Provenance& provenance) {
+  std::vector<std::string> sentences;
+  std::string given;
+  for (const StageLine& stage : provenance.stages) {
+    if (stage.state == "given") given += (given.empty() ? "" : ", ") + stage.name;
+    if (stage.state == "replaced")
+      sentences.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
   }
-  if (n_unidentifiable > 0) {
-    list.push_back({Level::bad, counted(n_unidentifiable, "tension is", "tensions are") +
-                                    " not identifiable from this displacement: disregard (hollow marks)."});
+  if (!given.empty())
+    sentences.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
+  return sentences;
+}
+
+std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {
+  return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, html_escaped(text), more);
+}
+
+/// The remedy in sight; number, threshold and its reason unfold.
+std::string details_of(const Finding& f) {
+  std::string html;
+  if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + html_escaped(f.remedy);
+  if (f.number && f.threshold) {
+    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", html_escaped(f.id),
+                        html_escaped(f.number_is), readable(*f.number), readable(*f.threshold), html_escaped(f.reason),
+                        is_open(f) ? "" : " " + html_escaped(f.remedy));
   }
-  if (n_wide > 0) {
-    list.push_back({Level::caution, counted(n_wide, "tension is", "tensions are") +
-                                        " uncertain by as much as the tension itself or more (95 % interval)."});
+  return html;
+}
+
+std::string item_of(const Finding& f) {
+  switch (f.severity) {
+    case Severity::note: return item("fact", "<b>Note:</b> ", f.text, details_of(f));
+    case Severity::caution: return item("caution", "<b>Caution:</b> ", f.text, details_of(f));
+    case Severity::bad: return item("bad", "<b>Distrust:</b> ", f.text, details_of(f));
   }
-  if (n_zero > 0) {
-    list.push_back({Level::caution,
-                    counted(n_zero, "tension is", "tensions are") +
-                        " zero, the least allowed: fibres do not push. Read the interval’s upper end as a limit."});
-  }
-  if (n_missing > 0) {
-    list.push_back({Level::caution, counted(n_missing, "segmented fibre has", "segmented fibres have") +
-                                        " no tension: not in the network."});
-  }
-  if (results.fit.n_meshes == 1) {
-    list.push_back({Level::caution,
-                    "Fitted on one mesh: the intervals hold the noise of the beads but not the choice "
-                    "of the mesh, which is usually the larger error."});
-  }
-  const Balance balance = balance_of(results);
-  constexpr double kRounding = 1e-6;  // equilibria are solved to 1e-9 of the largest tension, at some thousand vertices
-  if (balance.net_force > kRounding) {
-    list.push_back({Level::bad, fmt::format("The forces do not sum to nothing: |sum| / sum of magnitudes = {:.1e}.",
-                                            balance.net_force)});
-  }
-  if (balance.net_torque > kRounding && balance.has_moments) {
-    list.push_back({Level::bad, fmt::format("The torques do not sum to nothing: |sum| / sum of magnitudes = {:.1e}.",
-                                            balance.net_torque)});
-  }
-  return list;
+  return {};
+}
+
+/// Stages that ran and asked: without one there is nothing that a tick could stand for.
+bool was_asked(const Provenance& provenance) {
+  return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
+    return stage.name == "fit" && (stage.state == "run" || stage.state == "up to date");
+  });
 }
 
 }  // namespace
 
-Balance balance_of(const CellResults& results) {
-  const auto by_id = adhesions_by_id(results.cell);
-  Vec2 centre;
-  for (const Adhesion& adhesion : results.cell.adhesions) {
-    centre += (1.0 / static_cast<double>(results.cell.adhesions.size())) * adhesion.position_um;
-  }
-  Vec2 net;
-  double torque = 0, magnitudes = 0, lever = 0;
-  bool has_moments = true;
-  for (const AdhesionForce& force : results.forces) {
-    const Vec2 arm = by_id.at(force.adhesion_id)->position_um - centre;
-    net += force.force_nN;
-    torque += cross(arm, force.force_nN) + force.moment_nN_um.value_or(0);
-    has_moments = has_moments && force.moment_nN_um.has_value();
-    magnitudes += norm(force.force_nN);
-    lever += norm(arm) * norm(force.force_nN);
-  }
-  if (!(magnitudes > 0)) return {};
-  return {.net_force = norm(net) / magnitudes,
-          .net_torque = lever > 0 ? std::abs(torque) / lever : 0,
-          .has_moments = has_moments};
+std::vector<std::string> facts_of(const CellResults& results) {
+  std::vector<std::string> facts = {what(results)};
+  if (results.comparison) facts.push_back(truth(results));
+  facts.push_back(quality(results.fit));
+  return facts;
 }
 
-std::vector<Finding> findings_of(const CellResults& results, const std::vector<std::string>& not_converged,
-                                 const std::vector<std::string>& by_hand) {
-  std::vector<Finding> list = {what(results)};
-  if (results.comparison) list.push_back(truth(results));
-  for (const std::string& stage : not_converged) {
-    list.push_back({Level::bad, "The stage " + stage + " did not converge: what follows from it is provisional."});
+std::string findings_section(const CellResults& results, const Provenance& provenance) {
+  std::string html = "<ul class=\"findings\">\n", open, notes;
+  for (const std::string& fact : facts_of(results)) html += item("fact", "", fact);
+  for (const StageLine& stage : provenance.stages) {
+    if (!stage.converged)
+      open += item("bad", "<b>Distrust:</b> ",
+                   "The stage " + stage.name + " did not converge: what follows from it is provisional.");
   }
-  list.push_back(quality(results.fit));
-  for (Finding& doubt : doubts(results)) list.push_back(std::move(doubt));
-  for (const std::string& sentence : by_hand) list.push_back({Level::fact, sentence});
-  return list;
+  for (const Finding& finding : provenance.findings) (is_open(finding) ? open : notes) += item_of(finding);
+  if (const auto& accuracy = provenance.accuracy) {
+    (accuracy->is_met ? notes : open) +=
+        item(accuracy->is_met ? "fact" : "caution", accuracy->is_met ? "" : "<b>Caution:</b> ",
+             "Verified by the error budget: " + accuracy->verdict + ".");
+  }
+  if (open.empty() && was_asked(provenance))
+    open = item("good", "<b>✓</b> ", "No finding is open: nothing that the program checks speaks against these results.");
+  for (const std::string& sentence : on_outputs(provenance)) notes += item("fact", "", sentence);
+  return section("In short", html + open + notes + "</ul>\n");
 }
 
 }  // namespace mbtfm::report

@@ -2,6 +2,7 @@
 
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/json_record.h"
 #include "pipeline/contract/own_files.h"
 #include "pipeline/report/numbers.h"
@@ -61,7 +62,7 @@ StageLine stage_of(const std::string& name, const JsonRecord& record) {
           .inputs = flat(run, "inputs")};
 }
 
-EffectLine effect_of(const JsonRecord& record) {
+EffectLine effect_line_of(const JsonRecord& record) {
   return {.name = record.at("name").text(),
           .stage = record.text_or("stage", ""),
           .why = record.text_or("why", ""),
@@ -83,7 +84,8 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
         WantedAccuracy{.verdict = accuracy->at("verdict").text(), .is_met = accuracy->at("met").is_true()};
   }
   for (const auto& [name, stage] : run.at("stages").members()) provenance.stages.push_back(stage_of(name, stage));
-  for (const JsonRecord& effect : run.at("effects").list()) provenance.effects.push_back(effect_of(effect));
+  for (const JsonRecord& effect : run.at("effects").list()) provenance.effects.push_back(effect_line_of(effect));
+  provenance.findings = findings_of(run);
   return provenance;
 }
 

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/findings.h"
+
 namespace mbtfm::report {
 
 struct StageLine {
@@ -35,6 +37,7 @@ struct Provenance {
   std::optional<WantedAccuracy> accuracy;
   std::vector<StageLine> stages;
   std::vector<EffectLine> effects;
+  std::vector<Finding> findings;
 };
 
 /// Of run.json; empty where there is none. @throws InputError where it is malformed

@@ -24,32 +24,6 @@ extern const std::string_view kParaviewScript;  // view_in_paraview.py, made int
 
 namespace {
 
-std::string findings_section(const CellResults& results, const Provenance& provenance) {
-  std::vector<std::string> not_converged, by_hand;
-  std::string given;
-  for (const StageLine& stage : provenance.stages) {
-    if (!stage.converged) not_converged.push_back(stage.name);
-    if (stage.state == "given") given += (given.empty() ? "" : ", ") + stage.name;
-    if (stage.state == "replaced")
-      by_hand.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
-  }
-  if (!given.empty())
-    by_hand.push_back("Given with the cell, not computed by this program: the outputs of " + given + ".");
-  std::vector<Finding> findings = findings_of(results, not_converged, by_hand);
-  if (const auto& accuracy = provenance.accuracy) {
-    findings.push_back(
-        {accuracy->is_met ? Level::good : Level::caution, "Verified by the error budget: " + accuracy->verdict + "."});
-  }
-  std::string html = "<ul class=\"findings\">\n";
-  for (const Finding& finding : findings) {
-    static constexpr const char* kClass[] = {"fact", "good", "caution", "bad"};
-    static constexpr const char* kMark[] = {"", "<b>✓</b>", "<b>Caution:</b>", "<b>Distrust:</b>"};
-    const auto level = static_cast<std::size_t>(finding.level);
-    html += fmt::format("<li class=\"{}\">{}{}</li>\n", kClass[level], kMark[level], html_escaped(finding.text));
-  }
-  return section("In short", html + "</ul>\n");
-}
-
 std::string html_of(const Figure& map) { return figure(map.chart, map.caption, map.legend); }
 
 /// A file of the cell as it lies in its folder.

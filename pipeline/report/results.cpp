@@ -1,5 +1,7 @@
 #include "pipeline/report/results.h"
 
+#include <cmath>
+
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/own_files.h"
@@ -64,6 +66,29 @@ std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell) {
   std::map<int, const Adhesion*> by_id;
   for (const Adhesion& adhesion : cell.adhesions) by_id[adhesion.adhesion_id] = &adhesion;
   return by_id;
+}
+
+Balance balance_of(const CellResults& results) {
+  const auto by_id = adhesions_by_id(results.cell);
+  Vec2 centre;
+  for (const Adhesion& adhesion : results.cell.adhesions) {
+    centre += (1.0 / static_cast<double>(results.cell.adhesions.size())) * adhesion.position_um;
+  }
+  Vec2 net;
+  double torque = 0, magnitudes = 0, lever = 0;
+  bool has_moments = true;
+  for (const AdhesionForce& force : results.forces) {
+    const Vec2 arm = by_id.at(force.adhesion_id)->position_um - centre;
+    net += force.force_nN;
+    torque += cross(arm, force.force_nN) + force.moment_nN_um.value_or(0);
+    has_moments = has_moments && force.moment_nN_um.has_value();
+    magnitudes += norm(force.force_nN);
+    lever += norm(arm) * norm(force.force_nN);
+  }
+  if (!(magnitudes > 0)) return {};
+  return {.net_force = norm(net) / magnitudes,
+          .net_torque = lever > 0 ? std::abs(torque) / lever : 0,
+          .has_moments = has_moments};
 }
 
 }  // namespace mbtfm::report

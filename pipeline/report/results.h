@@ -44,4 +44,11 @@ CellResults read_results(const Path& cell);
 /// Adhesion by id.
 std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell);
 
+/// |sum of forces| and |sum of torques about the centre of the adhesions|, relative to the sum of the magnitudes.
+struct Balance {
+  double net_force = 0, net_torque = 0;
+  bool has_moments = false;  ///< those of single adhesions are in the table, and counted
+};
+Balance balance_of(const CellResults& results);
+
 }  // namespace mbtfm::report

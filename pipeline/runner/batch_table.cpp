@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/json_record.h"
 #include "pipeline/contract/own_files.h"
 #include "pipeline/runner/record.h"
@@ -22,6 +23,7 @@ namespace {
 struct StageSays {
   std::string summary;
   std::vector<std::pair<std::string, std::string>> figures;  ///< name, value
+  std::vector<Finding> findings;
 };
 
 std::string text_of(const Value& value) {
@@ -42,7 +44,7 @@ std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
   if (!is_own_file(file)) return std::nullopt;
   try {
     const JsonRecord record(file, "a stage's record");
-    StageSays says{.summary = record.text_or("summary", ""), .figures = {}};
+    StageSays says{.summary = record.text_or("summary", ""), .figures = {}, .findings = findings_of(record)};
     for (const auto& [name, value] : record.at("figures").members()) {
       // null: not a number, in JSON
       says.figures.emplace_back(name, value.json().is_null() ? std::string() : text_of(value.figure()));
@@ -67,16 +69,18 @@ std::string last_summary(const fs::path& cell, const std::vector<std::string>& o
 
 void write_batch_table(const fs::path& file, const fs::path& folder, const std::vector<BatchCell>& cells,
                        const std::vector<std::string>& only) {
-  std::vector<std::string> header = {"cell", "exit_code", "seconds", "message", "failed_stage"};
+  std::vector<std::string> header = {"cell", "exit_code", "seconds", "message", "failed_stage", "findings"};
   const std::size_t n_fixed = header.size();
   std::set<std::string> columns;  // of the header
   std::vector<std::map<std::string, std::string>> rows(cells.size());
+  std::vector<std::vector<Finding>> findings(cells.size());
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (cells[i].exit_code != 0) continue;  // what it has on disk may be of an earlier run
     for (const Stage& stage : stages()) {
       if (!is_asked(stage, only)) continue;
       const auto record = record_of(cells[i].cell, stage);
       if (!record) continue;
+      findings[i].insert(findings[i].end(), record->findings.begin(), record->findings.end());
       for (const auto& [name, value] : record->figures) {
         const std::string column = stage.name + "." + name;
         if (columns.insert(column).second) header.push_back(column);
@@ -90,7 +94,8 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
         .add(cells[i].exit_code)
         .add(cells[i].seconds)
         .add(cells[i].message)
-        .add(cells[i].failed_stage);
+        .add(cells[i].failed_stage)
+        .add(open_ids(findings[i]));
     for (std::size_t k = n_fixed; k < header.size(); ++k) csv.add(rows[i][header[k]]);
     csv.end_row();
   }

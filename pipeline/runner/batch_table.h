@@ -14,7 +14,7 @@ namespace mbtfm::runner {
 std::string last_summary(const std::filesystem::path& cell, const std::vector<std::string>& only);
 
 /// Write a table with a row for each cell: cell (relative to the folder), exit_code, seconds, message, failed_stage,
-/// and every figure
+/// findings (identities of the open ones), and every figure
 /// that a stage of any of the cells reports, as stage.figure; a field is empty where a cell has no such figure.
 /// @throws OutputError
 void write_batch_table(const std::filesystem::path& file, const std::filesystem::path& folder,

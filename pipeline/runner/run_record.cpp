@@ -80,6 +80,7 @@ ordered_json stage_entry(const Stage& stage, const StageOutcome& outcome, const 
   if (const auto effects = record.find("effects")) {
     for (const JsonRecord& effect : effects->list()) effect.expect_object();
   }
+  findings_of(record);  // are such
   return entry;
 }
 
@@ -118,14 +119,18 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   const RunRecordLock lock(cell);
   const std::optional<JsonRecord> before = open_run_record(cell);
   ordered_json run, entries;
-  ordered_json effects = ordered_json::array();
+  ordered_json effects = ordered_json::array(), findings = ordered_json::array();
+  const auto gather = [](ordered_json& all, const ordered_json& entry, const char* key, const std::string& stage) {
+    for (ordered_json one : entry.value(key, ordered_json::array())) {
+      one["stage"] = stage;
+      all.push_back(std::move(one));
+    }
+  };
   for (std::size_t i = 0; i < stages().size(); ++i) {
     const Stage& stage = stages()[i];
     entries[stage.name] = stage_entry(stage, outcome.stages[i], cell, entry_of(before, stage.name));
-    for (ordered_json effect : entries[stage.name].value("effects", ordered_json::array())) {
-      effect["stage"] = stage.name;
-      effects.push_back(std::move(effect));
-    }
+    gather(effects, entries[stage.name], "effects", stage.name);
+    gather(findings, entries[stage.name], "findings", stage.name);
   }
   run["program"] = "mbtfm";
   run["version"] = options.version;
@@ -137,6 +142,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
       std::all_of(entries.begin(), entries.end(), [](const ordered_json& entry) { return entry.at("converged"); });
   run["images"] = images_in(cell);
   run["effects"] = std::move(effects);
+  run["findings"] = std::move(findings);
   // Of a fit that has not ended in this run, the old file may be what is to be replaced.
   const bool has_fit = is_done_entry(entries[stages().back().name]);
   run["stages"] = std::move(entries);

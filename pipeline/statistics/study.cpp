@@ -5,6 +5,7 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/json.h"
 #include "pipeline/contract/own_files.h"
 #include "pipeline/contract/parallel.h"
 #include "pipeline/runner/batch.h"
@@ -26,7 +27,8 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
               .forces = read_adhesion_forces(folder / "4_fit/adhesion_forces.csv"),
               .tensions = read_tensions(folder / "4_fit/tensions.csv"),
               .fit = read_fit_summary(folder / "4_fit/fit.json"),
-              .directions = {}};
+              .directions = {},
+              .findings = {}};
   std::set<int> ids;
   for (const Adhesion& a : c.cell.adhesions) ids.insert(a.adhesion_id);
   for (const AdhesionForce& f : c.forces) {
@@ -35,6 +37,8 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
                      "adhesion " + std::to_string(f.adhesion_id),
                      "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
+  const Path run = folder / further_files_of_a_cell()[3];
+  if (is_own_file(run)) c.findings = findings_of(JsonRecord(run, "a run.json of mbtfm run"));
   c.directions = directions_of(c.cell, {.measured = field_where_there(folder / further_files_of_a_cell()[0]),
                                         .fitted = field_where_there(folder / further_files_of_a_cell()[1]),
                                         .without_fibres = field_where_there(folder / further_files_of_a_cell()[2]),
@@ -106,7 +110,7 @@ const std::vector<std::string>& files_of_a_cell() {
 
 const std::vector<std::string>& further_files_of_a_cell() {
   static const std::vector<std::string> files = {"2_track/displacement.csv", "4_fit/fitted_displacement.csv",
-                                                 "4_fit/displacement_without_fibres.csv"};
+                                                 "4_fit/displacement_without_fibres.csv", "run.json"};
   return files;
 }
 

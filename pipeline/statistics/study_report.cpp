@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 
 #include "pipeline/contract/version.h"
 #include "pipeline/report/page.h"
@@ -116,6 +117,44 @@ Table cells_table(const Study& study) {
   return table;
 }
 
+/// The first names; of many.
+std::string first_of(const std::vector<std::string>& names) {
+  constexpr std::size_t kMost = 5;
+  const auto n = std::min(kMost, names.size());
+  return fmt::format("{}{}", fmt::join(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), ", "),
+                     names.size() > kMost ? ", …" : "");
+}
+
+/// Open findings, each with the cells that have it.
+Table findings_table(const Study& study) {
+  Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}};
+  std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
+  for (const StudyCell& c : study.cells) {
+    for (const Finding& f : c.findings) {
+      if (!is_open(f)) continue;
+      auto& [finding, cells] = by_id[f.id];
+      finding = &f;
+      if (cells.empty() || cells.back() != c.name) cells.push_back(c.name);
+    }
+  }
+  for (const auto& [id, found] : by_id) {
+    const auto& [finding, cells] = found;
+    table.rows.push_back({html_escaped(id), name_of(finding->severity), std::to_string(cells.size()),
+                          html_escaped(first_of(cells)), html_escaped(finding->remedy)});
+  }
+  return table;
+}
+
+std::string findings_text(const Study& study, const std::string& table_html) {
+  const auto n_open = std::ranges::count_if(study.cells, [](const StudyCell& c) { return has_open(c.findings); });
+  if (n_open == 0) return "<p><b>✓</b> No finding is open in any cell that enters.</p>\n";
+  return fmt::format(
+             "<p>{} of {} cells have open findings: what they name may be off by more than the error bars say. The "
+             "column <code>exclude</code> of the table of conditions leaves a cell out.</p>\n",
+             n_open, study.cells.size()) +
+         table_html;
+}
+
 std::string list_of(const std::vector<std::string>& sentences) {
   std::string html = "<ul>\n";
   for (const std::string& s : sentences) html += "<li>" + html_escaped(s) + "</li>\n";
@@ -162,12 +201,14 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   body += report::section("What was found", found);
   std::string pictures;
   for (const Figure& figure : figures) pictures += embedded(figure);
-  body += report::section("Figures", pictures);
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const Table& table, const std::string& name) {
     const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
     return report::html_of(table, {file->first, file->second});
   };
+  body += report::section("What the program noticed",
+                          findings_text(study, with_file(findings_table(study), "findings.csv")));
+  body += report::section("Figures", pictures);
   body += report::section("Tension by fibre type", with_file(types_table(study, analysis), "types.csv"));
   std::string tests;
   for (const Measure* m : analysis.measures()) {

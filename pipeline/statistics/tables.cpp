@@ -35,7 +35,8 @@ std::string cells_csv(const Study& study) {
                                            "expected_relative_l2",
                                            "noise_um",
                                            "n_meshes",
-                                           "converged"};
+                                           "converged",
+                                           "findings"};
   CsvText csv(header);
   for (const StudyCell& c : study.cells) {
     std::map<FibreType, int> n_of;
@@ -55,7 +56,7 @@ std::string cells_csv(const Study& study) {
         .add(where_known(c.fit.network_surface_tension_nN_per_um))
         .add(c.fit.relative_l2)
         .add(c.fit.expected_relative_l2);
-    csv.add(c.fit.noise_um).add(c.fit.n_meshes).add(c.fit.converged ? 1 : 0);
+    csv.add(c.fit.noise_um).add(c.fit.n_meshes).add(c.fit.converged ? 1 : 0).add(open_ids(c.findings));
     csv.end_row();
   }
   for (const LeftOutCell& c : study.left_out) {
@@ -255,8 +256,24 @@ std::string direction_means_csv(const Analysis& analysis) {
 
 }  // namespace
 
+namespace {
+
+std::string findings_csv(const Study& study) {
+  CsvText csv({"cell", "condition", "id", "severity", "number", "threshold", "text"});
+  for (const StudyCell& c : study.cells) {
+    for (const Finding& f : c.findings) {
+      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(f.id).add(name_of(f.severity));
+      csv.add(f.number).add(f.threshold).add(f.text).end_row();
+    }
+  }
+  return csv.str();
+}
+
+}  // namespace
+
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis) {
   return {{"cells.csv", cells_csv(study)},
+          {"findings.csv", findings_csv(study)},
           {"adhesions.csv", adhesions_csv(study)},
           {"fibres.csv", fibres_csv(study)},
           {"types.csv", types_csv(study, analysis)},

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/findings.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -48,6 +49,13 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "parameters.md", page);
   EXPECT_EQ(read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+}
+
+/// The same for the page of findings.
+TEST(Documents, the_page_of_findings_is_what_the_program_declares) {
+  const std::string page = findings_page();
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "findings.md", page);
+  EXPECT_EQ(read_text(kDocs / "findings.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.

@@ -286,7 +286,7 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   };
   const Ended of_still = given("still.csv");
   EXPECT_EQ(of_still.code, 0);
-  EXPECT_NE(of_still.said.find("WARNING: nothing moves: 0 of 64 beads"), std::string::npos) << of_still.said;
+  EXPECT_NE(of_still.said.find("nothing-moves): Nothing moves: 0 of 64 beads"), std::string::npos) << of_still.said;
   const Ended of_twice = given("twice.csv");
   EXPECT_EQ(of_twice.code, 0);
   EXPECT_NE(of_twice.said.find("1 flagged"), std::string::npos) << of_twice.said;

@@ -71,10 +71,15 @@ TEST_P(Dense, the_bits_are_the_same_for_any_number_of_threads) {
   for (const int threads : {2, 4}) {
     EXPECT_TRUE(one_gram == gram(A, threads));
     EXPECT_TRUE(one_product == product(A, B, threads));
+    MatrixXd one_factor = gram(B), factor = one_factor;
+    one_factor.diagonal().array() += 1;
+    factor.diagonal().array() += 1;
+    EXPECT_TRUE(upper_cholesky(one_factor, 1) && upper_cholesky(factor, threads));
+    EXPECT_TRUE(one_factor == factor);
   }
 }
 
-INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 300));
+INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 300, 700));
 
 TEST(DenseCholesky, a_matrix_that_is_not_positive_is_told_and_its_lower_half_kept) {
   MatrixXd A(2, 2);

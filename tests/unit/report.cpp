@@ -114,18 +114,38 @@ TEST(Report, colour_bars_end_at_a_tick_that_shows_the_value) {
 
 std::string text_of(const CellResults& results) {
   std::string text;
-  for (const Finding& finding : findings_of(results, {}, {})) text += finding.text + "\n";
+  for (const std::string& fact : facts_of(results)) text += fact + "\n";
   return text;
 }
 
-TEST(Report, counts_one_tension_in_the_singular) {
+Provenance fitted_here(std::vector<Finding> findings) {
+  Provenance provenance;
+  provenance.stages.push_back({.name = "fit", .state = "run"});
+  provenance.findings = std::move(findings);
+  return provenance;
+}
+
+TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
   const FakeCell cell;
-  CellResults results = read_results(cell.folder.path());
-  for (auto& [id, tension] : results.tensions) tension.tension_nN = 1;
-  results.tensions.at(1).tension_nN = 0;
-  EXPECT_NE(text_of(results).find("1 tension is zero"), std::string::npos);
-  results.tensions.at(2).tension_nN = 0;
-  EXPECT_NE(text_of(results).find("2 tensions are zero"), std::string::npos);
+  const CellResults results = read_results(cell.folder.path());
+  const auto has_tick = [&](const Provenance& p) { return findings_section(results, p).find("✓") != std::string::npos; };
+  EXPECT_TRUE(has_tick(fitted_here({})));
+  EXPECT_TRUE(has_tick(fitted_here({*noticed(FindingKind::wide_interval, 1, "x")})));
+  EXPECT_FALSE(has_tick(fitted_here({*noticed(FindingKind::missing_fibre, 1, "x")})));
+  EXPECT_FALSE(has_tick(fitted_here({*noticed(FindingKind::not_identifiable, 2, "x")})));
+  Provenance not_converged = fitted_here({});
+  not_converged.stages.front().converged = false;
+  EXPECT_FALSE(has_tick(not_converged));
+  EXPECT_FALSE(has_tick({}));  // nobody asked
+}
+
+TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
+  const FakeCell cell;
+  const Finding finding = *noticed(FindingKind::missing_fibre, 3, "three <fibres>");
+  const std::string html = findings_section(read_results(cell.folder.path()), fitted_here({finding}));
+  for (const std::string& part : {std::string("three &lt;fibres&gt;"), html_escaped(finding.remedy),
+                                  html_escaped(finding.reason), std::string(": 3. Threshold: 0;")})
+    EXPECT_NE(html.find(part), std::string::npos) << part;
 }
 
 TEST(Report, tells_the_noise_from_the_models_error) {

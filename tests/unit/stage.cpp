@@ -54,7 +54,7 @@ StageReport write_two(const Example&, StageContext& context) {
   context.input("in");
   write_text(context.output("out", "a.csv"), "a");
   write_text(context.output("out", "deep/b.csv"), "b");
-  return {.summary = "two files", .figures = {{"n", std::int64_t{2}}}, .effects = {}};
+  return {.summary = "two files", .figures = {{"n", std::int64_t{2}}}, .effects = {}, .findings = {}};
 }
 
 TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {

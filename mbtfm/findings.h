@@ -1,0 +1,31 @@
+/// What the fit noticed of its data and of its own answer.
+#pragma once
+
+#include <vector>
+
+#include "mbtfm/fit_results.h"
+#include "mbtfm/model_checks.h"
+#include "pipeline/contract/findings.h"
+
+namespace mbtfm::inverse {
+
+/// What the findings are read off.
+struct FitOutcome {
+  const EnsembleFit& fit;
+  const LinearData& data;
+  const Cell& cell;  ///< with its fibres, whether in the network or not
+  const FitSummary& summary;
+  const std::vector<Tension>& tensions;
+  const std::vector<MissingFibre>& missing;
+};
+
+/// In the order in which a user should read them.
+std::vector<Finding> findings_of(const FitOutcome& outcome);
+
+/// |sum of forces| and |sum of torques| over the sums of their magnitudes: rounding only.
+struct Imbalance {
+  double force = 0, torque = 0;
+};
+Imbalance imbalance_of(const EnsembleFit& fit);
+
+}  // namespace mbtfm::inverse

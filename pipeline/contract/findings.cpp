@@ -1,0 +1,159 @@
+#include "pipeline/contract/findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm {
+
+const std::vector<KindOfFinding>& kinds_of_findings() {
+  using enum FindingKind;
+  using enum Severity;
+  static const std::vector<KindOfFinding> kinds = {
+      {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by three standard errors",
+       0.98, "chance moves 1 bead in 90 by that much",
+       "Check that the two bead images belong to this cell, and that the cell was removed between them."},
+      {moves_outward, "moves-outward", "track", caution,
+       "mean cosine between a bead's displacement and the direction away from the centre", 0.3,
+       "a contracting cell has -0.7 or so, a layer of cells about 0",
+       "Check whether the stressed and the relaxed image are exchanged."},
+      {common_motion, "common-motion", "fit", note,
+       "largest displacement of a bead by growth, shear or turn of the whole image, over its standard error", 3,
+       "chance reaches 3 standard errors in less than one cell of a hundred for each of the four",
+       "None is needed: the motion was taken off, and the error bars hold its error. If it recurs, look for a change of "
+       "focus or of temperature between the bead images."},
+      {unexplained_displacement, "unexplained-displacement", "fit", caution,
+       "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,
+       "up to half of the noise's standard deviation, the model's own error adds less than an eighth to what is left",
+       "Look at the map of what is left: arrows in a line want a fibre, arrows at one place an adhesion, arrows "
+       "everywhere another gel or a common motion of the beads."},
+      {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
+       "without the noise nobody can tell whether the model fits", "Give sigma_um in displacement.csv."},
+      {noise_disagrees, "noise-disagrees", "fit", caution,
+       "scatter of the beads about their neighbours, over the standard error that the tracker states", 1.3,
+       "on simulated images it is 0.9 to 1.1; the tensions' error bars take the larger of both",
+       "Look for beads that are out of focus or overlap. Of a displacement field of another program, check sigma_um."},
+      {beads_disagree_by_region, "beads-disagree", "fit", caution,
+       "largest chi squared per degree of freedom in a region of the image", 3,
+       "noise alone does not reach 2 over the 30 beads that a region has at least",
+       "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
+       "adhesion that was not segmented."},
+      {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
+       "a pair of adhesions is named where chance would name one in one cell of twenty, all pairs tried",
+       "Look for the fibre in the actin image between these adhesions. If it is there, put "
+       "4_fit/missing_fibres.zip beside cell.toml as fibres.zip and run again."},
+      {missing_adhesion, "missing-adhesion", "fit", caution, "places where the beads call for a force and no adhesion is",
+       0, "a place is named where chance would name one in one cell of twenty, all places tried",
+       "Look at this place in the adhesion image. If an adhesion is there, lower segment.adhesion_snr or draw it "
+       "(adhesions.zip)."},
+      {fibre_without_tension, "fibre-without-tension", "fit", caution, "segmented fibres that are not in the network", 0,
+       "each of them may carry force", "Run the network stage again: network.vtu is of another segmentation."},
+      {not_identifiable, "not-identifiable", "fit", bad, "fibre tensions that these beads do not determine", 0,
+       "such a tension can take any value without the beads noticing",
+       "Disregard these tensions (hollow marks; identifiable = FALSE). More beads near these fibres would help."},
+      {network_not_identifiable, "network-not-identifiable", "fit", bad,
+       "1 where the tension of the actin network is not determined", 0,
+       "then the network's share of the force and its surface tension are not known either",
+       "Disregard the tension and the force of the network; tensions of fibres and total force hold."},
+      {wide_interval, "wide-interval", "fit", note,
+       "tensions whose 95 % interval is wider than twice the tension itself", 0,
+       "of such a tension little more is known than that it is small", "Read the interval, not the value."},
+      {tension_at_zero, "tension-at-zero", "fit", note, "tensions that are zero, the least allowed", 0,
+       "fibres do not push: zero is where a fit of a weak fibre ends",
+       "Read the upper end of the interval as a limit."},
+      {single_mesh, "single-mesh", "fit", caution, "1 where one mesh was fitted", 0,
+       "the choice of the mesh is usually a larger error than the noise of the beads, and one mesh cannot show it",
+       "Use fit.n_meshes = 2 or more."},
+      {forces_out_of_balance, "forces-out-of-balance", "fit", bad,
+       "length of the sum of the adhesion forces, over the sum of their lengths", 1e-6,
+       "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
+       "Report this with the cell: it should not happen."},
+      {torques_out_of_balance, "torques-out-of-balance", "fit", bad,
+       "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,
+       "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
+       "Report this with the cell: it should not happen."},
+      {assumed_input, "assumed-input", "fit", note, "physical inputs that cell.toml does not give", 0,
+       "forces depend on them, and nobody measured them", "Give them in cell.toml."},
+      {modulus_error_unknown, "modulus-error-unknown", "fit", note,
+       "1 where gel.youngs_modulus_sigma_kPa is not given", 0,
+       "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
+       "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
+  };
+  return kinds;
+}
+
+const KindOfFinding& properties_of(FindingKind kind) {
+  const auto& kinds = kinds_of_findings();
+  const auto found = std::ranges::find(kinds, kind, &KindOfFinding::kind);
+  MBTFM_ASSERT(found != kinds.end());
+  return *found;
+}
+
+const char* name_of(Severity severity) {
+  static constexpr const char* kNames[] = {"note", "caution", "bad"};
+  return kNames[static_cast<std::size_t>(severity)];
+}
+
+bool is_open(const Finding& finding) { return finding.severity != Severity::note; }
+
+bool has_open(const std::vector<Finding>& findings) { return std::ranges::any_of(findings, is_open); }
+
+std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text, Severity severity) {
+  const KindOfFinding& k = properties_of(kind);
+  if (number <= k.threshold) return std::nullopt;
+  return Finding{.id = k.id,
+                 .severity = severity,
+                 .text = text,
+                 .number = std::isfinite(number) ? std::optional(number) : std::nullopt,
+                 .threshold = k.threshold,
+                 .number_is = k.number,
+                 .reason = k.reason,
+                 .remedy = k.remedy};
+}
+
+std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text) {
+  return noticed(kind, number, text, properties_of(kind).severity);
+}
+
+std::string line_of(const Finding& finding) {
+  return std::string(name_of(finding.severity)) + " (" + finding.id + "): " + finding.text +
+         (is_open(finding) ? " " + finding.remedy : "");
+}
+
+std::string open_ids(const std::vector<Finding>& findings) {
+  std::set<std::string> seen;
+  std::string ids;
+  for (const Finding& finding : findings) {
+    if (is_open(finding) && seen.insert(finding.id).second) ids += (ids.empty() ? "" : "; ") + finding.id;
+  }
+  return ids;
+}
+
+std::string findings_page() {
+  std::string page =
+      "# Findings\n\n"
+      "The program tells what it notices about the images, the beads and its own answer. Each finding has an identity, a\n"
+      "number, a threshold and a remedy. A finding appears on the terminal, in the report, in `run.json`, in `run.log`, in\n"
+      "the column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n"
+      "- **note**: worth knowing; the results hold.\n"
+      "- **caution**: the results may be off by more than their error bars say.\n"
+      "- **bad**: do not use what the finding names.\n\n"
+      "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
+  for (const char* stage : {"segment", "track", "network", "fit"}) {
+    bool has_title = false;
+    for (const KindOfFinding& k : kinds_of_findings()) {
+      if (std::string(stage) != k.stage) continue;
+      if (!has_title) page += "\n## " + std::string(stage) + "\n";
+      has_title = true;
+      page += "\n### `" + std::string(k.id) + "` (" + name_of(k.severity) + ")\n\n- Number: " + k.number +
+              "; threshold " + brief(k.threshold) + ".\n- Why this threshold: " + k.reason + ".\n- What to do: " +
+              k.remedy + "\n";
+    }
+  }
+  return page;
+}
+
+}  // namespace mbtfm

@@ -1,0 +1,86 @@
+/// What the program notices and a user should know. Every finding has a kind, declared in the one table of findings.cpp
+/// with the threshold, its reason and the remedy; docs/findings.md is written from that table. From the records of the
+/// stages the findings reach the terminal, run.json, batch.csv, run.log, the report and the study.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace mbtfm {
+
+enum class Severity {
+  note,     ///< worth knowing; the results hold
+  caution,  ///< open: the results may be off by more than their error bars say
+  bad       ///< open: what it names must not be used
+};
+
+enum class FindingKind {
+  // track
+  nothing_moves,
+  moves_outward,
+  // fit: the displacement
+  common_motion,
+  unexplained_displacement,
+  noise_unknown,
+  noise_disagrees,
+  beads_disagree_by_region,
+  // fit: the cell
+  missing_fibre,
+  missing_adhesion,
+  fibre_without_tension,
+  // fit: the answer
+  not_identifiable,
+  network_not_identifiable,
+  wide_interval,
+  tension_at_zero,
+  single_mesh,
+  forces_out_of_balance,
+  torques_out_of_balance,
+  // fit: the gel
+  assumed_input,
+  modulus_error_unknown
+};
+
+struct KindOfFinding {
+  FindingKind kind;
+  const char* id;  ///< its identity in files
+  const char* stage;
+  Severity severity;
+  const char* number;  ///< what is asked, with its unit
+  double threshold;    ///< a finding where the number is above it
+  const char* reason;  ///< of the threshold
+  const char* remedy;
+};
+
+const std::vector<KindOfFinding>& kinds_of_findings();
+const KindOfFinding& properties_of(FindingKind kind);
+
+/// As it is written to files and shown, complete in itself.
+struct Finding {
+  std::string id;
+  Severity severity = Severity::note;
+  std::string text;  ///< what was found, one to three sentences
+  std::optional<double> number, threshold;
+  std::string number_is;  ///< what the number is, with its unit
+  std::string reason, remedy;
+};
+
+const char* name_of(Severity severity);
+bool is_open(const Finding& finding);
+bool has_open(const std::vector<Finding>& findings);
+
+/// A finding where the number is above its kind's threshold, or is not a number.
+std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text);
+/// The same, with another severity than the kind's own: where this case is milder or worse than the kind as a rule.
+std::optional<Finding> noticed(FindingKind kind, double number, const std::string& text, Severity severity);
+
+/// "caution (missing-fibre): text Remedy."
+std::string line_of(const Finding& finding);
+/// Identities of the open ones, each once, in their order: "missing-fibre; common-motion".
+std::string open_ids(const std::vector<Finding>& findings);
+
+/// docs/findings.md
+std::string findings_page();
+
+}  // namespace mbtfm

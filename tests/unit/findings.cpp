@@ -1,0 +1,61 @@
+#include "pipeline/contract/findings.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+#include <set>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/json.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm {
+namespace {
+
+TEST(Findings, every_kind_has_an_identity_of_its_own_a_reason_and_a_remedy) {
+  std::set<std::string> ids;
+  for (const KindOfFinding& k : kinds_of_findings()) {
+    EXPECT_TRUE(ids.insert(k.id).second) << k.id;
+    EXPECT_EQ(std::string(k.id).find_first_not_of("abcdefghijklmnopqrstuvwxyz-"), std::string::npos) << k.id;
+    for (const char* text : {k.stage, k.number, k.reason, k.remedy}) EXPECT_FALSE(std::string(text).empty()) << k.id;
+    EXPECT_EQ(&properties_of(k.kind), &k);
+  }
+}
+
+TEST(Findings, are_noticed_above_their_threshold_and_where_the_number_is_none) {
+  const double threshold = properties_of(FindingKind::moves_outward).threshold;
+  EXPECT_FALSE(noticed(FindingKind::moves_outward, threshold, "x"));
+  EXPECT_TRUE(noticed(FindingKind::moves_outward, threshold + 1e-9, "x"));
+  const auto unknown = noticed(FindingKind::moves_outward, std::numeric_limits<double>::quiet_NaN(), "x");
+  ASSERT_TRUE(unknown);
+  EXPECT_FALSE(unknown->number);
+}
+
+TEST(Findings, notes_are_not_open) {
+  const Finding note = *noticed(FindingKind::wide_interval, 1, "x");
+  const Finding caution = *noticed(FindingKind::missing_fibre, 1, "y");
+  EXPECT_FALSE(has_open({note}));
+  EXPECT_TRUE(has_open({note, caution}));
+  EXPECT_EQ(open_ids({note, caution, caution}), "missing-fibre");
+  EXPECT_EQ(line_of(note), "note (wide-interval): x");
+  EXPECT_EQ(line_of(caution), "caution (missing-fibre): y " + caution.remedy);
+}
+
+TEST(Findings, pass_through_a_record_unchanged) {
+  const test::TemporaryFolder folder;
+  const Finding there = *noticed(FindingKind::not_identifiable, 2, "of \"two\"\n");
+  nlohmann::ordered_json json;
+  json["findings"] = {json_of(there)};
+  write_text(folder / "a.json", json_text(json));
+  const std::vector<Finding> back = findings_of(JsonRecord(folder / "a.json", "a record"));
+  ASSERT_EQ(back.size(), 1u);
+  EXPECT_EQ(json_of(back.front()), json_of(there));
+  write_text(folder / "b.json", R"({"findings": [{"id": "a", "severity": "loud", "text": "b"}]})");
+  EXPECT_THROW(findings_of(JsonRecord(folder / "b.json", "a record")), InputError);
+  write_text(folder / "c.json", "{}");  // as older versions wrote it
+  EXPECT_TRUE(findings_of(JsonRecord(folder / "c.json", "a record")).empty());
+}
+
+}  // namespace
+}  // namespace mbtfm
