@@ -11,26 +11,6 @@ Change change_between(const std::string& effect, const EnsembleFit& without, con
   return {effect, values_of(with).head(before.size()) - before};
 }
 
-LinearData without_turn(LinearData data) {
-  Vec2 centre;
-  for (const Vec2 p : data.position_um) centre += (1 / static_cast<double>(data.position_um.size())) * p;
-  Eigen::VectorXd turn(data.displacement_um.size()), weighted(turn.size());
-  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
-    const Vec2 d = data.position_um[static_cast<std::size_t>(b)] - centre;
-    const double weight = data.bead_weight[b] * std::pow(data.weight_per_um[2 * b], 2);
-    turn.segment<2>(2 * b) << -d.y, d.x;
-    weighted.segment<2>(2 * b) = weight * turn.segment<2>(2 * b);
-  }
-  const double norm = weighted.dot(turn);
-  if (norm <= 0) return data;
-  weighted /= norm;
-  // the angle that fits best for any forces is linear in them: (turnᵀ W² (u − G R)) / (turnᵀ W² turn)
-  data.response = substrate::less_a_mode(data.response, turn, data.response->pull_back(weighted));
-  data.displacement_um -= weighted.dot(data.displacement_um) * turn;
-  reweight(data, Eigen::VectorXd(data.bead_weight));
-  return data;
-}
-
 double relative(const Change& change, const EnsembleFit& fit) {
   if (change.at_most) return *change.at_most;
   const Eigen::VectorXd tensions = values_of(fit);

@@ -18,10 +18,6 @@ struct Change {
 
 Change change_between(const std::string& effect, const EnsembleFit& without, const EnsembleFit& with);
 
-/// The data less a turn of the whole field about the beads' centre, which is found beside the forces: what it explains
-/// of the displacement is taken off both sides.
-LinearData without_turn(LinearData data);
-
 /// |change| / |t| over the fibres, or of the network where there are none.
 double relative(const Change& change, const EnsembleFit& fit);
 

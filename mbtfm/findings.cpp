@@ -124,6 +124,22 @@ Noticed out_of_balance(FindingKind kind, double imbalance, const std::string& wh
                                       brief(imbalance) + ".");
 }
 
+Noticed common_motion(const FitOutcome& o) {
+  if (!o.motion) return {};
+  const CommonMotion& m = o.motion->motion;
+  double largest = 0;  // in standard errors
+  const double values[] = {m.turn_rad, m.growth, m.shear_1, m.shear_2};
+  for (int i = 0; i < 4; ++i) largest = std::max(largest, std::abs(values[i]) / o.motion->sigma[i + 2]);
+  constexpr double kLarge = 0.01;  // of all lengths: no refocus and no warming does that
+  const bool is_large = std::max({std::abs(m.growth), std::abs(m.shear_1), std::abs(m.shear_2)}) > kLarge;
+  return noticed(FindingKind::common_motion, largest,
+                 "All beads share a motion beside the cell's pull: " + sentence_of(*o.motion) + ". It was taken off." +
+                     (is_large ? " It is too large for a change of focus or of temperature: were both pictures taken "
+                                 "with the same objective?"
+                               : ""),
+                 is_large ? Severity::caution : Severity::note);
+}
+
 }  // namespace
 
 Imbalance imbalance_of(const EnsembleFit& fit) {
@@ -138,7 +154,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
   for (Noticed found :
-       {missing_fibres_noticed(o), unexplained(o), noise_unknown(o), not_identifiable(o),
+       {common_motion(o), missing_fibres_noticed(o), unexplained(o), noise_unknown(o), not_identifiable(o),
         network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
         out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
         out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),

@@ -1,8 +1,10 @@
 /// What the fit noticed of its data and of its own answer.
 #pragma once
 
+#include <optional>
 #include <vector>
 
+#include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/model_checks.h"
 #include "pipeline/contract/findings.h"
@@ -17,6 +19,7 @@ struct FitOutcome {
   const FitSummary& summary;
   const std::vector<Tension>& tensions;
   const std::vector<MissingFibre>& missing;
+  const std::optional<FoundMotion>& motion;
 };
 
 /// In the order in which a user should read them.

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <optional>
 
+#include "mbtfm/common_motion.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/parallel.h"
 
 namespace mbtfm::inverse {
 namespace {
-
-constexpr const char* kTurnLeft = "turn of the displacement";
 
 /// The fit again, with other networks, data or loss. From the same start as a run that has the effect from the first.
 EnsembleFit fit_again(const FittedCell& c, const std::vector<network::CableNetwork>& networks, LinearData data,
@@ -67,9 +66,11 @@ std::optional<Change> with_loss(const Effect& e, const FittedCell& c, int thread
   return change_between(e.name, c.fit, fit_again(c, c.networks, c.data, c.parameters.fit.robust_kind, threads));
 }
 
-std::optional<Change> with_turn(const Effect& e, const FittedCell& c, int threads) {
+std::optional<Change> with_motion(const Effect& e, const FittedCell& c, int threads) {
+  LinearData with = c.data;
+  allow_motions(with, affine_motions(c.inputs.beads));
   return change_between(e.name, c.fit,
-                        fit_again(c, c.networks, without_turn(unweighted(c.data)), c.parameters.fit.loss, threads));
+                        fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
 
 /// What it changes of the network's tension.
@@ -88,7 +89,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e);
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
   if (e.name == "robust loss") return with_loss(e, c, threads);
-  if (e.name == kTurnLeft) return with_turn(e, c, threads);
+  if (e.name == kCommonMotion) return with_motion(e, c, threads);
   return {};
 }
 
@@ -123,9 +124,6 @@ std::vector<network::CableNetwork> of_cables(const std::vector<network::CableNet
 }
 
 std::vector<Change> explain(std::vector<Effect>& effects, const FittedCell& cell, int threads) {
-  effects.push_back(
-      decided(kTurnLeft, "auto", false,
-              "mbtfm-track takes turns off the displacement; this is what it left, or was told to leave"));
   std::vector<Change> changes;
   for (Effect& effect : effects) {
     if (effect.is_on) continue;
@@ -148,7 +146,7 @@ void declare(ParameterList& list, FitStageParameters& p) {
   list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
   declare(list, p.effects,
           {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
-           "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
+           "common_motion", "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
 }
 
 std::vector<int> adhesion_ids_of(const Cell& cell) {

@@ -1,9 +1,11 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
+#include <numbers>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
 
+#include "mbtfm/common_motion.h"
 #include "mbtfm/cross_validation.h"
 #include "mbtfm/effects.h"
 #include "mbtfm/error_budget.h"
@@ -193,9 +195,9 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
 /// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
 std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::SharedResponse& response,
                        const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
-                       const FitParameters& p, bool is_coupled, StageContext& context) {
+                       const FitParameters& p, bool moves, bool is_coupled, StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
-      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, is_coupled,
+      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, moves, is_coupled,
       context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
       next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
@@ -222,8 +224,10 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   Responses responses = responses_of(inputs.beads, series, [&](const DisplacementField& b) {
     return substrate->response(points_of(b), ellipses_of(inputs.cell));
   });
+  const bool moves = allows_common_motion(p.effects);
   LinearData data =
-      reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit), context.threads);
+      reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit), context.threads,
+             moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -264,9 +268,14 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  std::optional<FoundMotion> motion;
+  if (moves) motion = motion_beside(data, fit);
   const auto budget_start = std::chrono::steady_clock::now();
   summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
   const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
+  if (motion) {
+    for (const auto& figure : figures_of(*motion)) summary.more.push_back(figure);
+  }
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const Influence influence = influence_of(fit, data);
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence);
@@ -290,7 +299,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                          {most_informed_array(influence), weight_array(data)});
   const std::string of_series = series.empty() ? ""
                                                : fit_frames(series, responses.of_series, inputs.cell, networks, fit,
-                                                            p.fit, coupling.is_on, context);
+                                                            p.fit, moves, coupling.is_on, context);
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces, p.fit.surface_lines);
   context.progress(1, "done");
@@ -306,7 +315,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   report.effects = substrate->effects();
   report.effects.insert(report.effects.begin(), fibres);
   report.effects.insert(report.effects.end(),
-                        {elasticity, robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
+                        {common_motion_effect(p.effects.common_motion, motion), elasticity, robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
   if (p.explain) {
     context.progress(0.97, "explaining what is off");
     const std::vector<Change> changes =
@@ -315,7 +324,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   }
   report.summary += of_series;
   report.figures.emplace_back("error_budget_s", budget_s);
-  report.findings = findings_of(FitOutcome{fit, data, cell, summary, tensions, missing});
+  report.findings = findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, motion});
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0)

@@ -65,7 +65,9 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
                       const std::vector<network::CableNetwork>& networks, const FitParameters& parameters) {
   const NoiseLevel noise =
       noise_level(inputs.beads, data, fit.forces_nN, inputs.cell.outline_um, parameters.far_distance_um);
-  const double measured_um = data.displacement_um.norm();
+  const Eigen::VectorXd measured = less_motion(data, data.displacement_um - data.response->displace(fit.forces_nN)) +
+                                   data.response->displace(fit.forces_nN);
+  const double measured_um = measured.norm();
   FitSummary s;
   s.relative_l2 = relative_l2(data, fit.forces_nN);
   s.noise_um = noise.sigma_um;
@@ -102,7 +104,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
 }
 
 DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data) {
-  const Eigen::VectorXd model = data.response->displace(forces_nN);
+  Eigen::VectorXd model = data.response->displace(forces_nN);
+  if (data.motions.cols() > 0) model += data.motions * motion_in(data, data.displacement_um - model);
   DisplacementField field = inputs.beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);

@@ -1,5 +1,7 @@
 #include "mbtfm/linear_data.h"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 
@@ -34,6 +36,23 @@ Root root_of(Eigen::MatrixXd A, int threads) {
   return {std::move(A), n_felt};
 }
 
+/// Gᵀ W² P G, on and above its diagonal.
+Eigen::MatrixXd gram_less_motions(const LinearData& data, const Eigen::VectorXd& weight) {
+  Eigen::MatrixXd gram = data.response->upper_gram(weight);
+  if (data.motions.cols() == 0) return gram;
+  // M Q with (M Q)ᵀ W² (M Q) = 1, of those motions that differ
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(data.motions.transpose() * weight.asDiagonal() *
+                                                             data.motions);
+  constexpr double kRounding = 1e-13;
+  const Eigen::VectorXd scale = eigen.eigenvalues().unaryExpr([&](double square) {
+    return square > kRounding * eigen.eigenvalues().maxCoeff() ? 1 / std::sqrt(square) : 0.0;
+  });
+  const Eigen::MatrixXd unit = data.motions * (eigen.eigenvectors() * scale.asDiagonal());
+  const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
+  add_upper_gram(pulled.transpose(), gram, data.threads, -1);
+  return gram;
+}
+
 }  // namespace
 
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
@@ -42,11 +61,13 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
 }
 
 LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response, const std::vector<bool>& is_used,
-                  int threads) {
+                  int threads, Eigen::MatrixXd motions) {
   const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
   MBTFM_ASSERT(response->rows() == n_rows);
   LinearData data;
   data.threads = threads;
+  data.motions = std::move(motions);
+  data.n_used = -data.motions.cols();
   data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
   data.displacement_um.resize(n_rows);
   data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
@@ -63,13 +84,35 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   return data;
 }
 
+void allow_motions(LinearData& data, Eigen::MatrixXd motions) {
+  data.n_used += data.motions.cols() - motions.cols();
+  data.motions = std::move(motions);
+  reweight(data, Eigen::VectorXd(data.bead_weight));
+}
+
+Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  // by rank: beads in one place tell no turn from a shift
+  return (data.motions.transpose() * weighted).completeOrthogonalDecomposition().solve(weighted.transpose() * displacements);
+}
+
+Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
+  if (data.motions.cols() > 0) displacements -= data.motions * motion_in(data, displacements);
+  return displacements;
+}
+
+Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+  return less_motion(data, data.displacement_um - data.response->displace(forces_nN));
+}
+
 void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory
   const Eigen::VectorXd weight = squared_weights(data);
-  const Eigen::VectorXd weighted_u = weight.cwiseProduct(data.displacement_um);
-  // A = Gᵀ W² G = Cᵀ C; then y = C⁻ᵀ Gᵀ W² u.
-  auto [root, n_felt] = root_of(data.response->upper_gram(weight), data.threads);
+  const Eigen::VectorXd u = less_motion(data, data.displacement_um);
+  const Eigen::VectorXd weighted_u = weight.cwiseProduct(u);
+  // A = Gᵀ W² P G = Cᵀ C; then y = C⁻ᵀ Gᵀ W² P u.
+  auto [root, n_felt] = root_of(gram_less_motions(data, weight), data.threads);
   Eigen::MatrixXd target = data.response->pull_back(weighted_u);
   solve_upper_transposed(root, target);
   data.reduced.target = target;
@@ -77,7 +120,7 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.reduced.n_felt = n_felt;
   data.reduced.is_upper = true;
   data.reduced.n_components = data.n_used;
-  data.reduced.floor_squared = std::max(0.0, weighted_u.dot(data.displacement_um) - target.squaredNorm());
+  data.reduced.floor_squared = std::max(0.0, weighted_u.dot(u) - target.squaredNorm());
 }
 
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {
@@ -117,12 +160,12 @@ void BeadAnswers::for_each_block(const std::function<void(Eigen::Index, const Ei
   for (Eigen::Index first = 0; first < n_rows(); first += at_once) {
     const Eigen::Index count = std::min(at_once, n_rows() - first);
     const Eigen::MatrixXd forces = by_force_.middleRows(first, count).transpose();
-    body(first, data_.response->displace(forces).transpose() * weight.asDiagonal());
+    body(first, less_motion(data_, data_.response->displace(forces)).transpose() * weight.asDiagonal());
   }
 }
 
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN) {
-  return data.weight_per_um.cwiseProduct(data.displacement_um - data.response->displace(forces_nN));
+  return data.weight_per_um.cwiseProduct(residual_um(data, forces_nN));
 }
 
 double noise_variance(const LinearData& data) {
@@ -132,8 +175,9 @@ double noise_variance(const LinearData& data) {
 
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
   const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
-  const double scale = is_used.cwiseProduct(data.displacement_um).norm();
-  const double misfit = is_used.cwiseProduct(data.displacement_um - data.response->displace(forces_nN)).norm();
+  const Eigen::VectorXd model = data.response->displace(forces_nN), residual = less_motion(data, data.displacement_um - model);
+  const double scale = is_used.cwiseProduct(model + residual).norm();  // u less the motion
+  const double misfit = is_used.cwiseProduct(residual).norm();
   return scale > 0 ? misfit / scale : misfit;
 }
 

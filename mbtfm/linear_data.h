@@ -11,7 +11,8 @@
 
 namespace mbtfm::inverse {
 
-/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R. White noise of W u is white in y.
+/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best.
+/// White noise of W u is white in y.
 struct ReducedData {
   std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
   Eigen::VectorXd target;                             ///< y
@@ -29,7 +30,8 @@ struct LinearData {
   Eigen::VectorXd displacement_um;     ///< u, in the same order
   Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
-  Eigen::Index n_used = 0;             ///< components of the beads that are used
+  Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
+  Eigen::Index n_used = 0;             ///< components of the beads that are used, less one for each motion
   bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
   int threads = 1;                     ///< to reduce it with
   ReducedData reduced;                 ///< of all that, bead_weight included
@@ -39,10 +41,20 @@ struct LinearData {
 /// @param response  2·beads × 2·adhesions
 /// @param is_used  by bead; empty: all
 LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
-                  const std::vector<bool>& is_used = {}, int threads = 1);
+                  const std::vector<bool>& is_used = {}, int threads = 1, Eigen::MatrixXd motions = {});
 /// The same with the matrix of the response.
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used = {});
+
+/// Let the beads move by any sum of these (2·beads × some) besides. Reduces again.
+void allow_motions(LinearData& data, Eigen::MatrixXd motions);
+/// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed:
+/// (MᵀW²M)⁻¹ MᵀW² D
+Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
+/// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M)⁻¹ MᵀW².
+Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
+/// What forces and motions leave: P (u − G R), um.
+Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
 /// Reduce again with these weights by bead.
 void reweight(LinearData& data, const Eigen::VectorXd& bead_weight);
@@ -70,14 +82,14 @@ class BeadAnswers {
   Eigen::MatrixXd by_force_;
 };
 
-/// u − G R, times W
+/// residual_um, times W
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
 /// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
 /// below the stated errors'.
 double noise_variance(const LinearData& data);
 
-/// |u − G R| / |u| over the beads that are used
+/// |residual| / |u less the common motion| over the beads that are used
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
 }  // namespace mbtfm::inverse

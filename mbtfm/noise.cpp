@@ -8,7 +8,7 @@ namespace mbtfm::inverse {
 NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
                        const Polygon& outline_um, double far_distance_um) {
   constexpr std::size_t kFewest = 30;  // of beads: 60 components tell a standard deviation to about 10 %
-  const Eigen::VectorXd residual = data.displacement_um - data.response->displace(forces_nN);
+  const Eigen::VectorXd residual = residual_um(data, forces_nN);
   std::vector<double> far, all;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);

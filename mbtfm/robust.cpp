@@ -48,7 +48,8 @@ BeadJacobian bead_jacobian(const LinearData& data, const Eigen::MatrixXd& force_
   for (Eigen::Index first = 0; first < J.cols(); first += kColumns) {
     const Eigen::Index count = std::min(kColumns, J.cols() - first);
     J.middleCols(first, count) =
-        (data.weight_per_um.asDiagonal() * data.response->displace(force_derivatives.middleCols(first, count)))
+        (data.weight_per_um.asDiagonal() *
+         less_motion(data, data.response->displace(force_derivatives.middleCols(first, count))))
             .cast<float>();
   }
   return J;
@@ -136,7 +137,8 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
     const Eigen::VectorXd change = fit.trial.tensions_nN - before;
     const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
-    const double moved = data.weight_per_um.cwiseProduct(data.response->displace(derivatives * change)).norm();
+    const Eigen::VectorXd changed = less_motion(data, data.response->displace(derivatives * change));
+    const double moved = data.weight_per_um.cwiseProduct(changed).norm();
     if (moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
   }
   return fit;

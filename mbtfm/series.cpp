@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 
+#include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/csv.h"
@@ -211,13 +212,14 @@ Responses responses_of(const DisplacementField& beads, const std::vector<SeriesF
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
-                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
-                                 int threads, const Progress& progress, Trial start,
+                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
+                                 bool is_coupled, int threads, const Progress& progress, Trial start,
                                  const std::vector<FrameFit>& kept) {
   std::vector<FrameFit> fits;
   const auto fitted = [&](const SeriesFrame& frame) {
     FrameData good = good_beads_of(frame, response, is_used);
-    LinearData data = reduce(good.beads, std::move(good.response), good.is_used);
+    LinearData data = reduce(good.beads, std::move(good.response), good.is_used, threads,
+                             moves ? affine_motions(good.beads) : Eigen::MatrixXd());
     return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start), data);
   };
   for (const SeriesFrame& frame : frames) {

@@ -54,14 +54,15 @@ std::vector<FrameFit> read_fits(const Path& folder);
 
 /// @param response  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
+/// @param moves  a common motion of the beads is found with the tensions
 /// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
 /// @param start  of the first frame, on the first network
 /// @param kept  fits of the same networks, compliance and parameters: taken for frames whose file is still the same
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
-                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool is_coupled,
-                                 int threads, const Progress& progress, Trial start,
+                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
+                                 bool is_coupled, int threads, const Progress& progress, Trial start,
                                  const std::vector<FrameFit>& kept = {});
 
 /// By frame and fibre. @param interval_s  between frames, if known

@@ -14,13 +14,10 @@ SolvedMisfit solved_misfit(const substrate::Substrate& substrate, std::vector<Ve
     for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});
     const std::lock_guard lock(*one_at_a_time);
     const std::vector<Vec2> u_um = substrate.displacements_um(points_um, ellipses, forces_nN);
-    double sum = 0;
-    for (std::size_t i = 0; i < u_um.size(); ++i) {
-      const auto row = 2 * static_cast<Eigen::Index>(i);
-      const Vec2 misfit_um = u_um[i] - Vec2{data.displacement_um[row], data.displacement_um[row + 1]};
-      sum += std::pow(data.weight_per_um[row], 2) * dot(misfit_um, misfit_um);
-    }
-    return sum;
+    Eigen::VectorXd misfit_um = data.displacement_um;
+    for (std::size_t i = 0; i < u_um.size(); ++i)
+      misfit_um.segment<2>(2 * static_cast<Eigen::Index>(i)) -= Eigen::Vector2d(u_um[i].x, u_um[i].y);
+    return data.weight_per_um.cwiseProduct(less_motion(data, misfit_um)).squaredNorm();
   };
 }
 

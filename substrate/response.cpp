@@ -39,46 +39,10 @@ class Dense final : public Response {
   int threads_;
 };
 
-class LessAMode final : public Response {
- public:
-  LessAMode(SharedResponse whole, VectorXd mode, VectorXd share)
-      : whole_(std::move(whole)), mode_(std::move(mode)), share_(std::move(share)) {
-    MBTFM_ASSERT(mode_.size() == whole_->rows() && share_.size() == whole_->cols());
-  }
-
-  Index rows() const override { return whole_->rows(); }
-  Index cols() const override { return whole_->cols(); }
-  MatrixXd displace(const MatrixXd& forces_nN) const override {
-    return whole_->displace(forces_nN) - mode_ * (share_.transpose() * forces_nN);
-  }
-  MatrixXd pull_back(const MatrixXd& displacements) const override {
-    return whole_->pull_back(displacements) - share_ * (mode_.transpose() * displacements);
-  }
-  MatrixXd upper_gram(const VectorXd& weight) const override {
-    const VectorXd weighted = weight.cwiseProduct(mode_);
-    const VectorXd pulled = whole_->pull_back(weighted);
-    const MatrixXd mixed = pulled * share_.transpose();
-    return whole_->upper_gram(weight) - mixed - mixed.transpose() + weighted.dot(mode_) * share_ * share_.transpose();
-  }
-  SharedResponse at_points(const std::vector<Index>& points) const override {
-    std::vector<Index> rows;
-    for (const Index p : points) rows.insert(rows.end(), {2 * p, 2 * p + 1});
-    return less_a_mode(whole_->at_points(points), mode_(rows), share_);
-  }
-
- private:
-  SharedResponse whole_;
-  VectorXd mode_, share_;
-};
-
 }  // namespace
 
 SharedResponse dense_response(MatrixXd compliance_um_per_nN, int threads) {
   return std::make_shared<Dense>(std::move(compliance_um_per_nN), threads);
-}
-
-SharedResponse less_a_mode(SharedResponse response, VectorXd mode, VectorXd share) {
-  return std::make_shared<LessAMode>(std::move(response), std::move(mode), std::move(share));
 }
 
 SharedResponse pointwise_response(const Substrate& model, const std::vector<Vec2>& points_um,

@@ -43,8 +43,4 @@ SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>&
 SharedResponse pointwise_response(const Substrate& model, const std::vector<Vec2>& points_um,
                                   const std::vector<Ellipse>& ellipses, int threads);
 
-/// G with a displacement taken off in proportion to the forces: G − mode angleᵀ.
-/// @param mode  by row; @param share  by column
-SharedResponse less_a_mode(SharedResponse response, Eigen::VectorXd mode, Eigen::VectorXd share);
-
 }  // namespace mbtfm::substrate

@@ -24,6 +24,8 @@ const std::vector<Key>& switches() {
       {"vertical_displacement", &S::vertical_displacement,
        "displacement into the gel; auto: where a three-dimensional surface is written"},
       {"drift_rotation", &S::drift_rotation, "turn of the stressed image; auto: where the far field shows one"},
+      {"common_motion", &S::common_motion,
+       "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
       {"cable_elasticity", &S::cable_elasticity,
        "cables resist to be longer than at rest; auto: where any would be longer"},
       {"robust_loss", &S::robust_loss, "outlying beads count less; auto: where tails cost more than the loss does"},

@@ -21,9 +21,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "a contracting cell has -0.7 or so, a layer of cells about 0",
        "Check whether the stressed and the relaxed image are exchanged."},
       {common_motion, "common-motion", "fit", note,
-       "largest displacement of a bead by growth, shear or turn of the whole image, over its standard error", 3,
-       "chance reaches 3 standard errors in less than one cell of a hundred for each of the four",
-       "None is needed: the motion was taken off, and the error bars hold its error. If it recurs, look for a change of "
+       "largest of growth, shears and turn of the whole field, over its standard error", 3,
+       "chance alone takes one of the four beyond 3 standard errors in one cell of a hundred",
+       "Nothing for this cell: the motion was taken off, and the error bars hold its error. If it recurs, look for a change of "
        "focus or of temperature between the bead images."},
       {unexplained_displacement, "unexplained-displacement", "fit", caution,
        "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,

@@ -111,22 +111,5 @@ TEST(EffectsOfTheFit, time_coupling_where_there_is_a_frame_before) {
   EXPECT_FALSE(decide_time_coupling(false, "on").is_on) << "a series has a first frame";
 }
 
-TEST(Explained, a_turn_put_onto_the_field_is_told_from_the_tensions) {
-  TensionScene s = scene(0.03);
-  const auto on = networks(1);
-  const Eigen::VectorXd straight = values_of(fitted(on, without_turn(s.data), s));
-  Vec2 centre;
-  for (const Vec2 p : s.points_um) centre += (1 / static_cast<double>(s.points_um.size())) * p;
-  for (Bead& bead : s.beads) {
-    const Vec2 d = bead.position_um - centre;
-    bead.displacement_um += 0.004 * Vec2{-d.y, d.x};  // a quarter of a degree
-  }
-  const LinearData turned = reduce(s.beads, s.compliance_um_per_nN);
-  const Eigen::VectorXd cleared = values_of(fitted(on, without_turn(turned), s));
-  const Eigen::VectorXd left = values_of(fitted(on, turned, s));
-  EXPECT_LE((cleared - straight).norm(), 1e-5 * straight.norm());  // the fit's tolerance
-  EXPECT_GE((left - straight).norm(), 0.01 * straight.norm());
-}
-
 }  // namespace
 }  // namespace mbtfm::inverse

@@ -117,19 +117,6 @@ TEST(Response, blocks_of_one_point_and_of_many_at_one_place_are_exact) {
   }
 }
 
-TEST(Response, less_a_mode_is_the_matrix_less_that_product) {
-  const MatrixXd G = random_columns(12, 6, 1);
-  const VectorXd mode = random_columns(12, 1, 2), share = random_columns(6, 1, 3);
-  const SharedResponse response = less_a_mode(dense_response(G), mode, share);
-  const MatrixXd wanted = G - mode * share.transpose(), D = random_columns(12, 2, 4);
-  const VectorXd weight = random_columns(12, 1, 5).cwiseAbs2();
-  EXPECT_LE((whole(*response) - wanted).norm(), 1e-14 * wanted.norm());
-  EXPECT_LE((response->pull_back(D) - wanted.transpose() * D).norm(), 1e-13);
-  const MatrixXd square = wanted.transpose() * weight.asDiagonal() * wanted;
-  EXPECT_LE(MatrixXd((response->upper_gram(weight) - square).triangularView<Eigen::Upper>()).norm(), 1e-13);
-  EXPECT_LE((whole(*response->at_points({4, 1})) - wanted({8, 9, 2, 3}, Eigen::all)).norm(), 1e-14);
-}
-
 TEST(Response, large_scenes_are_blocked_and_small_ones_exact) {
   const auto model = gel("half-space", 60);
   const Scene scene = uneven_scene();

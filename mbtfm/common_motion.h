@@ -1,0 +1,55 @@
+/// Motion that all beads share beside the displacement by forces: shift, turn, growth and shear of one picture against
+/// the other, as after a change of focus or of temperature. It is found beside the forces by least squares, so that none
+/// of it is taken for force, whatever its size, and what the beads cannot tell from it is in the error bars.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/ensemble.h"
+#include "mbtfm/linear_data.h"
+#include "pipeline/contract/effects.h"
+
+namespace mbtfm::inverse {
+
+/// u = shift + (growth 1 + turn [0 −1; 1 0] + shear_1 [1 0; 0 −1] + shear_2 [0 1; 1 0]) (x − centre)
+struct CommonMotion {
+  Vec2 centre_um;
+  Vec2 shift_um;
+  double turn_rad = 0;  ///< from +x towards +y
+  double growth = 0;    ///< relative
+  double shear_1 = 0;   ///< growth along x less growth along y, half of it
+  double shear_2 = 0;   ///< the same along the diagonals
+  Vec2 at(Vec2 place_um) const;
+  /// The largest displacement within this distance from the centre, less the shift.
+  double largest_um(double radius_um) const;
+};
+
+/// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
+/// (relative).
+Eigen::MatrixXd affine_motions(const DisplacementField& beads);
+
+/// A common motion with the standard errors of its numbers, in the order of affine_motions().
+struct FoundMotion {
+  CommonMotion motion;
+  Eigen::VectorXd sigma;
+  double chi_squared = 0;  ///< of turn, growth and shears against none, 4 degrees of freedom
+};
+/// @param forces_nN  of the fit, by adhesion
+FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit);
+
+inline constexpr const char* kCommonMotion = "common motion";
+/// Always on but where it is switched off: a motion too small to be noticed still shifts the total force by some of its
+/// standard errors, and what it costs where there is none is little (docs/effects.md).
+bool allows_common_motion(const EffectSwitches& switches);
+/// @param found  none where it is off
+Effect common_motion_effect(const std::string& setting, const std::optional<FoundMotion>& found);
+/// Of fit.json.
+Figures figures_of(const FoundMotion& found);
+
+/// "growth 0.12 +- 0.01 %, turn ..."
+std::string sentence_of(const FoundMotion& found);
+
+}  // namespace mbtfm::inverse

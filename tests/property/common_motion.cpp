@@ -1,0 +1,123 @@
+#include "mbtfm/common_motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "mbtfm/fit_results.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::TensionScene;
+
+constexpr CommonMotion kMotion{.centre_um = {20, 30},
+                               .shift_um = {0.4, -0.2},
+                               .turn_rad = 0.005,
+                               .growth = -0.003,
+                               .shear_1 = 0.001,
+                               .shear_2 = 0.002};
+
+void move(DisplacementField& beads, const CommonMotion& motion) {
+  for (Bead& bead : beads) bead.displacement_um += motion.at(bead.position_um);
+}
+
+LinearData with_motions(const TensionScene& scene, const DisplacementField& beads) {
+  return reduce(beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(beads));
+}
+
+EnsembleFit fit_of(const TensionScene& scene, LinearData& data, const std::string& loss = "squares") {
+  FitParameters parameters;
+  parameters.loss = loss;
+  std::vector<network::CableNetwork> networks;
+  networks.emplace_back(scene.cables.network(), scene.cables.parameters());
+  return fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {});
+}
+
+TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
+  const TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
+  for (const std::string loss : {"squares", "huber"}) {
+    LinearData still = with_motions(scene, scene.beads);
+    DisplacementField moved_beads = scene.beads;
+    move(moved_beads, kMotion);
+    LinearData moved = with_motions(scene, moved_beads);
+    const EnsembleFit a = fit_of(scene, still, loss), b = fit_of(scene, moved, loss);
+    const double scale = values_of(a).norm();
+    EXPECT_LE((values_of(a) - values_of(b)).norm(), 1e-6 * scale) << loss;  // where iterations end
+    EXPECT_LE((a.covariance_nN2 - b.covariance_nN2).norm(), 1e-5 * a.covariance_nN2.norm()) << loss;
+    EXPECT_NEAR(a.chi_squared_per_degree, b.chi_squared_per_degree, 1e-6) << loss;
+    EXPECT_NEAR(relative_l2(still, a.forces_nN), relative_l2(moved, b.forces_nN), 1e-6) << loss;
+  }
+}
+
+TEST(CommonMotion, without_allowing_for_it_growth_is_taken_for_force) {
+  TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
+  move(scene.beads, {.centre_um = {}, .shift_um = {}, .growth = 0.003});
+  LinearData blind = reduce(scene.beads, scene.compliance_um_per_nN), seeing = with_motions(scene, scene.beads);
+  const double truth = total_nN(scene.forces_nN);
+  const EnsembleFit a = fit_of(scene, blind), b = fit_of(scene, seeing);
+  EXPECT_GT(std::abs(a.total_force_nN.value - truth), 5 * a.total_force_nN.standard_error);
+  EXPECT_LT(std::abs(b.total_force_nN.value - truth), 4 * b.total_force_nN.standard_error);
+}
+
+TEST(CommonMotion, what_was_planted_is_found_within_its_stated_error) {
+  TensionScene scene = test::tension_scene("case_21", 400, 0.05, 1);
+  constexpr int kDraws = 60;
+  Eigen::VectorXd squares = Eigen::VectorXd::Zero(6);
+  for (unsigned draw = 1; draw <= kDraws; ++draw) {
+    test::measure(scene, 0.05, draw);
+    move(scene.beads, kMotion);
+    LinearData data = with_motions(scene, scene.beads);
+    const EnsembleFit fit = fit_of(scene, data);
+    const FoundMotion found = motion_beside(data, fit);
+    const CommonMotion& m = found.motion;
+    const Vec2 shift = m.shift_um - kMotion.at(m.centre_um);
+    Eigen::VectorXd error(6);
+    error << shift.x, shift.y, m.turn_rad - kMotion.turn_rad, m.growth - kMotion.growth, m.shear_1 - kMotion.shear_1,
+        m.shear_2 - kMotion.shear_2;
+    squares += error.cwiseQuotient(found.sigma).cwiseAbs2() / kDraws;
+  }
+  // a mean of 60 squared normal numbers has a standard deviation of .18
+  for (const double square : squares) EXPECT_NEAR(square, 1, 4 * 0.18);
+}
+
+TEST(CommonMotion, reduced_data_are_those_of_the_projected_displacements) {
+  const TensionScene scene = test::tension_scene("case_21", 50, 0.05, 7);
+  LinearData data = with_motions(scene, scene.beads);
+  reweight(data, Eigen::VectorXd::LinSpaced(50, 0.1, 1));
+  const Eigen::VectorXd weight = squared_weights(data);
+  const Eigen::MatrixXd& M = data.motions;
+  const Eigen::MatrixXd P = Eigen::MatrixXd::Identity(100, 100) -
+                            M * (M.transpose() * weight.asDiagonal() * M).inverse() * M.transpose() * weight.asDiagonal();
+  for (const double size : {0.0, 1.0}) {
+    const Eigen::VectorXd forces = size * scene.forces_nN;
+    const Eigen::VectorXd left = P * (data.displacement_um - scene.compliance_um_per_nN * forces);
+    const double wanted = left.cwiseAbs2().dot(weight);
+    const double reduced = (displace(data.reduced, forces) - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
+    EXPECT_NEAR(reduced, wanted, 1e-9 * wanted);
+  }
+}
+
+TEST(CommonMotion, of_beads_in_one_place_or_none_is_no_obstacle) {
+  const TensionScene scene = test::tension_scene("case_21", 50, 0.05, 7);
+  DisplacementField beads(scene.beads.begin(), scene.beads.end());
+  for (Bead& bead : beads) bead.position_um = {3, 4};
+  const LinearData data = with_motions(scene, beads);
+  EXPECT_TRUE(data.reduced.target.allFinite());
+  EXPECT_EQ(affine_motions({}).rows(), 0);
+}
+
+TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {
+  constexpr CommonMotion kStill{.centre_um = {20, 30}, .shift_um = {}, .turn_rad = 0.005, .growth = -0.003,
+                                .shear_1 = 0.001, .shear_2 = 0.002};
+  double largest = 0;
+  for (int i = 0; i < 3600; ++i) {
+    const double angle = i * 1.7453292519943296e-3;
+    largest = std::max(largest, norm(kStill.at(kStill.centre_um + 7 * Vec2{std::cos(angle), std::sin(angle)})));
+  }
+  EXPECT_NEAR(largest, kStill.largest_um(7), 1e-5 * largest);
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
