@@ -36,6 +36,7 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
   mesh.force_derivatives = problem.force_derivatives(trial);
   mesh.local = local_misfit(trial, displace(problem.data(), mesh.force_derivatives));
   mesh.network_forces_nN = network_forces_nN(problem, trial);
+  mesh.network_part_nN = problem.network_part_nN(trial);
   mesh.torques_nN_um = problem.torques_nN_um(trial);
   return mesh;
 }
@@ -101,8 +102,10 @@ struct Quantities {
 /// @param of_mesh  quantities of a mesh
 /// @param along  each by force (forces × quantities): its own error is the model's, beside that of the tensions; empty
 ///               for tensions
+/// @param is_single  each quantity is of one adhesion
 template <class OfMesh>
-std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const Eigen::MatrixXd& along = {}) {
+std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const Eigen::MatrixXd& along = {},
+                                   bool is_single = false) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
   Eigen::VectorXd value, noise;
   Eigen::MatrixXd model;  // variances by force
@@ -118,7 +121,7 @@ std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh
     noise += own_noise / n_meshes;
     if (model.size() == 0) continue;
     Eigen::MatrixXd by_force = transposed_product(mesh.by_force, q.gradients);
-    if (along.size() > 0) by_force -= along;
+    if (along.size() > 0) by_force -= (is_single ? std::sqrt(all.model_error->of_single) : 1.0) * along;
     model += all.model_error->force_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
   }
   std::vector<Estimate> estimates;
@@ -162,7 +165,7 @@ std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
       return Quantities{own.transpose() * mesh.fit.trial.forces_nN.segment(2 * first, 2 * count),
                         transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
     };
-    for (const Estimate& magnitude : estimates_of(all, of_mesh, along)) magnitudes.push_back(magnitude);
+    for (const Estimate& magnitude : estimates_of(all, of_mesh, along, true)) magnitudes.push_back(magnitude);
   }
   return magnitudes;
 }
@@ -180,13 +183,18 @@ Sides mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
 /// Errors by way of the forces' directions in the mean over meshes.
 Estimate total_force_of(const EnsembleFit& all) {
   const Eigen::VectorXd along = directions_of(all.forces_nN);
-  return estimate_of(
+  Estimate total = estimate_of(
       all,
       [&](const MeshFit& mesh) {
         return along.dot(mesh.fit.trial.forces_nN + mesh.force_derivatives * mesh.past_bounds_nN) -
                magnitude_bias_nN(all.forces_nN, mesh.force_derivatives, mesh.covariance_nN2);
       },
       [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, along);
+  if (!all.model_error) return total;
+  const RoughnessOfTotal roughness = roughness_of_total(all.forces_nN, *all.model_error);
+  total.value += roughness.lacking_nN;
+  total.standard_error = std::hypot(total.standard_error, roughness.sigma_nN);
+  return total;
 }
 
 /// Proportional to the network's tension.
@@ -263,8 +271,8 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
   std::vector<MeshForces> forces;
   for (const MeshFit& mesh : all.meshes) {
     const Trial& trial = mesh.fit.trial;
-    forces.push_back(
-        {trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN), mesh.force_derivatives});
+    forces.push_back({trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN),
+                      mesh.network_part_nN, mesh.force_derivatives});
   }
   return forces;
 }
@@ -298,12 +306,6 @@ Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
     if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
   }
   return along;
-}
-
-double total_nN(const Eigen::VectorXd& forces_nN) {
-  double sum = 0;
-  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
-  return sum;
 }
 
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {

@@ -37,6 +37,7 @@ struct MeshFit {
   Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
   std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
+  Eigen::VectorXd network_part_nN;                   ///< of the forces: what the links of the actin network bring
 };
 
 struct EnsembleFit {
@@ -84,9 +85,6 @@ Eigen::VectorXd values_of(const EnsembleFit& fit);
 /// Unit vectors of forces (fx, fy by adhesion), zero where a force is: the change of the sum of their magnitudes is
 /// along them.
 Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN);
-
-/// Sum of the magnitudes of forces (fx, fy by adhesion).
-double total_nN(const Eigen::VectorXd& forces_nN);
 
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);

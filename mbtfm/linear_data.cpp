@@ -168,6 +168,12 @@ Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd&
   return data.weight_per_um.cwiseProduct(residual_um(data, forces_nN));
 }
 
+double total_nN(const Eigen::VectorXd& forces_nN) {
+  double sum = 0;
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
+  return sum;
+}
+
 double noise_variance(const LinearData& data) {
   const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.n_felt));
   return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / n_free);

@@ -82,6 +82,9 @@ class BeadAnswers {
   Eigen::MatrixXd by_force_;
 };
 
+/// Sum of the magnitudes of forces (fx, fy by adhesion).
+double total_nN(const Eigen::VectorXd& forces_nN);
+
 /// residual_um, times W
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
 

@@ -1,9 +1,11 @@
 /// The error of the model itself. The cell's own network is one of many that its outline, adhesions and fibres allow,
 /// and no mesh is it. Each adhesion's force therefore has an error e beside the beads' noise n,
 ///
-///   y = C (R(t) + e) + n,   Var e_a = phi |R_a|,   Var n = s²:
+///   y = C (R(t) + e) + n,   Var e_a = phi L_a,   L_a = |N_a| + 0.05 |R_a - N_a|,   Var n = s²:
 ///
-/// in proportion to the force, as of a load that many links share at random. It is not used to weigh the data (what
+/// in proportion to N_a, what the links of the actin network bring to the adhesion, as of a load that many links share
+/// at random, and to a twentieth of what its fibres bring, whose ends spread over it. (Measured on networks of four
+/// formulations, `other_network forces`: phi is the same within a half from loads of 0.03 to 2 nN.) It is not used to weigh the data (what
 /// meshes tell of it adds more noise than it takes away: docs/validation.md) but makes the tensions' error bars.
 #pragma once
 
@@ -17,7 +19,13 @@ namespace mbtfm::inverse {
 struct ModelError {
   double phi_nN = 0;                   ///< as the misfit calls for, but not below
   double least_phi_nN = 0;             ///< that of one further mesh about the mean of these
-  Eigen::VectorXd force_variance_nN2;  ///< phi |R_a|, by component of the forces
+  double measured_phi_nN = 0;          ///< as the misfit alone has it; of the cell's network and the mean's together
+  double phi_of_mean_nN = 0;           ///< what the meshes tell of their mean's own
+  Eigen::VectorXd loads_nN;            ///< L_a, by component of the forces
+  /// Variance of a single adhesion's error over phi L_a. What one adhesion lacks its neighbours have, as a rule: beads
+  /// and tensions see less of that than of errors independent of each other. So do the meshes, and tell by how much.
+  double of_single = 1;
+  Eigen::VectorXd force_variance_nN2;  ///< phi L_a, by component of the forces
   double noise_variance = 0;           ///< s²: 1 where the beads' errors are as stated
 };
 
@@ -27,9 +35,17 @@ inline constexpr double kDegreesByAdhesion = 2;
 
 /// Forces that one mesh gives for the tensions common to all, and their derivatives.
 struct MeshForces {
-  Eigen::VectorXd forces_nN;
+  Eigen::VectorXd forces_nN, network_part_nN;
   Eigen::MatrixXd derivatives;
 };
+
+/// A rough network has larger adhesion forces than a smooth one of the same tensions: an error e across a force R makes
+/// it longer, on average by sqrt(R² + Var e) − R. What the cell's network has of this and the meshes' mean has not is
+/// lacking in the sum of the magnitudes.
+struct RoughnessOfTotal {
+  double lacking_nN = 0, sigma_nN = 0;
+};
+RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const ModelError& error);
 
 /// phi by moments: what the meshes' mean leaves of the data, the tensions following, is s² and C Var(e) Cᵀ together.
 /// @param meshes  at least two

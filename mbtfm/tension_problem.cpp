@@ -52,6 +52,10 @@ Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* 
   return trial;
 }
 
+Eigen::VectorXd TensionProblem::network_part_nN(const Trial& trial) const {
+  return to_data_rows(cables_.network_part_nN(trial.equilibrium));
+}
+
 Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
   const Network& network = cables_.network();
   const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);

@@ -44,6 +44,8 @@ class TensionProblem {
                  std::optional<double> force_tolerance = {}) const;
   /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
   Eigen::VectorXd torques_nN_um(const Trial& trial) const;
+  /// The part of the forces that the actin network brings, by adhesion of the data.
+  Eigen::VectorXd network_part_nN(const Trial& trial) const;
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
   Eigen::MatrixXd force_derivatives(const Trial& trial) const;
   /// d(C R)/dt

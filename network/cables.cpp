@@ -209,6 +209,20 @@ Eigen::VectorXd CableNetwork::adhesion_forces_nN(const std::vector<double>& tens
   return result;
 }
 
+Eigen::VectorXd CableNetwork::network_part_nN(const Equilibrium& equilibrium) const {
+  Eigen::VectorXd result = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()));
+  const std::vector<Link>& links = impl_->network.links;
+  for (std::size_t k = 0; k < links.size(); ++k) {
+    const Vec2 span = equilibrium.spans_um[k];
+    if (links[k].fibre_id != 0 || norm(span) == 0) continue;
+    const Vec2 force = (equilibrium.link_force_nN[k] / norm(span)) * span;
+    const int a = impl_->adhesion[links[k].vertex_a], b = impl_->adhesion[links[k].vertex_b];
+    if (a >= 0) result.segment<2>(2 * a) += Eigen::Vector2d(force.x, force.y);
+    if (b >= 0) result.segment<2>(2 * b) -= Eigen::Vector2d(force.x, force.y);
+  }
+  return result;
+}
+
 Eigen::MatrixXd CableNetwork::reaction_derivatives(const std::vector<double>& tensions_nN,
                                                    const Equilibrium& equilibrium, int threads) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);

@@ -79,6 +79,8 @@ class CableNetwork {
   std::vector<Vec2> reactions_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
   /// Force on the substrate by adhesion: (fx, fy) of adhesion_ids()[i] at 2i, 2i+1.
   Eigen::VectorXd adhesion_forces_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
+  /// The part of them that the links of the actin network bring, fibres left out.
+  Eigen::VectorXd network_part_nN(const Equilibrium& equilibrium) const;
   /// dR/dt of the adhesion forces: 2·adhesions × groups, by the implicit function theorem (thesis has none):
   /// dR/dt = −(B_x − H_xf H_ff⁻¹ B_f), H = d²U/dx², B = d²U/dx dt. At a tension of zero: the derivative from above;
   /// with all tensions zero: the elastic response of the network at rest.

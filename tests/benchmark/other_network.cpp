@@ -4,6 +4,7 @@
 ///   truths         truths of several formulations, beads with and without noise; and, beside the fit as it is, one
 ///   that
 ///                  weighs the data by what the meshes tell of each adhesion's error
+///   forces         forces of the adhesions on networks of these truths, found and true, and their stated errors
 ///   meshes         by the number of meshes, with and without noise: error and processor time
 ///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
 #include <cstdio>
@@ -11,6 +12,8 @@
 #include <cstring>
 #include <ctime>
 
+#include "mbtfm/common_motion.h"
+#include "mbtfm/fit_results.h"
 #include "samples/experiment.h"
 #include "tests/support/tension_scene.h"
 
@@ -23,6 +26,7 @@ constexpr double kNoise_um = 0.02;
 
 struct OtherNetwork {
   samples::Experiment experiment;
+  Eigen::VectorXd forces_nN;  ///< true, by adhesion
   std::vector<int> adhesion_ids;
   LinearData noisy, exact;  ///< weighted alike
 };
@@ -45,11 +49,21 @@ Eigen::VectorXd forces_on(const samples::Experiment& experiment, network::Networ
   return cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN));
 }
 
+Eigen::VectorXd forces_of(const samples::Experiment& experiment) {
+  Eigen::VectorXd forces_nN(2 * static_cast<Eigen::Index>(experiment.forces.size()));
+  for (std::size_t a = 0; a < experiment.forces.size(); ++a)
+    forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)) << experiment.forces[a].force_nN.x,
+        experiment.forces[a].force_nN.y;
+  return forces_nN;
+}
+
 /// @param truth  formulation of the cell's own network; none: the simulator's
 OtherNetwork other_network(std::uint64_t seed, const network::NetworkParameters* truth = nullptr) {
   samples::ScenarioParameters p;
   p.seed = seed;
-  OtherNetwork o{.experiment = samples::simulate(p, 2), .adhesion_ids = {}, .noisy = {}, .exact = {}};
+  OtherNetwork o{
+      .experiment = samples::simulate(p, 2), .forces_nN = {}, .adhesion_ids = {}, .noisy = {}, .exact = {}};
+  o.forces_nN = truth ? forces_on(o.experiment, *truth, seed) : forces_of(o.experiment);
   std::vector<Vec2> points;
   for (const Bead& bead : o.experiment.displacement) points.push_back(bead.position_um);
   std::vector<substrate::Ellipse> ellipses;
@@ -61,7 +75,7 @@ OtherNetwork other_network(std::uint64_t seed, const network::NetworkParameters*
       substrate::make_greens(p.gel, {.model = "layer"}, 2)->compliance_um_per_nN(points, ellipses);
   DisplacementField exact = o.experiment.displacement;
   if (truth) {
-    const Eigen::VectorXd u_um = compliance * forces_on(o.experiment, *truth, seed);
+    const Eigen::VectorXd u_um = compliance * o.forces_nN;
     for (std::size_t i = 0; i < exact.size(); ++i) {
       const auto row = 2 * static_cast<Eigen::Index>(i);
       exact[i].displacement_um = {u_um[row], u_um[row + 1]};
@@ -76,8 +90,8 @@ OtherNetwork other_network(std::uint64_t seed, const network::NetworkParameters*
     noisy[i].sigma_um = kNoise_um;
     exact[i].sigma_um = {};  // no error is stated where there is none
   }
-  o.noisy = reduce(noisy, compliance);
-  o.exact = reduce(exact, compliance);
+  o.noisy = reduce(noisy, substrate::dense_response(compliance), {}, 2, affine_motions(noisy));
+  o.exact = reduce(exact, substrate::dense_response(compliance), {}, 2, affine_motions(exact));
   return o;
 }
 
@@ -135,14 +149,42 @@ void formulations(Cells cells) {
   }
 }
 
+using Formulations = std::vector<std::pair<const char*, network::NetworkParameters>>;
+
+Formulations true_formulations() {
+  return {{"second neighbours", {}},
+          {"edges", {.link_reach = "neighbours"}},
+          {"edges and rims", {.link_reach = "neighbours", .adhesion_anchor = "rim", .rim_points = 12}},
+          {"edges and centres", {.link_reach = "neighbours", .adhesion_anchor = "centre"}}};
+}
+
+/// Of every adhesion: true force, found force, stated error; and of the cell's total.
+void forces(Cells cells) {
+  std::printf("cell,truth,adhesion_id,connected,true_nN,found_nN,sigma_nN,across_nN,network_nN\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    for (const auto& [name, truth] : true_formulations()) {
+      OtherNetwork o = other_network(c, &truth);
+      const EnsembleFit found = fit(span(o.experiment.cell, FitParameters{}.n_meshes), o.noisy, o);
+      const Estimate& total = found.total_force_nN;
+      std::printf("%d,%s,0,0,%.5g,%.5g,%.5g,0,0\n", int(c), name, total_nN(o.forces_nN), total.value,
+                  total.standard_error);
+      const std::vector<AdhesionForce> by_adhesion = forces_of(found, o.experiment.cell);
+      for (std::size_t a = 0; a < by_adhesion.size(); ++a) {
+        const AdhesionForce& f = by_adhesion[a];
+        const Eigen::Vector2d wanted = o.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a));
+        const Eigen::Vector2d got(f.force_nN.x, f.force_nN.y), unit = got.normalized();
+        std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected), wanted.norm(),
+                    got.norm(), f.sigma_nN.value_or(0), unit[0] * wanted[1] - unit[1] * wanted[0],
+                    found.network_forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm());
+      }
+    }
+  }
+}
+
 void truths(Cells cells) {
-  const std::pair<const char*, network::NetworkParameters> formulations[] = {
-      {"second neighbours", {}},
-      {"edges", {.link_reach = "neighbours"}},
-      {"edges and rims", {.link_reach = "neighbours", .adhesion_anchor = "rim", .rim_points = 12}}};
   std::printf("cell,truth,noise_nm,relative_error,rms_error_over_stated,coverage,relative_error_if_weighed\n");
   for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
-    for (const auto& [name, truth] : formulations) {
+    for (const auto& [name, truth] : true_formulations()) {
       OtherNetwork o = other_network(c, &truth);
       const std::vector<network::CableNetwork> networks = span(o.experiment.cell, FitParameters{}.n_meshes);
       for (LinearData* data : {&o.noisy, &o.exact}) {
@@ -197,12 +239,12 @@ int main(int argc, char** argv) {
   if (argc > 3) cells.first = static_cast<std::uint64_t>(std::atoi(argv[3]));
   cells.last = cells.first + static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 20) - 1;
   const std::pair<const char*, void (*)(Cells)> studies[] = {
-      {"formulations", formulations}, {"truths", truths}, {"meshes", meshes}, {"parts", parts}};
+      {"formulations", formulations}, {"truths", truths}, {"forces", forces}, {"meshes", meshes}, {"parts", parts}};
   for (const auto& [name, study] : studies) {
     if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
     study(cells);
     return 0;
   }
-  std::fprintf(stderr, "other_network formulations|truths|meshes|parts [cells] [first seed]\n");
+  std::fprintf(stderr, "other_network formulations|truths|forces|meshes|parts [cells] [first seed]\n");
   return 2;
 }

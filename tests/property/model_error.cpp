@@ -40,7 +40,10 @@ struct Model {
   Eigen::VectorXd forces(double size) { return D * tensions + size * deviation.cwiseProduct(draw(kForces, 1).col(0)); }
   std::vector<MeshForces> meshes(int n) {
     std::vector<MeshForces> all;
-    for (int m = 0; m < n; ++m) all.push_back({forces(1), D});
+    for (int m = 0; m < n; ++m) {
+      const Eigen::VectorXd forces_nN = forces(1);
+      all.push_back({forces_nN, forces_nN, D});  // all of the network
+    }
     return all;
   }
   /// What the beads tell of a cell whose forces deviate `size` times as much as the meshes'.
@@ -132,19 +135,53 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
   const Eigen::Index n = scene.compliance_um_per_nN.cols();
   const EnsembleFit fit = fitted(Eigen::VectorXd::Zero(n));
   const Eigen::VectorXd along = directions_of(fit.forces_nN);
+  const auto total = [](const EnsembleFit& f) {  // as fitted: roughness is an error of its own, added to that
+    return f.total_force_nN.value - roughness_of_total(f.forces_nN, *f.model_error).lacking_nN;
+  };
   double variance = 0;
   for (Eigen::Index k = 0; k < n; ++k) {
     const double deviation = std::sqrt(fit.model_error->force_variance_nN2[k]);
     const EnsembleFit other = fitted(deviation * Eigen::VectorXd::Unit(n, k));
-    variance += std::pow(other.total_force_nN.value - fit.total_force_nN.value - deviation * along[k], 2);
+    variance += std::pow(total(other) - total(fit) - deviation * along[k], 2);
   }
   // linear about the fit: forces bend by some per cent over a deviation, and fits stop short by a part of the noise
-  EXPECT_NEAR(std::sqrt(variance) / fit.total_force_nN.from_model(), 1, 0.15);
+  const double of_roughness = roughness_of_total(fit.forces_nN, *fit.model_error).sigma_nN;
+  const double stated = std::sqrt(std::pow(fit.total_force_nN.from_model(), 2) - of_roughness * of_roughness);
+  EXPECT_NEAR(std::sqrt(variance) / stated, 1, 0.15);
+}
+
+/// Forces of which all is scatter but their mean are longer than that by what roughness_of_total() says.
+TEST(ModelError, a_rough_network_pulls_more_than_a_smooth_one_of_the_same_mean) {
+  Model model(4);
+  constexpr int kDraws = 4000;
+  const Eigen::VectorXd mean_nN = model.D * model.tensions;
+  double longer_nN = 0;
+  for (int i = 0; i < kDraws; ++i) longer_nN += (total_nN(model.forces(1)) - total_nN(mean_nN)) / kDraws;
+  ModelError error;
+  error.measured_phi_nN = 0.02;  // that of the draws
+  error.loads_nN = model.deviation.cwiseAbs2() / 0.02;
+  const RoughnessOfTotal roughness = roughness_of_total(mean_nN, error);
+  // each force varies by sqrt(.02 |R|) along itself: the mean of the draws' sums is known to .01
+  EXPECT_NEAR(longer_nN, roughness.lacking_nN, 0.04 * roughness.lacking_nN + 0.03);
+}
+
+TEST(ModelError, a_single_adhesion_lacks_what_its_neighbours_have) {
+  // Errors that cancel between two adhesions in one place: the beads, and so the misfit, see nothing of them.
+  Model model(5);
+  model.C.middleCols<2>(2) = model.C.middleCols<2>(0);
+  std::vector<MeshForces> meshes = model.meshes(8);
+  const double independent = model_error(meshes, model.data(1), 1).of_single;
+  for (MeshForces& mesh : meshes) {
+    const Eigen::Vector2d moved = 5 * model.draw(2, 1).col(0);
+    mesh.forces_nN.segment<2>(0) += moved;
+    mesh.forces_nN.segment<2>(2) -= moved;
+  }
+  EXPECT_GT(model_error(meshes, model.data(1), 1).of_single, 2 * independent);
 }
 
 TEST(ModelError, that_is_none_leaves_the_data_as_they_are) {
   Model model(1);
-  const std::vector<MeshForces> meshes(3, {model.D * model.tensions, model.D});
+  const std::vector<MeshForces> meshes(3, {model.D * model.tensions, model.D * model.tensions, model.D});
   ReducedData data = model.data(0);
   data.target = *data.compliance * model.D * model.tensions;
   const ModelError error = model_error(meshes, data, 1);
