@@ -57,11 +57,17 @@ FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit) {
                                .shear_2 = a[5]},
                     .sigma = {}};
   // The beads' own noise, and what errors of the tensions and of the model's forces look like to the motions.
-  const Eigen::MatrixXd normal = data.motions.transpose() * squared_weights(data).asDiagonal() * data.motions;
-  Eigen::MatrixXd covariance = fit.variance * normal.completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const Eigen::MatrixXd inverse = (data.motions.transpose() * weighted).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd by_force = inverse * data.response->pull_back(weighted).transpose();  // motion_in(G)
   const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = motion_in(data, data.response->displace(mesh.force_derivatives));
-  covariance += by_tension * mesh.covariance_nN2 * by_tension.transpose();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  Eigen::MatrixXd covariance =
+      fit.variance * inverse + by_tension * mesh.noise_covariance_nN2 * by_tension.transpose();
+  if (fit.model_error) {
+    const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
+    covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
+  }
   found.sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
   const Eigen::VectorXd strain = a.tail<4>();
   found.chi_squared = strain.dot(covariance.bottomRightCorner<4, 4>().completeOrthogonalDecomposition().solve(strain));

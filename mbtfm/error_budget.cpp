@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <optional>
 
 #include "pipeline/contract/parallel.h"
 #include "substrate/layer.h"
@@ -265,6 +266,65 @@ VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const Bea
   return variance;
 }
 
+/// What the beads would show more if the gel were another.
+VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int threads) {
+  std::vector<Vec2> points;
+  for (const Bead& bead : in.beads) points.push_back(bead.position_um);
+  std::vector<Ellipse> ellipses;
+  for (const Adhesion& a : in.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  const auto field = [&](const Gel& gel) {
+    return substrate::make_greens(gel, {.model = "layer"}, threads)->response(points, ellipses)->displace(in.fit.forces_nN);
+  };
+  return field(other) - field(in.gel);
+}
+
+/// Of what the user states of the gel; none where nothing is stated. Forces and tensions are proportional to the
+/// modulus (but for the stretch of cables); what another thickness or Poisson's ratio changes of the displacement is
+/// taken for force.
+std::optional<VectorXd> gel_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers,
+                                      int threads) {
+  const Gel& gel = in.gel;
+  if (!gel.youngs_modulus_sigma_kPa && !gel.thickness_sigma_um && !gel.poisson_ratio_sigma) return std::nullopt;
+  const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
+  VectorXd variance = (gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa * values).cwiseAbs2();
+  std::vector<Gel> others;
+  if (gel.thickness_sigma_um.value_or(0) > 0) {
+    others.push_back(gel);
+    others.back().thickness_um += *gel.thickness_sigma_um;
+  }
+  if (gel.poisson_ratio_sigma.value_or(0) > 0) {
+    others.push_back(gel);  // to the side where there is room
+    const double sigma = std::min(*gel.poisson_ratio_sigma, 0.25);
+    others.back().poisson_ratio += gel.poisson_ratio > 0.25 ? -sigma : sigma;
+  }
+  for (const Gel& other : others) {
+    const VectorXd change = change_by_other_gel_um(in, other, threads);
+    answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
+      variance.segment(first, of_beads.rows()) += (of_beads * change).cwiseAbs2();
+    });
+  }
+  return variance;
+}
+
+/// Of a tension at zero the part by noise and model is what its interval's upper half says: it could be that much, and
+/// linear propagation knows only that it is held.
+void add_room_above(const EnsembleFit& fit, MeanVariances& mean) {
+  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+    const Estimate& tension = fit.tensions_nN[i];
+    const auto at = static_cast<Index>(i);
+    if (!tension.sides_95 || !std::isfinite(tension.sides_95->above)) continue;
+    const double room = std::pow(tension.sides_95->above / kNormal95, 2);
+    if (tension.value > 0 || room <= mean.beads[at] + mean.mesh[at] + mean.model[at]) continue;
+    const LocalMisfit& local = fit.meshes.front().local;
+    const double by_noise = fit.variance * local.H(at, at);
+    const double by_model = local.model_variance.size() > 0 ? local.model_variance(at, at) : 0;
+    const double share = by_noise + by_model > 0 ? by_noise / (by_noise + by_model) : 1;
+    mean.beads[at] = share * room;
+    mean.mesh[at] = 0;
+    mean.model[at] = (1 - share) * room;
+  }
+}
+
 }  // namespace
 
 void declare(ParameterList& list, SegmentationErrors& p) {
@@ -282,16 +342,22 @@ void declare(ParameterList& list, SegmentationErrors& p) {
 ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const Gain gain = gain_of(in.fit, in.fit.meshes.front());
   const BeadAnswers answers = answers_of(in, gain);
-  const MeanVariances mean = mean_variances(in);
+  MeanVariances mean = mean_variances(in);
+  add_room_above(in.fit, mean);
+  if (in.fit.model_error)
+    mean.mesh[mean.mesh.size() - 1] += std::pow(roughness_of_total(in.fit.forces_nN, *in.fit.model_error).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
   const VectorXd substrate = substrate_variances(in, gain, answers);
+  const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
   const auto parts = [&](Index i) {
     ErrorParts p{.beads = std::sqrt(mean.beads[i]),
                  .segmentation = std::sqrt(segmentation[i]),
                  .mesh = {},
                  .substrate = std::sqrt(substrate[i]),
                  .solver = std::sqrt(mean.solver[i]),
-                 .model = std::sqrt(mean.model[i])};
+                 .model = std::sqrt(mean.model[i]),
+                 .gel = {}};
+    if (gel) p.gel = std::sqrt((*gel)[i]);
     if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mean.mesh[i]);
     return p;
   };

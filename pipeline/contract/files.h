@@ -69,6 +69,7 @@ struct ErrorParts {
   double substrate = 0;        ///< discretisation of the gel, or what its model leaves out
   double solver = 0;           ///< where the iterations stopped
   double model = 0;            ///< what the misfit calls for beside the beads' noise and the mesh
+  std::optional<double> gel;   ///< modulus, thickness and Poisson's ratio, where their errors are stated
 };
 double total(const ErrorParts& parts);
 

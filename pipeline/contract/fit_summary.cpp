@@ -34,6 +34,7 @@ void for_each_part(Parts& p, const Visit& visit) {
   visit("substrate", p.substrate);
   visit("solver", p.solver);
   visit("model", p.model);
+  visit("gel", p.gel);
 }
 
 nlohmann::ordered_json json_of_parts(const ErrorParts& parts) {
@@ -47,7 +48,7 @@ nlohmann::ordered_json json_of_parts(const ErrorParts& parts) {
 ErrorParts parts_of(const JsonRecord& record) {
   ErrorParts parts;
   for_each_part(parts, [&](const char* name, auto& part) {
-    if (!record.at(name).json().is_null()) part = record.at(name).number();
+    if (const auto value = record.find(name)) part = value->number();
   });
   return parts;
 }

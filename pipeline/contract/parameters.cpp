@@ -307,6 +307,12 @@ void declare(ParameterList& list, Gel& gel) {
   list.add("poisson_ratio", gel.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true},
            "Poisson's ratio of the gel; 0.49 or 0.499 for an incompressible one");
   list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");
+  list.add("youngs_modulus_sigma_kPa", gel.youngs_modulus_sigma_kPa, Range{.low = 0},
+           "standard error of Young's modulus, for the error budget (kPa); unset: not known");
+  list.add("poisson_ratio_sigma", gel.poisson_ratio_sigma, Range{.low = 0, .high = 0.5},
+           "standard error of Poisson's ratio, for the error budget; unset: not known");
+  list.add("thickness_sigma_um", gel.thickness_sigma_um, Range{.low = 0},
+           "standard error of the thickness, for the error budget (um); unset: not known");
 }
 
 }  // namespace mbtfm

@@ -81,6 +81,8 @@ struct Gel {
   double youngs_modulus_kPa = 0;
   double poisson_ratio = 0.49;
   double thickness_um = 60;
+  // standard errors, where the user knows them: the error budget then has a part for the gel
+  std::optional<double> youngs_modulus_sigma_kPa{}, poisson_ratio_sigma{}, thickness_sigma_um{};
 };
 
 /// A cable between two vertices of a network.
