@@ -36,14 +36,15 @@ struct Fitted {
   TensionScene scene;
   std::vector<network::CableNetwork> networks;
   EnsembleFit fit;
-  ErrorBudget budget(SegmentationErrors errors, double substrate_error = 0, bool lacks_base = false) const {
+  ErrorBudget budget(SegmentationErrors errors, double substrate_error = 0, bool lacks_base = false,
+                     const Gel& gel = kGel) const {
     const Cell cell = cell_of(scene);
     return error_budget({.fit = fit,
                          .data = scene.data,
                          .networks = networks,
                          .cell = cell,
                          .beads = scene.beads,
-                         .gel = kGel,
+                         .gel = gel,
                          .substrate_error = substrate_error,
                          .lacks_base = lacks_base,
                          .segmentation = errors},
@@ -219,6 +220,59 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
     ++n_compared;
   }
   EXPECT_GE(n_compared, 1);
+}
+
+TEST(ErrorBudget, ten_percent_of_the_modulus_are_ten_percent_of_every_tension_and_of_the_force) {
+  const Fitted f = fitted(test::tension_scene("case_21", 800, kLittleNoise, 5));
+  Gel gel = kGel;
+  gel.youngs_modulus_sigma_kPa = 0.1 * gel.youngs_modulus_kPa;
+  const ErrorBudget budget = f.budget(kExact, 0, false, gel);
+  for (const TensionError& t : budget.tensions) {
+    ASSERT_TRUE(t.parts_nN.gel);
+    EXPECT_NEAR(*t.parts_nN.gel, 0.1 * t.tension_nN, 1e-9);
+  }
+  // forces grow with the tensions but for cables beyond their rest length, whose stretch is the same
+  EXPECT_NEAR(*budget.total_force_parts_nN.gel, 0.1 * budget.total_force_nN, 0.02 * budget.total_force_nN);
+  EXPECT_FALSE(f.budget(kExact).tensions.front().parts_nN.gel);
+}
+
+TEST(ErrorBudget, an_error_of_the_thickness_or_of_poissons_ratio_does_what_another_gel_would_do_to_the_fit) {
+  const Fitted f = fitted(test::tension_scene("case_21", 800, kLittleNoise, 5));
+  Gel thicker = kGel, less_tight = kGel;
+  thicker.thickness_sigma_um = 2;  // little: the propagation is linear
+  less_tight.poisson_ratio_sigma = 0.01;
+  for (Gel gel : {thicker, less_tight}) {
+    const ErrorBudget budget = f.budget(kExact, 0, false, gel);
+    Gel other = gel;
+    other.thickness_um += gel.thickness_sigma_um.value_or(0);
+    other.poisson_ratio -= gel.poisson_ratio_sigma.value_or(0);
+    const Eigen::VectorXd change =
+        substrate::make_greens(other, {.model = "layer"}, 2)->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
+        f.scene.forces_nN;
+    const Eigen::VectorXd moved = answers(f, change);
+    for (std::size_t i = 0; i < budget.tensions.size(); ++i) {
+      const double stated = *budget.tensions[i].parts_nN.gel;
+      EXPECT_NEAR(stated, std::abs(moved[static_cast<Eigen::Index>(i)]), 0.1 * stated + 0.01) << i;
+    }
+  }
+}
+
+TEST(ErrorBudget, of_a_tension_at_zero_is_what_its_interval_says) {
+  TensionScene scene = test::tension_scene("case_21", 800, 0.05, 5);
+  Eigen::VectorXd tensions = scene.tensions_nN;
+  tensions[1] = 1;
+  test::contract(scene, tensions);
+  const Eigen::VectorXd pulling_um = scene.displacement_um;
+  tensions[1] = 0;
+  test::contract(scene, tensions);
+  scene.displacement_um += 4 * (scene.displacement_um - pulling_um);  // as if the fibre pushed
+  test::measure(scene, 0.05, 3);
+  const Fitted f = fitted(std::move(scene));
+  ASSERT_EQ(f.fit.tensions_nN[1].value, 0);
+  ASSERT_EQ(f.fit.tensions_nN[1].noise, 0);  // it is held
+  const ErrorParts parts = f.budget(kExact).tensions[1].parts_nN;
+  EXPECT_GT(parts.beads, 0);
+  EXPECT_NEAR(std::hypot(parts.beads, parts.model), f.fit.tensions_nN[1].sides_95->above / kNormal95, 1e-9);
 }
 
 }  // namespace
