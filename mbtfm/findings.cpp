@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 
 #include "pipeline/contract/csv.h"
 
@@ -42,6 +43,72 @@ Noticed noise_unknown(const FitOutcome& o) {
   const bool is_known = o.summary.expected_relative_l2 > 0;
   return noticed(FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.displacement_um.size() / 2),
                  "The noise of the beads is not known.");
+}
+
+double stated_noise_um(const LinearData& data) {
+  double squares = 0, n = 0;
+  for (Eigen::Index i = 0; i < data.weight_per_um.size(); ++i) {
+    if (data.weight_per_um[i] <= 0) continue;
+    squares += 1 / (data.weight_per_um[i] * data.weight_per_um[i]);
+    n += 1;
+  }
+  return n > 0 ? std::sqrt(squares / n) : 0;
+}
+
+Noticed noise_disagrees(const FitOutcome& o) {
+  const double stated = stated_noise_um(o.data);
+  if (!o.data.has_errors || stated <= 0) return {};
+  const double ratio = o.summary.noise_um / stated;
+  return noticed(FindingKind::noise_disagrees, ratio,
+                 "Far from the cell the beads scatter by " + brief(1000 * o.summary.noise_um) +
+                     " nm about what the model says; their stated standard error is " + brief(1000 * stated) + " nm.");
+}
+
+/// A square of the picture with some sixty beads.
+struct Region {
+  Vec2 centre_um;
+  double side_um = 0, chi_squared = 0;  ///< by degree of freedom
+};
+
+/// The one whose beads the model explains worst.
+Region worst_region(const LinearData& data, const Eigen::VectorXd& forces_nN, double noise_um) {
+  constexpr double kBeads = 60, kFewest = 30;
+  const Eigen::VectorXd residual = residual_um(data, forces_nN);
+  Vec2 low{1e300, 1e300}, high{-1e300, -1e300};
+  for (const Vec2 p : data.position_um) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  const double n = static_cast<double>(data.position_um.size());
+  const double side_um = std::sqrt(kBeads / std::max(1.0, n) * (high.x - low.x) * (high.y - low.y));
+  if (!(side_um > 0) || noise_um <= 0) return {};
+  struct Sum {
+    double squares = 0, n = 0;
+  };
+  std::map<std::pair<int, int>, Sum> sums;
+  for (std::size_t b = 0; b < data.position_um.size(); ++b) {
+    const auto row = 2 * static_cast<Eigen::Index>(b);
+    if (data.weight_per_um[row] <= 0) continue;
+    const Vec2 at = (1 / side_um) * (data.position_um[b] - low);
+    Sum& sum = sums[{static_cast<int>(at.x), static_cast<int>(at.y)}];
+    sum.squares += residual.segment<2>(row).squaredNorm() / (2 * noise_um * noise_um);
+    sum.n += 1;
+  }
+  Region worst{.centre_um = {}, .side_um = side_um, .chi_squared = 0};
+  for (const auto& [at, sum] : sums) {
+    if (sum.n < kFewest || sum.squares / sum.n <= worst.chi_squared) continue;
+    worst.centre_um = low + side_um * Vec2{at.first + 0.5, at.second + 0.5};
+    worst.chi_squared = sum.squares / sum.n;
+  }
+  return worst;
+}
+
+Noticed beads_disagree(const FitOutcome& o) {
+  const Region worst = worst_region(o.data, o.fit.forces_nN, o.summary.noise_um);
+  return noticed(FindingKind::beads_disagree_by_region, worst.chi_squared,
+                 "In the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
+                     brief(worst.centre_um.y) + ") um the model leaves " + brief(worst.chi_squared) +
+                     " times the squares that the noise of the beads would leave.");
 }
 
 Noticed missing_fibres_noticed(const FitOutcome& o) {
@@ -154,7 +221,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
   for (Noticed found :
-       {common_motion(o), missing_fibres_noticed(o), unexplained(o), noise_unknown(o), not_identifiable(o),
+       {common_motion(o), missing_fibres_noticed(o), unexplained(o), beads_disagree(o), noise_unknown(o), noise_disagrees(o), not_identifiable(o),
         network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
         out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
         out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),

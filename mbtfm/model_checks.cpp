@@ -232,9 +232,10 @@ void write_fibres_left_out(const Path& file, const std::vector<FibreLeftOut>& fi
 }
 
 void write_missing_fibres(const Path& file, const std::vector<MissingFibre>& fibres) {
-  CsvText csv({"start_adhesion_id", "end_adhesion_id", "tension_nN", "chi_squared_gain"});
+  CsvText csv({"start_adhesion_id", "end_adhesion_id", "tension_nN", "chi_squared_gain", "sigma_nN"});
   for (const MissingFibre& f : fibres) {
-    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.tension_nN).add(f.chi_squared_gain).end_row();
+    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.tension_nN).add(f.chi_squared_gain);
+    csv.add(f.tension_nN / std::sqrt(f.chi_squared_gain)).end_row();
   }
   write_text(file, csv.str());
 }

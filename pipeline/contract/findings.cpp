@@ -33,8 +33,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
        "without the noise nobody can tell whether the model fits", "Give sigma_um in displacement.csv."},
       {noise_disagrees, "noise-disagrees", "fit", caution,
-       "scatter of the beads about their neighbours, over the standard error that the tracker states", 1.3,
-       "on simulated images it is 0.9 to 1.1; the tensions' error bars take the larger of both",
+       "scatter of the beads far from the cell about the model, over their stated standard error", 1.3,
+       "the error bars take the larger of both: a third more than stated is more than chance and model explain",
        "Look for beads that are out of focus or overlap. Of a displacement field of another program, check sigma_um."},
       {beads_disagree_by_region, "beads-disagree", "fit", caution,
        "largest chi squared per degree of freedom in a region of the image", 3,
@@ -43,12 +43,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "adhesion that was not segmented."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
        "a pair of adhesions is named where chance would name one in one cell of twenty, all pairs tried",
-       "Look for the fibre in the actin image between these adhesions. If it is there, put "
-       "4_fit/missing_fibres.zip beside cell.toml as fibres.zip and run again."},
-      {missing_adhesion, "missing-adhesion", "fit", caution, "places where the beads call for a force and no adhesion is",
-       0, "a place is named where chance would name one in one cell of twenty, all places tried",
-       "Look at this place in the adhesion image. If an adhesion is there, lower segment.adhesion_snr or draw it "
-       "(adhesions.zip)."},
+       "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
+       "mbtfm-add-fibres --rois 1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's "
+       "folder, then mbtfm run."},
       {fibre_without_tension, "fibre-without-tension", "fit", caution, "segmented fibres that are not in the network", 0,
        "each of them may carry force", "Run the network stage again: network.vtu is of another segmentation."},
       {not_identifiable, "not-identifiable", "fit", bad, "fibre tensions that these beads do not determine", 0,

@@ -175,11 +175,23 @@ Figure segmentation_map(const CellResults& results) {
               hover_of(fibre, results));
   }
   draw_fibre_ids(map, results);
+  const auto by_id = adhesions_by_id(results.cell);
+  for (const MissingFibre& f : results.missing_fibres) {
+    map.curve({by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
+              std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
+              fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN",
+                          f.start_adhesion_id, f.end_adhesion_id, readable(f.tension_nN), readable(f.sigma_nN)));
+  }
+  const std::string missing =
+      results.missing_fibres.empty()
+          ? ""
+          : fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>missing (dashed)</span>",
+                        is_dark ? "#ffe14d" : "#b00020");
   return {map,
           is_dark ? "Adhesions, fibres and outline over the images they were found in: actin grey, adhesions purple. "
                     "Full size: 1_segment/overlay.png."
                   : "Adhesions, fibres and outline.",
-          legend(types + "<span><span class=\"type\" style=\"background:#ff9be6\"></span>adhesion</span>")};
+          legend(types + "<span><span class=\"type\" style=\"background:#ff9be6\"></span>adhesion</span>" + missing)};
 }
 
 Figure adhesion_map(const CellResults& results) {

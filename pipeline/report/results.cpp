@@ -38,6 +38,26 @@ std::optional<Images> images_of(const Path& segmentation) {
   return Images{file, low_um, low_um + Vec2{table.number(0, "width_um"), table.number(0, "height_um")}};
 }
 
+std::vector<MissingFibre> missing_fibres_in(const Path& file, const Cell& cell) {
+  std::vector<MissingFibre> fibres;
+  if (!is_own_file(file)) return fibres;
+  const CsvTable table(file);
+  const auto by_id = adhesions_by_id(cell);
+  for (int row = 0; row < table.n_rows(); ++row) {
+    MissingFibre fibre{.start_adhesion_id = table.integer(row, "start_adhesion_id", 1),
+                       .end_adhesion_id = table.integer(row, "end_adhesion_id", 1),
+                       .tension_nN = table.number(row, "tension_nN"),
+                       .sigma_nN = table.number(row, "sigma_nN")};
+    for (const int id : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
+      if (!by_id.contains(id))
+        throw InputError(file.string(), "adhesions of 1_segment/adhesions.csv", "adhesion " + std::to_string(id),
+                         "run the fit again: mbtfm run --redo fit");
+    }
+    fibres.push_back(fibre);
+  }
+  return fibres;
+}
+
 }  // namespace
 
 CellResults read_results(const Path& cell) {
@@ -59,6 +79,7 @@ CellResults read_results(const Path& cell) {
   results.residual = residual_of(results.displacement, cell / "4_fit/fitted_displacement.csv");
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
   results.images = images_of(cell / "1_segment");
+  results.missing_fibres = missing_fibres_in(cell / "4_fit/missing_fibres.csv", results.cell);
   return results;
 }
 

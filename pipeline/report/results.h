@@ -22,6 +22,12 @@ struct Images {
   Vec2 low_um, high_um;
 };
 
+/// A fibre between two adhesions that was not segmented and that the beads call for.
+struct MissingFibre {
+  int start_adhesion_id = 0, end_adhesion_id = 0;
+  double tension_nN = 0, sigma_nN = 0;
+};
+
 struct CellResults {
   Path folder;
   std::string name;
@@ -36,6 +42,7 @@ struct CellResults {
   std::optional<Residual> residual;
   std::optional<Comparison> comparison;  ///< of a simulated cell
   std::optional<Images> images;
+  std::vector<MissingFibre> missing_fibres;
 };
 
 /// @throws InputError where a file that the stages write lacks or is malformed

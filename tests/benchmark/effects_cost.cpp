@@ -158,7 +158,7 @@ void compare_series(int n) {
   const auto off = [&] {
     const Effect coupling = inverse::decide_time_coupling(true, "off");
     inverse::fit_series(frames, networks, substrate::dense_response(scene.compliance_um_per_nN), {}, scene.adhesion_ids,
-                        parameters, coupling.is_on, 1, {}, start);
+                        parameters, false, coupling.is_on, 1, {}, start);
   };
   const auto one_by_one = [&] {
     for (const inverse::SeriesFrame& frame : frames) {

@@ -1,0 +1,68 @@
+/// mbtfm-add-fibres: the fibres of a segmentation and those that the beads call for, as ImageJ selections to run with.
+#include <string>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/stage.h"
+#include "segment/roi.h"
+
+namespace mbtfm::segment {
+namespace {
+
+struct AddFibresParameters {};
+void declare(ParameterList& list, AddFibresParameters& parameters) {
+  (void)list;
+  (void)parameters;
+}
+
+/// Of the ellipse `adhesion 12`, as lines count: from the centre of the first pixel.
+Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std::string& file) {
+  constexpr double kCentre_px = 0.5;
+  const std::string name = "adhesion " + std::to_string(adhesion_id);
+  for (const Roi& roi : rois) {
+    if (roi.name == name && roi.points_px.size() == 2)
+      return 0.5 * (roi.points_px[0] + roi.points_px[1]) - Vec2{kCentre_px, kCentre_px};
+  }
+  throw InputError(file, "an ellipse called '" + name + "'", "none",
+                   "RoiSet.zip and missing_fibres.csv must be of the same run: mbtfm run CELL");
+}
+
+StageReport add_fibres(const AddFibresParameters&, StageContext& context) {
+  const auto rois_file = context.input("rois"), missing_file = context.input("missing");
+  const std::vector<Roi> rois = read_rois(rois_file);
+  std::vector<Roi> fibres;
+  for (const Roi& roi : rois) {
+    if (is_line(roi.shape)) fibres.push_back(roi);
+  }
+  const auto n_segmented = static_cast<std::int64_t>(fibres.size());
+  const CsvTable missing(missing_file);
+  for (int row = 0; row < missing.n_rows(); ++row) {
+    Roi fibre;
+    fibre.shape = RoiShape::polyline;
+    fibre.name = "added " + std::to_string(row + 1);
+    for (const char* end : {"start_adhesion_id", "end_adhesion_id"})
+      fibre.points_px.push_back(centre_of_adhesion(rois, missing.integer(row, end, 1), rois_file.string()));
+    fibres.push_back(fibre);
+  }
+  write_roi_set(context.output("out"), fibres);
+  StageReport report;
+  report.summary = std::to_string(n_segmented) + " segmented fibres and " + std::to_string(missing.n_rows()) +
+                   " that the beads call for; beside cell.toml, as fibres.zip, they are what mbtfm run takes";
+  report.figures = {{"n_segmented", n_segmented}, {"n_added", std::int64_t{missing.n_rows()}}};
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
+
+int main(int argc, char** argv) {
+  using mbtfm::FileArgument;
+  using namespace mbtfm::segment;
+  return mbtfm::run_stage<AddFibresParameters>(
+      {.name = "add-fibres",
+       .purpose = "put the fibres that the beads call for beside the segmented ones, as fibres.zip for mbtfm run",
+       .files = {{"rois", FileArgument::Kind::input, "1_segment/RoiSet.zip of the cell"},
+                 {"missing", FileArgument::Kind::input, "4_fit/missing_fibres.csv of the same run"},
+                 {"out", FileArgument::Kind::output, "fibres.zip beside cell.toml"}}},
+      argc, argv, add_fibres);
+}
