@@ -37,4 +37,16 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
                    "set pixel_size_um, in cell.toml or as --pixel_size_um");
 }
 
+std::string caution_about_loss(const Channel& channel) {
+  if (!channel.image.is_lossy) return {};
+  return "; CAUTION: " + channel.name +
+         " is a lossy image (JPEG): its intensities and the positions of its beads are changed; use the microscope's "
+         "own file";
+}
+
+std::optional<Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um) {
+  if (!given_um || !channel.image.pixel_size_um) return std::nullopt;
+  return doubt_about_pixel_size(*given_um, *channel.image.pixel_size_um);
+}
+
 }  // namespace mbtfm::segment

@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -179,10 +180,9 @@ void commit(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) put_in_place(temporary, destination);
 }
 
-int run(const StageDescription& description, ParameterList& list, const CommandLine& line,
+int run(const StageDescription& description, ParameterList& list, const CommandLine& line, StageContext context,
         const std::function<StageReport(StageContext&)>& body) {
   const auto begin = std::chrono::steady_clock::now();
-  StageContext context;
   set_files(context, description, line);
   context.threads = line.threads;
   context.progress = terminal_progress(description.name, line.is_quiet);
@@ -257,6 +257,14 @@ fs::path StageContext::pending_path(const fs::path& destination) {
   return temporary;
 }
 
+void StageContext::doubt(const std::optional<Doubt>& doubt, const std::string& where) {
+  if (!doubt) return;
+  require_possible(*doubt, allowed_, where);
+  const auto is_same = [&](const Doubt& d) { return d.id == doubt->id && d.value == doubt->value; };
+  if (std::ranges::any_of(doubts, is_same)) return;  // of another frame or channel
+  doubts.push_back(*doubt);
+}
+
 void StageContext::make_folder(const fs::path& folder) {
   if (folder.empty() || fs::exists(folder)) return;
   make_folder(folder.parent_path());
@@ -276,6 +284,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
   try {
     ParameterList list;
     declare_parameters(list);
+    CheckParameters checks;
+    if (has_plausible_quantity(list)) declare(list, checks);
     CommandLine line;
     CLI::App app(description.purpose, "mbtfm-" + stage);
     add_options(app, line, description, list);
@@ -292,9 +302,13 @@ int run_stage(const StageDescription& description, int argc, char** argv,
       return kDone;
     }
     set_parameters(list, line, app);
+    StageContext context;
+    context.allowed_ = allowed_quantities(checks);
+    context.doubts = doubts_about(list, context.allowed_);
+    context.assumed = assumed_inputs(list);
     if (line.only_check) return kDone;
     reserve_blas_buffers(line.threads);
-    return run(description, list, line, body);
+    return run(description, list, line, std::move(context), body);
   } catch (...) {
     return report_current_exception("mbtfm-" + stage);
   }

@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "pipeline/contract/files.h"
+#include "pipeline/contract/plausible.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -48,6 +49,12 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "parameters.md", page);
   EXPECT_EQ(read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+}
+
+/// Set MBTFM_WRITE_DOCS to write the page instead.
+TEST(Documents, the_page_of_plausible_values_is_the_table_that_the_programs_ask) {
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "plausible.md", plausible_page());
+  EXPECT_EQ(read_text(kDocs / "plausible.md"), plausible_page()) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.
