@@ -67,7 +67,7 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
                                           : chosen_lambda(*r.scan, parameters.lambda_by);
   r.length_um = *r.lambda * length_um;
   const Eigen::VectorXd loads = problem.solve(*r.lambda);
-  r.relative_l2 = problem.relative_l2(loads);
+  r.relative_l2 = problem.relative_l2(*r.lambda);
   return {loads, problem.covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
 }
 

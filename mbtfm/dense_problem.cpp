@@ -87,8 +87,7 @@ LambdaScan DenseProblem::scan() const {
   const auto point_at = [&](double lambda) -> ScanPoint {
     const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
     return {.lambda = lambda,
-            .misfit = data_squared_ - 2 * (shares * projected_.array()).sum() +
-                      (eigenvalues_.array() * shares.square()).sum(),
+            .misfit = misfit(lambda),
             .norm = shares.square().sum(),
             .degrees = (eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda)).sum(),
             .removable_misfit = is_felt.select(shares.square() / eigenvalues_.array(), 0).sum() * std::pow(lambda, 4)};
@@ -116,11 +115,13 @@ Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
   return eigenvectors_ * (shares.asDiagonal() * projected_truth_);
 }
 
-double DenseProblem::relative_l2(const Eigen::VectorXd& loads) const {
-  double sum = 0;
-  for_blocks(
-      [&](const Range&, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) { sum += (u - G * loads).squaredNorm(); });
-  return data_squared_ > 0 ? std::sqrt(sum / data_squared_) : 0;
+double DenseProblem::misfit(double lambda) const {
+  const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
+  return data_squared_ - 2 * (shares * projected_.array()).sum() + (eigenvalues_.array() * shares.square()).sum();
+}
+
+double DenseProblem::relative_l2(double lambda) const {
+  return data_squared_ > 0 ? std::sqrt(std::max(0.0, misfit(lambda)) / data_squared_) : 0;
 }
 
 }  // namespace mbtfm::inverse

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <utility>
 
 #include "pipeline/contract/csv.h"
@@ -37,7 +38,12 @@ std::string with_unit(std::string_view id, const std::string& number) {
   const std::string unit = unit_of(id);
   return number + (unit.empty() ? "" : " " + (unit == "um2" ? "um²" : unit));
 }
-std::string with_unit(std::string_view id, double value) { return with_unit(id, brief(value)); }
+/// Six digits: 8400, not 8.4e+03.
+std::string with_unit(std::string_view id, double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return with_unit(id, text);
+}
 
 std::optional<double> value_of(const Parameter& p) {
   if (const auto* member = std::get_if<double*>(&p.member)) return **member;
@@ -88,7 +94,7 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
       {.id = "beads_per_um2",
        .quantity = "density of the beads",
        .usual = Range::between(0.02, 10),
-       .possible = Range::positive(),
+       .possible = Range::not_negative(),
        .source = "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
                  "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² "
                  "beads are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
@@ -99,7 +105,7 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .possible = Range::between(0.01, 100),
        .source = "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS cells: Soine et al., PLoS Comput. Biol. 11 "
                  "(2015) e1004076). A spot of 0.01 um² is a sixth of what a lens resolves; 100 um² is a small cell",
-       .remedy = "check the pixel size, the channel and adhesion_sensitivity or the thresholds of [segment]"},
+       .remedy = "check the pixel size, the channel and the thresholds of [segment]"},
       {.id = "cell_area_um2",
        .quantity = "area of the cell",
        .usual = Range::between(200, 20000),
