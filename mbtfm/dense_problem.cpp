@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -64,11 +65,12 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
   Eigen::VectorXd pulled = Eigen::VectorXd::Zero(n_loads);
   Eigen::MatrixXd pulled_by_truth = Eigen::MatrixXd::Zero(n_loads, n_true);
   for_blocks([&](const Range& range, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(G.transpose());
+    add_upper_gram(G, normal);
     pulled += G.transpose() * u;
     if (n_true > 0) pulled_by_truth += G.transpose() * weighted(truth, range);
     data_squared_ += u.squaredNorm();
   });
+  mirror_upper(normal);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
   eigenvalues_ = eigen.eigenvalues().cwiseMax(0);
   eigenvectors_ = eigen.eigenvectors();
@@ -107,7 +109,10 @@ Eigen::VectorXd DenseProblem::solve(double lambda) const {
 
 Eigen::MatrixXd DenseProblem::covariance(double lambda, double variance) const {
   const Eigen::ArrayXd shares = eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda).square();
-  return variance * eigenvectors_ * shares.matrix().asDiagonal() * eigenvectors_.transpose();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(eigenvectors_.rows(), eigenvectors_.rows());
+  add_upper_outer(eigenvectors_ * (variance * shares).sqrt().matrix().asDiagonal(), covariance);
+  mirror_upper(covariance);
+  return covariance;
 }
 
 Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {

@@ -50,7 +50,8 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   const std::optional<double> assumed_um = assume_noise(inputs.beads);
   if (assumed_um) context.assumed.push_back(assumed_noise(*assumed_um));
   context.progress(0.1, "reconstructing tractions");
-  const Reconstruction r = reconstruct(inputs, p.traction, context.threads);
+  Reconstruction r = reconstruct(inputs, p.traction, context.threads);
+  if (assumed_um) r.figures.emplace_back("assumed_sigma_um", *assumed_um);
   const TractionSums sums = sums_of(r, inputs, p.traction.grow_um);
   expect_plausible(context, inputs, r, sums);
 
@@ -85,7 +86,6 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
     report.summary += "; WARNING: the tractions push outward everywhere: are stressed and relaxed swapped?";
   }
   report.figures = summary_of(r, sums);
-  if (assumed_um) report.figures.emplace_back("assumed_sigma_um", *assumed_um);
   const bool is_layer = p.traction.gel_model == "layer";
   report.effects = {decided("finite thickness", is_layer ? "on" : "off", is_layer,
                             is_layer ? "layer on a rigid base" : "half-space, as gel_model asks")};

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "segment/channels.h"
 #include "segment/image_file.h"
 #include "segment/png.h"
 #include "tests/support/temporary_folder.h"
@@ -319,6 +320,17 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   EXPECT_EQ(read_image(folder / "a.jpg", {.channel = "red"}).width, 64);
   EXPECT_THROW(read_image(folder / "a.jpg", {.channel = "4"}), InputError);
   EXPECT_THROW(read_image(folder / "a.jpg", {.page = 2}), InputError);
+}
+
+TEST(Channels, a_pixel_size_given_is_compared_with_each_images_own_binned_or_not) {
+  Image image = ramp(64, 48);
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, 0.1)) << "the image has none";
+  image.pixel_size_um = 0.1;
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, std::nullopt)) << "nothing is given";
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, 0.1));
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", binned(image, 2)}, 0.2)) << "of binned pixels both";
+  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.105)->level, DoubtLevel::caution);
+  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.2)->level, DoubtLevel::refused);
 }
 
 }  // namespace
