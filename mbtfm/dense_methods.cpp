@@ -19,15 +19,11 @@ using Eigen::Index;
 /// A "point" is a disc smaller than any adhesion one sees: beads next to it feel a point, none on it infinity.
 constexpr double kPointRadius_um = 0.1;
 
-double beads_per_um2(const DisplacementField& beads) {
-  Vec2 low = beads.front().position_um, high = low;
-  for (const Bead& b : beads) {
-    low = {std::min(low.x, b.position_um.x), std::min(low.y, b.position_um.y)};
-    high = {std::max(high.x, b.position_um.x), std::max(high.y, b.position_um.y)};
-  }
-  const double area = (high.x - low.x) * (high.y - low.y);
-  if (!(area > 0)) throw InvalidData("displacement", "beads spread over an area", "all on one line");
-  return static_cast<double>(beads.size()) / area;
+/// @throws InvalidData where they spread over no area
+double density_per_um2(const DisplacementField& beads) {
+  const double density = beads_per_um2(beads);
+  if (!(density > 0)) throw InvalidData("displacement", "beads spread over an area", "all on one line");
+  return density;
 }
 
 /// Forces or tractions with what is known of their errors.
@@ -65,13 +61,13 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
     r.remark = "no bead has moved: there is no traction";
     return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n_true)};
   }
-  const double length_um = length_at_unit_density_um / std::sqrt(beads_per_um2(inputs.beads));
+  const double length_um = length_at_unit_density_um / std::sqrt(density_per_um2(inputs.beads));
   r.scan = problem.scan();
   r.lambda = parameters.lambda_um_per_kPa ? *parameters.lambda_um_per_kPa * inputs.gel.youngs_modulus_kPa / length_um
                                           : chosen_lambda(*r.scan, parameters.lambda_by);
   r.length_um = *r.lambda * length_um;
   const Eigen::VectorXd loads = problem.solve(*r.lambda);
-  r.relative_l2 = problem.relative_l2(loads);
+  r.relative_l2 = problem.relative_l2(*r.lambda);
   return {loads, problem.covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
 }
 

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::inverse {
 
@@ -64,11 +65,12 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
   Eigen::VectorXd pulled = Eigen::VectorXd::Zero(n_loads);
   Eigen::MatrixXd pulled_by_truth = Eigen::MatrixXd::Zero(n_loads, n_true);
   for_blocks([&](const Range& range, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
-    normal.selfadjointView<Eigen::Lower>().rankUpdate(G.transpose());
+    add_upper_gram(G, normal);
     pulled += G.transpose() * u;
     if (n_true > 0) pulled_by_truth += G.transpose() * weighted(truth, range);
     data_squared_ += u.squaredNorm();
   });
+  mirror_upper(normal);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
   eigenvalues_ = eigen.eigenvalues().cwiseMax(0);
   eigenvectors_ = eigen.eigenvectors();
@@ -87,8 +89,7 @@ LambdaScan DenseProblem::scan() const {
   const auto point_at = [&](double lambda) -> ScanPoint {
     const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
     return {.lambda = lambda,
-            .misfit = data_squared_ - 2 * (shares * projected_.array()).sum() +
-                      (eigenvalues_.array() * shares.square()).sum(),
+            .misfit = misfit(lambda),
             .norm = shares.square().sum(),
             .degrees = (eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda)).sum(),
             .removable_misfit = is_felt.select(shares.square() / eigenvalues_.array(), 0).sum() * std::pow(lambda, 4)};
@@ -108,7 +109,10 @@ Eigen::VectorXd DenseProblem::solve(double lambda) const {
 
 Eigen::MatrixXd DenseProblem::covariance(double lambda, double variance) const {
   const Eigen::ArrayXd shares = eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda).square();
-  return variance * eigenvectors_ * shares.matrix().asDiagonal() * eigenvectors_.transpose();
+  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(eigenvectors_.rows(), eigenvectors_.rows());
+  add_upper_outer(eigenvectors_ * (variance * shares).sqrt().matrix().asDiagonal(), covariance);
+  mirror_upper(covariance);
+  return covariance;
 }
 
 Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
@@ -116,11 +120,13 @@ Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
   return eigenvectors_ * (shares.asDiagonal() * projected_truth_);
 }
 
-double DenseProblem::relative_l2(const Eigen::VectorXd& loads) const {
-  double sum = 0;
-  for_blocks(
-      [&](const Range&, const Eigen::MatrixXd& G, const Eigen::VectorXd& u) { sum += (u - G * loads).squaredNorm(); });
-  return data_squared_ > 0 ? std::sqrt(sum / data_squared_) : 0;
+double DenseProblem::misfit(double lambda) const {
+  const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
+  return data_squared_ - 2 * (shares * projected_.array()).sum() + (eigenvalues_.array() * shares.square()).sum();
+}
+
+double DenseProblem::relative_l2(double lambda) const {
+  return data_squared_ > 0 ? std::sqrt(std::max(0.0, misfit(lambda)) / data_squared_) : 0;
 }
 
 }  // namespace mbtfm::inverse

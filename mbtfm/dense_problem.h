@@ -27,13 +27,14 @@ class DenseProblem {
   Eigen::MatrixXd covariance(double lambda, double variance) const;
   /// What solve(lambda) makes of each true load of one, without noise.
   Eigen::MatrixXd response_to_truth(double lambda) const;
-  double relative_l2(const Eigen::VectorXd& loads) const;
+  double relative_l2(double lambda) const;  ///< |u − G f| / |u| of solve(lambda), weighted
   double data_squared() const { return data_squared_; }
 
  private:
   template <class Use>
   void for_blocks(const Use& use) const;  ///< use(range of beads, weighted block of G, weighted u of the same rows)
   struct Range;
+  double misfit(double lambda) const;  ///< |G f − u|² of solve(lambda)
   Eigen::MatrixXd weighted(const Compliance& compliance, const Range& range) const;
   const DisplacementField& beads_;
   Compliance compliance_;

@@ -208,11 +208,20 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
          (n_refused > 0 ? ", " + std::to_string(n_refused) + " of them without a fit (see frames.csv)" : "");
 }
 
+/// @throws InputError where no cell pulls like that
+void expect_plausible(StageContext& context, const FitSummary& summary, const std::vector<Tension>& tensions,
+                      const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions) {
+  context.expect_plausible("total_force_nN", summary.total_force_nN);
+  context.expect_plausible("fibre_tension_nN", surest_fibre_tension_nN(tensions));
+  context.expect_plausible("traction_kPa", surest_traction_kPa(forces, adhesions));
+}
+
 StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitStageParameters p = given;
   p.substrate.effects = p.effects;
   context.progress(0, "reading");
   FitInputs inputs = read_inputs(context);
+  context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
   const Cell cell = inputs.cell;
   const std::vector<SeriesFrame> series = read_series_of(context);
   if (!series.empty() && p.fit.substrate == "per-evaluation")
@@ -270,6 +279,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   std::optional<FoundMotion> motion;
   if (moves) motion = motion_beside(data, fit);
+  expect_plausible(context, summary, tensions, forces, inputs.cell.adhesions);
   const auto budget_start = std::chrono::steady_clock::now();
   summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
   const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
@@ -324,6 +334,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   }
   report.summary += of_series;
   report.figures.emplace_back("error_budget_s", budget_s);
+  context.notice(noticed(FindingKind::modulus_error_unknown, p.gel.youngs_modulus_sigma_kPa ? 0 : 1,
+                         "No error of Young's modulus is given. An error of 10 % would change every force by 10 %."));
   report.findings = findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, motion});
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;

@@ -3,7 +3,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "mbtfm/force_correction.h"
+#include "mbtfm/lattice_forces.h"
 
 namespace mbtfm::inverse {
 
@@ -121,17 +121,9 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
   if (!inputs.adhesions.empty()) {
-    const PenalisedTractions penalised{.problem = problem,
-                                       .displacements = displacements,
-                                       .tikhonov_lambda = r.lambda,
-                                       .lambda_by_gcv = r.scan->by_gcv,
-                                       .variance = r.scan->variance};
-    WaveField corrected = taken_by_penalty(penalised);
-    corrected.x += waves.x;
-    corrected.y += waves.y;
-    // Neither the cells' means nor the Gaussian filter: both carry force over the adhesions' rims.
-    r.forces = forces_of(penalised, tractions_kPa(problem, corrected, ReadOut::points, 0), inputs.adhesions,
-                         parameters.grow_um, threads);
+    r.forces = forces_on(
+        {.problem = problem, .scan = *r.scan, .compliance = even_forces_um_per_nN(inputs, parameters.gel_model, threads)},
+        forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um), threads);
   }
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},

@@ -162,12 +162,14 @@ LatticeProblem::LatticeProblem(const DisplacementField& beads, const Gel& gel, c
   Eigen::ArrayXd &x = data_x_, &y = data_y_;
   x.resize(beads.size());
   y.resize(beads.size());
+  root_weights_.resize(beads.size());
   bool is_on_nodes = true, is_even = true;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     const Bead& b = beads[i];
     const double weight = (states_errors ? 1 / (b.sigma_um * b.sigma_um) : 1) * n_nodes / sum;
     is_even = is_even && std::abs(weight - 1) < 1e-9;
     const double root = std::sqrt(weight);
+    root_weights_[i] = root;
     const Vec2 at = 1 / field_.spacing_um * (b.position_um - field_.origin_um);
     const Stencil column = stencil_of(at.x), row = stencil_of(at.y);
     first_tap_.push_back(taps_.size());
@@ -210,19 +212,36 @@ NodeField LatticeProblem::spread_signs() const {
   return spread(x, y);
 }
 
-std::vector<double> LatticeProblem::residuals(const NodeField& nodes) const {
-  std::vector<double> residuals;
-  residuals.reserve(2 * n_beads_);
+Eigen::VectorXd LatticeProblem::data() const {
+  Eigen::VectorXd components(2 * static_cast<Eigen::Index>(n_beads_));
+  components(Eigen::seq(0, Eigen::last, 2)) = data_x_;
+  components(Eigen::seq(1, Eigen::last, 2)) = data_y_;
+  return components;
+}
+
+Eigen::MatrixXd LatticeProblem::weighted(Eigen::MatrixXd by_component) const {
+  for (Eigen::Index i = 0; i < root_weights_.size(); ++i) by_component.middleRows<2>(2 * i) *= root_weights_[i];
+  return by_component;
+}
+
+NodeField LatticeProblem::spread_of(const Eigen::VectorXd& components) const {
+  return spread(components(Eigen::seq(0, Eigen::last, 2)), components(Eigen::seq(1, Eigen::last, 2)));
+}
+
+Eigen::VectorXd LatticeProblem::at_beads(const NodeField& nodes) const {
+  Eigen::VectorXd components = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(n_beads_));
   for (std::size_t i = 0; i < n_beads_; ++i) {
-    double x = data_x_[i], y = data_y_[i];
     for (std::size_t k = first_tap_[i]; k < first_tap_[i + 1]; ++k) {
-      x -= taps_[k].weight * nodes.x[taps_[k].node];
-      y -= taps_[k].weight * nodes.y[taps_[k].node];
+      components[2 * static_cast<Eigen::Index>(i)] += taps_[k].weight * nodes.x[taps_[k].node];
+      components[2 * static_cast<Eigen::Index>(i) + 1] += taps_[k].weight * nodes.y[taps_[k].node];
     }
-    residuals.push_back(x);
-    residuals.push_back(y);
   }
-  return residuals;
+  return components;
+}
+
+std::vector<double> LatticeProblem::residuals(const NodeField& nodes) const {
+  const Eigen::VectorXd left = data() - at_beads(nodes);
+  return {left.begin(), left.end()};
 }
 
 void LatticeProblem::normal(const NodeField& nodes, NodeField& result) const {

@@ -41,6 +41,14 @@ class LatticeProblem {
   const NodeField& spread_data() const { return spread_; }
   /// Pᵀ z of random signs: tells the trace of the influence matrix (Hutchinson 1990).
   NodeField spread_signs() const;
+  /// u, components in turn
+  Eigen::VectorXd data() const;
+  /// Rows of beads' components times the roots of their weights.
+  Eigen::MatrixXd weighted(Eigen::MatrixXd by_component) const;
+  /// Pᵀ of weighted components
+  NodeField spread_of(const Eigen::VectorXd& components) const;
+  /// P of displacements on the lattice, component by component
+  Eigen::VectorXd at_beads(const NodeField& displacements) const;
   /// u − P of displacements on the lattice, component by component
   std::vector<double> residuals(const NodeField& displacements) const;
   /// Pᵀ P of nodes, to `result`
@@ -68,6 +76,7 @@ class LatticeProblem {
   std::vector<std::size_t> first_tap_;  ///< by bead, and one more
   NodeField spread_;
   Eigen::ArrayXd data_x_, data_y_;  ///< u
+  Eigen::ArrayXd root_weights_;     ///< by bead
 };
 
 /// (G PᵀP G + lambda²) t = b by conjugate gradients, preconditioned with the inverse for a field without gaps or

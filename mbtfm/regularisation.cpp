@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::inverse {
@@ -12,6 +13,7 @@ namespace mbtfm::inverse {
 namespace {
 
 constexpr int kPointsPerDecade = 3;  // the criteria are smooth over a factor of two
+constexpr double kLeastCurvature = 0.1;  // a radius of ten e-folds, four decades, is no corner to the eye
 constexpr int kFine = 16;            // places between two points at which their spline is looked at
 
 /// A spline through values at the points, as a function of the point's index.
@@ -102,7 +104,6 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
   const double corner_at = std::clamp(
       smallest_at(scan.points.size(), [&](double at) { return -curvature_at(std::clamp(at, 2.0, n_last - 2)); }), 2.0,
       n_last - 2);
-  constexpr double kLeastCurvature = 0.1;  // a radius of ten e-folds, four decades, is no corner to the eye
   if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(corner_at);
 
   // (14) The determinant from its derivative: d log det(1 + G Gᵀ / lambda²) / d log lambda² = −degrees.
@@ -162,6 +163,15 @@ RiskScale::RiskScale(const std::vector<double>& risk)
 double RiskScale::to(double risk) const { return std::asinh((risk - least) / depth); }
 double RiskScale::from(double tamed) const { return least + depth * std::sinh(tamed); }
 
+namespace {
+
+/// But for the ends, where a spline knows no curvature.
+double largest_curvature(const LambdaScan& scan) {
+  return *std::max_element(scan.curvature.begin() + 2, scan.curvature.end() - 2);
+}
+
+}  // namespace
+
 double chosen_lambda(const LambdaScan& scan, const std::string& criterion) {
   if (criterion == "risk") return scan.by_risk;
   if (criterion == "gcv") return scan.by_gcv;
@@ -169,7 +179,10 @@ double chosen_lambda(const LambdaScan& scan, const std::string& criterion) {
     throw NotSolved({.converged = false,
                      .iterations = 0,
                      .last_change = 0,
-                     .reason = "the L-curve of these data has no corner: choose lambda by another criterion"});
+                     .reason = "the L-curve of these data has no corner (its largest curvature is " +
+                               brief(largest_curvature(scan)) + ", a corner has " + brief(kLeastCurvature) +
+                               " at least): set lambda_by = risk, which takes lambda " + brief(scan.by_risk) +
+                               " here; it aims at the tractions, and needs no corner"});
   }
   if (criterion == "l-curve") return *scan.by_l_curve;
   if (criterion == "evidence") return scan.by_evidence;

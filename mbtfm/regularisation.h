@@ -46,7 +46,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
 /// over what is left of Gaussian noise where the tractions have followed it, tr (1 − H)² of n.
 double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square);
 
-/// @throws NotSolved where the criterion is the L-curve and has no corner
+/// @throws NotSolved where the criterion is the L-curve and has no corner; it says which criterion to take
 double chosen_lambda(const LambdaScan& scan, const std::string& criterion);
 
 /// Quantities of the scan between its points too, as the criteria see them: by splines through to(value).

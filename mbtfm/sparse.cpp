@@ -3,7 +3,7 @@
 #include <cmath>
 #include <limits>
 
-#include "mbtfm/force_correction.h"
+#include "mbtfm/lattice_forces.h"
 #include "mbtfm/fttc.h"
 #include "pipeline/contract/errors.h"
 
@@ -144,15 +144,9 @@ Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionPa
       std::count_if(tractions.begin(), tractions.end(), [](Vec2 traction) { return norm(traction) > 0; });
   r.patches = patches_of(problem, tractions, displacements);
   if (!inputs.adhesions.empty()) {
-    const PenalisedTractions penalised{.problem = problem,
-                                       .displacements = displacements,
-                                       .tikhonov_lambda = {},
-                                       .lambda_by_gcv = scan.by_gcv,
-                                       .variance = scan.variance};
-    NodeField corrected = problem.transform().backward(taken_by_penalty(penalised));
-    corrected.x += choice.tractions.x;
-    corrected.y += choice.tractions.y;
-    r.forces = forces_of(penalised, on_field(problem, corrected), inputs.adhesions, parameters.grow_um, threads);
+    r.forces = forces_on(
+        {.problem = problem, .scan = scan, .compliance = even_forces_um_per_nN(inputs, parameters.gel_model, threads)},
+        forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um), threads);
   }
   r.relative_l2 = std::sqrt(choice.misfit / problem.data_squared());
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},

@@ -4,6 +4,8 @@
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/memory.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::inverse {
 
@@ -25,7 +27,8 @@ void declare(ParameterList& list, TractionParameters& p) {
            "fttc: the tractions are smoothed by this Gaussian (um)");
   list.add("element_um", p.element_um, Range::mesh_um(), "bem: side of the elements that cover the cell (um)");
   list.add("grow_um", p.grow_um, Range::zero_or_size_um(),
-           "an adhesion's force is that of the tractions on its ellipse grown by this (um)");
+           "sums are taken within this of the outline or of the adhesions; bem: an adhesion's force is that of the "
+           "tractions on its ellipse grown by this (um)");
   list.add("shift_error_um", p.shift_error_um, Range::size_um(),
            "adhesion-forces: shift of an ellipse whose effect on its force is reported (um)");
   list.add("size_error", p.size_error, Range::between(0.001, 10),
@@ -105,6 +108,20 @@ std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches,
     *forces[a].moment_nN_um += cross(positions[p] - adhesions[a].position_um, force);
   }
   return forces;
+}
+
+Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::string& gel_model, int threads) {
+  const auto n_beads = static_cast<double>(inputs.beads.size());
+  expect_room_for({.what = "the compliance of the adhesions",
+                   .count = n_beads,
+                   .parts = "beads",
+                   .bytes_each = 3 * 4 * sizeof(double) * static_cast<double>(inputs.adhesions.size()),
+                   .remedy = "leave --adhesions out, or take fewer beads"});
+  std::vector<Vec2> points;
+  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return substrate::make_greens(inputs.gel, {.model = gel_model}, threads)->compliance_um_per_nN(points, ellipses);
 }
 
 Vec2 direction_of(Vec2 force_nN) {

@@ -89,6 +89,9 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
 std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
                                               double grow_um);
 
+/// Displacements of the beads by a force of one spread evenly over each adhesion: 2·beads × 2·adhesions.
+Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::string& gel_model, int threads);
+
 /// Along which the error of a force's magnitude is taken: the force, or x where there is none.
 Vec2 direction_of(Vec2 force_nN);
 

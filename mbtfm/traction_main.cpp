@@ -1,4 +1,7 @@
 /// mbtfm-traction: the standard traction reconstructions, beside the model-based one.
+#include <algorithm>
+
+#include "mbtfm/neighbour_noise.h"
 #include "mbtfm/traction.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/effects.h"
@@ -18,6 +21,24 @@ void declare(ParameterList& list, TractionStageParameters& p) {
   declare(list, p.traction);
 }
 
+/// Where not all beads state their errors, all get the one that their neighbours tell of.
+/// @returns it; none where they do, or where there are too few beads to tell: then the misfit will
+std::optional<double> assume_noise(DisplacementField& beads) {
+  if (std::ranges::all_of(beads, [](const Bead& b) { return b.sigma_um > 0; })) return std::nullopt;
+  const std::optional<double> sigma_um = noise_from_neighbours_um(beads);
+  const bool is_found = sigma_um && *sigma_um > 0;  // a computed field has none
+  for (Bead& b : beads) b.sigma_um = is_found ? *sigma_um : 0;
+  return is_found ? sigma_um : std::nullopt;
+}
+
+/// Of one cell: a whole field may hold many. @throws InputError where no cell pulls like that
+void expect_plausible(StageContext& context, const TractionInputs& inputs, const Reconstruction& r,
+                      const TractionSums& sums) {
+  if (inputs.outline_um.empty() && inputs.adhesions.empty()) return;
+  context.expect_plausible("total_force_nN", sums.total_force_nN);
+  if (!r.forces.empty()) context.expect_plausible("traction_kPa", surest_traction_kPa(r.forces, inputs.adhesions));
+}
+
 StageReport run(const TractionStageParameters& p, StageContext& context) {
   context.progress(0, "reading");
   TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
@@ -25,9 +46,14 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   const auto n_flagged = std::erase_if(inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
   if (context.has_input("adhesions")) inputs.adhesions = read_adhesions(context.input("adhesions"));
   if (context.has_input("outline")) inputs.outline_um = read_outline(context.input("outline")).front();
+  context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
+  const std::optional<double> assumed_um = assume_noise(inputs.beads);
+  if (assumed_um) context.assumed.push_back(assumed_noise(*assumed_um));
   context.progress(0.1, "reconstructing tractions");
-  const Reconstruction r = reconstruct(inputs, p.traction, context.threads);
+  Reconstruction r = reconstruct(inputs, p.traction, context.threads);
+  if (assumed_um) r.figures.emplace_back("assumed_sigma_um", *assumed_um);
   const TractionSums sums = sums_of(r, inputs, p.traction.grow_um);
+  expect_plausible(context, inputs, r, sums);
 
   write_tractions(context.output("out"), r.patches);
   write_tractions_vtp(context.output_beside("out", ".vtp"), r.patches);
@@ -47,6 +73,10 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   report.summary = p.traction.method + ": total force " + brief(sums.total_force_nN) + " nN, strain energy " +
                    brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " + brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
+  if (assumed_um) {
+    report.summary += "; the field states no errors: " + brief(*assumed_um) +
+                      " um is assumed for all, as its neighbours tell";
+  }
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged beads left out";
   report.converged = r.report.converged;
   if (!r.report.converged) report.summary += "; " + r.report.reason;
@@ -71,7 +101,7 @@ int main(int argc, char** argv) {
   return mbtfm::run_stage<TractionStageParameters>(
       {.name = "traction",
        .purpose = "reconstruct tractions from bead displacements by a standard method",
-       .files = {{"displacement", FileArgument::Kind::input, "displacement.csv of the beads"},
+       .files = {{"displacement", FileArgument::Kind::input, "displacement.csv of the beads; without the column sigma_um their errors are told from neighbours"},
                  {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
                  {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
                  {"out", FileArgument::Kind::output,

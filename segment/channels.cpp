@@ -37,4 +37,14 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
                    "set pixel_size_um, in cell.toml or as --pixel_size_um");
 }
 
+std::optional<Finding> noticed_loss(const Channel& channel) {
+  return noticed(FindingKind::lossy_image, channel.image.is_lossy ? 1 : 0,
+                 channel.name + " is a lossy image (JPEG): its intensities and the positions of its beads are changed.");
+}
+
+std::optional<Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um) {
+  if (!given_um || !channel.image.pixel_size_um) return std::nullopt;
+  return doubt_about_pixel_size(*given_um, *channel.image.pixel_size_um);
+}
+
 }  // namespace mbtfm::segment

@@ -4,6 +4,8 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/contract/findings.h"
+#include "pipeline/contract/plausible.h"
 #include "segment/image.h"
 
 namespace mbtfm::segment {
@@ -23,5 +25,11 @@ void require_equal_sizes(const Channel& first, const Channel& second);
 /// The pixel size of two images of one field: the one given, or else the calibration that they have.
 /// @throws InputError where neither tells it, or they contradict each other
 double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um);
+
+/// A finding where the image is a JPEG.
+std::optional<Finding> noticed_loss(const Channel& channel);
+
+/// Where the pixel size given is not that of the image's own calibration. Both are of the image as it is, binned or not.
+std::optional<Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um);
 
 }  // namespace mbtfm::segment

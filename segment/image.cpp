@@ -13,15 +13,14 @@
 namespace mbtfm::segment {
 namespace {
 
-constexpr const char* kExpected = "a TIFF or PNG image";
+constexpr const char* kExpected = "a TIFF, PNG or JPEG image";
 
 struct Signature {
   std::string_view bytes;
   std::string_view name;
 };
 using namespace std::string_view_literals;
-constexpr Signature kForeignFormats[] = {{"\xFF\xD8\xFF"sv, "a JPEG image"},
-                                         {"GIF8"sv, "a GIF image"},
+constexpr Signature kForeignFormats[] = {{"GIF8"sv, "a GIF image"},
                                          {"BM"sv, "a BMP image"},
                                          {"PK\x03\x04"sv, "a zip archive"},
                                          {"ZISRAWFILE"sv, "a Zeiss CZI file"},
@@ -94,17 +93,29 @@ void declare(ParameterList& list, PlaneChoice& choice, const std::string& prefix
                "file that does not state its dimensions");
 }
 
+namespace {
+
+void require_one_page(const std::filesystem::path& file, const PlaneChoice& choice, const std::string& kind) {
+  PlaneChoice of_page = choice;
+  of_page.channel.clear();
+  chosen_pages(Stack{.channel_names = {""}, .pages = {0}}, of_page, file.string());
+  if (choice.page.value_or(1) > 1)
+    throw InputError(file.string(), "page " + std::to_string(*choice.page), kind + ", which has only one");
+}
+
+}  // namespace
+
 Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   const std::string head = head_of(file);
   if (choice.page && *choice.page < 1) throw InputError(file.string(), "a page from 1", std::to_string(*choice.page));
   if (is_tiff(head)) return read_tiff(file, choice);
   if (head.starts_with("\x89PNG")) {
-    PlaneChoice of_page = choice;
-    of_page.channel.clear();
-    chosen_pages(Stack{.channel_names = {""}, .pages = {0}}, of_page, file.string());
-    if (choice.page.value_or(1) > 1)
-      throw InputError(file.string(), "page " + std::to_string(*choice.page), "a PNG image, which has only one");
+    require_one_page(file, choice, "a PNG image");
     return read_png(file, choice);
+  }
+  if (head.starts_with("\xFF\xD8\xFF")) {
+    require_one_page(file, choice, "a JPEG image");
+    return read_jpeg(file, choice);
   }
   for (const Signature& format : kForeignFormats) {
     if (head.starts_with(format.bytes)) {
@@ -121,7 +132,8 @@ Image binned(Image image, int binning) {
                .height = image.height / binning,
                .pixels = {},
                .pixel_size_um = image.pixel_size_um,
-               .full_scale = image.full_scale};
+               .full_scale = image.full_scale,
+               .is_lossy = image.is_lossy};
   if (result.width == 0 || result.height == 0) {
     throw InvalidData("binning", "blocks that fit into the image",
                       std::to_string(binning) + " x " + std::to_string(binning) + " pixels of " +

@@ -18,6 +18,7 @@ struct Image {
   std::vector<float> pixels;
   std::optional<double> pixel_size_um;  ///< from the file's own calibration
   double full_scale = 0;                ///< the value at which the detector saturates; 0: none (float)
+  bool is_lossy = false;                ///< as a JPEG is: intensities, and with them positions, are not the camera's
   float at(int column, int row) const { return pixels[static_cast<std::size_t>(row) * width + column]; }
   float& at(int column, int row) { return pixels[static_cast<std::size_t>(row) * width + column]; }
 };
@@ -35,7 +36,7 @@ struct PlaneChoice {
 /// <prefix>_channel, <prefix>_z, <prefix>_time and <prefix>_page. @param image  "the adhesion image"
 void declare(ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);
 
-/// Read a plane of a TIFF (8 or 16 bit, float; any libtiff compression) or a PNG.
+/// Read a plane of a TIFF (8 or 16 bit, float; any libtiff compression), a PNG or a JPEG.
 ///
 /// Dimensions: OME-XML, ImageJ; of a file that states none, page 1. Samples of a pixel that are not red, green and blue
 /// are channels. Calibration: OME PhysicalSizeX, ImageJ unit + resolution, Volocity.

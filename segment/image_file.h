@@ -1,4 +1,4 @@
-/// Inside of the image reader: what its TIFF and its PNG half share.
+/// Inside of the image reader: what its TIFF, PNG and JPEG parts share.
 #pragma once
 
 #include <cstdint>
@@ -16,6 +16,9 @@ Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
 
 /// Read a file that begins as a PNG; of RGB the mean where no channel is chosen. @throws InputError
 Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
+
+/// Read a file that begins as a JPEG, grey or RGB, of which the mean where no channel is chosen. @throws InputError
+Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice);
 
 /// Refuse a size that a damaged header makes up, before memory is taken for it.
 ///

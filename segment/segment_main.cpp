@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/contract/csv.h"
@@ -106,6 +107,17 @@ void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
   }
 }
 
+/// @throws InputError where no cell looks like that
+void expect_plausible(StageContext& context, const Segmentation& s) {
+  context.expect_plausible("cell_area_um2", s.area_um2);
+  std::vector<double> areas_um2;
+  for (const Adhesion& a : s.cell.adhesions) areas_um2.push_back(a.area_um2);
+  if (areas_um2.empty()) return;
+  const auto middle = areas_um2.begin() + static_cast<std::ptrdiff_t>(areas_um2.size() / 2);
+  std::nth_element(areas_um2.begin(), middle, areas_um2.end());
+  context.expect_plausible("adhesion_area_um2", *middle);
+}
+
 StageReport run(const SegmentParameters& given, StageContext& context) {
   cv::setNumThreads(context.threads);
   SegmentParameters parameters = given;
@@ -113,9 +125,15 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
   if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
   const auto adhesion = channel(context, "adhesion-image", parameters.adhesion_plane, binning);
   const auto actin = channel(context, "actin-image", parameters.actin_plane, binning);
+  for (const auto& image : {adhesion, actin}) {
+    if (!image) continue;
+    context.doubt(doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
+    context.notice(noticed_loss(*image));
+  }
   const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
                         roi_set(context, "fibre-rois", binning)};
   const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
+  for (const Segmentation& s : cells) expect_plausible(context, s);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
     write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]),
@@ -138,9 +156,9 @@ int main(int argc, char** argv) {
       {.name = "segment",
        .purpose = "find adhesions, stress fibres and the outline of a cell in its microscope images",
        .files = {{"adhesion-image", FileArgument::Kind::optional_input,
-                  "adhesion channel (TIFF or PNG); without it every fibre counts as an arc"},
+                  "adhesion channel (TIFF, PNG or JPEG); without it every fibre counts as an arc"},
                  {"actin-image", FileArgument::Kind::optional_input,
-                  "actin channel (TIFF or PNG); without it no fibres, and the outline from the adhesion channel"},
+                  "actin channel (TIFF, PNG or JPEG); without it no fibres, and the outline from the adhesion channel"},
                  {"outline-roi", FileArgument::Kind::optional_input,
                   "ImageJ selection used as the cell's outline (.roi)"},
                  {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas used as adhesions (.roi or .zip)"},

@@ -114,6 +114,8 @@ class Reader {
     image.height = static_cast<int>(layout_.height);
     image.pixel_size_um = calibration_;
     image.full_scale = full_scale();
+    const auto packing = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+    image.is_lossy = packing == COMPRESSION_JPEG || packing == COMPRESSION_OJPEG;
     image.pixels.assign(static_cast<std::size_t>(layout_.width) * layout_.height, 0.0f);
     return image;
   }

@@ -125,6 +125,8 @@ std::vector<Frame> frames_of_file(const fs::path& file, const TrackParameters& p
   return frames;
 }
 
+constexpr const char* kImageExtensions[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
+
 /// The images of a folder in the order of their names, or those of a file.
 std::vector<Frame> frames_of(StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
@@ -132,11 +134,11 @@ std::vector<Frame> frames_of(StageContext& context, const TrackParameters& param
   std::vector<std::string> names;
   for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
     const std::string extension = entry.path().extension().string();
-    if (extension == ".tif" || extension == ".tiff" || extension == ".png") {
+    if (std::ranges::find(kImageExtensions, extension) != std::end(kImageExtensions)) {
       names.push_back(entry.path().filename().string());
     }
   }
-  if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png)", "none");
+  if (names.empty()) throw InputError(given.string(), "images (.tif, .tiff, .png, .jpg, .jpeg)", "none");
   std::sort(names.begin(), names.end());
   context.input("stressed", names);
   std::vector<Frame> frames;
@@ -162,10 +164,14 @@ struct TrackedFrame {
 };
 
 TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
-                     const TrackParameters& parameters, int binning, const Progress& progress) {
+                     const TrackParameters& parameters, int binning, const Progress& progress, StageContext& context) {
   const Channel stressed{frame.name(), binned(read_image(frame.file, frame.plane), binning)};
   require_equal_sizes(relaxed, stressed);
   const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
+  for (const Channel* image : {&relaxed, &stressed}) {
+    context.doubt(doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
+    context.notice(noticed_loss(*image));
+  }
   if (stressed.image.pixels == relaxed.image.pixels) {
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
   }
@@ -283,7 +289,7 @@ StageReport track(TrackParameters parameters, int binning, StageContext& context
   const RelaxedBeads beads =
       with_names(relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads); });
   const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
-    return tracked(relaxed, beads, frame, parameters, binning, progress);
+    return tracked(relaxed, beads, frame, parameters, binning, progress, context);
   };
   const std::optional<fs::path> earlier = earlier_run(context);
   if (earlier && CsvTable(*earlier / "frames.csv").n_rows() == static_cast<int>(frames.size())) {
@@ -291,6 +297,7 @@ StageReport track(TrackParameters parameters, int binning, StageContext& context
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
+  context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
   write_field(context, tracking.field, "displacement");
   return report_of(tracking, pixel_size_um);
 }
@@ -332,6 +339,7 @@ StageReport run(const TrackStageParameters& given, StageContext& context) {
   if (context.has_input("displacement")) {
     if (has_images) throw UsageError("--displacement and bead images exclude each other");
     const DisplacementField field = read_given_field(context.input("displacement"), parameters);
+    context.expect_plausible("beads_per_um2", beads_per_um2(field));
     write_field(context, field, "displacement");
     StageReport report = report_of(field);
     report.summary = std::to_string(field.size()) + " displacements read" + report.summary;
@@ -356,8 +364,8 @@ int main(int argc, char** argv) {
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
        .files =
            {{"stressed", Kind::optional_input,
-             "beads while the cell pulls (TIFF or PNG); a folder of them: a time series"},
-            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF or PNG)"},
+             "beads while the cell pulls (TIFF, PNG or JPEG); a folder of them: a time series"},
+            {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)"},
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},

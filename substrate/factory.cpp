@@ -3,11 +3,11 @@
 namespace mbtfm::substrate {
 
 std::unique_ptr<Substrate> make_substrate(const Gel& gel, const SubstrateParameters& parameters, int threads) {
-  return make_from({{"half-space", make_half_space},
-                    {"layer", make_layer},
-                    {"split", make_split},
-                    {"refined", make_refined},
-                    {"auto", make_automatic}},
+  return make_from({{"half-space", make_half_space, true},
+                    {"layer", make_layer, true},
+                    {"split", make_split, false},
+                    {"refined", make_refined, false},
+                    {"auto", make_automatic, true}},
                    gel, parameters, threads);
 }
 

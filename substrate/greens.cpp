@@ -87,6 +87,11 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
   std::string names;
   for (const Model& model : table) {
     if (model.name == parameters.model) {
+      if (gel.poisson_ratio == 0.5 && !model.takes_incompressible) {
+        throw UsageError("gel.poisson_ratio = 0.5: the model " + model.name +
+                         " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
+                         "or half-space");
+      }
       if (model.name == "auto") return model.make(gel, parameters, threads);  // decides by the scene
       return model.make(gel, without_what_is_off(parameters, effects_of_model(parameters)), threads);
     }
@@ -96,7 +101,7 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
 }
 
 std::unique_ptr<Substrate> make_greens(const Gel& gel, const SubstrateParameters& parameters, int threads) {
-  return make_from({{"half-space", make_half_space}, {"layer", make_layer}}, gel, parameters, threads);
+  return make_from({{"half-space", make_half_space, true}, {"layer", make_layer, true}}, gel, parameters, threads);
 }
 
 std::vector<double> Substrate::vertical_um(const std::vector<Vec2>&, const std::vector<Ellipse>&,

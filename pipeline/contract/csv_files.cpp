@@ -171,13 +171,13 @@ Cell read_cell(const Path& folder) {
 
 DisplacementField read_displacement(const Path& file) {
   CsvTable table(file);
-  table.require({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});
-  const bool has_flags = table.has("flag");
+  table.require({"x_um", "y_um", "ux_um", "uy_um"});
+  const bool has_errors = table.has("sigma_um"), has_flags = table.has("flag");
   DisplacementField field(table.n_rows());
   for (int row = 0; row < table.n_rows(); ++row) {
     field[row] = {.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
                   .displacement_um = {table.number(row, "ux_um"), table.number(row, "uy_um")},
-                  .sigma_um = table.number(row, "sigma_um", Range::not_negative()),
+                  .sigma_um = has_errors ? table.number(row, "sigma_um", Range::not_negative()) : 0,
                   .flag = has_flags ? table.text(row, "flag") : std::string()};
   }
   return field;

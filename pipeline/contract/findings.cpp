@@ -13,6 +13,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
   using enum FindingKind;
   using enum Severity;
   static const std::vector<KindOfFinding> kinds = {
+      {unusual_value, "unusual-value", "any stage", caution, "values beyond what is usual", 0,
+       "each value has its range and its source: docs/plausible.md", "Check the value and its unit."},
+      {assumed_input, "assumed-input", "any stage", note, "physical inputs that cell.toml does not give", 0,
+       "forces depend on them, and nobody measured them", "Give them in cell.toml."},
+      {lossy_image, "lossy-image", "any stage", caution, "images that are JPEG files", 0,
+       "JPEG leaves out what an eye does not miss, and measures do", "Use the microscope's own file."},
       {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by three standard errors",
        0.98, "chance moves 1 bead in 90 by that much",
        "Check that the two bead images belong to this cell, and that the cell was removed between them."},
@@ -72,8 +78,6 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,
        "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
        "Report this with the cell: it should not happen."},
-      {assumed_input, "assumed-input", "fit", note, "physical inputs that cell.toml does not give", 0,
-       "forces depend on them, and nobody measured them", "Give them in cell.toml."},
       {modulus_error_unknown, "modulus-error-unknown", "fit", note,
        "1 where gel.youngs_modulus_sigma_kPa is not given", 0,
        "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
@@ -139,7 +143,7 @@ std::string findings_page() {
       "- **caution**: the results may be off by more than their error bars say.\n"
       "- **bad**: do not use what the finding names.\n\n"
       "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
-  for (const char* stage : {"segment", "track", "network", "fit"}) {
+  for (const char* stage : {"any stage", "segment", "track", "network", "fit"}) {
     bool has_title = false;
     for (const KindOfFinding& k : kinds_of_findings()) {
       if (std::string(stage) != k.stage) continue;

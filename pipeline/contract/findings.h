@@ -16,6 +16,10 @@ enum class Severity {
 };
 
 enum class FindingKind {
+  // any stage
+  unusual_value,
+  assumed_input,
+  lossy_image,
   // track
   nothing_moves,
   moves_outward,
@@ -37,7 +41,6 @@ enum class FindingKind {
   forces_out_of_balance,
   torques_out_of_balance,
   // fit: the gel
-  assumed_input,
   modulus_error_unknown
 };
 

@@ -17,8 +17,8 @@ namespace mbtfm {
 namespace {
 
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
-constexpr std::array kTables = {"gel",     "images",    "segment", "track", "network",  "cables",
-                                "effects", "substrate", "fit",     "stats", "scenario", "traction"};
+constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network",  "cables", "effects",
+                                "substrate", "fit",    "stats",   "scenario", "traction", "checks"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
@@ -107,27 +107,29 @@ bool try_set(Parameter& p, const std::string& text) {
                     p.member);
 }
 
-/// "1500 nm are 1.5 um": where the value is beyond the range as it stands, and within it in a unit a thousand times
-/// smaller. Empty where it is not.
-std::string unit_mistaken(const Parameter& p, const std::string& text) {
-  constexpr std::array<std::array<std::string_view, 2>, 3> kUnits = {{{"um", "nm"}, {"kPa", "Pa"}, {"nN", "pN"}}};
+std::string unit_slip(const Parameter& p, const std::string& text) {
   double value = 0;
-  if (!read_number(text, value) || !(value > p.range.high) || !is_inside(p.range, 1e-3 * value)) return {};
-  for (const auto& [unit, smaller] : kUnits) {
-    if (!p.name.ends_with("_" + std::string(unit))) continue;
-    return "was it meant in " + std::string(smaller) + "? " + text + " " + std::string(smaller) + " are " +
-           shortest(1e-3 * value) + " " + std::string(unit);
-  }
-  return {};
+  return read_number(text, value) ? mbtfm::unit_slip(p.name, value, p.range) : std::string();
 }
 
 std::string advice_on(const Parameter& p, const std::string& text) {
-  const std::string unit = unit_mistaken(p, text);
-  return unit.empty() ? p.meaning : unit + " (" + p.meaning + ")";
+  const std::string slip = unit_slip(p, text);
+  return slip.empty() ? p.meaning : slip + " (" + p.meaning + ")";
 }
 
 std::string place(const std::string& name, const toml::node& node) {
   return name + ":" + std::to_string(node.source().begin.line);
+}
+
+/// The texts of an array with commas between them.
+std::string joined(const toml::array& list, const std::string& where) {
+  std::string text;
+  for (const toml::node& element : list) {
+    const auto* name = element.as_string();
+    if (!name) throw InputError(where, "a number, a text, true or false", "an array of other things than texts");
+    text += (text.empty() ? "" : ",") + name->get();
+  }
+  return text;
 }
 
 /// The value as a flag would spell it.
@@ -136,7 +138,8 @@ std::string spelled(const toml::node& node, const std::string& where) {
   if (const auto* v = node.as_integer()) return std::to_string(v->get());
   if (const auto* v = node.as_boolean()) return v->get() ? "true" : "false";
   if (const auto* v = node.as_string()) return v->get();
-  throw InputError(where, "a number, a text, true or false", "an array, a date or a nested table");
+  if (const auto* list = node.as_array()) return joined(*list, where);
+  throw InputError(where, "a number, a text, true or false", "a date or a nested table");
 }
 
 std::string unknown_key_hint(const std::vector<std::string>& known, std::string_view key) {
@@ -160,6 +163,22 @@ std::string describe(const std::string& noun, const Range& range) {
     text += shortest(range.high);
   }
   return text;
+}
+
+std::string unit_slip(std::string_view name, double value, const Range& range) {
+  struct Unit {
+    std::string_view unit, smaller, larger;
+  };
+  constexpr std::array<Unit, 3> kUnits = {{{"um", "nm", "mm"}, {"kPa", "Pa", "MPa"}, {"nN", "pN", "uN"}}};
+  for (const auto& [unit, smaller, larger] : kUnits) {
+    if (!name.ends_with("_" + std::string(unit))) continue;
+    const bool is_large = value > range.high;
+    const double meant = is_large ? 1e-3 * value : 1e3 * value;
+    if (is_inside(range, value) || !(value > 0) || !is_inside(range, meant)) return {};
+    return "the unit is " + std::string(unit) + ": " + shortest(value) + " " + std::string(is_large ? smaller : larger) +
+           " is " + shortest(meant) + " " + std::string(unit);
+  }
+  return {};
 }
 
 void ParameterList::add(Parameter parameter) {
@@ -250,9 +269,9 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
 
 void set_from_text(Parameter& p, const std::string& text) {
   if (!try_set(p, text)) {
-    const std::string unit = unit_mistaken(p, text);
+    const std::string slip = unit_slip(p, text);
     throw UsageError("--" + p.name + ": expected " + expectation(p) + ", found '" + text + "'" +
-                     (unit.empty() ? "" : "; " + unit));
+                     (slip.empty() ? "" : "; " + slip));
   }
   p.is_set = true;
 }
@@ -304,8 +323,8 @@ void declare(ParameterList& list, Gel& gel) {
   list.table("gel");
   list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the gel (kPa)");
   list.required();
-  list.add("poisson_ratio", gel.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true},
-           "Poisson's ratio of the gel; 0.49 or 0.499 for an incompressible one");
+  list.add("poisson_ratio", gel.poisson_ratio, Range::between(0, 0.5),
+           "Poisson's ratio of the gel; 0.5, the incompressible limit, for models without finite elements");
   list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");
   list.add("youngs_modulus_sigma_kPa", gel.youngs_modulus_sigma_kPa, Range{.low = 0},
            "standard error of Young's modulus, for the error budget (kPa); unset: not known");

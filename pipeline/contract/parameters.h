@@ -41,6 +41,10 @@ bool is_inside(const Range& range, double value);
 /// "a number > 0", for messages and the parameter page.
 std::string describe(const std::string& noun, const Range& range);
 
+/// "the unit is kPa: 8400 Pa is 8.4 kPa": where the value is outside the range as it stands, and inside it in a unit a
+/// thousand times smaller or larger. Empty where it is not. @param name  with its unit
+std::string unit_slip(std::string_view name, double value, const Range& range);
+
 struct Parameter {
   std::string table;  ///< of cell.toml; empty: above the first table
   std::string name;   ///< key in the table, and the flag --name

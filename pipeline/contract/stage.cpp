@@ -4,6 +4,7 @@
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <chrono>
 #include <cstdio>
 #include <nlohmann/json.hpp>
@@ -182,15 +183,33 @@ void commit(const StageContext& context) {
   for (const auto& [temporary, destination] : context.pending_) put_in_place(temporary, destination);
 }
 
-int run(const StageDescription& description, ParameterList& list, const CommandLine& line,
+/// What was noticed, doubted and assumed beside what the stage itself reports.
+void add_findings(StageReport& report, const StageContext& context) {
+  std::vector<Finding> findings;
+  for (const Doubt& doubt : context.doubts) {
+    Finding finding = *noticed(FindingKind::unusual_value, 1, sentence_of(doubt) + ".");
+    finding.number = doubt.value;
+    finding.threshold = doubt.limit;
+    finding.number_is = doubt.quantity;
+    finding.reason = doubt.source;
+    finding.remedy = doubt.remedy;
+    findings.push_back(std::move(finding));
+  }
+  findings.insert(findings.end(), context.findings_.begin(), context.findings_.end());
+  report.findings.insert(report.findings.begin(), findings.begin(), findings.end());
+  for (const AssumedInput& input : context.assumed)
+    report.findings.push_back(*noticed(FindingKind::assumed_input, 1, sentence_of(input) + ". " + input.effect));
+}
+
+int run(const StageDescription& description, ParameterList& list, const CommandLine& line, StageContext context,
         const std::function<StageReport(StageContext&)>& body) {
   const auto begin = std::chrono::steady_clock::now();
-  StageContext context;
   set_files(context, description, line);
   context.threads = line.threads;
   context.progress = terminal_progress(description.name, line.is_quiet);
   try {
-    const StageReport report = body(context);
+    StageReport report = body(context);
+    add_findings(report, context);
     expect_all_written(context);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     // The record takes its place last: where it is, all that it speaks of is.
@@ -262,6 +281,19 @@ fs::path StageContext::pending_path(const fs::path& destination) {
   return temporary;
 }
 
+void StageContext::notice(const std::optional<Finding>& finding) {
+  const auto is_same = [&](const Finding& f) { return f.id == finding->id && f.text == finding->text; };
+  if (finding && std::ranges::none_of(findings_, is_same)) findings_.push_back(*finding);
+}
+
+void StageContext::doubt(const std::optional<Doubt>& doubt, const std::string& where) {
+  if (!doubt) return;
+  require_possible(*doubt, allowed_, where);
+  const auto is_same = [&](const Doubt& d) { return d.id == doubt->id && d.value == doubt->value; };
+  if (std::ranges::any_of(doubts, is_same)) return;  // of another frame or channel
+  doubts.push_back(*doubt);
+}
+
 void StageContext::make_folder(const fs::path& folder) {
   if (folder.empty() || fs::exists(folder)) return;
   make_folder(folder.parent_path());
@@ -281,6 +313,8 @@ int run_stage(const StageDescription& description, int argc, char** argv,
   try {
     ParameterList list;
     declare_parameters(list);
+    CheckParameters checks;
+    if (has_plausible_quantity(list)) declare(list, checks);
     CommandLine line;
     CLI::App app(description.purpose, "mbtfm-" + stage);
     add_options(app, line, description, list);
@@ -297,9 +331,13 @@ int run_stage(const StageDescription& description, int argc, char** argv,
       return kDone;
     }
     set_parameters(list, line, app);
+    StageContext context;
+    context.allowed_ = allowed_quantities(checks);
+    context.doubts = doubts_about(list, context.allowed_);
+    context.assumed = assumed_inputs(list);
     if (line.only_check) return kDone;
     reserve_blas_buffers(line.threads);
-    return run(description, list, line, body);
+    return run(description, list, line, std::move(context), body);
   } catch (...) {
     return report_current_exception("mbtfm-" + stage);
   }

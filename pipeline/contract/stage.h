@@ -10,6 +10,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parameters.h"
+#include "pipeline/contract/plausible.h"
 #include "pipeline/contract/report.h"
 
 namespace mbtfm {
@@ -32,6 +33,17 @@ class StageContext {
  public:
   int threads = 1;
   Progress progress;
+  /// About inputs and results, so far; they become findings of the stage.
+  std::vector<Doubt> doubts;
+  std::vector<AssumedInput> assumed;
+  /// Add a finding, if there is one that was not there yet.
+  void notice(const std::optional<Finding>& finding);
+
+  /// A doubt about an input or a result, if there is one. @param where  as in messages
+  /// @throws InputError where it is refused and [checks] does not allow it
+  void doubt(const std::optional<Doubt>& doubt, const std::string& where);
+  /// The same about a result of the table of plausible values.
+  void expect_plausible(std::string_view id, double value) { doubt(doubt_about(id, value), std::string(id)); }
 
   /// Path of an input that was given.
   std::filesystem::path input(const std::string& name);
@@ -46,6 +58,8 @@ class StageContext {
   std::filesystem::path output_beside(const std::string& name, const std::string& ending);
 
   // used by run_stage
+  std::vector<Finding> findings_;
+  std::vector<std::string> allowed_;  ///< quantities whose values are not refused
   /// Temporary path, free to be written to, of what is to be `destination`.
   std::filesystem::path pending_path(const std::filesystem::path& destination);
   std::map<std::string, std::filesystem::path> inputs_, outputs_;

@@ -190,11 +190,22 @@ void check(const DisplacementField& field) {
   }
 }
 
+double beads_per_um2(const DisplacementField& beads) {
+  if (beads.empty()) return 0;
+  Vec2 low = beads.front().position_um, high = low;
+  for (const Bead& b : beads) {
+    low = {std::min(low.x, b.position_um.x), std::min(low.y, b.position_um.y)};
+    high = {std::max(high.x, b.position_um.x), std::max(high.y, b.position_um.y)};
+  }
+  const double area_um2 = (high.x - low.x) * (high.y - low.y);
+  return area_um2 > 0 ? static_cast<double>(beads.size()) / area_um2 : 0;
+}
+
 void check(const Gel& gel) {
   require_positive(gel.youngs_modulus_kPa, "youngs_modulus_kPa", "the gel");
   require_positive(gel.thickness_um, "thickness_um", "the gel");
-  require(std::isfinite(gel.poisson_ratio) && gel.poisson_ratio >= 0 && gel.poisson_ratio < 0.5,
-          "'poisson_ratio' of the gel", "a number from 0 to below 0.5 (0.49 or 0.499 for an incompressible gel)",
+  require(std::isfinite(gel.poisson_ratio) && gel.poisson_ratio >= 0 && gel.poisson_ratio <= 0.5,
+          "'poisson_ratio' of the gel", "a number from 0 to 0.5",
           shown(gel.poisson_ratio));
 }
 

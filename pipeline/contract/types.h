@@ -76,6 +76,8 @@ struct Bead {
   std::string flag;     ///< why it must not be used; empty: good
 };
 using DisplacementField = std::vector<Bead>;
+/// Over the rectangle that holds them; 0 where they spread over no area.
+double beads_per_um2(const DisplacementField& beads);
 
 struct Gel {
   double youngs_modulus_kPa = 0;

@@ -127,8 +127,8 @@ TEST_F(Errors, a_negative_modulus_is_refused_before_anything_runs) {
 }
 
 TEST_F(Errors, a_poisson_ratio_of_one_half_is_refused_before_anything_runs) {
-  replace_in_toml("poisson_ratio", "poisson_ratio = 0.5");
-  expect_error(kInput, {"cell.toml:", "poisson_ratio", "< 0.5", "'0.5'"}, "1_segment");
+  replace_in_toml("poisson_ratio", "poisson_ratio = 0.51");
+  expect_error(kInput, {"cell.toml:", "poisson_ratio", "<= 0.5", "'0.51'"}, "1_segment");
 }
 
 TEST_F(Errors, not_a_number_in_a_table_names_file_line_and_column) {

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "mbtfm/traction.h"
+#include "pipeline/contract/json_record.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/program.h"
 
@@ -75,6 +76,46 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
     EXPECT_NE(run.output.find(word), std::string::npos) << run.output;
     EXPECT_FALSE(fs::exists(folder / "traction.csv"));
   }
+}
+
+TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
+  const test::TemporaryFolder folder;
+  constexpr double kNoise = 0.05;
+  const test::EllipseScene scene = test::ellipse_scene(48, kNoise);
+  CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
+  for (const Bead& b : scene.field) {
+    csv.add(b.position_um.x).add(b.position_um.y).add(b.displacement_um.x).add(b.displacement_um.y).end_row();
+  }
+  write_text(folder / "displacement.csv", csv.str());
+  const auto run = [&](const std::string& more) {
+    return test::run_program("mbtfm-traction --youngs_modulus_kPa 8.4 --displacement " +
+                             (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string() +
+                             more);
+  };
+  const auto told = run("");
+  ASSERT_EQ(told.code, 0) << told.output;
+  EXPECT_NE(told.output.find("the field states no errors"), std::string::npos) << told.output;
+  // 2304 beads: half of them tell the noise to 2.5 %
+  const double assumed_um = JsonRecord(folder / "traction.json", "figures").at("assumed_sigma_um").number();
+  EXPECT_NEAR(assumed_um / (kNoise * scene.largest_um), 1, 0.075);
+}
+
+TEST(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_incompressible_gel) {
+  const test::TemporaryFolder folder;
+  const test::EllipseScene scene = test::ellipse_scene(32, 0.05);
+  write_displacement(folder / "displacement.csv", scene.field);
+  const auto run = [&](const std::string& toml) {
+    write_text(folder / "cell.toml", toml);
+    return test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
+                             (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
+  };
+  const auto refused = run("[gel]\nyoungs_modulus_kPa = 8400\n");
+  EXPECT_EQ(refused.code, 3) << refused.output;
+  EXPECT_NE(refused.output.find("8400 Pa is 8.4 kPa"), std::string::npos) << refused.output;
+  EXPECT_FALSE(fs::exists(folder / "traction.csv"));
+  EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8400\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n").code, 0);
+  EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.5\n").code, 0);
+  EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.501\n").code, 3);
 }
 
 TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_force) {

@@ -1,4 +1,4 @@
-/// TIFF and PNG images.
+/// TIFF, PNG and JPEG images.
 #include <tiffio.h>
 
 #include "segment/image.h"
@@ -53,7 +53,9 @@ std::string tiff(const Layout& layout) {
 std::vector<std::string> samples() {
   put("whole.png", "");
   segment::write_png(folder() / "whole.png", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
-  std::vector<std::string> files = {bytes_of(folder() / "whole.png")};
+  put("whole.jpg", "");
+  segment::write_jpeg(folder() / "whole.jpg", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
+  std::vector<std::string> files = {bytes_of(folder() / "whole.png"), bytes_of(folder() / "whole.jpg")};
   for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_PACKBITS, COMPRESSION_ADOBE_DEFLATE,
                                 COMPRESSION_JPEG, COMPRESSION_ZSTD, COMPRESSION_LZMA, COMPRESSION_WEBP}) {
     if (!TIFFIsCODECConfigured(static_cast<std::uint16_t>(compression))) continue;

@@ -9,6 +9,7 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "segment/channels.h"
 #include "segment/image_file.h"
 #include "segment/png.h"
 #include "tests/support/temporary_folder.h"
@@ -294,6 +295,42 @@ TEST(Image, real_calibrations_are_found) {
     EXPECT_NEAR(found.value_or(0), expected.value_or(0), 1e-5 * expected.value_or(0)) << file;
   }
   EXPECT_EQ(read_image(kShared / "tiff/derived_tiffcp/beads_2ch.ome.tif", {.page = 2}).pixel_size_um, 0.16);
+}
+
+TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
+  const test::TemporaryFolder folder;
+  Picture picture{.width = 64, .height = 48, .rgb = {}};
+  for (int j = 0; j < 48; ++j) {
+    for (int i = 0; i < 64; ++i) {
+      for (const int value : {2 * i + 40, 2 * i + 40, 2 * i + 40}) picture.rgb.push_back(static_cast<std::uint8_t>(value));
+    }
+  }
+  write_jpeg(folder / "a.jpg", picture);
+  const Image image = read_image(folder / "a.jpg");
+  ASSERT_EQ(image.width, 64);
+  ASSERT_EQ(image.height, 48);
+  EXPECT_EQ(image.full_scale, 255);
+  EXPECT_TRUE(image.is_lossy);
+  EXPECT_FALSE(image.pixel_size_um) << "its resolution is a printer's";
+  // an even slope has few waves: at quality 80 these are rounded to steps of some counts
+  for (int j = 0; j < 48; ++j) {
+    for (int i = 0; i < 64; ++i) EXPECT_NEAR(image.at(i, j), 2 * i + 40, 6) << i << ", " << j;
+  }
+  EXPECT_TRUE(binned(image, 2).is_lossy);
+  EXPECT_EQ(read_image(folder / "a.jpg", {.channel = "red"}).width, 64);
+  EXPECT_THROW(read_image(folder / "a.jpg", {.channel = "4"}), InputError);
+  EXPECT_THROW(read_image(folder / "a.jpg", {.page = 2}), InputError);
+}
+
+TEST(Channels, a_pixel_size_given_is_compared_with_each_images_own_binned_or_not) {
+  Image image = ramp(64, 48);
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, 0.1)) << "the image has none";
+  image.pixel_size_um = 0.1;
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, std::nullopt)) << "nothing is given";
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, 0.1));
+  EXPECT_FALSE(doubt_about_calibration({"a.tif", binned(image, 2)}, 0.2)) << "of binned pixels both";
+  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.105)->level, DoubtLevel::caution);
+  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.2)->level, DoubtLevel::refused);
 }
 
 }  // namespace
