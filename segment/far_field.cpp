@@ -304,6 +304,22 @@ void take_noise(FarField& far, const std::vector<Vec2>& positions, const std::ve
   far.noise = quantile(std::move(sizes), 0.5) / 0.6745;
 }
 
+/// Beside a cell that is cut the tail has no fit: squares count by the square of their distance from what does not rest,
+/// as tails fall.
+void weigh_by_distance(Design& design, const RestingField& rest) {
+  std::vector<Vec2> pulled;
+  for (const FieldCell& cell : rest.cells) {
+    if (cell.n_beads > 0 && !cell.rests) pulled.push_back(cell.place);
+  }
+  for (std::size_t k = 0; k < design.cells.size(); ++k) {
+    double nearest = 1e300;
+    for (const Vec2 place : pulled) nearest = std::min(nearest, norm(place - design.cells[k]->place));
+    const double share = pulled.empty() ? 1 : nearest / rest.side;
+    design.weight[2 * k] *= share * share;
+    design.weight[2 * k + 1] *= share * share;
+  }
+}
+
 /// Forces and global motion of a divided field, ready to be solved.
 struct Fit {
   bool is_at_rest = false;
@@ -322,6 +338,7 @@ Fit fit_of(const RestingField& rest, Vec2 corner, double width, double height, d
   }
   if (fit.is_at_rest && is_whole && rest.n_moving > 0) fit.sources = sources_of(rest, corner, width, height);
   Design design = design_of(used, fit.sources, rest, scale);
+  if (fit.is_at_rest && !is_whole) weigh_by_distance(design, rest);
   fit.normal = normal_of(design);
   fit.ridge = best_ridge(fit.normal);
   if (!fit.is_at_rest) return fit;
