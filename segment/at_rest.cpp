@@ -19,8 +19,8 @@ constexpr double kTail = 0.1;
 constexpr double kEnough = 0.25;
 /// What moves by more is pulled by adhesions nearby: the field of one falls to a quarter within two of its widths.
 constexpr double kPulled = 0.25;
-/// Of the picture's side: what is as near to what is pulled may be, too. Gaps in a ring of adhesions are closed so, since
-/// inside of it the gel is quiet, but not far away.
+/// Of the picture's side: what is as near to what is pulled may be, too. Gaps in a ring of adhesions are closed so,
+/// since inside of it the gel is quiet, but not far away.
 constexpr double kGap = 1.0 / 12;
 /// A gel grows, and a dish put back is turned, by a few per cent at most.
 constexpr double kLargestLinear = 0.03;
@@ -97,7 +97,7 @@ struct Followed {
 struct Search {
   const RestingField& field;
   Vec2 centre;
-  double scale;  ///< half the picture
+  double scale;                  ///< half the picture
   std::vector<double> width_of;  ///< by square: what a square at rest may be off by
 
   double weight(std::size_t k, const GlobalMotion& motion, double widened) const {
@@ -142,7 +142,9 @@ GlobalMotion mode_of(const Search& search) {
   };
   using Part = std::function<bool(const Place&)>;
   std::vector<Part> parts = {[](const Place&) { return true; },
-                             [](const Place& p) { return std::min({p.left, p.top, p.right, p.bottom}) < 0.15; }};
+                             [](const Place& p) {
+                               return std::min({p.left, p.top, p.right, p.bottom}) < 0.15;
+                             }};
   for (const double share : {0.2, 0.4}) {
     for (const auto side : {&Place::left, &Place::top, &Place::right, &Place::bottom}) {
       parts.emplace_back([=](const Place& p) { return p.*side < share; });

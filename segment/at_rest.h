@@ -35,14 +35,14 @@ struct RestingField {
   int nx = 0, ny = 0;
   double side = 1;  ///< of a square
   std::vector<FieldCell> cells;
-  GlobalMotion motion;          ///< roughly, of what rests
-  double bead_noise = 0;        ///< standard deviation of a bead's component about its square
-  double share_at_rest = 0;     ///< of the squares with beads
+  GlobalMotion motion;                ///< roughly, of what rests
+  double bead_noise = 0;              ///< standard deviation of a bead's component about its square
+  double share_at_rest = 0;           ///< of the squares with beads
   double share_of_border_moving = 0;  ///< of the squares along the border, those that do not rest
   double share_of_border_pulled = 0;  ///< the same, those that move by a quarter of the largest displacement
   double pull_of_border = 0;          ///< largest motion along the border over the largest anywhere
-  int n_moving = 0;             ///< squares that do not rest
-  double largest = 0;           ///< 99 % of the beads move by less, beside the motion
+  int n_moving = 0;                   ///< squares that do not rest
+  double largest = 0;                 ///< 99 % of the beads move by less, beside the motion
   /// A cell pulls at more of the border than an adhesion near it does.
   bool is_cut() const { return share_of_border_pulled > 0.1; }
   const FieldCell& at(int i, int j) const { return cells[static_cast<std::size_t>(j) * nx + i]; }
@@ -62,8 +62,6 @@ RestingField resting_field(const std::vector<Vec2>& positions, const std::vector
 struct GlobalColumns {
   double x[6], y[6];
 };
-inline GlobalColumns global_columns(Vec2 d) {
-  return {{1, 0, -d.y, d.x, d.x, d.y}, {0, 1, d.x, d.y, -d.y, d.x}};
-}
+inline GlobalColumns global_columns(Vec2 d) { return {{1, 0, -d.y, d.x, d.x, d.y}, {0, 1, d.x, d.y, -d.y, d.x}}; }
 
 }  // namespace mbtfm::segment

@@ -12,13 +12,13 @@ namespace mbtfm::segment {
 inline constexpr const char* kAffineDrift = "affine drift";  ///< the effect's name
 
 struct MotionTaken {
-  GlobalMotion motion;   ///< what is taken off
-  CommonMotion common;   ///< what was found, in the unit of the positions for um
-  Effect affine;         ///< whether turn, growth and shear are taken off
+  GlobalMotion motion;  ///< what is taken off
+  CommonMotion common;  ///< what was found, in the unit of the positions for um
+  Effect affine;        ///< whether turn, growth and shear are taken off
   double rms = 0, noise = 0;
   /// Turn, growth and shear are found by more than their errors and more than the tolerance, whether taken off or not.
   bool is_affine = false;
-  bool is_large = false;  ///< they move the border by more than `large`, and are most of what is at rest does
+  bool is_large = false;   ///< they move the border by more than `large`, and are most of what is at rest does
   double contraction = 0;  ///< as of FarField
   int n_moving = 0;        ///< squares of the picture that do not rest
 };

@@ -9,8 +9,8 @@
 namespace mbtfm::segment {
 namespace {
 
-/// Patches of forces: 16 a side of what moves, so about the size of an adhesion, and half of it what the force is spread
-/// over. With 8 a side a cell's tail is missed by so much that growth by 0.03 % seems to be there.
+/// Patches of forces: 16 a side of what moves, so about the size of an adhesion, and half of it what the force is
+/// spread over. With 8 a side a cell's tail is missed by so much that growth by 0.03 % seems to be there.
 constexpr int kMostSources = 250;
 constexpr double kSoftening = 0.5;
 /// By this share of its displacement patches miss a square that is pulled.
@@ -108,8 +108,8 @@ void solve_lower_transposed(const cv::Mat& L, cv::Mat& B) {
 /// The squares that are fitted, their weights and their columns.
 struct Design {
   std::vector<const FieldCell*> cells;
-  cv::Mat forces, global, u;       ///< two rows a square
-  std::vector<double> weight;      ///< by row
+  cv::Mat forces, global, u;   ///< two rows a square
+  std::vector<double> weight;  ///< by row
 };
 
 /// In beads: what patches of forces are too coarse for counts as noise of a square.
@@ -124,7 +124,8 @@ Design design_of(const std::vector<const FieldCell*>& cells, const Sources& sour
                  double scale) {
   const Vec2 centre = rest.motion.centre;
   const int n = static_cast<int>(cells.size()), n_forces = 2 * static_cast<int>(sources.at.size());
-  Design design{cells, cv::Mat(2 * n, n_forces, CV_64F), cv::Mat(2 * n, kGlobal, CV_64F), cv::Mat(2 * n, 1, CV_64F), {}};
+  Design design{
+      cells, cv::Mat(2 * n, n_forces, CV_64F), cv::Mat(2 * n, kGlobal, CV_64F), cv::Mat(2 * n, 1, CV_64F), {}};
   for (int k = 0; k < n; ++k) {
     const FieldCell& cell = *cells[k];
     if (n_forces > 0) fill_kernels(design.forces.rowRange(2 * k, 2 * k + 2), cell.place, sources);
@@ -304,8 +305,8 @@ void take_noise(FarField& far, const std::vector<Vec2>& positions, const std::ve
   far.noise = quantile(std::move(sizes), 0.5) / 0.6745;
 }
 
-/// Beside a cell that is cut the tail has no fit: squares count by the square of their distance from what does not rest,
-/// as tails fall.
+/// Beside a cell that is cut the tail has no fit: squares count by the square of their distance from what does not
+/// rest, as tails fall.
 void weigh_by_distance(Design& design, const RestingField& rest) {
   std::vector<Vec2> pulled;
   for (const FieldCell& cell : rest.cells) {

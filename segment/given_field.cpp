@@ -198,8 +198,7 @@ bool points_outward(const DisplacementField& field, const CommonMotion& common, 
   constexpr double kOutward = 0.4;
   // a cell that the border cuts moves it as much as anything
   constexpr double kReached = 0.5;
-  return common.has_far_field && !is_affine_left && common.pull_of_border <= kReached &&
-         outwardness(field) > kOutward;
+  return common.has_far_field && !is_affine_left && common.pull_of_border <= kReached && outwardness(field) > kOutward;
 }
 
 }  // namespace mbtfm::segment

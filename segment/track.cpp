@@ -173,9 +173,9 @@ Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const 
   } catch (const InvalidData& unturned) {  // turned so far that its beads are not met with again?
     try {
       Tracking turned = track_as("on", stressed, pixel_size_um, progress);
-      turned.affine = decided(turned.affine.name, "auto", true,
-                              "unturned, the images do not fit together; with " + affine_in_words(turned.common) +
-                                  " taken off they do");
+      turned.affine = decided(
+          turned.affine.name, "auto", true,
+          "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
       return turned;
     } catch (const InvalidData&) {
       throw unturned;

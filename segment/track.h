@@ -22,7 +22,7 @@ struct TrackParameters {
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
   /// on, off or auto: a stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too
   std::string drift_affine = "off";
-  bool may_push = false;  ///< a gel that is pushed outward is no sign of exchanged images
+  bool may_push = false;           ///< a gel that is pushed outward is no sign of exchanged images
   double effect_tolerance = 0.01;  ///< auto: what displaces the border by less, of the largest displacement, stays
   double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
   double outlier_threshold = 4;    ///< in robust sd: 4 rejects one good bead in 16 000
@@ -61,7 +61,7 @@ struct CommonMotion {
   bool has_far_field = false;  ///< some part of the picture is at rest; otherwise all are those of all beads alike
   double share_at_rest = 0;    ///< of the picture
   double share_of_border_moving = 0;
-  bool is_affine = false;  ///< turn, growth and shear are there, taken off or not
+  bool is_affine = false;             ///< turn, growth and shear are there, taken off or not
   double share_of_border_pulled = 0;  ///< by a quarter of the largest displacement: there a cell is cut
   double pull_of_border = 0;          ///< largest motion along the border over the largest anywhere
 };

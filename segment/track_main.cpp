@@ -194,7 +194,12 @@ TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Fr
 class FrameList {
  public:
   void add(const Frame& frame, const Tracking& t) {
-    begin(frame).add(t.n_good).add(t.common.drift_um.x).add(t.common.drift_um.y).add(t.common.turn_rad * kRadian_deg).add(t.noise_um);
+    begin(frame)
+        .add(t.n_good)
+        .add(t.common.drift_um.x)
+        .add(t.common.drift_um.y)
+        .add(t.common.turn_rad * kRadian_deg)
+        .add(t.noise_um);
     list_.add(figures_of(t.field).largest_um).add("").end_row();
   }
   void add_refused(const Frame& frame, const std::string& why) {

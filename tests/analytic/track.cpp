@@ -195,7 +195,11 @@ TEST(FarField, turn_growth_and_shear_beside_a_cell_are_found_within_their_errors
   constexpr double kSide = 600, kNoise = 0.3;
   constexpr int kDraws = 12;
   const auto peaks = test::ring_of_adhesions(kSide, 8);
-  const GlobalMotion truth{.shift = {3, -2}, .turn_rad = 0.003, .growth = -0.002, .stretch = 0.001, .skew = 0.0005,
+  const GlobalMotion truth{.shift = {3, -2},
+                           .turn_rad = 0.003,
+                           .growth = -0.002,
+                           .stretch = 0.001,
+                           .skew = 0.0005,
                            .centre = {0.5 * (kSide - 1), 0.5 * (kSide - 1)}};
   double squares = 0, n = 0;
   for (int draw = 0; draw < kDraws; ++draw) {
@@ -203,13 +207,12 @@ TEST(FarField, turn_growth_and_shear_beside_a_cell_are_found_within_their_errors
     const FarField far =
         whole_motion(field.positions, field.displacements, {-0.5, -0.5}, kSide, kSide, {Drift::affine}).of.front();
     ASSERT_TRUE(far.is_at_rest);
-    for (const auto& [found, wanted, sigma] :
-         {std::array{far.drift.shift.x, truth.shift.x, far.errors.shift},
-          {far.drift.shift.y, truth.shift.y, far.errors.shift},
-          {far.drift.turn_rad, truth.turn_rad, far.errors.turn_rad},
-          {far.drift.growth, truth.growth, far.errors.growth},
-          {far.drift.stretch, truth.stretch, far.errors.shear},
-          {far.drift.skew, truth.skew, far.errors.shear}}) {
+    for (const auto& [found, wanted, sigma] : {std::array{far.drift.shift.x, truth.shift.x, far.errors.shift},
+                                               {far.drift.shift.y, truth.shift.y, far.errors.shift},
+                                               {far.drift.turn_rad, truth.turn_rad, far.errors.turn_rad},
+                                               {far.drift.growth, truth.growth, far.errors.growth},
+                                               {far.drift.stretch, truth.stretch, far.errors.shear},
+                                               {far.drift.skew, truth.skew, far.errors.shear}}) {
       EXPECT_LT(std::abs(found - wanted), 4 * sigma) << "draw " << draw;
       squares += std::pow((found - wanted) / sigma, 2), ++n;
     }

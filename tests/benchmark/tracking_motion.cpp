@@ -62,9 +62,9 @@ struct Asked {
 int main(int argc, char** argv) {
   const auto argument = [&](int k, double otherwise) { return argc > k ? std::atof(argv[k]) : otherwise; };
   const int threads = static_cast<int>(argument(3, 2));
-  const Crop crops[] = {{"middle", 0, 0, 1024, 1024},   {"corner", 140, 140, 884, 884},
-                        {"cut 1", 512, 0, 512, 1024},   {"cut 1b", 300, 0, 724, 1024}, {"cut 2", 512, 512, 512, 512},
-                        {"cut 2b", 320, 320, 704, 704}, {"cut 3", 280, 660, 464, 364}};
+  const Crop crops[] = {{"middle", 0, 0, 1024, 1024},  {"corner", 140, 140, 884, 884}, {"cut 1", 512, 0, 512, 1024},
+                        {"cut 1b", 300, 0, 724, 1024}, {"cut 2", 512, 512, 512, 512},  {"cut 2b", 320, 320, 704, 704},
+                        {"cut 3", 280, 660, 464, 364}};
   const Asked motions[] = {{"none", 0, 0, 0, 0, {}},
                            {"drift", 0, 0, 0, 0, {0.83, -0.46}},
                            {"growth .1 %", 0.001, 0, 0, 0, {}},
@@ -72,7 +72,8 @@ int main(int argc, char** argv) {
                            {"shear .1 %", 0, 0, 0.0006, 0.0008, {}},
                            {"turn .3 deg", 0, 0.0052, 0, 0, {}},
                            {"all", 0.003, -0.0052, 0.001, -0.001, {0.83, -0.46}}};
-  std::printf("shift error um, growth %% (error), turn deg (error), rest, on, rms of field - truth over sigma; noise\n");
+  std::printf(
+      "shift error um, growth %% (error), turn deg (error), rest, on, rms of field - truth over sigma; noise\n");
   for (int seed = static_cast<int>(argument(1, 1)); seed <= argument(2, 2); ++seed) {
     samples::ScenarioParameters p;
     ParameterList list;
@@ -107,12 +108,14 @@ int main(int argc, char** argv) {
           const auto& c = t.common;
           const double angle = 2 * c.shear_angle_rad;
           const Vec2 shear = c.shear * Vec2{std::cos(angle), std::sin(angle)} - Vec2{asked.stretch, asked.skew};
-          std::printf("%+.3f %+.3f (%.3f)  growth %+.4f (%.4f)  turn %+.4f (%.4f)  shear %+.4f %+.4f (%.4f)  rest %d %.2f %.2f %.2f %s"
-                      "  noise %.3f out %+.2f",
-                      missed.x, missed.y, c.drift_sigma_um, 100 * (c.growth - asked.growth), 100 * c.growth_sigma,
-                      57.2958 * (c.turn_rad - asked.turn_rad), 57.2958 * c.turn_sigma_rad, 100 * shear.x, 100 * shear.y,
-                      100 * c.shear_sigma, c.has_far_field, c.share_at_rest, c.share_of_border_moving, c.share_of_border_pulled,
-                      t.affine.is_on ? "ON " : "off", t.noise_um, segment::outwardness(t.field));
+          std::printf(
+              "%+.3f %+.3f (%.3f)  growth %+.4f (%.4f)  turn %+.4f (%.4f)  shear %+.4f %+.4f (%.4f)  rest %d %.2f %.2f "
+              "%.2f %s"
+              "  noise %.3f out %+.2f",
+              missed.x, missed.y, c.drift_sigma_um, 100 * (c.growth - asked.growth), 100 * c.growth_sigma,
+              57.2958 * (c.turn_rad - asked.turn_rad), 57.2958 * c.turn_sigma_rad, 100 * shear.x, 100 * shear.y,
+              100 * c.shear_sigma, c.has_far_field, c.share_at_rest, c.share_of_border_moving, c.share_of_border_pulled,
+              t.affine.is_on ? "ON " : "off", t.noise_um, segment::outwardness(t.field));
         } catch (const InvalidData& error) {
           std::printf("REFUSED %s", error.what());
         }

@@ -219,9 +219,8 @@ TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_gi
   EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed).substr(0, refused.size()), refused);
   EXPECT_NE(what_is_wrong(one.relaxed, one.stressed), "nothing");
   const auto little = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .turn_rad = 0.02, .seed = 1});
-  EXPECT_NE(
-      what_is_wrong(little.relaxed, little.stressed).find("(effects.drift_affine = off), found a turn of 1.1"),
-      std::string::npos);
+  EXPECT_NE(what_is_wrong(little.relaxed, little.stressed).find("(effects.drift_affine = off), found a turn of 1.1"),
+            std::string::npos);
   TrackParameters parameters;
   parameters.drift_affine = "on";
   EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed, parameters).substr(0, refused.size()), refused);
@@ -278,8 +277,8 @@ Image cropped(const Image& image, int left, int top, int width, int height) {
   return result;
 }
 
-/// What a picture shows of a cell that its border cuts may point anywhere: no word of exchanged images either way round,
-/// and none of growth alone.
+/// What a picture shows of a cell that its border cuts may point anywhere: no word of exchanged images either way
+/// round, and none of growth alone.
 TEST(TrackStability, a_cell_that_the_border_cuts_is_never_called_exchanged) {
   test::hard_case("a cell cut by one, two, three sides, either way round; a picture that grows", "never refused");
   const auto peaks = test::ring_of_adhesions(512, 8);
