@@ -5,7 +5,9 @@
 #include <set>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
+#include "segment/common_motion.h"
 #include "segment/local_motion.h"
 
 namespace mbtfm::segment {
@@ -165,6 +167,38 @@ double outwardness(const DisplacementField& field) {
     cosines += norm(bead.displacement_um) * dot(bead.displacement_um, out) / norm(out);
   }
   return cosines / total;
+}
+
+GivenMotion take_affine_off(DisplacementField& field, const TrackParameters& parameters) {
+  std::vector<Vec2> positions, displacements;
+  for (const Bead& bead : field) {
+    if (!bead.flag.empty()) continue;
+    positions.push_back(bead.position_um);
+    displacements.push_back(bead.displacement_um);
+  }
+  Vec2 first{1e300, 1e300}, last{-1e300, -1e300};
+  for (const Vec2 p : positions) {
+    first = {std::min(first.x, p.x), std::min(first.y, p.y)};
+    last = {std::max(last.x, p.x), std::max(last.y, p.y)};
+  }
+  constexpr std::size_t kFewest = 100;  // squares enough that a motion of six numbers is no chance
+  if (positions.size() < kFewest || !(last.x > first.x) || !(last.y > first.y)) {
+    return {.common = {}, .affine = decided(kAffineDrift, "auto", false, "too few places would show it")};
+  }
+  const MotionTaken all = motion_taken(positions, displacements, first, last.x - first.x, last.y - first.y,
+                                       parameters.drift_affine, parameters.effect_tolerance, 0);
+  if (all.affine.is_on) {
+    for (Bead& bead : field) bead.displacement_um = bead.displacement_um - all.motion.at(bead.position_um);
+  }
+  return {.common = all.common, .affine = all.affine};
+}
+
+bool points_outward(const DisplacementField& field, const CommonMotion& common, bool is_affine_left) {
+  // a contracting cell has -0.7 to -0.5, exchanged +0.5 to +0.7; one whose part alone is in view up to +0.3
+  constexpr double kOutward = 0.4;
+  // a cell that the border cuts moves it as much as anything
+  constexpr double kReached = 0.5;
+  return common.has_far_field && !is_affine_left && common.pull_of_border <= kReached && outwardness(field) > kOutward;
 }
 
 }  // namespace mbtfm::segment

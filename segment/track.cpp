@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/effects.h"
@@ -10,18 +9,15 @@
 #include "segment/alignment.h"
 #include "segment/beads.h"
 #include "segment/coarse_field.h"
-#include "segment/far_field.h"
+#include "segment/common_motion.h"
 #include "segment/follow.h"
+#include "segment/given_field.h"
 #include "segment/measure.h"
 #include "segment/pool.h"
 #include "segment/scene.h"
 
 namespace mbtfm::segment {
 namespace {
-
-Drift drift_kind(const std::string& name) {
-  return name == "translation" ? Drift::translation : name == "rotation" ? Drift::rotation : Drift::similarity;
-}
 
 int search_window(const Scene& scene, const TrackParameters& parameters, double pixel_size_um) {
   // sixteen beads make the right peak stand out; shifts are found up to half a window
@@ -44,59 +40,28 @@ void require_numbers(const Image& image, const char* which) {
   }
 }
 
-/// A turn that is taken for displacement is a wrong field, however well its beads were found.
-void require_no_turn(const FarField& far, Drift kind) {
-  if (kind != Drift::translation || !far.is_turned) return;
-  throw InvalidData("the stressed image", "a far field that is shifted at most (effects.drift_rotation = off)",
-                    "one turned by " + brief(far.turn_rad * 180 / std::numbers::pi) + " degrees");
-}
-
 struct Measured {
   std::vector<Track> tracks;
   Pooling pooling;
 };
 
-/// As of each of these kinds.
-std::vector<FarField> far_fields_of(const Scene& scene, const Measured& measured, const TrackParameters& parameters,
-                                    const std::vector<Drift>& kinds) {
-  const auto& [tracks, pooling] = measured;
+/// What moved the good beads together, px. @param setting  as of TrackParameters::drift_affine
+MotionTaken motion_of_all(const Scene& scene, const Measured& measured, const std::string& setting, double tolerance) {
   std::vector<Vec2> positions, displacements;
-  double squares = 0;
-  for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (!tracks[k].is_good()) continue;
-    squares += pooling.beads[k].sigma_px * pooling.beads[k].sigma_px;
-    positions.push_back(scene.relaxed->positions[k]);
-    displacements.push_back(pooling.beads[k].u);
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    if (!measured.tracks[k].is_good()) continue;
+    positions.push_back(scene.position(k));
+    displacements.push_back(measured.pooling.beads[k].u);
   }
   const Plane& plane = scene.relaxed->image.plane;
-  const double noise = std::sqrt(squares / std::max<double>(1, static_cast<double>(positions.size())));
-  return far_fields(positions, displacements, plane.width, plane.height,
-                    parameters.far_field_share * std::min(plane.width, plane.height), kinds, noise);
+  return motion_taken(positions, displacements, {-0.5, -0.5}, plane.width, plane.height, setting, tolerance, 1);
 }
 
-constexpr const char* kRotation = "drift rotation";
-
-/// About the drift; a hundredth of the beads may move further, as outliers do.
-double largest_displacement_px(const std::vector<Track>& tracks, const Pooling& pooling, const FarField& far,
-                               const Scene& scene) {
-  std::vector<double> lengths;
-  for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (!tracks[k].is_good()) continue;
-    lengths.push_back(norm(pooling.beads[k].u - far.drift.at(scene.position(static_cast<int>(k)))));
-  }
-  return lengths.empty() ? 0 : quantile(std::move(lengths), 0.99);
-}
-
-/// Drift rotation: where the turn, found together with the cell's own tail, displaces the border by more than the
-/// tolerance, of the largest displacement, and by more than three of its standard errors.
-Effect decide_rotation(const FarField& turned, double largest_px, const Plane& plane, double tolerance) {
-  if (!turned.is_at_rest) return decided(kRotation, "auto", false, "no place is at rest that would show a turn");
-  const double arm_px = 0.5 * std::min(plane.width, plane.height), unit_px = std::max(largest_px, 1e-9);
-  const double threshold = std::max(tolerance, 3 * turned.turn_sigma_rad * arm_px / unit_px);
-  return decided(kRotation, "auto", std::abs(turned.drift.turn_rad) * arm_px / unit_px, threshold,
-                 "a turn of " + brief(turned.drift.turn_rad * 180 / std::numbers::pi) + " +- " +
-                     brief(turned.turn_sigma_rad * 180 / std::numbers::pi) +
-                     " degrees displaces the border, over the largest displacement, by");
+/// A turn that is taken for displacement is a wrong field, however well its beads were found.
+void require_shift_alone(const MotionTaken& all) {
+  if (all.affine.is_on || !all.is_large) return;
+  throw InvalidData("the stressed image", "one that is shifted at most (effects.drift_affine = off)",
+                    affine_in_words(all.common));
 }
 
 /// The beads that left the stressed image when it was turned.
@@ -124,52 +89,36 @@ Measured measured_beads(const Scene& scene, std::vector<Track> tracks, const std
   return {std::move(tracks), std::move(pooling)};
 }
 
-Tracking tracking_of(const Scene& scene, const std::vector<Track>& tracks, const Pooling& pooling, const FarField& far,
-                     double pixel_size_um) {
+CommonMotion in_um(CommonMotion common, double pixel_size_um) {
+  common.drift_um = pixel_size_um * common.drift_um;
+  common.drift_sigma_um *= pixel_size_um;
+  return common;
+}
+
+/// With the turn by which the image was turned back before.
+CommonMotion turned_as_before(CommonMotion common, const Turn& turn, Vec2 centre) {
+  common.drift_um = turn.of(centre + common.drift_um) - centre;
+  common.turn_rad += turn.angle_rad;
+  return common;
+}
+
+Tracking tracking_of(const Scene& scene, const Measured& measured, const MotionTaken& all, double pixel_size_um) {
+  const auto& [tracks, pooling] = measured;
   Tracking result;
-  result.far_field_rms_um = pixel_size_um * far.rms;
-  result.noise_um = pixel_size_um * far.noise;
-  result.has_far_field = far.is_at_rest;
+  result.far_field_rms_um = pixel_size_um * all.rms;
+  result.noise_um = pixel_size_um * all.noise;
   result.scatter_um = pixel_size_um * pooling.scatter_px;
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma();
   result.n_beads_stressed = static_cast<int>(scene.stressed.beads.size());
+  result.affine = all.affine;
   for (int k = 0; k < scene.n_beads(); ++k) {
     const Pooled& found = pooling.beads[k];
     const Vec2 place = scene.position(k);
     result.field.push_back({.position_um = pixel_size_um * (place + Vec2{0.5, 0.5}),
-                            .displacement_um = pixel_size_um * (found.u - far.drift.at(place)),
+                            .displacement_um = pixel_size_um * (found.u - all.motion.at(place)),
                             .sigma_um = pixel_size_um * found.sigma_px,
                             .flag = tracks[k].flag});
     if (tracks[k].is_good()) ++result.n_good;
-  }
-  return result;
-}
-
-struct DriftOfAll {
-  FarField far;
-  Effect rotation;
-};
-
-/// What the whole image did, with a turn or without. @param turn  by which it was turned back before, if any
-DriftOfAll drift_of_all(const Scene& scene, const Measured& measured, const TrackParameters& parameters,
-                        const std::string& kind, const std::optional<Turn>& turn) {
-  const Drift first = kind == "auto" ? Drift::translation : drift_kind(kind);
-  std::vector<Drift> kinds = {first};
-  if (kind == "auto") kinds.push_back(Drift::rotation);
-  const std::vector<FarField> far = far_fields_of(scene, measured, parameters, kinds);
-  DriftOfAll result{far.front(), decided(kRotation, first == Drift::translation ? "off" : "on", true, "as asked")};
-  require_no_turn(result.far, first);
-  if (kind == "auto") {
-    const Stopwatch watch;
-    const double largest_px = largest_displacement_px(measured.tracks, measured.pooling, result.far, scene);
-    result.rotation = decide_rotation(far[1], largest_px, scene.relaxed->image.plane, parameters.effect_tolerance);
-    if (result.rotation.is_on) result.far = far[1];
-    result.rotation.seconds = watch.seconds();
-  } else if (parameters.drift == "auto") {
-    const double all_rad = turn->angle_rad + result.far.drift.turn_rad;
-    result.rotation = decided(kRotation, "auto", true,
-                              "unturned, the images do not fit together; turned by " +
-                                  brief(all_rad * 180 / std::numbers::pi) + " degrees they do");
   }
   return result;
 }
@@ -189,11 +138,8 @@ void declare(ParameterList& list, TrackParameters& p) {
   list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
            "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
-  list.add("drift_growth", p.drift_growth,
-           "take growth of the whole image by a few per cent for drift, too, beside a turn: a gel that swells");
-  list.add(
-      "far_field_share", p.far_field_share, Range::between(0.01, 0.5),
-      "width of the frame along the border that is taken for far from the cell, for the drift (share of the side)");
+  list.add("may_push", p.may_push,
+           "the cell may push its gel outward; otherwise that is taken for exchanged images, an error");
   list.add("least_similarity", p.least_similarity, Range::between(0, 1),
            "least correlation of a bead's surroundings in both images");
   list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
@@ -219,19 +165,25 @@ RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& paramete
 }
 
 Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const Progress& progress) const {
-  if (parameters_.drift != "auto") return track_as(parameters_.drift, stressed, pixel_size_um, progress);
+  if (parameters_.drift_affine != "auto") return track_as(parameters_.drift_affine, stressed, pixel_size_um, progress);
   try {
     return track_as("auto", stressed, pixel_size_um, progress);
+  } catch (const ExchangedImages&) {
+    throw;
   } catch (const InvalidData& unturned) {  // turned so far that its beads are not met with again?
     try {
-      return track_as("rotation", stressed, pixel_size_um, progress);
+      Tracking turned = track_as("on", stressed, pixel_size_um, progress);
+      turned.affine = decided(
+          turned.affine.name, "auto", true,
+          "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
+      return turned;
     } catch (const InvalidData&) {
       throw unturned;
     }
   }
 }
 
-Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, double pixel_size_um,
+Tracking RelaxedBeads::track_as(const std::string& setting, const Image& stressed, double pixel_size_um,
                                 const Progress& progress) const {
   const auto tell = [&](double fraction, const char* what) {
     if (progress) progress(fraction, what);
@@ -245,7 +197,7 @@ Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, 
   require_numbers(stressed, "stressed");
   tell(0, "finding beads");
   std::optional<Turn> turn;
-  if (kind != "auto" && drift_kind(kind) != Drift::translation) {
+  if (setting == "on") {
     const Plane light = without_background(stressed, background_sigma(side_->bead_sigma));
     turn = turn_between(plane, light, side_->bead_sigma, threads_);
     if (!turn) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
@@ -261,17 +213,18 @@ Tracking RelaxedBeads::track_as(const std::string& kind, const Image& stressed, 
   Followed followed = follow(scene, grid, parameters_);
   tell(0.7, "measuring beads");
   const Measured measured = measured_beads(scene, std::move(followed.tracks), turn, parameters_);
-  const std::vector<Track>& tracks = measured.tracks;
-  require_common_beads(followed.n_by_grid, n_good(tracks), scene.n_beads());
-  const Pooling& pooling = measured.pooling;
-  const auto [far, rotation] = drift_of_all(scene, measured, parameters_, kind, turn);
-  Tracking result = tracking_of(scene, tracks, pooling, far, pixel_size_um);
-  result.rotation = rotation;
-  const GlobalMotion& drift = far.drift;
-  const Vec2 centre = drift.centre + drift.shift;
-  result.drift_um = pixel_size_um * ((turn ? turn->of(centre) : centre) - drift.centre);
-  result.turn_rad = rotation.is_on ? drift.turn_rad + (turn ? turn->angle_rad : 0) : far.turn_rad;
-  result.growth = drift.growth;
+  require_common_beads(followed.n_by_grid, n_good(measured.tracks), scene.n_beads());
+  const MotionTaken all = motion_of_all(scene, measured, setting, parameters_.effect_tolerance);
+  require_shift_alone(all);
+  Tracking result = tracking_of(scene, measured, all, pixel_size_um);
+  const CommonMotion common = turn ? turned_as_before(all.common, *turn, all.motion.centre) : all.common;
+  result.common = in_um(common, pixel_size_um);
+  const bool is_affine_left = all.is_affine && !all.affine.is_on;
+  if (!parameters_.may_push && points_outward(result.field, result.common, is_affine_left)) {
+    throw ExchangedImages("the stressed image", "beads that a cell pulls inward",
+                          "beads that move outward (" + brief(outwardness(result.field)) +
+                              " of -1, inward, to 1), as if the stressed and the relaxed image were exchanged");
+  }
   return result;
 }
 

@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/parameters.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/contract/types.h"
@@ -19,11 +20,10 @@ struct TrackParameters {
   int stressed_last = 0;               ///< of a time series the last time or page; 0: a single image
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
-  /// translation, rotation, similarity, or auto: a stage drifts; a dish put back on it is turned, too
-  std::string drift = "translation";
-  bool drift_growth = false;       ///< a gel that swells between the images
-  double effect_tolerance = 0.01;  ///< auto: turns that displace the border by less, of the largest displacement, stay
-  double far_field_share = 0.12;   ///< of the image's side: the frame that is taken for far from the cell
+  /// on, off or auto: a stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too
+  std::string drift_affine = "off";
+  bool may_push = false;           ///< a gel that is pushed outward is no sign of exchanged images
+  double effect_tolerance = 0.01;  ///< auto: what displaces the border by less, of the largest displacement, stays
   double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
   double outlier_threshold = 4;    ///< in robust sd: 4 rejects one good bead in 16 000
   // a displacement field from elsewhere
@@ -46,19 +46,41 @@ struct DetectedBead {
 std::vector<DetectedBead> detect_beads(const Image& image, double detection_snr = TrackParameters{}.detection_snr,
                                        int threads = 1);
 
+/// What all beads do together beside the cell's pull, with standard errors. The drift is taken off the field; turn,
+/// growth and shear as `drift_affine` says.
+struct CommonMotion {
+  Vec2 drift_um;  ///< of the stressed image's centre
+  double drift_sigma_um = 0;
+  double turn_rad = 0;  ///< of the stressed image, from +x towards +y
+  double turn_sigma_rad = 0;
+  double growth = 0;  ///< relative
+  double growth_sigma = 0;
+  double shear = 0;            ///< longer by so much along its direction, shorter across it
+  double shear_angle_rad = 0;  ///< from +x towards +y
+  double shear_sigma = 0;
+  bool has_far_field = false;  ///< some part of the picture is at rest; otherwise all are those of all beads alike
+  double share_at_rest = 0;    ///< of the picture
+  double share_of_border_moving = 0;
+  bool is_affine = false;             ///< turn, growth and shear are there, taken off or not
+  double share_of_border_pulled = 0;  ///< by a quarter of the largest displacement: there a cell is cut
+  double pull_of_border = 0;          ///< largest motion along the border over the largest anywhere
+};
+
 struct Tracking {
   DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
-  Vec2 drift_um;                ///< of the stressed image's centre; the drift is taken off the field
-  double turn_rad = 0;          ///< of the stressed image as a whole, from +x towards +y; taken off as `drift` says
-  double growth = 0;            ///< relative; the same
-  double far_field_rms_um = 0;  ///< of a displacement component in the frame, after the drift is taken off
-  double noise_um = 0;          ///< the same as robust standard deviation, less the cell's tail
+  CommonMotion common;          ///< what all beads do together
+  double far_field_rms_um = 0;  ///< of a displacement component at rest, less drift and the cell's tail
+  double noise_um = 0;          ///< the same as robust standard deviation
   double bead_sigma_um = 0;     ///< of a bead's picture
-  bool has_far_field = false;   ///< the frame moves less than the rest; otherwise the drift is that of all beads
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
   int n_good = 0;
-  Effect rotation{};         ///< whether a turn was taken off, and why
+  Effect affine{};           ///< whether turn, growth and shear were taken off, and why
   int n_beads_stressed = 0;  ///< found in the stressed image
+};
+
+/// The two images seem to be exchanged.
+struct ExchangedImages : InvalidData {
+  using InvalidData::InvalidData;
 };
 
 struct Side;
@@ -72,7 +94,7 @@ class RelaxedBeads {
   /// Displacement of each bead of the relaxed image.
   ///
   /// 1. Windows of both images are cross-correlated on a grid, coarse to fine (drift: phase correlation; before that,
-  ///    where `drift` allows for it, the stressed image is turned back).
+  ///    where `drift_affine` asks for it, the stressed image is turned back).
   /// 2. Around each bead the stressed image is registered to the relaxed one by an affine map with free gain and offset
   ///    (inverse-compositional Gauss–Newton: Baker & Matthews, IJCV 56:221, 2004), from the grid's prediction, and,
   ///    where that fails, from that of the beads already tracked nearby or from the stressed image's beads there; then
@@ -85,10 +107,11 @@ class RelaxedBeads {
   ///
   /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
   /// @throws InvalidData where the stressed image shows no beads, others than the relaxed one, or the sizes differ
+  /// @throws ExchangedImages where the gel is pushed outward as if the images were exchanged (given_field.h)
   Tracking track(const Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
 
  private:
-  Tracking track_as(const std::string& kind, const Image& stressed, double pixel_size_um,
+  Tracking track_as(const std::string& setting, const Image& stressed, double pixel_size_um,
                     const Progress& progress) const;
   std::shared_ptr<const Side> side_;
   TrackParameters parameters_;

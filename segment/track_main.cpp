@@ -81,6 +81,25 @@ StageReport report_of(const DisplacementField& field) {
   return report;
 }
 
+void add_figures(StageReport& report, const CommonMotion& c) {
+  const Figures figures = {{"drift_x_um", c.drift_um.x},
+                           {"drift_y_um", c.drift_um.y},
+                           {"drift_sigma_um", c.drift_sigma_um},
+                           {"turn_deg", c.turn_rad * kRadian_deg},
+                           {"turn_sigma_deg", c.turn_sigma_rad * kRadian_deg},
+                           {"growth", c.growth},
+                           {"growth_sigma", c.growth_sigma},
+                           {"shear", c.shear},
+                           {"shear_angle_deg", c.shear_angle_rad * kRadian_deg},
+                           {"shear_sigma", c.shear_sigma},
+                           {"has_far_field", c.has_far_field},
+                           {"share_at_rest", c.share_at_rest},
+                           {"share_of_border_moving", c.share_of_border_moving},
+                           {"share_of_border_pulled", c.share_of_border_pulled},
+                           {"pull_of_border", c.pull_of_border}};
+  report.figures.insert(report.figures.end(), figures.begin(), figures.end());
+}
+
 StageReport report_of(const Tracking& tracking, double pixel_size_um) {
   StageReport report = report_of(tracking.field);
   report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(tracking.field.size()) + " beads tracked" +
@@ -88,16 +107,12 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
   const Figures more = {{"pixel_size_um", pixel_size_um},
                         {"n_beads_stressed", static_cast<std::int64_t>(tracking.n_beads_stressed)},
                         {"bead_sigma_um", tracking.bead_sigma_um},
-                        {"drift_x_um", tracking.drift_um.x},
-                        {"drift_y_um", tracking.drift_um.y},
-                        {"turn_deg", tracking.turn_rad * kRadian_deg},
-                        {"growth", tracking.growth},
-                        {"has_far_field", tracking.has_far_field},
                         {"far_field_residual_um", tracking.far_field_rms_um},
                         {"noise_um", tracking.noise_um},
                         {"scatter_um", tracking.scatter_um}};
   report.figures.insert(report.figures.end(), more.begin(), more.end());
-  report.effects = {tracking.rotation};
+  add_figures(report, tracking.common);
+  report.effects = {tracking.affine};
   return report;
 }
 
@@ -151,10 +166,14 @@ template <class Body>
 auto with_names(const std::string& names, const Body& body) {
   try {
     return body();
+  } catch (const ExchangedImages& error) {
+    throw InputError(names + ": " + error.element, error.expected, error.found,
+                     "exchange the files of --stressed and --relaxed (beads_stressed and beads_relaxed in cell.toml); "
+                     "if this cell does push outward, set track.may_push = true");
   } catch (const InvalidData& error) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
                      "are these the bead channels of one place, in focus? Check the planes, detection_snr, and where "
-                     "one may be turned against the other, effects.drift_rotation");
+                     "one may be turned against the other, effects.drift_affine");
   }
 }
 
@@ -184,7 +203,12 @@ TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Fr
 class FrameList {
  public:
   void add(const Frame& frame, const Tracking& t) {
-    begin(frame).add(t.n_good).add(t.drift_um.x).add(t.drift_um.y).add(t.turn_rad * kRadian_deg).add(t.noise_um);
+    begin(frame)
+        .add(t.n_good)
+        .add(t.common.drift_um.x)
+        .add(t.common.drift_um.y)
+        .add(t.common.turn_rad * kRadian_deg)
+        .add(t.noise_um);
     list_.add(figures_of(t.field).largest_um).add("").end_row();
   }
   void add_refused(const Frame& frame, const std::string& why) {
@@ -313,21 +337,13 @@ void declare(ParameterList& list, TrackStageParameters& p) {
   list.table("track");
   list.add("binning", p.binning, Range::between(1, kLargestBinning),
            "the images are reduced first: means of blocks of so many pixels a side");
-  declare(list, p.effects, {"drift_rotation", "effect_tolerance"});
+  declare(list, p.effects, {"drift_affine", "effect_tolerance"});
 }
 
 /// What may have moved the image, as the switches say.
 TrackParameters switched(const TrackStageParameters& given) {
   TrackParameters parameters = given.track;
-  const std::string& rotation = given.effects.drift_rotation;
-  if (parameters.drift_growth && rotation == "off") {
-    throw UsageError(
-        "track.drift_growth: expected effects.drift_rotation on or auto, found off: growth is found with a turn");
-  }
-  parameters.drift = parameters.drift_growth ? "similarity"
-                     : rotation == "auto"    ? "auto"
-                     : rotation == "on"      ? "rotation"
-                                             : "translation";
+  parameters.drift_affine = given.effects.drift_affine;
   parameters.effect_tolerance = given.effects.effect_tolerance;
   return parameters;
 }
@@ -338,10 +354,13 @@ StageReport run(const TrackStageParameters& given, StageContext& context) {
   const bool has_images = context.has_input("stressed") || context.has_input("relaxed");
   if (context.has_input("displacement")) {
     if (has_images) throw UsageError("--displacement and bead images exclude each other");
-    const DisplacementField field = read_given_field(context.input("displacement"), parameters);
+    DisplacementField field = read_given_field(context.input("displacement"), parameters);
     context.expect_plausible("beads_per_um2", beads_per_um2(field));
+    const GivenMotion motion = take_affine_off(field, parameters);
     write_field(context, field, "displacement");
     StageReport report = report_of(field);
+    add_figures(report, motion.common);
+    report.effects = {motion.affine};
     report.summary = std::to_string(field.size()) + " displacements read" + report.summary;
     return report;
   }

@@ -23,7 +23,7 @@ const std::vector<Key>& switches() {
       {"depth_graded_gel", &S::depth_graded_gel, "modulus_profile; auto: where the modulus differs from even"},
       {"vertical_displacement", &S::vertical_displacement,
        "displacement into the gel; auto: where a three-dimensional surface is written"},
-      {"drift_rotation", &S::drift_rotation, "turn of the stressed image; auto: where the far field shows one"},
+      {"drift_affine", &S::drift_affine, "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
       {"common_motion", &S::common_motion,
        "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
       {"cable_elasticity", &S::cable_elasticity,

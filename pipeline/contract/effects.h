@@ -20,7 +20,7 @@ struct EffectSwitches {
   std::string finite_sides = "auto";
   std::string depth_graded_gel = "auto";
   std::string vertical_displacement = "auto";
-  std::string drift_rotation = "auto";
+  std::string drift_affine = "auto";
   std::string common_motion = "auto";
   std::string cable_elasticity = "auto";
   std::string robust_loss = "auto";

@@ -35,7 +35,7 @@ const std::vector<Stage>& stages() {
        .writes = {displacement},
        .series = {"2_track/frames.csv", "2_track/displacement_*.csv"},
        .tables = {"", "images", "track", "checks"},
-       .effects = {"drift_rotation", "effect_tolerance"}},
+       .effects = {"drift_affine", "effect_tolerance"}},
       {.name = "network",
        .folder = "3_network",
        .images = {},

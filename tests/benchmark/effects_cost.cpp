@@ -173,11 +173,11 @@ void compare_tracking(int n) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(512, 6), {.width = 512, .n_beads = 5200});
   const auto track = [&](const std::string& drift) {
     segment::TrackParameters parameters;
-    parameters.drift = drift;
+    parameters.drift_affine = drift;
     segment::track_beads(pair.relaxed, pair.stressed, 0.1, parameters, 1);
   };
   compare(
-      "drift rotation", n, [&] { track("auto"); }, [&] { track("translation"); });
+      "affine drift", n, [&] { track("auto"); }, [&] { track("off"); });
 }
 
 }  // namespace

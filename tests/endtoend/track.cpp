@@ -225,18 +225,16 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_time 3 --stressed_last 2").code, 2);
 }
 
-TEST(TrackEndToEnd, swapped_images_are_tracked_with_a_warning) {
+TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
   const test::TemporaryFolder folder;
-  const auto pair = test::draw_bead_pair(test::ring_of_adhesions(256, 5), {.width = 256, .n_beads = 1300});
+  const auto pair = test::draw_bead_pair(test::ring_of_adhesions(384, 6), {.width = 384, .n_beads = 2950});
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
-  const Ended right = run_track(folder, files(folder, "r.tif", "s.tif"));
-  EXPECT_EQ(right.code, 0);
-  EXPECT_EQ(right.said.find("WARNING"), std::string::npos) << right.said;
+  EXPECT_EQ(run_track(folder, files(folder, "r.tif", "s.tif")).code, 0);
   const Ended swapped = run_track(folder, files(folder, "s.tif", "r.tif"));
-  EXPECT_EQ(swapped.code, 0);
-  EXPECT_NE(swapped.said.find("outward everywhere: are stressed and relaxed swapped?"), std::string::npos)
-      << swapped.said;
+  EXPECT_EQ(swapped.code, 3);
+  EXPECT_NE(swapped.said.find("exchange the files of --stressed and --relaxed"), std::string::npos) << swapped.said;
+  EXPECT_EQ(run_track(folder, files(folder, "s.tif", "r.tif") + " --may_push").code, 0);
 }
 
 TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {

@@ -92,7 +92,7 @@ inline std::vector<Moved> moved_beads(const segment::Tracking& tracking) {
   std::vector<Moved> result;
   for (const Bead& bead : tracking.field) {
     if (!bead.flag.empty()) continue;
-    result.push_back({bead.position_um - Vec2{0.5, 0.5}, bead.displacement_um + tracking.drift_um});
+    result.push_back({bead.position_um - Vec2{0.5, 0.5}, bead.displacement_um + tracking.common.drift_um});
   }
   return result;
 }

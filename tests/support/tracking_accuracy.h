@@ -49,7 +49,7 @@ inline double steepness(const std::vector<Peak>& peaks, Vec2 at) {
 inline TrackingErrors errors_of(const segment::Tracking& tracking, const std::vector<Peak>& peaks, Vec2 drift = {}) {
   TrackingErrors e;
   e.n_beads = static_cast<int>(tracking.field.size());
-  const Vec2 missed = tracking.drift_um - drift;
+  const Vec2 missed = tracking.common.drift_um - drift;
   e.drift.add(dot(missed, missed));
   for (const Bead& bead : tracking.field) {
     if (!bead.flag.empty()) continue;

@@ -20,17 +20,17 @@ EffectSwitches read(std::string_view toml, const std::vector<std::string>& names
 }
 
 TEST(Effects, a_stage_reads_its_own_switches_and_leaves_the_others_to_their_stages) {
-  const std::string toml = "[effects]\nfinite_sides = 'off'\ndrift_rotation = 'on'\neffect_tolerance = 0.05\n";
+  const std::string toml = "[effects]\nfinite_sides = 'off'\ndrift_affine = 'on'\neffect_tolerance = 0.05\n";
   const EffectSwitches fit = read(toml, {"finite_sides", "effect_tolerance"});
   EXPECT_EQ(fit.finite_sides, "off");
-  EXPECT_EQ(fit.drift_rotation, "auto");
+  EXPECT_EQ(fit.drift_affine, "auto");
   EXPECT_EQ(fit.effect_tolerance, 0.05);
-  EXPECT_EQ(read(toml, {"drift_rotation"}).drift_rotation, "on");
+  EXPECT_EQ(read(toml, {"drift_affine"}).drift_affine, "on");
 }
 
 TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
   try {
-    read("[effects]\nfinite_side = 'on'\n", {"drift_rotation"});
+    read("[effects]\nfinite_side = 'on'\n", {"drift_affine"});
     FAIL();
   } catch (const InputError& error) {
     EXPECT_NE(error.hint.find("'finite_sides'"), std::string::npos) << error.hint;
@@ -63,7 +63,7 @@ TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {
     }
     return names;
   };
-  EXPECT_EQ(changed("[effects]\ndrift_rotation = 'off'\n"), "track ");
+  EXPECT_EQ(changed("[effects]\ndrift_affine = 'off'\n"), "track ");
   EXPECT_EQ(changed("[effects]\nstress_fibres = 'off'\n"), "network fit ");
   EXPECT_EQ(changed("[effects]\nrobust_loss = 'off'\n"), "fit ");
 }

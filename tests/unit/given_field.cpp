@@ -55,6 +55,37 @@ TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
   EXPECT_LT(outwardness(field), -0.5);
 }
 
+TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
+  const auto peaks = test::ring_of_adhesions(512, 8.3);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 0.05);
+  for (const double growth : {0.0, 0.003}) {
+    DisplacementField field, truth;
+    for (int j = 0; j < 64; ++j) {
+      for (int i = 0; i < 64; ++i) {
+        const Vec2 place{8 * i + 4.0, 8 * j + 4.0}, u = test::displacement(peaks, place);
+        truth.push_back({.position_um = place, .displacement_um = u, .sigma_um = 0.05, .flag = {}});
+        field.push_back(truth.back());
+        const double x = normal(random);
+        field.back().displacement_um = u + growth * (place - Vec2{256, 256}) + Vec2{x, normal(random)};
+      }
+    }
+    TrackParameters parameters;
+    parameters.drift_affine = "auto";
+    const DisplacementField before = field;
+    const GivenMotion motion = take_affine_off(field, parameters);
+    EXPECT_EQ(motion.affine.is_on, growth > 0) << motion.affine.why;
+    EXPECT_NEAR(motion.common.growth, growth, 0.05 / 256);  // the noise of one point, at the border
+    for (std::size_t k = 0; k < field.size(); ++k) {
+      if (!motion.affine.is_on) {
+        EXPECT_EQ(field[k].displacement_um, before[k].displacement_um);
+      }
+      // six standard deviations of the noise
+      EXPECT_LT(norm(field[k].displacement_um - truth[k].displacement_um), 0.3);
+    }
+  }
+}
+
 TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
   const test::TemporaryFolder folder;
   CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});

@@ -1,4 +1,4 @@
-/// Whether the tracker takes a turn off is decided by the pictures.
+/// Whether the tracker takes turn, growth and shear off is decided by the pictures.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -15,27 +15,27 @@ Tracking tracked(double turn_rad, std::uint64_t seed, const std::string& drift =
   const auto pair = test::draw_bead_pair(
       kCell, {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = {2, -1}, .seed = seed});
   TrackParameters parameters;
-  parameters.drift = drift;
+  parameters.drift_affine = drift;
   return track_beads(pair.relaxed, pair.stressed, 0.1, parameters, 2);
 }
 
-TEST(DriftRotation, is_taken_off_where_the_border_is_turned) {
+TEST(AffineDrift, is_taken_off_where_the_border_is_turned) {
   for (const double turn_rad : {-0.002, 0.17}) {
     const Tracking tracking = tracked(turn_rad, 3);
-    EXPECT_TRUE(tracking.rotation.is_on) << turn_rad << ": " << tracking.rotation.why;
-    EXPECT_NEAR(tracking.turn_rad, turn_rad, 2e-4);
+    EXPECT_TRUE(tracking.affine.is_on) << turn_rad << ": " << tracking.affine.why;
+    EXPECT_NEAR(tracking.common.turn_rad, turn_rad, 2e-4);
   }
 }
 
-TEST(DriftRotation, is_left_where_nothing_is_turned) {
+TEST(AffineDrift, is_left_where_nothing_is_turned) {
   for (const std::uint64_t seed : {1, 2}) {
     const Tracking tracking = tracked(0, seed);
-    EXPECT_FALSE(tracking.rotation.is_on) << seed << ": " << tracking.rotation.why;
+    EXPECT_FALSE(tracking.affine.is_on) << seed << ": " << tracking.affine.why;
   }
 }
 
-TEST(DriftRotation, the_question_changes_nothing_where_the_answer_is_no) {
-  const DisplacementField asked = tracked(0, 1).field, not_asked = tracked(0, 1, "translation").field;
+TEST(AffineDrift, the_question_changes_nothing_where_the_answer_is_no) {
+  const DisplacementField asked = tracked(0, 1).field, not_asked = tracked(0, 1, "off").field;
   ASSERT_EQ(asked.size(), not_asked.size());
   for (std::size_t i = 0; i < asked.size(); ++i) {
     // one least squares, another column beside it: rounding of sums of some thousand terms
