@@ -150,7 +150,7 @@ std::vector<int> fibres_whose(const std::vector<Tension>& tensions, const Predic
 Noticed noticed_of_fibres(FindingKind kind, const std::vector<int>& ids, const std::string& one,
                           const std::string& many) {
   return noticed(kind, static_cast<double>(ids.size()),
-                 counted(static_cast<std::int64_t>(ids.size()), one, many) + " (fibre " + listed(ids) + ").");
+                 counted(static_cast<std::int64_t>(ids.size()), one, many) + (ids.size() == 1 ? " (fibre " : " (fibres ") + listed(ids) + ").");
 }
 
 Noticed not_identifiable(const FitOutcome& o) {

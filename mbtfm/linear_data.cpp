@@ -19,10 +19,11 @@ struct Root {
   Eigen::Index n_felt = 0;
 };
 
-Root root_of(Eigen::MatrixXd A, int threads) {
+/// @param trace  of the normal matrix before anything was taken off it: its rounding stays
+Root root_of(Eigen::MatrixXd A, double trace, int threads) {
   constexpr double kRounding = 1e-13;  // of a normal matrix
   const Eigen::VectorXd diagonal = A.diagonal();
-  const double least = kRounding * std::max(diagonal.sum(), 1e-300);
+  const double least = kRounding * std::max(trace, 1e-300);
   mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
   bool is_definite = upper_cholesky(A, threads);
   if (!is_definite || A.diagonal().cwiseAbs2().minCoeff() <= least) {
@@ -36,9 +37,8 @@ Root root_of(Eigen::MatrixXd A, int threads) {
   return {std::move(A), n_felt};
 }
 
-/// Gᵀ W² P G, on and above its diagonal.
-Eigen::MatrixXd gram_less_motions(const LinearData& data, const Eigen::VectorXd& weight) {
-  Eigen::MatrixXd gram = data.response->upper_gram(weight);
+/// Gᵀ W² P G, on and above its diagonal, of Gᵀ W² G.
+Eigen::MatrixXd less_motions(Eigen::MatrixXd gram, const LinearData& data, const Eigen::VectorXd& weight) {
   if (data.motions.cols() == 0) return gram;
   // M Q with (M Q)ᵀ W² (M Q) = 1, of those motions that differ
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(data.motions.transpose() * weight.asDiagonal() *
@@ -112,7 +112,9 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   const Eigen::VectorXd u = less_motion(data, data.displacement_um);
   const Eigen::VectorXd weighted_u = weight.cwiseProduct(u);
   // A = Gᵀ W² P G = Cᵀ C; then y = C⁻ᵀ Gᵀ W² P u.
-  auto [root, n_felt] = root_of(gram_less_motions(data, weight), data.threads);
+  Eigen::MatrixXd gram = data.response->upper_gram(weight);
+  const double trace = gram.diagonal().sum();
+  auto [root, n_felt] = root_of(less_motions(std::move(gram), data, weight), trace, data.threads);
   Eigen::MatrixXd target = data.response->pull_back(weighted_u);
   solve_upper_transposed(root, target);
   data.reduced.target = target;

@@ -70,16 +70,20 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
     left_of_squares += left_of(displace(data, mesh.forces_nN - mean.forces_nN));
   }
   const double left = left_of(data.target - C * mean.forces_nN);
-  const double per_phi = left_of(C * loads.cwiseSqrt().asDiagonal());
+  const Eigen::MatrixXd by_load = C * loads.cwiseSqrt().asDiagonal();
+  const double per_phi = left_of(by_load);
   const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - qr.rank());
-  const double measured = per_phi > 0 ? std::max(0.0, beyond_noise / per_phi) : 0;
+  // Where the tensions follow nearly all that errors of the forces do, the misfit tells nothing of these.
+  constexpr double kTold = 1e-6;
+  const bool is_told = per_phi > kTold * by_load.squaredNorm();
+  const double measured = is_told ? std::max(0.0, beyond_noise / per_phi) : 0;
   const double phi = std::max(least, measured);
   return {.phi_nN = phi,
           .least_phi_nN = least,
           .measured_phi_nN = measured,
           .phi_of_mean_nN = least / (static_cast<double>(meshes.size()) + 1),
           .loads_nN = loads,
-          .of_single = left_of_squares > 0 && loads.sum() > 0
+          .of_single = is_told && left_of_squares > 0
                            ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares)
                            : 1,
           .force_variance_nN2 = phi * loads,
@@ -91,7 +95,8 @@ RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const Mode
     double sum = 0;
     for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
       const double force = forces_nN.segment<2>(row).norm();
-      sum += std::hypot(force, std::sqrt(phi * error.loads_nN[row])) - force;
+      const double across = std::min(std::sqrt(phi * error.loads_nN[row]), force);  // no error turns a force round
+      sum += std::hypot(force, across) - force;
     }
     return sum;
   };

@@ -10,13 +10,13 @@ namespace mbtfm::samples {
 
 namespace {
 
-/// Parameters as TOML, those of one table after another.
+/// Parameters that are set, as TOML, those of one table after another.
 std::string to_toml(const ParameterList& list, const std::vector<std::string>& tables) {
   std::string text;
   for (const std::string& table : tables) {
     if (!table.empty()) text += "\n[" + table + "]\n";
     for (const Parameter& p : list.all()) {
-      if (p.table != table) continue;
+      if (p.table != table || to_text(p).empty()) continue;  // not set
       const bool is_text = std::holds_alternative<std::string*>(p.member);
       text += p.name + " = " + (is_text ? '"' + to_text(p) + '"' : to_text(p)) + "\n";
     }

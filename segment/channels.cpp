@@ -1,5 +1,6 @@
 #include "segment/channels.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/contract/csv.h"
@@ -40,6 +41,19 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
 std::optional<Finding> noticed_loss(const Channel& channel) {
   return noticed(FindingKind::lossy_image, channel.image.is_lossy ? 1 : 0,
                  channel.name + " is a lossy image (JPEG): its intensities and the positions of its beads are changed.");
+}
+
+double share_at_brightest(const Image& image) {
+  if (image.pixels.empty()) return 0;
+  const float brightest = *std::max_element(image.pixels.begin(), image.pixels.end());
+  const auto n = std::count(image.pixels.begin(), image.pixels.end(), brightest);
+  return static_cast<double>(n) / static_cast<double>(image.pixels.size());
+}
+
+std::optional<Finding> noticed_saturation(const Channel& channel) {
+  const double share = share_at_brightest(channel.image);
+  return noticed(FindingKind::saturated, share,
+                 channel.name + " is saturated: " + brief(100 * share) + " % of its pixels have its largest value.");
 }
 
 std::optional<Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um) {

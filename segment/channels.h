@@ -28,6 +28,10 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
 
 /// A finding where the image is a JPEG.
 std::optional<Finding> noticed_loss(const Channel& channel);
+/// Share of the pixels that have the image's largest value: one or two of a picture that is not saturated.
+double share_at_brightest(const Image& image);
+/// A finding where the detector was saturated.
+std::optional<Finding> noticed_saturation(const Channel& channel);
 
 /// Where the pixel size given is not that of the image's own calibration. Both are of the image as it is, binned or not.
 std::optional<Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um);

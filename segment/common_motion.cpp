@@ -101,7 +101,6 @@ MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<V
   result.common.is_affine = result.is_affine;
   result.rms = taken.rms;
   result.noise = taken.noise;
-  result.contraction = taken.contraction;
   result.n_moving = whole.rest.n_moving;
   return result;
 }

@@ -18,9 +18,8 @@ struct MotionTaken {
   double rms = 0, noise = 0;
   /// Turn, growth and shear are found by more than their errors and more than the tolerance, whether taken off or not.
   bool is_affine = false;
-  bool is_large = false;   ///< they move the border by more than `large`, and are most of what is at rest does
-  double contraction = 0;  ///< as of FarField
-  int n_moving = 0;        ///< squares of the picture that do not rest
+  bool is_large = false;  ///< they move the border by more than `large`, and are most of what is at rest does
+  int n_moving = 0;       ///< squares of the picture that do not rest
 };
 
 /// Find it; `setting` is auto, on or off.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/csv.h"
+#include "segment/channels.h"
 
 namespace mbtfm::segment {
 
@@ -10,8 +11,7 @@ std::string emptiness_of(const Image& image) {
   if (image.pixels.empty()) return "no pixels";
   const auto [darkest, brightest] = std::minmax_element(image.pixels.begin(), image.pixels.end());
   if (*darkest == *brightest) return "every pixel is " + shortest(*darkest);
-  const auto n = std::count(image.pixels.begin(), image.pixels.end(), *brightest);
-  const double share = static_cast<double>(n) / static_cast<double>(image.pixels.size());
+  const double share = share_at_brightest(image);
   constexpr double kMostAtOneValue = 0.1;
   if (share <= kMostAtOneValue) return {};
   return brief(100 * share) + " % of the pixels at " + shortest(*brightest) +

@@ -255,29 +255,6 @@ void take_errors(FarField& far, const Solved& s, double scale) {
   far.linear_chi_squared = linear.dot(inverse * linear);
 }
 
-double contraction_of(const Sources& sources, const cv::Mat& forces) {
-  if (forces.empty()) return 0;
-  Vec2 centre, mean;
-  double weights = 0, moment = 0, most = 0;
-  const auto force = [&](std::size_t k) {
-    const int at = 2 * static_cast<int>(k);
-    return Vec2{forces.at<double>(at), forces.at<double>(at + 1)};
-  };
-  for (std::size_t k = 0; k < sources.at.size(); ++k) mean += (1.0 / static_cast<double>(sources.at.size())) * force(k);
-  for (std::size_t k = 0; k < sources.at.size(); ++k) {
-    const double size = norm(force(k) - mean);
-    centre += size * sources.at[k];
-    weights += size;
-  }
-  if (!(weights > 0)) return 0;
-  centre = (1 / weights) * centre;
-  for (std::size_t k = 0; k < sources.at.size(); ++k) {
-    const Vec2 arm = sources.at[k] - centre, pull = force(k) - mean;
-    moment += dot(arm, pull), most += norm(arm) * norm(pull);
-  }
-  return most > 0 ? moment / most : 0;
-}
-
 /// Beads in the squares at rest, about drift and tail. 1500 tell a standard deviation to a fiftieth.
 void take_noise(FarField& far, const std::vector<Vec2>& positions, const std::vector<Vec2>& u,
                 const std::vector<char>& is_used, const Sources& sources, const cv::Mat& forces) {
@@ -378,7 +355,6 @@ WholeMotion whole_motion(const std::vector<Vec2>& positions, const std::vector<V
     result.is_at_rest = fit.is_at_rest;
     result.drift = motion_of(s, centre, scale);
     take_errors(result, s, scale);
-    result.contraction = contraction_of(fit.sources, s.forces);
     take_noise(result, positions, displacements, is_used, fit.sources, s.forces);
   }
   return whole;

@@ -25,11 +25,6 @@ struct FarField {
   double rms = 0;                 ///< of a bead's component about drift and the cell's tail
   double noise = 0;               ///< the same from the median, which outliers do not move
   bool is_at_rest = false;        ///< some part of the picture is; otherwise the drift is that of all beads
-  /// Beside the affine motion: how far squares at rest are off, beyond their noise, and where furthest.
-  double beyond_affine = 0, beyond_affine_sigma = 0;
-  Vec2 beyond_affine_place;
-  /// Σ x·f of the forces that explain the tail, over Σ |x||f|: negative where the cell contracts.
-  double contraction = 0;
 };
 
 /// What all beads do together, and what of it turned, grew or sheared.

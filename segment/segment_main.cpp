@@ -54,9 +54,12 @@ StageReport report_of(const Segmentation& s) {
   report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
                    std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
                    " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
-  if (s.n_adhesions_outside > 0)
-    report.summary += "; " + std::to_string(s.n_adhesions_outside) + " adhesions outside the cell left out";
-  if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
+  for (std::optional<Finding> found :
+       {noticed(FindingKind::cell_cut, s.is_cut_by_border ? 1 : 0, "The image's border cuts the cell."),
+        noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
+                std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out.")}) {
+    if (found) report.findings.push_back(std::move(*found));
+  }
   if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;
 }
@@ -129,6 +132,7 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
     if (!image) continue;
     context.doubt(doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
     context.notice(noticed_loss(*image));
+    context.notice(noticed_saturation(*image));
   }
   const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
                         roi_set(context, "fibre-rois", binning)};

@@ -190,6 +190,7 @@ TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Fr
   for (const Channel* image : {&relaxed, &stressed}) {
     context.doubt(doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
     context.notice(noticed_loss(*image));
+    context.notice(noticed_saturation(*image));
   }
   if (stressed.image.pixels == relaxed.image.pixels) {
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");

@@ -20,6 +20,10 @@ enum class FindingKind {
   unusual_value,
   assumed_input,
   lossy_image,
+  saturated,
+  // segment
+  cell_cut,
+  adhesions_left_out,
   // track
   nothing_moves,
   moves_outward,

@@ -239,7 +239,7 @@ TEST_F(Surroundings, an_edge_length_that_is_no_length_is_refused_before_anything
   EXPECT_FALSE(fs::exists(cell_ / "1_segment"));
   const Outcome flag = run_program("mbtfm-network --edge_length_um 1500 --check");
   EXPECT_EQ(flag.code, kUsage);
-  EXPECT_NE(flag.output.find("1500 nm are 1.5 um"), std::string::npos) << flag.output;
+  EXPECT_NE(flag.output.find("1500 nm is 1.5 um"), std::string::npos) << flag.output;
 }
 
 TEST_F(Surroundings, stages_are_chosen_one_by_one_or_with_commas) {

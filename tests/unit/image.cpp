@@ -333,5 +333,16 @@ TEST(Channels, a_pixel_size_given_is_compared_with_each_images_own_binned_or_not
   EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.2)->level, DoubtLevel::refused);
 }
 
+TEST(Channels, a_saturated_image_is_noticed_by_the_share_of_its_pixels_at_the_largest_value) {
+  Image image = ramp(100, 100);
+  EXPECT_FALSE(noticed_saturation({"a.tif", image}));
+  const float brightest = *std::max_element(image.pixels.begin(), image.pixels.end());
+  for (int i = 0; i < 50; ++i) image.at(i, 7) = brightest + 1;
+  const auto found = noticed_saturation({"a.tif", image});
+  ASSERT_TRUE(found);
+  EXPECT_NEAR(*found->number, 0.005, 1e-12);
+  EXPECT_NE(found->text.find("a.tif is saturated: 0.5 % of its pixels"), std::string::npos) << found->text;
+}
+
 }  // namespace
 }  // namespace mbtfm::segment
