@@ -73,15 +73,15 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
   const Eigen::MatrixXd by_load = C * loads.cwiseSqrt().asDiagonal();
   const double per_phi = left_of(by_load);
   const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - qr.rank());
-  // Where the tensions follow nearly all that errors of the forces do, the misfit tells nothing of these.
-  constexpr double kTold = 1e-6;
-  const bool is_told = per_phi > kTold * by_load.squaredNorm();
-  const double measured = is_told ? std::max(0.0, beyond_noise / per_phi) : 0;
+  const double measured = per_phi > 0 ? std::max(0.0, beyond_noise / per_phi) : 0;
+  // From few adhesions the misfit tells next to nothing of single forces: of twenty numbers a third, of one nothing.
+  constexpr Eigen::Index kEnough = 20;
+  const bool is_told = data.n_felt - qr.rank() >= kEnough;
   const double phi = std::max(least, measured);
   return {.phi_nN = phi,
           .least_phi_nN = least,
-          .measured_phi_nN = measured,
-          .phi_of_mean_nN = least / (static_cast<double>(meshes.size()) + 1),
+          .measured_phi_nN = is_told ? measured : least / (1 + static_cast<double>(meshes.size())),
+          .phi_of_mean_nN = least / (1 + static_cast<double>(meshes.size())),
           .loads_nN = loads,
           .of_single = is_told && left_of_squares > 0
                            ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares)

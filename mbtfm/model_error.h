@@ -19,7 +19,8 @@ namespace mbtfm::inverse {
 struct ModelError {
   double phi_nN = 0;                   ///< as the misfit calls for, but not below
   double least_phi_nN = 0;             ///< that of one further mesh about the mean of these
-  double measured_phi_nN = 0;          ///< as the misfit alone has it; of the cell's network and the mean's together
+  double measured_phi_nN = 0;          ///< as the misfit alone has it, of the cell's network and the mean's together;
+                                       ///< the mean's where there are too few adhesions to tell it
   double phi_of_mean_nN = 0;           ///< what the meshes tell of their mean's own
   Eigen::VectorXd loads_nN;            ///< L_a, by component of the forces
   /// Variance of a single adhesion's error over phi L_a. What one adhesion lacks its neighbours have, as a rule: beads

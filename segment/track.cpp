@@ -166,17 +166,23 @@ RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& paramete
 
 Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const Progress& progress) const {
   if (parameters_.drift_affine != "auto") return track_as(parameters_.drift_affine, stressed, pixel_size_um, progress);
+  const auto turned_back_first = [&] {
+    Tracking turned = track_as("on", stressed, pixel_size_um, progress);
+    turned.affine = decided(
+        turned.affine.name, "auto", true,
+        "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
+    return turned;
+  };
   try {
-    return track_as("auto", stressed, pixel_size_um, progress);
+    Tracking unturned = track_as("auto", stressed, pixel_size_um, progress);
+    // A turn is its angle and nothing else while it is small: 0.01 shortens lengths by 5e-5.
+    constexpr double kSmall_rad = 0.01;
+    return std::abs(unturned.common.turn_rad) <= kSmall_rad ? unturned : turned_back_first();
   } catch (const ExchangedImages&) {
     throw;
   } catch (const InvalidData& unturned) {  // turned so far that its beads are not met with again?
     try {
-      Tracking turned = track_as("on", stressed, pixel_size_um, progress);
-      turned.affine = decided(
-          turned.affine.name, "auto", true,
-          "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
-      return turned;
+      return turned_back_first();
     } catch (const InvalidData&) {
       throw unturned;
     }

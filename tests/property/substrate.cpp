@@ -143,5 +143,19 @@ TEST(Layer, tends_to_the_half_space_as_it_grows_thick) {
   }
 }
 
+TEST(IncompressibleGel, is_the_limit_of_nearly_incompressible_ones) {
+  const Gel incompressible{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.5, .thickness_um = 20};
+  const Gel nearly{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.4999, .thickness_um = 20};
+  const Ellipse ellipse = {{0, 0}, 1, 0.5, 0};
+  const std::vector<Vec2> points = {{0, 0}, {3, 1}, {20, 5}};
+  for (const std::string model : {"half-space", "layer"}) {
+    const auto compliance = [&](const Gel& gel) {
+      return make_greens(gel, {.model = model}, 1)->compliance_um_per_nN(points, {ellipse});
+    };
+    // smooth in nu: 1e-4 of it changes the compliance by some 1e-4; a layer's own numbers are right to as much
+    EXPECT_LE((compliance(incompressible) - compliance(nearly)).norm(), 2e-3 * compliance(nearly).norm()) << model;
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm::substrate
