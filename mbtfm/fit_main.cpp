@@ -211,7 +211,7 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
 /// @throws InputError where no cell pulls like that
 void expect_plausible(StageContext& context, const FitSummary& summary, const std::vector<Tension>& tensions,
                       const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions) {
-  context.expect_plausible("total_force_nN", summary.total_force_nN);
+  context.expect_plausible("total_force_nN", std::max(0.0, summary.total_force_nN));  // of noise alone: either side of 0
   context.expect_plausible("fibre_tension_nN", surest_fibre_tension_nN(tensions));
   context.expect_plausible("traction_kPa", surest_traction_kPa(forces, adhesions));
 }
