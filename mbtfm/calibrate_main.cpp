@@ -213,8 +213,11 @@ StageReport calibrate(const TractionParameters& p, StageContext& context) {
   write_text(context.output_beside("out", ".svg"),
              charts::svg_file({forces_chart(cells, shown), slope_chart(series, slope_one_um)}, 2,
                               {std::to_string(cells.size()) + " cells. Dashed: FTTC as the fit."}));
-  StageReport report{
-      .converged = true, .summary = std::to_string(cells.size()) + " cells", .figures = {}, .effects = {}, .findings = {}};
+  StageReport report{.converged = true,
+                     .summary = std::to_string(cells.size()) + " cells",
+                     .figures = {},
+                     .effects = {},
+                     .findings = {}};
   if (slope_one_um) {
     report.figures.emplace_back("length_of_slope_one_um", *slope_one_um);
     report.summary += ": FTTC gives the forces of the fit at lambda E = " + brief(*slope_one_um) + " um";

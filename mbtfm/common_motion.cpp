@@ -58,12 +58,12 @@ FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit) {
                     .sigma = {}};
   // The beads' own noise, and what errors of the tensions and of the model's forces look like to the motions.
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  const Eigen::MatrixXd inverse = (data.motions.transpose() * weighted).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse =
+      (data.motions.transpose() * weighted).completeOrthogonalDecomposition().pseudoInverse();
   const Eigen::MatrixXd by_force = inverse * data.response->pull_back(weighted).transpose();  // motion_in(G)
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
-  Eigen::MatrixXd covariance =
-      fit.variance * inverse + by_tension * mesh.noise_covariance_nN2 * by_tension.transpose();
+  Eigen::MatrixXd covariance = fit.variance * inverse + by_tension * mesh.noise_covariance_nN2 * by_tension.transpose();
   if (fit.model_error) {
     const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
     covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();

@@ -271,8 +271,8 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
   std::vector<MeshForces> forces;
   for (const MeshFit& mesh : all.meshes) {
     const Trial& trial = mesh.fit.trial;
-    forces.push_back({trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN),
-                      mesh.network_part_nN, mesh.force_derivatives});
+    forces.push_back({trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN), mesh.network_part_nN,
+                      mesh.force_derivatives});
   }
   return forces;
 }
@@ -345,9 +345,9 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   parallel_for(n_meshes, threads, [&](int m) {
     const auto i = static_cast<std::size_t>(m);
     const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit, inner);
-    all.meshes[i] = describe(problem, m == 0 ? std::move(first.fit)
-                                             : fit_tensions(problem, parameters, inner,
-                                                            scaled_to_data(problem, answer)));
+    all.meshes[i] =
+        describe(problem, m == 0 ? std::move(first.fit)
+                                 : fit_tensions(problem, parameters, inner, scaled_to_data(problem, answer)));
     tell();
   });
   add_means(all);

@@ -273,7 +273,9 @@ VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int th
   std::vector<Ellipse> ellipses;
   for (const Adhesion& a : in.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const auto field = [&](const Gel& gel) {
-    return substrate::make_greens(gel, {.model = "layer"}, threads)->response(points, ellipses)->displace(in.fit.forces_nN);
+    return substrate::make_greens(gel, {.model = "layer"}, threads)
+        ->response(points, ellipses)
+        ->displace(in.fit.forces_nN);
   };
   return field(other) - field(in.gel);
 }

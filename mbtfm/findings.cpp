@@ -150,7 +150,8 @@ std::vector<int> fibres_whose(const std::vector<Tension>& tensions, const Predic
 Noticed noticed_of_fibres(FindingKind kind, const std::vector<int>& ids, const std::string& one,
                           const std::string& many) {
   return noticed(kind, static_cast<double>(ids.size()),
-                 counted(static_cast<std::int64_t>(ids.size()), one, many) + (ids.size() == 1 ? " (fibre " : " (fibres ") + listed(ids) + ").");
+                 counted(static_cast<std::int64_t>(ids.size()), one, many) +
+                     (ids.size() == 1 ? " (fibre " : " (fibres ") + listed(ids) + ").");
 }
 
 Noticed not_identifiable(const FitOutcome& o) {
@@ -187,8 +188,8 @@ Noticed single_mesh(const FitOutcome& o) {
 }
 
 Noticed out_of_balance(FindingKind kind, double imbalance, const std::string& what) {
-  return noticed(kind, imbalance, "The " + what + " do not sum to zero: |sum| / sum of magnitudes = " +
-                                      brief(imbalance) + ".");
+  return noticed(kind, imbalance,
+                 "The " + what + " do not sum to zero: |sum| / sum of magnitudes = " + brief(imbalance) + ".");
 }
 
 Noticed common_motion(const FitOutcome& o) {
@@ -221,8 +222,8 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
   for (Noticed found :
-       {common_motion(o), missing_fibres_noticed(o), unexplained(o), beads_disagree(o), noise_unknown(o), noise_disagrees(o), not_identifiable(o),
-        network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
+       {common_motion(o), missing_fibres_noticed(o), unexplained(o), beads_disagree(o), noise_unknown(o),
+        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
         out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
         out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),
         tensions_at_zero(o)}) {

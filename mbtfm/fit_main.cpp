@@ -1,9 +1,9 @@
 /// mbtfm-fit: tensions, adhesion forces and their error bars from bead displacements.
-#include <numbers>
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <map>
+#include <numbers>
 
 #include "mbtfm/common_motion.h"
 #include "mbtfm/cross_validation.h"
@@ -197,8 +197,8 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
                        const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
                        const FitParameters& p, bool moves, bool is_coupled, StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
-      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, moves, is_coupled,
-      context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
+      frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, moves,
+      is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
       next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
@@ -211,7 +211,8 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
 /// @throws InputError where no cell pulls like that
 void expect_plausible(StageContext& context, const FitSummary& summary, const std::vector<Tension>& tensions,
                       const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions) {
-  context.expect_plausible("total_force_nN", std::max(0.0, summary.total_force_nN));  // of noise alone: either side of 0
+  context.expect_plausible("total_force_nN",
+                           std::max(0.0, summary.total_force_nN));  // of noise alone: either side of 0
   context.expect_plausible("fibre_tension_nN", surest_fibre_tension_nN(tensions));
   context.expect_plausible("traction_kPa", surest_traction_kPa(forces, adhesions));
 }
@@ -235,8 +236,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   });
   const bool moves = allows_common_motion(p.effects);
   LinearData data =
-      reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit), context.threads,
-             moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
+      reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit),
+             context.threads, moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -324,8 +325,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      .findings = {}};
   report.effects = substrate->effects();
   report.effects.insert(report.effects.begin(), fibres);
-  report.effects.insert(report.effects.end(),
-                        {common_motion_effect(p.effects.common_motion, motion), elasticity, robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
+  report.effects.insert(report.effects.end(), {common_motion_effect(p.effects.common_motion, motion), elasticity,
+                                               robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
   if (p.explain) {
     context.progress(0.97, "explaining what is off");
     const std::vector<Change> changes =

@@ -121,9 +121,10 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());
   if (!inputs.adhesions.empty()) {
-    r.forces = forces_on(
-        {.problem = problem, .scan = *r.scan, .compliance = even_forces_um_per_nN(inputs, parameters.gel_model, threads)},
-        forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um), threads);
+    r.forces = forces_on({.problem = problem,
+                          .scan = *r.scan,
+                          .compliance = even_forces_um_per_nN(inputs, parameters.gel_model, threads)},
+                         forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um), threads);
   }
   r.figures = {{"lattice_spacing_um", problem.field().spacing_um},
                {"lattice_columns", std::int64_t(problem.field().n_columns)},

@@ -44,9 +44,8 @@ Eigen::MatrixXd less_motions(Eigen::MatrixXd gram, const LinearData& data, const
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(data.motions.transpose() * weight.asDiagonal() *
                                                              data.motions);
   constexpr double kRounding = 1e-13;
-  const Eigen::VectorXd scale = eigen.eigenvalues().unaryExpr([&](double square) {
-    return square > kRounding * eigen.eigenvalues().maxCoeff() ? 1 / std::sqrt(square) : 0.0;
-  });
+  const Eigen::VectorXd scale = eigen.eigenvalues().unaryExpr(
+      [&](double square) { return square > kRounding * eigen.eigenvalues().maxCoeff() ? 1 / std::sqrt(square) : 0.0; });
   const Eigen::MatrixXd unit = data.motions * (eigen.eigenvectors() * scale.asDiagonal());
   const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
   add_upper_gram(pulled.transpose(), gram, data.threads, -1);
@@ -93,7 +92,9 @@ void allow_motions(LinearData& data, Eigen::MatrixXd motions) {
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
   // by rank: beads in one place tell no turn from a shift
-  return (data.motions.transpose() * weighted).completeOrthogonalDecomposition().solve(weighted.transpose() * displacements);
+  return (data.motions.transpose() * weighted)
+      .completeOrthogonalDecomposition()
+      .solve(weighted.transpose() * displacements);
 }
 
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
@@ -183,7 +184,8 @@ double noise_variance(const LinearData& data) {
 
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
   const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
-  const Eigen::VectorXd model = data.response->displace(forces_nN), residual = less_motion(data, data.displacement_um - model);
+  const Eigen::VectorXd model = data.response->displace(forces_nN),
+                        residual = less_motion(data, data.displacement_um - model);
   const double scale = is_used.cwiseProduct(model + residual).norm();  // u less the motion
   const double misfit = is_used.cwiseProduct(residual).norm();
   return scale > 0 ? misfit / scale : misfit;

@@ -30,8 +30,7 @@ Eigen::VectorXd loads_nN(const MeshForces& mean) {
   Eigen::VectorXd loads(mean.forces_nN.size());
   for (Eigen::Index row = 0; row < loads.size(); row += 2) {
     const Eigen::Vector2d network = mean.network_part_nN.segment<2>(row);
-    loads.segment<2>(row).setConstant(network.norm() +
-                                      kOfFibres * (mean.forces_nN.segment<2>(row) - network).norm());
+    loads.segment<2>(row).setConstant(network.norm() + kOfFibres * (mean.forces_nN.segment<2>(row) - network).norm());
   }
   return loads;
 }
@@ -83,9 +82,8 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
           .measured_phi_nN = is_told ? measured : least / (1 + static_cast<double>(meshes.size())),
           .phi_of_mean_nN = least / (1 + static_cast<double>(meshes.size())),
           .loads_nN = loads,
-          .of_single = is_told && left_of_squares > 0
-                           ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares)
-                           : 1,
+          .of_single =
+              is_told && left_of_squares > 0 ? std::max(1.0, squares / loads.sum() * per_phi / left_of_squares) : 1,
           .force_variance_nN2 = phi * loads,
           .noise_variance = noise_variance};
 }

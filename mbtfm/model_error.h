@@ -5,8 +5,9 @@
 ///
 /// in proportion to N_a, what the links of the actin network bring to the adhesion, as of a load that many links share
 /// at random, and to a twentieth of what its fibres bring, whose ends spread over it. (Measured on networks of four
-/// formulations, `other_network forces`: phi is the same within a half from loads of 0.03 to 2 nN.) It is not used to weigh the data (what
-/// meshes tell of it adds more noise than it takes away: docs/validation.md) but makes the tensions' error bars.
+/// formulations, `other_network forces`: phi is the same within a half from loads of 0.03 to 2 nN.) It is not used to
+/// weigh the data (what meshes tell of it adds more noise than it takes away: docs/validation.md) but makes the
+/// tensions' error bars.
 #pragma once
 
 #include <Eigen/Core>
@@ -17,12 +18,12 @@
 namespace mbtfm::inverse {
 
 struct ModelError {
-  double phi_nN = 0;                   ///< as the misfit calls for, but not below
-  double least_phi_nN = 0;             ///< that of one further mesh about the mean of these
-  double measured_phi_nN = 0;          ///< as the misfit alone has it, of the cell's network and the mean's together;
-                                       ///< the mean's where there are too few adhesions to tell it
-  double phi_of_mean_nN = 0;           ///< what the meshes tell of their mean's own
-  Eigen::VectorXd loads_nN;            ///< L_a, by component of the forces
+  double phi_nN = 0;           ///< as the misfit calls for, but not below
+  double least_phi_nN = 0;     ///< that of one further mesh about the mean of these
+  double measured_phi_nN = 0;  ///< as the misfit alone has it, of the cell's network and the mean's together;
+                               ///< the mean's where there are too few adhesions to tell it
+  double phi_of_mean_nN = 0;   ///< what the meshes tell of their mean's own
+  Eigen::VectorXd loads_nN;    ///< L_a, by component of the forces
   /// Variance of a single adhesion's error over phi L_a. What one adhesion lacks its neighbours have, as a rule: beads
   /// and tensions see less of that than of errors independent of each other. So do the meshes, and tell by how much.
   double of_single = 1;

@@ -10,7 +10,7 @@ namespace mbtfm::inverse {
 
 namespace {
 
-constexpr std::size_t kFewest = 40;     // beads: half of them, 40 components, tell a deviation to 13 %
+constexpr std::size_t kFewest = 40;      // beads: half of them, 40 components, tell a deviation to 13 %
 constexpr std::size_t kNeighbours = 20;  // for six numbers each way: their own noise adds a fifth to the variance
 
 /// Beads in square boxes of about two, row by row.

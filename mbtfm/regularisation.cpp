@@ -12,9 +12,9 @@ namespace mbtfm::inverse {
 
 namespace {
 
-constexpr int kPointsPerDecade = 3;  // the criteria are smooth over a factor of two
+constexpr int kPointsPerDecade = 3;      // the criteria are smooth over a factor of two
 constexpr double kLeastCurvature = 0.1;  // a radius of ten e-folds, four decades, is no corner to the eye
-constexpr int kFine = 16;            // places between two points at which their spline is looked at
+constexpr int kFine = 16;                // places between two points at which their spline is looked at
 
 /// A spline through values at the points, as a function of the point's index.
 auto spline_of(const std::vector<double>& values) {

@@ -3,8 +3,8 @@
 #include <cmath>
 #include <limits>
 
-#include "mbtfm/lattice_forces.h"
 #include "mbtfm/fttc.h"
+#include "mbtfm/lattice_forces.h"
 #include "pipeline/contract/errors.h"
 
 namespace mbtfm::inverse {

@@ -74,8 +74,8 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
                    brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " + brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
   if (assumed_um) {
-    report.summary += "; the field states no errors: " + brief(*assumed_um) +
-                      " um is assumed for all, as its neighbours tell";
+    report.summary +=
+        "; the field states no errors: " + brief(*assumed_um) + " um is assumed for all, as its neighbours tell";
   }
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged beads left out";
   report.converged = r.report.converged;
@@ -101,7 +101,8 @@ int main(int argc, char** argv) {
   return mbtfm::run_stage<TractionStageParameters>(
       {.name = "traction",
        .purpose = "reconstruct tractions from bead displacements by a standard method",
-       .files = {{"displacement", FileArgument::Kind::input, "displacement.csv of the beads; without the column sigma_um their errors are told from neighbours"},
+       .files = {{"displacement", FileArgument::Kind::input,
+                  "displacement.csv of the beads; without the column sigma_um their errors are told from neighbours"},
                  {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
                  {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
                  {"out", FileArgument::Kind::output,

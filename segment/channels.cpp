@@ -39,8 +39,9 @@ double common_pixel_size_um(const Channel& first, const Channel& second, std::op
 }
 
 std::optional<Finding> noticed_loss(const Channel& channel) {
-  return noticed(FindingKind::lossy_image, channel.image.is_lossy ? 1 : 0,
-                 channel.name + " is a lossy image (JPEG): its intensities and the positions of its beads are changed.");
+  return noticed(
+      FindingKind::lossy_image, channel.image.is_lossy ? 1 : 0,
+      channel.name + " is a lossy image (JPEG): its intensities and the positions of its beads are changed.");
 }
 
 double share_at_brightest(const Image& image) {

@@ -33,7 +33,8 @@ double share_at_brightest(const Image& image);
 /// A finding where the detector was saturated.
 std::optional<Finding> noticed_saturation(const Channel& channel);
 
-/// Where the pixel size given is not that of the image's own calibration. Both are of the image as it is, binned or not.
+/// Where the pixel size given is not that of the image's own calibration. Both are of the image as it is, binned or
+/// not.
 std::optional<Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um);
 
 }  // namespace mbtfm::segment

@@ -70,7 +70,8 @@ StageReport report_of(const DisplacementField& field) {
                     {"sigma_um", figures.sigma_um},
                     {"outwardness", outwardness(field)}};
   if (n_flagged > 0) report.summary += "; " + std::to_string(n_flagged) + " flagged in displacement.csv";
-  const double still = 1 - static_cast<double>(figures.n_moving) / static_cast<double>(std::max<std::int64_t>(1, figures.n_good));
+  const double still =
+      1 - static_cast<double>(figures.n_moving) / static_cast<double>(std::max<std::int64_t>(1, figures.n_good));
   for (std::optional<Finding> found :
        {noticed(FindingKind::nothing_moves, still,
                 "Nothing moves: " + std::to_string(figures.n_moving) + " of " + std::to_string(figures.n_good) +

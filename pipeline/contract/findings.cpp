@@ -21,7 +21,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "JPEG leaves out what an eye does not miss, and measures do", "Use the microscope's own file."},
       {saturated, "saturated", "any stage", caution, "share of the pixels that have the image's largest value", 1e-3,
        "in an image that is not saturated one or two pixels have it; adhesions cover 0.01 of an image",
-       "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter exposure."},
+       "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
+       "exposure."},
       {cell_cut, "cell-cut", "segment", caution, "1 where the image's border cuts the cell", 0,
        "what the cell does outside of the image is not seen, and its forces do not balance inside of it",
        "Record the whole cell. Else distrust the fibres and adhesions near the cut, and the total force."},
@@ -37,7 +38,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {common_motion, "common-motion", "fit", note,
        "largest of growth, shears and turn of the whole field, over its standard error", 3,
        "chance alone takes one of the four beyond 3 standard errors in one cell of a hundred",
-       "Nothing for this cell: the motion was taken off, and the error bars hold its error. If it recurs, look for a change of "
+       "Nothing for this cell: the motion was taken off, and the error bars hold its error. If it recurs, look for a "
+       "change of "
        "focus or of temperature between the bead images."},
       {unexplained_displacement, "unexplained-displacement", "fit", caution,
        "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,
@@ -60,8 +62,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
        "mbtfm-add-fibres --rois 1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's "
        "folder, then mbtfm run."},
-      {fibre_without_tension, "fibre-without-tension", "fit", caution, "segmented fibres that are not in the network", 0,
-       "each of them may carry force", "Run the network stage again: network.vtu is of another segmentation."},
+      {fibre_without_tension, "fibre-without-tension", "fit", caution, "segmented fibres that are not in the network",
+       0, "each of them may carry force", "Run the network stage again: network.vtu is of another segmentation."},
       {not_identifiable, "not-identifiable", "fit", bad, "fibre tensions that these beads do not determine", 0,
        "such a tension can take any value without the beads noticing",
        "Disregard these tensions (hollow marks; identifiable = FALSE). More beads near these fibres would help."},
@@ -86,9 +88,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,
        "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
        "Report this with the cell: it should not happen."},
-      {modulus_error_unknown, "modulus-error-unknown", "fit", note,
-       "1 where gel.youngs_modulus_sigma_kPa is not given", 0,
-       "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
+      {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 where gel.youngs_modulus_sigma_kPa is not given",
+       0, "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
   };
   return kinds;
@@ -144,8 +145,10 @@ std::string open_ids(const std::vector<Finding>& findings) {
 std::string findings_page() {
   std::string page =
       "# Findings\n\n"
-      "The program tells what it notices about the images, the beads and its own answer. Each finding has an identity, a\n"
-      "number, a threshold and a remedy. A finding appears on the terminal, in the report, in `run.json`, in `run.log`, in\n"
+      "The program tells what it notices about the images, the beads and its own answer. Each finding has an identity, "
+      "a\n"
+      "number, a threshold and a remedy. A finding appears on the terminal, in the report, in `run.json`, in "
+      "`run.log`, in\n"
       "the column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n"
       "- **note**: worth knowing; the results hold.\n"
       "- **caution**: the results may be off by more than their error bars say.\n"
@@ -158,8 +161,8 @@ std::string findings_page() {
       if (!has_title) page += "\n## " + std::string(stage) + "\n";
       has_title = true;
       page += "\n### `" + std::string(k.id) + "` (" + name_of(k.severity) + ")\n\n- Number: " + k.number +
-              "; threshold " + brief(k.threshold) + ".\n- Why this threshold: " + k.reason + ".\n- What to do: " +
-              k.remedy + "\n";
+              "; threshold " + brief(k.threshold) + ".\n- Why this threshold: " + k.reason +
+              ".\n- What to do: " + k.remedy + "\n";
     }
   }
   return page;

@@ -175,8 +175,8 @@ std::string unit_slip(std::string_view name, double value, const Range& range) {
     const bool is_large = value > range.high;
     const double meant = is_large ? 1e-3 * value : 1e3 * value;
     if (is_inside(range, value) || !(value > 0) || !is_inside(range, meant)) return {};
-    return "the unit is " + std::string(unit) + ": " + shortest(value) + " " + std::string(is_large ? smaller : larger) +
-           " is " + shortest(meant) + " " + std::string(unit);
+    return "the unit is " + std::string(unit) + ": " + shortest(value) + " " +
+           std::string(is_large ? smaller : larger) + " is " + shortest(meant) + " " + std::string(unit);
   }
   return {};
 }

@@ -61,43 +61,48 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .quantity = "Young's modulus of the gel",
        .usual = Range::between(0.1, 100),
        .possible = Range::between(0.01, 1000),
-       .source = "Tissues and the gels that stand for them have 0.1 kPa (brain) to 100 kPa (bone before it mineralises): "
-                 "Discher, Janmey & Wang, Science 310 (2005) 1139. Above 1000 kPa the strongest adhesions known, 10 kPa "
-                 "over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; below 0.01 kPa a "
-                 "gel does not keep its shape",
+       .source =
+           "Tissues and the gels that stand for them have 0.1 kPa (brain) to 100 kPa (bone before it mineralises): "
+           "Discher, Janmey & Wang, Science 310 (2005) 1139. Above 1000 kPa the strongest adhesions known, 10 kPa "
+           "over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; below 0.01 kPa a "
+           "gel does not keep its shape",
        .remedy = "check the modulus and its unit, kPa"},
       {.id = "poisson_ratio",
        .quantity = "Poisson's ratio of the gel",
        .usual = Range::between(0.3, 0.5),
        .possible = Range::between(0, 0.5),
-       .source = "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., "
-                 "Polym. Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets thicker where "
-                 "it is pulled",
+       .source =
+           "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., "
+           "Polym. Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets thicker where "
+           "it is pulled",
        .remedy = "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
       {.id = "thickness_um",
        .quantity = "thickness of the gel",
        .usual = Range::between(10, 1000),
        .possible = Range::between(1, 1e5),
-       .source = "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements are "
-                 "set by the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective with "
-                 "the resolution for beads looks through",
+       .source =
+           "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements are "
+           "set by the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective with "
+           "the resolution for beads looks through",
        .remedy = "measure the thickness by focusing on the glass and on the surface; for a half-space set gel_model or "
                  "the effect finite_thickness"},
       {.id = kPixelSize,
        .quantity = "pixel size",
        .usual = Range::between(0.02, 1.3),
        .possible = Range::between(0.005, 7),
-       .source = "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without "
-                 "a lens",
+       .source =
+           "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without "
+           "a lens",
        .remedy = "check the pixel size and its unit, um: the camera's pixel over the magnification, times the camera's "
                  "binning"},
       {.id = "beads_per_um2",
        .quantity = "density of the beads",
        .usual = Range::between(0.02, 10),
        .possible = Range::not_negative(),
-       .source = "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
-                 "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² "
-                 "beads are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
+       .source =
+           "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
+           "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² "
+           "beads are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
        .remedy = "check the pixel size; use more beads, or thin out a field that was interpolated"},
       {.id = "adhesion_area_um2",
        .quantity = "median area of the adhesions",
@@ -110,7 +115,8 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .quantity = "area of the cell",
        .usual = Range::between(200, 20000),
        .possible = Range::between(10, 1e6),
-       .source = "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony of hundreds of cells",
+       .source =
+           "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony of hundreds of cells",
        .remedy = "check the pixel size, and whether the outline holds one cell"},
       {.id = "total_force_nN",
        .quantity = "total force of the cell",
@@ -125,17 +131,20 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .quantity = "tension of a stress fibre",
        .usual = Range::between(0, 150),
        .possible = Range::between(0, 400),
-       .source = "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, "
-                 "J. Biomech. 39 (2006) 2603)",
+       .source =
+           "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, "
+           "J. Biomech. 39 (2006) 2603)",
        .remedy = "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
       {.id = "traction_kPa",
        .quantity = "traction below an adhesion",
        .usual = Range::between(0, 15),
        .possible = Range::between(0, 100),
-       .source = "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin "
-                 "et al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
-       .remedy = "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an area "
-                 "is a large traction"},
+       .source =
+           "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin "
+           "et al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
+       .remedy =
+           "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an area "
+           "is a large traction"},
   };
   return table;
 }
@@ -188,7 +197,8 @@ std::vector<std::string> allowed_quantities(const CheckParameters& p) {
     if (name.empty()) continue;
     if (!find(name)) {
       std::string known;
-      for (const PlausibleQuantity& q : plausible_quantities()) known += (known.empty() ? "" : ", ") + std::string(q.id);
+      for (const PlausibleQuantity& q : plausible_quantities())
+        known += (known.empty() ? "" : ", ") + std::string(q.id);
       throw UsageError("[checks] allow: expected names out of " + known + ", found '" + name + "'");
     }
     names.push_back(std::exchange(name, {}));
@@ -227,9 +237,10 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
                .limit = of_file_um,
                .source = "The image's own calibration says " + with_unit(kPixelSize, of_file_um) +
                          ". Forces go with the square of the pixel size",
-               .remedy = is_binning ? "the two differ by a factor of " + brief(whole) +
-                                          ": was the camera's binning, or a reduced copy, left out in one of them?"
-                                    : "find out which of the two is right, and leave pixel_size_um out if it is the image's",
+               .remedy = is_binning
+                             ? "the two differ by a factor of " + brief(whole) +
+                                   ": was the camera's binning, or a reduced copy, left out in one of them?"
+                             : "find out which of the two is right, and leave pixel_size_um out if it is the image's",
                .level = ratio > 1 + kRefused ? DoubtLevel::refused : DoubtLevel::caution};
 }
 
@@ -287,8 +298,8 @@ std::string plausible_page() {
       "20 % an error.\nIf `thickness_um`, `poisson_ratio` or the errors of the displacements are not given, they are "
       "listed as assumed.\n\n| quantity | usual | possible | source | what to do |\n|---|---|---|---|---|\n";
   for (const PlausibleQuantity& q : plausible_quantities()) {
-    page += "| `" + std::string(q.id) + "`: " + q.quantity + " |" + range_text(q.usual) + " |" + range_text(q.possible) +
-            " | " + q.source + " | " + q.remedy + " |\n";
+    page += "| `" + std::string(q.id) + "`: " + q.quantity + " |" + range_text(q.usual) + " |" +
+            range_text(q.possible) + " | " + q.source + " | " + q.remedy + " |\n";
   }
   return page;
 }

@@ -205,8 +205,7 @@ void check(const Gel& gel) {
   require_positive(gel.youngs_modulus_kPa, "youngs_modulus_kPa", "the gel");
   require_positive(gel.thickness_um, "thickness_um", "the gel");
   require(std::isfinite(gel.poisson_ratio) && gel.poisson_ratio >= 0 && gel.poisson_ratio <= 0.5,
-          "'poisson_ratio' of the gel", "a number from 0 to 0.5",
-          shown(gel.poisson_ratio));
+          "'poisson_ratio' of the gel", "a number from 0 to 0.5", shown(gel.poisson_ratio));
 }
 
 void check(const Network& network) {

@@ -119,9 +119,12 @@ std::string details_of(const Finding& f) {
 
 std::string item_of(const Finding& f) {
   switch (f.severity) {
-    case Severity::note: return item("fact", "<b>Note:</b> ", f.text, details_of(f));
-    case Severity::caution: return item("caution", "<b>Caution:</b> ", f.text, details_of(f));
-    case Severity::bad: return item("bad", "<b>Distrust:</b> ", f.text, details_of(f));
+    case Severity::note:
+      return item("fact", "<b>Note:</b> ", f.text, details_of(f));
+    case Severity::caution:
+      return item("caution", "<b>Caution:</b> ", f.text, details_of(f));
+    case Severity::bad:
+      return item("bad", "<b>Distrust:</b> ", f.text, details_of(f));
   }
   return {};
 }
@@ -157,7 +160,8 @@ std::string findings_section(const CellResults& results, const Provenance& prove
              "Verified by the error budget: " + accuracy->verdict + ".");
   }
   if (open.empty() && was_asked(provenance))
-    open = item("good", "<b>✓</b> ", "No finding is open: nothing that the program checks speaks against these results.");
+    open =
+        item("good", "<b>✓</b> ", "No finding is open: nothing that the program checks speaks against these results.");
   for (const std::string& sentence : on_outputs(provenance)) notes += item("fact", "", sentence);
   return section("In short", html + open + notes + "</ul>\n");
 }

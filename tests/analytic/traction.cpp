@@ -268,7 +268,8 @@ TEST(Tractions, forces_by_adhesion_are_nearer_the_truth_than_any_sum_of_the_map_
       double best = 1e9;
       for (const double grow_um : {0.7, 1.5, 2.0, 3.0, 4.0}) {
         std::vector<Vec2> sums;
-        for (const AdhesionForce& f : forces_by_adhesion(r.patches, scene.adhesions, grow_um)) sums.push_back(f.force_nN);
+        for (const AdhesionForce& f : forces_by_adhesion(r.patches, scene.adhesions, grow_um))
+          sums.push_back(f.force_nN);
         best = std::min(best, test::force_error(scene, sums));
       }
       const double reached = test::force_error(scene, forces_of(r));

@@ -62,7 +62,8 @@ TEST(Documents, the_page_of_findings_is_what_the_program_declares) {
 /// Set MBTFM_WRITE_DOCS to write the page instead.
 TEST(Documents, the_page_of_plausible_values_is_the_table_that_the_programs_ask) {
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "plausible.md", plausible_page());
-  EXPECT_EQ(read_text(kDocs / "plausible.md"), plausible_page()) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+  EXPECT_EQ(read_text(kDocs / "plausible.md"), plausible_page())
+      << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.

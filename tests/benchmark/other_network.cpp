@@ -61,8 +61,7 @@ Eigen::VectorXd forces_of(const samples::Experiment& experiment) {
 OtherNetwork other_network(std::uint64_t seed, const network::NetworkParameters* truth = nullptr) {
   samples::ScenarioParameters p;
   p.seed = seed;
-  OtherNetwork o{
-      .experiment = samples::simulate(p, 2), .forces_nN = {}, .adhesion_ids = {}, .noisy = {}, .exact = {}};
+  OtherNetwork o{.experiment = samples::simulate(p, 2), .forces_nN = {}, .adhesion_ids = {}, .noisy = {}, .exact = {}};
   o.forces_nN = truth ? forces_on(o.experiment, *truth, seed) : forces_of(o.experiment);
   std::vector<Vec2> points;
   for (const Bead& bead : o.experiment.displacement) points.push_back(bead.position_um);
@@ -173,8 +172,8 @@ void forces(Cells cells) {
         const AdhesionForce& f = by_adhesion[a];
         const Eigen::Vector2d wanted = o.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a));
         const Eigen::Vector2d got(f.force_nN.x, f.force_nN.y), unit = got.normalized();
-        std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected), wanted.norm(),
-                    got.norm(), f.sigma_nN.value_or(0), unit[0] * wanted[1] - unit[1] * wanted[0],
+        std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected),
+                    wanted.norm(), got.norm(), f.sigma_nN.value_or(0), unit[0] * wanted[1] - unit[1] * wanted[0],
                     found.network_forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm());
       }
     }

@@ -156,7 +156,8 @@ TEST_F(SubstrateProgram, says_what_it_lacks) {
   EXPECT_EQ(run(forces() + out).code, 2);  // a table, and no points
   EXPECT_EQ(run(forces() + "--model layer --out " + file("volume.vtu")).code, 2);
   for (const std::string model : {"split", "refined"})  // their bulk modulus would be infinite
-    EXPECT_EQ(run(forces() + "--poisson_ratio 0.5 --model " + model + " --points " + file("points.csv") + " " + out).code, 2);
+    EXPECT_EQ(
+        run(forces() + "--poisson_ratio 0.5 --model " + model + " --points " + file("points.csv") + " " + out).code, 2);
   EXPECT_EQ(run(forces() + "--poisson_ratio 0.51 --points " + file("points.csv") + " " + out).code, 2);
   EXPECT_EQ(run(forces() + "--youngs_modulus_kPa -1 --points " + file("points.csv") + " " + out).code, 2);
   write("traction.csv", "x_um,y_um,tx_kPa,ty_kPa\n1,1,1,0\n");

@@ -88,13 +88,15 @@ TEST(CommonMotion, reduced_data_are_those_of_the_projected_displacements) {
   reweight(data, Eigen::VectorXd::LinSpaced(50, 0.1, 1));
   const Eigen::VectorXd weight = squared_weights(data);
   const Eigen::MatrixXd& M = data.motions;
-  const Eigen::MatrixXd P = Eigen::MatrixXd::Identity(100, 100) -
-                            M * (M.transpose() * weight.asDiagonal() * M).inverse() * M.transpose() * weight.asDiagonal();
+  const Eigen::MatrixXd P =
+      Eigen::MatrixXd::Identity(100, 100) -
+      M * (M.transpose() * weight.asDiagonal() * M).inverse() * M.transpose() * weight.asDiagonal();
   for (const double size : {0.0, 1.0}) {
     const Eigen::VectorXd forces = size * scene.forces_nN;
     const Eigen::VectorXd left = P * (data.displacement_um - scene.compliance_um_per_nN * forces);
     const double wanted = left.cwiseAbs2().dot(weight);
-    const double reduced = (displace(data.reduced, forces) - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
+    const double reduced =
+        (displace(data.reduced, forces) - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
     EXPECT_NEAR(reduced, wanted, 1e-9 * wanted);
   }
 }
@@ -109,8 +111,8 @@ TEST(CommonMotion, of_beads_in_one_place_or_none_is_no_obstacle) {
 }
 
 TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {
-  constexpr CommonMotion kStill{.centre_um = {20, 30}, .shift_um = {}, .turn_rad = 0.005, .growth = -0.003,
-                                .shear_1 = 0.001, .shear_2 = 0.002};
+  constexpr CommonMotion kStill{
+      .centre_um = {20, 30}, .shift_um = {}, .turn_rad = 0.005, .growth = -0.003, .shear_1 = 0.001, .shear_2 = 0.002};
   double largest = 0;
   for (int i = 0; i < 3600; ++i) {
     const double angle = i * 1.7453292519943296e-3;

@@ -246,9 +246,9 @@ TEST(ErrorBudget, an_error_of_the_thickness_or_of_poissons_ratio_does_what_anoth
     Gel other = gel;
     other.thickness_um += gel.thickness_sigma_um.value_or(0);
     other.poisson_ratio -= gel.poisson_ratio_sigma.value_or(0);
-    const Eigen::VectorXd change =
-        substrate::make_greens(other, {.model = "layer"}, 2)->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
-        f.scene.forces_nN;
+    const Eigen::VectorXd change = substrate::make_greens(other, {.model = "layer"}, 2)
+                                       ->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
+                                   f.scene.forces_nN;
     const Eigen::VectorXd moved = answers(f, change);
     for (std::size_t i = 0; i < budget.tensions.size(); ++i) {
       const double stated = *budget.tensions[i].parts_nN.gel;

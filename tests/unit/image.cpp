@@ -302,7 +302,8 @@ TEST(Jpeg, is_read_as_what_it_shows_and_marked_as_lossy) {
   Picture picture{.width = 64, .height = 48, .rgb = {}};
   for (int j = 0; j < 48; ++j) {
     for (int i = 0; i < 64; ++i) {
-      for (const int value : {2 * i + 40, 2 * i + 40, 2 * i + 40}) picture.rgb.push_back(static_cast<std::uint8_t>(value));
+      for (const int value : {2 * i + 40, 2 * i + 40, 2 * i + 40})
+        picture.rgb.push_back(static_cast<std::uint8_t>(value));
     }
   }
   write_jpeg(folder / "a.jpg", picture);

@@ -126,12 +126,17 @@ TEST(Plausible, inputs_that_nobody_gave_are_listed_as_assumed) {
 TEST(Plausible, a_traction_or_a_tension_counts_as_far_as_its_error_leaves_it_sure) {
   const std::vector<Adhesion> adhesions(2, {.adhesion_id = 1, .position_um = {}, .area_um2 = 0.1});
   std::vector<AdhesionForce> forces(2);
-  forces[0] = {.adhesion_id = 1, .force_nN = {3, 4}, .sigma_nN = 2.5, .connected = false, .moment_nN_um = {}};  // 50 kPa, all of it noise
+  forces[0] = {.adhesion_id = 1,
+               .force_nN = {3, 4},
+               .sigma_nN = 2.5,
+               .connected = false,
+               .moment_nN_um = {}};  // 50 kPa, all of it noise
   forces[1] = {.adhesion_id = 2, .force_nN = {0, 1}, .sigma_nN = 0.25, .connected = false, .moment_nN_um = {}};
   EXPECT_DOUBLE_EQ(surest_traction_kPa(forces, adhesions), 5);
-  const std::vector<Tension> tensions = {{.fibre_id = 0, .tension_nN = 99, .low_nN = {}, .high_nN = {}},  // the network's is no fibre's
-                                         {.fibre_id = 1, .tension_nN = 50, .low_nN = 2, .high_nN = 98},
-                                         {.fibre_id = 2, .tension_nN = 7, .low_nN = {}, .high_nN = {}}};
+  const std::vector<Tension> tensions = {
+      {.fibre_id = 0, .tension_nN = 99, .low_nN = {}, .high_nN = {}},  // the network's is no fibre's
+      {.fibre_id = 1, .tension_nN = 50, .low_nN = 2, .high_nN = 98},
+      {.fibre_id = 2, .tension_nN = 7, .low_nN = {}, .high_nN = {}}};
   EXPECT_EQ(surest_fibre_tension_nN(tensions), 7);
 }
 

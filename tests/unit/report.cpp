@@ -128,7 +128,9 @@ Provenance fitted_here(std::vector<Finding> findings) {
 TEST(Report, a_tick_stands_only_where_no_finding_is_open) {
   const FakeCell cell;
   const CellResults results = read_results(cell.folder.path());
-  const auto has_tick = [&](const Provenance& p) { return findings_section(results, p).find("✓") != std::string::npos; };
+  const auto has_tick = [&](const Provenance& p) {
+    return findings_section(results, p).find("✓") != std::string::npos;
+  };
   EXPECT_TRUE(has_tick(fitted_here({})));
   EXPECT_TRUE(has_tick(fitted_here({*noticed(FindingKind::wide_interval, 1, "x")})));
   EXPECT_FALSE(has_tick(fitted_here({*noticed(FindingKind::missing_fibre, 1, "x")})));
