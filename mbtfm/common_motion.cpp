@@ -47,31 +47,80 @@ Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
   return motions;
 }
 
-FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit) {
-  const Eigen::VectorXd a = motion_in(data, data.displacement_um - data.response->displace(fit.forces_nN));
-  FoundMotion found{.motion = {.centre_um = centre_of(data.position_um),
-                               .shift_um = {a[0], a[1]},
-                               .turn_rad = a[2],
-                               .growth = a[3],
-                               .shear_1 = a[4],
-                               .shear_2 = a[5]},
-                    .sigma = {}};
-  // The beads' own noise, and what errors of the tensions and of the model's forces look like to the motions.
-  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  const Eigen::MatrixXd inverse =
-      (data.motions.transpose() * weighted).completeOrthogonalDecomposition().pseudoInverse();
-  const Eigen::MatrixXd by_force = inverse * data.response->pull_back(weighted).transpose();  // motion_in(G)
+namespace {
+
+/// Covariance of numbers that are linear in what is left of the beads.
+/// @param of_noise  of the numbers for noise of variance 1, the tensions held
+/// @param by_force  the numbers by adhesion force
+/// @param sign  of what the tensions' answer to noise adds: + for estimates beside the tensions, − for scores
+Eigen::MatrixXd covariance_of(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise, const Eigen::MatrixXd& by_force,
+                              int sign) {
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
-  Eigen::MatrixXd covariance = fit.variance * inverse + by_tension * mesh.noise_covariance_nN2 * by_tension.transpose();
+  Eigen::MatrixXd covariance =
+      fit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
   if (fit.model_error) {
     const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
     covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
   }
-  found.sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const Eigen::VectorXd strain = a.tail<4>();
-  found.chi_squared = strain.dot(covariance.bottomRightCorner<4, 4>().completeOrthogonalDecomposition().solve(strain));
-  return found;
+  return covariance;
+}
+
+/// 2·beads × 14, about the beads' centre and of size 1 or so.
+Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
+  constexpr int kPowers[7][2] = {{2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}};
+  std::vector<Vec2> places_um;
+  for (const Bead& bead : beads) places_um.push_back(bead.position_um);
+  const Vec2 centre = centre_of(places_um);
+  double squares = 0;
+  for (const Vec2 place : places_um) squares += dot(place - centre, place - centre);
+  const double unit_um = std::sqrt(squares / std::max(1.0, static_cast<double>(places_um.size())));
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 14);
+  if (!(unit_um > 0)) return motions;
+  for (std::size_t i = 0; i < places_um.size(); ++i) {
+    const Vec2 d = (1 / unit_um) * (places_um[i] - centre);
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    for (int k = 0; k < 7; ++k) {
+      motions(row, 2 * k) = motions(row + 1, 2 * k + 1) = std::pow(d.x, kPowers[k][0]) * std::pow(d.y, kPowers[k][1]);
+    }
+  }
+  return motions;
+}
+
+}  // namespace
+
+MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const Eigen::MatrixXd by_force = data.motion_inverse * data.response->pull_back(weighted).transpose();
+  return {.values = motion_in(data, data.displacement_um - data.response->displace(fit.forces_nN)),
+          .sigma = covariance_of(fit, data.motion_inverse, by_force, +1).diagonal().cwiseMax(0).cwiseSqrt()};
+}
+
+FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um) {
+  const Eigen::VectorXd& a = motions.values;
+  return {.motion = {.centre_um = centre_of(beads_um),
+                     .shift_um = {a[0], a[1]},
+                     .turn_rad = a[2],
+                     .growth = a[3],
+                     .shear_1 = a[4],
+                     .shear_2 = a[5]},
+          .sigma = motions.sigma.head(6)};
+}
+
+CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit) {
+  const Eigen::MatrixXd motions = less_motion(data, curved_motions(beads));
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
+  const Eigen::VectorXd scores = weighted.transpose() * residual_um(data, fit.forces_nN);
+  const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
+  const Eigen::MatrixXd of_noise = weighted.transpose() * motions;
+  const auto inverse = covariance_of(fit, of_noise, by_force, -1).completeOrthogonalDecomposition();
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd information =
+      of_noise - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.variance;
+  const Eigen::VectorXd moved = motions * information.completeOrthogonalDecomposition().solve(scores);
+  return {.chi_squared = scores.dot(inverse.solve(scores)),
+          .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
 }
 
 bool allows_common_motion(const EffectSwitches& switches) { return switches.common_motion != "off"; }

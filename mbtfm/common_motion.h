@@ -31,14 +31,28 @@ struct CommonMotion {
 /// (relative).
 Eigen::MatrixXd affine_motions(const DisplacementField& beads);
 
+/// How much of each motion the fit finds besides, with standard errors; in the order of the data's motions.
+struct MotionsBeside {
+  Eigen::VectorXd values, sigma;
+};
+MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit);
+
 /// A common motion with the standard errors of its numbers, in the order of affine_motions().
 struct FoundMotion {
   CommonMotion motion;
   Eigen::VectorXd sigma;
-  double chi_squared = 0;  ///< of turn, growth and shears against none, 4 degrees of freedom
 };
-/// @param forces_nN  of the fit, by adhesion
-FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit);
+/// @param motions  the first six those of affine_motions()
+FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um);
+
+/// What all beads do together that is not affine, as stitched tiles, a rolling shutter or a lens make it: displacements
+/// of second and third degree in x and y, fourteen numbers. A score test (Rao, Math Proc Camb Phil Soc 44:50, 1948):
+/// what the fit leaves of the beads is compared with them, and with what noise and the model's error leave of them.
+struct CurvedMotion {
+  double chi_squared = 0;  ///< 14 degrees of freedom where there is none
+  double rms_um = 0;       ///< of the beads' displacement by the best of them, the tensions following
+};
+CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit);
 
 inline constexpr const char* kCommonMotion = "common motion";
 /// Always on but where it is switched off: a motion too small to be noticed still shifts the total force by some of its

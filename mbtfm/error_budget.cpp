@@ -1,5 +1,8 @@
 #include "mbtfm/error_budget.h"
 
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -40,7 +43,7 @@ VectorXd variances(const MatrixXd& gain, const VectorXd& variance) { return gain
 
 /// The parts that each mesh tells, in squares, mean over the meshes.
 struct MeanVariances {
-  VectorXd beads, mesh, model, solver;
+  VectorXd beads, mesh, model, solver, place;
 };
 
 /// s² of the beads alone over the variance that the fit counts with: the rest is the model's where no model error is.
@@ -63,15 +66,45 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
   return (gain.of_tensions * step).cwiseAbs() + imbalance * (gain.of_tensions * mesh.local.tensions_nN).cwiseAbs();
 }
 
+/// Motions of the cell's place, pulled back to the forces: Gᵀ W² U with Uᵀ W² U = 1, the other motions taken off.
+MatrixXd pulled_place(const BudgetInputs& in) {
+  const Index n = in.n_of_place, n_others = in.data.motions.cols() - n;
+  const VectorXd weight = squared_weights(in.data);
+  const auto less = [&](const MatrixXd& others, const MatrixXd& motions) -> MatrixXd {
+    if (others.cols() == 0) return motions;
+    const MatrixXd weighted = weight.asDiagonal() * others;
+    const auto square = (weighted.transpose() * others).completeOrthogonalDecomposition();
+    return motions - others * square.solve(weighted.transpose() * motions);
+  };
+  const MatrixXd beside = less(in.data.motions.leftCols(n_others), in.data.motions.rightCols(n));
+  const MatrixXd weighted = weight.asDiagonal() * beside;
+  const MatrixXd upper = (weighted.transpose() * beside).llt().matrixU();
+  return in.data.response->pull_back(weighted * upper.inverse());
+}
+
+/// What the beads would tell more of the tensions if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.
+MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const MatrixXd& pulled) {
+  const MatrixXd answered = mesh.noise_covariance_nN2 * (mesh.force_derivatives.transpose() * pulled);  // Cov V
+  MatrixXd middle = pulled.transpose() * mesh.force_derivatives * answered;
+  middle.diagonal().array() += fit.variance;
+  return answered * middle.ldlt().solve(answered.transpose());
+}
+
 MeanVariances mean_variances(const BudgetInputs& in) {
   const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + 1;
   const double n = static_cast<double>(in.fit.meshes.size());
-  MeanVariances mean{VectorXd::Zero(n_rows), VectorXd::Zero(n_rows), VectorXd::Zero(n_rows), VectorXd::Zero(n_rows)};
+  const VectorXd none = VectorXd::Zero(n_rows);
+  MeanVariances mean{none, none, none, none, none};
+  const MatrixXd pulled = in.n_of_place > 0 ? pulled_place(in) : MatrixXd();
   for (const MeshFit& mesh : in.fit.meshes) {
     const Gain gain = gain_of(in.fit, mesh);
     const VectorXd noise =
         (gain.of_tensions * mesh.noise_covariance_nN2).cwiseProduct(gain.of_tensions).rowwise().sum();
     mean.beads += bead_share(in) / n * noise;
+    if (in.n_of_place > 0) {
+      const MatrixXd by_place = covariance_by_place(in.fit, mesh, pulled);
+      mean.place += bead_share(in) / n * (gain.of_tensions * by_place).cwiseProduct(gain.of_tensions).rowwise().sum();
+    }
     mean.solver += solver_error(in.fit, mesh, gain).cwiseAbs2() / n;
     mean.model += (1 - bead_share(in)) / n * noise;
     if (!in.fit.model_error) continue;
@@ -321,6 +354,7 @@ void add_room_above(const EnsembleFit& fit, MeanVariances& mean) {
     const double by_noise = fit.variance * local.H(at, at);
     const double by_model = local.model_variance.size() > 0 ? local.model_variance(at, at) : 0;
     const double share = by_noise + by_model > 0 ? by_noise / (by_noise + by_model) : 1;
+    mean.place[at] = 0;
     mean.beads[at] = share * room;
     mean.mesh[at] = 0;
     mean.model[at] = (1 - share) * room;
@@ -352,13 +386,15 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const VectorXd substrate = substrate_variances(in, gain, answers);
   const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
   const auto parts = [&](Index i) {
-    ErrorParts p{.beads = std::sqrt(mean.beads[i]),
+    ErrorParts p{.beads = std::sqrt(std::max(0.0, mean.beads[i] - mean.place[i])),
                  .segmentation = std::sqrt(segmentation[i]),
                  .mesh = {},
                  .substrate = std::sqrt(substrate[i]),
                  .solver = std::sqrt(mean.solver[i]),
                  .model = std::sqrt(mean.model[i]),
-                 .gel = {}};
+                 .gel = {},
+                 .place = {}};
+    if (in.n_of_place > 0) p.place = std::sqrt(mean.place[i]);
     if (gel) p.gel = std::sqrt((*gel)[i]);
     if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mean.mesh[i]);
     return p;

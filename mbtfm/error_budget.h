@@ -28,6 +28,7 @@ struct BudgetInputs {
   double substrate_error = 0;
   bool lacks_base = false;  ///< the substrate is a half-space
   SegmentationErrors segmentation;
+  Eigen::Index n_of_place = 0;  ///< of the data's motions, the last ones: they are the cell's place
 };
 
 /// By linear propagation about the solution: costs about as much as one step of the fit on one mesh.

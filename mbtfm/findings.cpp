@@ -208,6 +208,26 @@ Noticed common_motion(const FitOutcome& o) {
                  is_large ? Severity::caution : Severity::note);
 }
 
+Noticed curved_motion(const FitOutcome& o) {
+  if (!o.curved) return {};
+  return noticed(FindingKind::curved_motion, o.curved->chi_squared,
+                 "Beside the cell's pull all beads share a motion that is not even: it moves them by " +
+                     brief(1000 * o.curved->rms_um) +
+                     " nm on average. It was not taken off, and the error bars do not hold it.");
+}
+
+Noticed channel_shift(const FitOutcome& o) {
+  if (!o.place) return {};
+  const Placement& place = o.place->placement;
+  const Eigen::Vector3d values(place.shift_um.x, place.shift_um.y, place.turn_rad);
+  constexpr double kLarge_um = 1;  // filters are off by less
+  const bool is_large = norm(place.shift_um) > kLarge_um;
+  return noticed(FindingKind::channel_shift, values.cwiseAbs().cwiseQuotient(o.place->sigma).maxCoeff(),
+                 "The cell does not lie on the beads where its images say: it is shifted by " + sentence_of(*o.place) +
+                     "." + (is_large ? " Filters are off by less: do all images show the same place?" : ""),
+                 is_large ? Severity::caution : Severity::note);
+}
+
 }  // namespace
 
 Imbalance imbalance_of(const EnsembleFit& fit) {
@@ -221,12 +241,12 @@ Imbalance imbalance_of(const EnsembleFit& fit) {
 std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
-  for (Noticed found :
-       {common_motion(o), missing_fibres_noticed(o), unexplained(o), beads_disagree(o), noise_unknown(o),
-        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
-        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
-        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),
-        tensions_at_zero(o)}) {
+  for (Noticed found : {common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o), unexplained(o),
+                        beads_disagree(o), noise_unknown(o), noise_disagrees(o), not_identifiable(o),
+                        network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
+                        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
+                        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"),
+                        wide_intervals(o), tensions_at_zero(o)}) {
     if (found) findings.push_back(std::move(*found));
   }
   return findings;

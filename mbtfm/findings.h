@@ -7,6 +7,7 @@
 #include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/model_checks.h"
+#include "mbtfm/placement.h"
 #include "pipeline/contract/findings.h"
 
 namespace mbtfm::inverse {
@@ -20,6 +21,8 @@ struct FitOutcome {
   const std::vector<Tension>& tensions;
   const std::vector<MissingFibre>& missing;
   const std::optional<FoundMotion>& motion;
+  const std::optional<CurvedMotion>& curved;
+  const std::optional<FoundPlacement>& place;
 };
 
 /// In the order in which a user should read them.

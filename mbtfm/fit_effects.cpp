@@ -68,7 +68,7 @@ std::optional<Change> with_loss(const Effect& e, const FittedCell& c, int thread
 
 std::optional<Change> with_motion(const Effect& e, const FittedCell& c, int threads) {
   LinearData with = c.data;
-  allow_motions(with, affine_motions(c.inputs.beads));
+  add_motions(with, affine_motions(c.inputs.beads));
   return change_between(e.name, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
@@ -146,25 +146,7 @@ void declare(ParameterList& list, FitStageParameters& p) {
   list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
   declare(list, p.effects,
           {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
-           "common_motion", "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
-}
-
-std::vector<int> adhesion_ids_of(const Cell& cell) {
-  std::vector<int> ids;
-  for (const Adhesion& a : cell.adhesions) ids.push_back(a.adhesion_id);
-  return ids;
-}
-
-std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
-  std::vector<substrate::Ellipse> ellipses;
-  for (const Adhesion& a : cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  return ellipses;
-}
-
-std::vector<Vec2> points_of(const DisplacementField& beads) {
-  std::vector<Vec2> points;
-  for (const Bead& b : beads) points.push_back(b.position_um);
-  return points;
+           "common_motion", "channel_shift", "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
 }
 
 }  // namespace mbtfm::inverse

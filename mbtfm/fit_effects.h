@@ -31,10 +31,6 @@ struct FittedCell {
   const EnsembleFit& fit;
 };
 
-std::vector<int> adhesion_ids_of(const Cell& cell);
-std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
-std::vector<Vec2> points_of(const DisplacementField& beads);
-
 /// `first`, then further ones over the same cell from other seeds.
 std::vector<network::CableNetwork> span_ensemble(const Network& first, const Cell& cell, const FitStageParameters& p,
                                                  int threads);

@@ -12,6 +12,7 @@
 #include "mbtfm/findings.h"
 #include "mbtfm/fit_effects.h"
 #include "mbtfm/model_checks.h"
+#include "mbtfm/placement.h"
 #include "mbtfm/series.h"
 #include "mbtfm/solved_misfit.h"
 #include "network/effects.h"
@@ -98,7 +99,7 @@ std::string names_of_groups(const EnsembleFit& fit) {
 
 ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
                       const std::vector<network::CableNetwork>& networks, const FitInputs& inputs,
-                      const substrate::Substrate& substrate, const FitStageParameters& p, int threads) {
+                      const substrate::Substrate& substrate, const FitStageParameters& p, bool is_placed, int threads) {
   const Figures figures = substrate.figures();
   const bool lacks_base = std::find(figures.begin(), figures.end(),
                                     Figures::value_type{"substrate_model", std::string("half-space")}) != figures.end();
@@ -110,7 +111,8 @@ ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
                        .gel = p.gel,
                        .substrate_error = substrate::stated_error(p.substrate, figures),
                        .lacks_base = lacks_base,
-                       .segmentation = p.segmentation},
+                       .segmentation = p.segmentation,
+                       .n_of_place = is_placed ? 3 : 0},
                       threads);
 }
 
@@ -214,7 +216,7 @@ void expect_plausible(StageContext& context, const FitSummary& summary, const st
   context.expect_plausible("total_force_nN",
                            std::max(0.0, summary.total_force_nN));  // of noise alone: either side of 0
   context.expect_plausible("fibre_tension_nN", surest_fibre_tension_nN(tensions));
-  context.expect_plausible("traction_kPa", surest_traction_kPa(forces, adhesions));
+  context.expect_plausible("traction_kPa", traction_of_half_the_force_kPa(forces, adhesions));
 }
 
 StageReport fit(const FitStageParameters& given, StageContext& context) {
@@ -259,6 +261,22 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   Effect elasticity =
       network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
+  const auto data_of = [&](const Cell& placed) {
+    responses = responses_of(inputs.beads, series, [&](const DisplacementField& b) {
+      return substrate->response(points_of(b), ellipses_of(placed));
+    });
+    return reduce(inputs.beads, responses.of_beads, beads_in_region(inputs.beads, placed, p.fit), context.threads,
+                  moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
+  };
+  context.progress(0.35, "placing the cell on the beads");
+  PlacedCell place = place_cell(inputs.cell, networks.front(), data, data_of, p.gel, p.fit, start,
+                                p.effects.channel_shift, context.threads);
+  data = std::move(place.data);
+  if (place.effect.is_on) {
+    inputs.cell = place.cell;
+    networks = placed_networks(networks, place.placement);
+    start = TensionProblem(networks.front(), data.reduced, adhesion_ids).evaluate(place.start_nN);
+  }
   const auto fit_all = [&] {
     return fit_ensemble(
         networks, data, adhesion_ids, p.fit, context.threads,
@@ -278,14 +296,22 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
+  const MotionsBeside motions = motions_beside(data, fit);
   std::optional<FoundMotion> motion;
-  if (moves) motion = motion_beside(data, fit);
+  if (moves) motion = common_motion_among(motions, data.position_um);
+  std::optional<FoundPlacement> found_place;
+  if (place.effect.is_on) found_place = placement_among(motions, place.placement);
+  std::optional<CurvedMotion> curved;
+  if (moves) curved = curved_motion_beside(data, inputs.beads, fit);
   expect_plausible(context, summary, tensions, forces, inputs.cell.adhesions);
   const auto budget_start = std::chrono::steady_clock::now();
-  summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, context.threads);
+  summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, place.effect.is_on, context.threads);
   const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
   if (motion) {
     for (const auto& figure : figures_of(*motion)) summary.more.push_back(figure);
+  }
+  if (found_place) {
+    for (const auto& figure : figures_of(*found_place)) summary.more.push_back(figure);
   }
   const std::vector<ModelScore> models = compare_models(fit, data, networks.front(), adhesion_ids_of(inputs.cell));
   const Influence influence = influence_of(fit, data);
@@ -325,8 +351,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      .findings = {}};
   report.effects = substrate->effects();
   report.effects.insert(report.effects.begin(), fibres);
-  report.effects.insert(report.effects.end(), {common_motion_effect(p.effects.common_motion, motion), elasticity,
-                                               robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
+  report.effects.insert(report.effects.end(),
+                        {common_motion_effect(p.effects.common_motion, motion), place.effect, elasticity,
+                         robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
   if (p.explain) {
     context.progress(0.97, "explaining what is off");
     const std::vector<Change> changes =
@@ -337,7 +364,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   report.figures.emplace_back("error_budget_s", budget_s);
   context.notice(noticed(FindingKind::modulus_error_unknown, p.gel.youngs_modulus_sigma_kPa ? 0 : 1,
                          "No error of Young's modulus is given. An error of 10 % would change every force by 10 %."));
-  report.findings = findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, motion});
+  report.findings = findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, motion, curved, found_place});
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0)

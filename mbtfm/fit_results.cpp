@@ -23,6 +23,24 @@ double surface_tension_nN_per_um(const Network& network, const Polygon& outline_
 
 }  // namespace
 
+std::vector<int> adhesion_ids_of(const Cell& cell) {
+  std::vector<int> ids;
+  for (const Adhesion& a : cell.adhesions) ids.push_back(a.adhesion_id);
+  return ids;
+}
+
+std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return ellipses;
+}
+
+std::vector<Vec2> points_of(const DisplacementField& beads) {
+  std::vector<Vec2> points;
+  for (const Bead& b : beads) points.push_back(b.position_um);
+  return points;
+}
+
 std::vector<Tension> tensions_of(const EnsembleFit& fit) {
   double largest_nN = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
@@ -65,9 +83,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
                       const std::vector<network::CableNetwork>& networks, const FitParameters& parameters) {
   const NoiseLevel noise =
       noise_level(inputs.beads, data, fit.forces_nN, inputs.cell.outline_um, parameters.far_distance_um);
-  const Eigen::VectorXd measured = less_motion(data, data.displacement_um - data.response->displace(fit.forces_nN)) +
-                                   data.response->displace(fit.forces_nN);
-  const double measured_um = measured.norm();
+  const Eigen::VectorXd model = data.response->displace(fit.forces_nN);
+  const double measured_um = (less_motion(data, data.displacement_um - model) + model).norm();  // less the motion
   FitSummary s;
   s.relative_l2 = relative_l2(data, fit.forces_nN);
   s.noise_um = noise.sigma_um;

@@ -5,6 +5,7 @@
 
 #include "mbtfm/ensemble.h"
 #include "pipeline/contract/files.h"
+#include "substrate/compliance.h"
 
 namespace mbtfm::inverse {
 
@@ -14,6 +15,10 @@ struct FitInputs {
   DisplacementField beads;  ///< without the flagged ones
   int n_flagged = 0;
 };
+
+std::vector<int> adhesion_ids_of(const Cell& cell);
+std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
+std::vector<Vec2> points_of(const DisplacementField& beads);
 
 /// By group, with 95 % intervals.
 std::vector<Tension> tensions_of(const EnsembleFit& fit);

@@ -37,19 +37,38 @@ Root root_of(Eigen::MatrixXd A, double trace, int threads) {
   return {std::move(A), n_felt};
 }
 
-/// Gᵀ W² P G, on and above its diagonal, of Gᵀ W² G.
-Eigen::MatrixXd less_motions(Eigen::MatrixXd gram, const LinearData& data, const Eigen::VectorXd& weight) {
-  if (data.motions.cols() == 0) return gram;
-  // M Q with (M Q)ᵀ W² (M Q) = 1, of those motions that differ
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(data.motions.transpose() * weight.asDiagonal() *
-                                                             data.motions);
-  constexpr double kRounding = 1e-13;
-  const Eigen::VectorXd scale = eigen.eigenvalues().unaryExpr(
-      [&](double square) { return square > kRounding * eigen.eigenvalues().maxCoeff() ? 1 / std::sqrt(square) : 0.0; });
-  const Eigen::MatrixXd unit = data.motions * (eigen.eigenvectors() * scale.asDiagonal());
+/// (MᵀW²M)⁻¹, by rank: beads in one place tell no turn from a shift.
+Eigen::MatrixXd inverse_of_motions(const Eigen::MatrixXd& motions, const Eigen::VectorXd& weight) {
+  if (motions.cols() == 0) return {};
+  const Eigen::MatrixXd square = motions.transpose() * (weight.asDiagonal() * motions);
+  return square.completeOrthogonalDecomposition().pseudoInverse();
+}
+
+/// Take off a Gram matrix Gᵀ W² G, on and above its diagonal, what these motions explain of G.
+void take_off(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
+              const Eigen::MatrixXd& inverse, Eigen::MatrixXd& gram) {
+  if (motions.cols() == 0) return;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse);
+  const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::MatrixXd unit = motions * (eigen.eigenvectors() * root.asDiagonal());  // unitᵀ W² unit = 1
   const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
   add_upper_gram(pulled.transpose(), gram, data.threads, -1);
-  return gram;
+}
+
+/// From A = Gᵀ W² P G = Cᵀ C and y = C⁻ᵀ Gᵀ W² P u.
+/// @param trace  of A before anything was taken off it
+void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Eigen::MatrixXd A, double trace) {
+  auto [root, n_felt] = root_of(std::move(A), trace, data.threads);
+  const Eigen::VectorXd u = less_motion(data, data.displacement_um);
+  const Eigen::VectorXd weighted_u = weight.cwiseProduct(u);
+  Eigen::MatrixXd target = data.response->pull_back(weighted_u);
+  solve_upper_transposed(root, target);
+  data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root)),
+                  .target = target,
+                  .floor_squared = std::max(0.0, weighted_u.dot(u) - target.squaredNorm()),
+                  .n_components = data.n_used,
+                  .n_felt = n_felt,
+                  .is_upper = true};
 }
 
 }  // namespace
@@ -83,18 +102,24 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   return data;
 }
 
-void allow_motions(LinearData& data, Eigen::MatrixXd motions) {
-  data.n_used += data.motions.cols() - motions.cols();
-  data.motions = std::move(motions);
-  reweight(data, Eigen::VectorXd(data.bead_weight));
+void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
+  const Eigen::VectorXd weight = squared_weights(data);
+  const Eigen::MatrixXd beside = less_motion(data, motions);  // W-orthogonal to those that are there
+  const Eigen::MatrixXd& root = *data.reduced.compliance;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(root.cols(), root.cols());
+  add_upper_gram(root, A, data.threads);
+  const double trace = A.diagonal().sum();
+  take_off(data, weight, beside, inverse_of_motions(beside, weight), A);
+  data.n_used -= motions.cols();
+  data.motions.conservativeResize(motions.rows(), data.motions.cols() + motions.cols());
+  data.motions.rightCols(motions.cols()) = motions;
+  data.motion_inverse = inverse_of_motions(data.motions, weight);
+  set_reduced(data, weight, std::move(A), trace);
 }
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  // by rank: beads in one place tell no turn from a shift
-  return (data.motions.transpose() * weighted)
-      .completeOrthogonalDecomposition()
-      .solve(weighted.transpose() * displacements);
+  return data.motion_inverse * (weighted.transpose() * displacements);
 }
 
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
@@ -110,20 +135,11 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory
   const Eigen::VectorXd weight = squared_weights(data);
-  const Eigen::VectorXd u = less_motion(data, data.displacement_um);
-  const Eigen::VectorXd weighted_u = weight.cwiseProduct(u);
-  // A = Gᵀ W² P G = Cᵀ C; then y = C⁻ᵀ Gᵀ W² P u.
-  Eigen::MatrixXd gram = data.response->upper_gram(weight);
-  const double trace = gram.diagonal().sum();
-  auto [root, n_felt] = root_of(less_motions(std::move(gram), data, weight), trace, data.threads);
-  Eigen::MatrixXd target = data.response->pull_back(weighted_u);
-  solve_upper_transposed(root, target);
-  data.reduced.target = target;
-  data.reduced.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root));
-  data.reduced.n_felt = n_felt;
-  data.reduced.is_upper = true;
-  data.reduced.n_components = data.n_used;
-  data.reduced.floor_squared = std::max(0.0, weighted_u.dot(u) - target.squaredNorm());
+  data.motion_inverse = inverse_of_motions(data.motions, weight);
+  Eigen::MatrixXd A = data.response->upper_gram(weight);
+  const double trace = A.diagonal().sum();
+  take_off(data, weight, data.motions, data.motion_inverse, A);
+  set_reduced(data, weight, std::move(A), trace);
 }
 
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {

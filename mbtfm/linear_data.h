@@ -31,6 +31,7 @@ struct LinearData {
   Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
+  Eigen::MatrixXd motion_inverse;      ///< (MᵀW²M)⁻¹, by rank: beads in one place tell no turn from a shift
   Eigen::Index n_used = 0;             ///< components of the beads that are used, less one for each motion
   bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
   int threads = 1;                     ///< to reduce it with
@@ -46,8 +47,8 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used = {});
 
-/// Let the beads move by any sum of these (2·beads × some) besides. Reduces again.
-void allow_motions(LinearData& data, Eigen::MatrixXd motions);
+/// Let the beads move by any sum of these (2·beads × some) too, beside the motions that are allowed already.
+void add_motions(LinearData& data, const Eigen::MatrixXd& motions);
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed:
 /// (MᵀW²M)⁻¹ MᵀW² D
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parallel.h"
 
@@ -101,7 +102,19 @@ Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensi
 }
 
 Trial uniform_start(const TensionProblem& problem) {
-  return scaled_to_data(problem, Eigen::VectorXd::Ones(problem.n_tensions()));
+  Trial start = scaled_to_data(problem, Eigen::VectorXd::Ones(problem.n_tensions()));
+  const ReducedData& data = problem.data();
+  const Eigen::VectorXd pull = (*data.compliance * start.forces_nN).normalized();
+  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_components - data.n_felt));
+  const double sigma = std::sqrt(std::max(data.floor_squared, 1e-300) / n_free);  // of a component of the data
+  constexpr double kCertain = 6;  // standard errors: noise alone pushes by two or three, once in 1e9 by six
+  if (const double pulled = pull.dot(data.target); pulled < -kCertain * sigma) {
+    throw InvalidData("the displacement", "beads that a contracting cell pulls inward",
+                      "beads that move the other way, by " + brief(-pulled / sigma) +
+                          " standard errors: are the stressed and the relaxed image exchanged, or is the sign of the "
+                          "displacement or of an axis reversed?");
+  }
+  return start;
 }
 
 }  // namespace mbtfm::inverse

@@ -72,6 +72,7 @@ class TensionProblem {
 Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr);
 
 /// Tensions all equal, of the size that fits best: where the fit starts.
+/// @throws InvalidData where the beads move outward as a whole, which no contracting network explains
 Trial uniform_start(const TensionProblem& problem);
 
 }  // namespace mbtfm::inverse

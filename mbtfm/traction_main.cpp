@@ -36,7 +36,8 @@ void expect_plausible(StageContext& context, const TractionInputs& inputs, const
                       const TractionSums& sums) {
   if (inputs.outline_um.empty() && inputs.adhesions.empty()) return;
   context.expect_plausible("total_force_nN", sums.total_force_nN);
-  if (!r.forces.empty()) context.expect_plausible("traction_kPa", surest_traction_kPa(r.forces, inputs.adhesions));
+  if (!r.forces.empty())
+    context.expect_plausible("traction_kPa", traction_of_half_the_force_kPa(r.forces, inputs.adhesions));
 }
 
 StageReport run(const TractionStageParameters& p, StageContext& context) {

@@ -21,7 +21,8 @@ double round_below(double value);
 std::vector<double> ticks(double low, double high);
 
 /// Colours that differ in lightness and to colour-blind eyes (Okabe & Ito 2008), for curves in turn.
-inline constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#00805C", "#B87A00", "#8E4A7E", "#333333"};
+inline constexpr const char* kColours[] = {"#0072B2", "#D55E00", "#00805C", "#B87A00",
+                                           "#8E4A7E", "#333333", "#4A9CC9", "#8A8A00"};
 
 enum class Scale { linear, logarithmic };
 

@@ -63,13 +63,14 @@ void write_reactions(const Path& file, const std::vector<int>& vertices, const s
 
 /// What each source adds to a standard error. In squares they add up.
 struct ErrorParts {
-  double beads = 0;            ///< noise of the displacements
-  double segmentation = 0;     ///< shift, area and angle of the adhesions; free ends of the fibres
-  std::optional<double> mesh;  ///< one network is not another; none: a single mesh tells nothing of it
-  double substrate = 0;        ///< discretisation of the gel, or what its model leaves out
-  double solver = 0;           ///< where the iterations stopped
-  double model = 0;            ///< what the misfit calls for beside the beads' noise and the mesh
-  std::optional<double> gel;   ///< modulus, thickness and Poisson's ratio, where their errors are stated
+  double beads = 0;               ///< noise of the displacements
+  double segmentation = 0;        ///< shift, area and angle of the adhesions; free ends of the fibres
+  std::optional<double> mesh{};   ///< one network is not another; none: a single mesh tells nothing of it
+  double substrate = 0;           ///< discretisation of the gel, or what its model leaves out
+  double solver = 0;              ///< where the iterations stopped
+  double model = 0;               ///< what the misfit calls for beside the beads' noise and the mesh
+  std::optional<double> gel{};    ///< modulus, thickness and Poisson's ratio, where their errors are stated
+  std::optional<double> place{};  ///< of the cell on the beads, where it was found with the tensions
 };
 double total(const ErrorParts& parts);
 

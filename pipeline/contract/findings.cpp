@@ -39,8 +39,17 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "largest of growth, shears and turn of the whole field, over its standard error", 3,
        "chance alone takes one of the four beyond 3 standard errors in one cell of a hundred",
        "Nothing for this cell: the motion was taken off, and the error bars hold its error. If it recurs, look for a "
-       "change of "
-       "focus or of temperature between the bead images."},
+       "change of focus or of temperature between the bead images."},
+      {curved_motion, "curved-motion", "fit", caution,
+       "chi squared of displacements of second and third degree in x and y, 14 degrees of freedom", 36.1,
+       "noise and the error of the model exceed it in one cell of a thousand",
+       "The whole field is bent, and no cell does that: look for stitched tiles, a drift during the scan, another lens "
+       "or an uneven gel. Record the bead images in one piece, or leave far beads out with fit.region_um."},
+      {channel_shift, "channel-shift", "fit", note,
+       "largest of shift and turn of the cell against the beads, over its standard error", 4,
+       "chance alone takes one of three beyond 4 standard errors in one cell of five thousand",
+       "Nothing for this cell: the shift was taken into account, and the error bars hold its error. If it recurs, "
+       "measure the shift between the filters with beads that shine in both."},
       {unexplained_displacement, "unexplained-displacement", "fit", caution,
        "sum of squares that the model leaves of the displacement, over that of the beads' noise", 1.25,
        "up to half of the noise's standard deviation, the model's own error adds less than an eighth to what is left",

@@ -29,6 +29,8 @@ enum class FindingKind {
   moves_outward,
   // fit: the displacement
   common_motion,
+  curved_motion,
+  channel_shift,
   unexplained_displacement,
   noise_unknown,
   noise_disagrees,

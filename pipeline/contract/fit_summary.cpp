@@ -35,6 +35,7 @@ void for_each_part(Parts& p, const Visit& visit) {
   visit("solver", p.solver);
   visit("model", p.model);
   visit("gel", p.gel);
+  visit("place", p.place);
 }
 
 nlohmann::ordered_json json_of_parts(const ErrorParts& parts) {

@@ -62,8 +62,9 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
        .usual = Range::between(0.1, 100),
        .possible = Range::between(0.01, 1000),
        .source =
-           "Tissues and the gels that stand for them have 0.1 kPa (brain) to 100 kPa (bone before it mineralises): "
-           "Discher, Janmey & Wang, Science 310 (2005) 1139. Above 1000 kPa the strongest adhesions known, 10 kPa "
+           "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it mineralises): "
+           "Discher, Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 kPa. Above 1000 kPa "
+           "the strongest adhesions known, 10 kPa "
            "over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; below 0.01 kPa a "
            "gel does not keep its shape",
        .remedy = "check the modulus and its unit, kPa"},
@@ -136,7 +137,7 @@ const std::vector<PlausibleQuantity>& plausible_quantities() {
            "J. Biomech. 39 (2006) 2603)",
        .remedy = "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
       {.id = "traction_kPa",
-       .quantity = "traction below an adhesion",
+       .quantity = "traction of the adhesions that bear half of the force",
        .usual = Range::between(0, 15),
        .possible = Range::between(0, 100),
        .source =
@@ -244,14 +245,23 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
                .level = ratio > 1 + kRefused ? DoubtLevel::refused : DoubtLevel::caution};
 }
 
-double surest_traction_kPa(const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions) {
+double traction_of_half_the_force_kPa(const std::vector<AdhesionForce>& forces,
+                                      const std::vector<Adhesion>& adhesions) {
   MBTFM_ASSERT(forces.size() == adhesions.size());
-  double largest = 0;
+  std::vector<std::pair<double, double>> loads;  // traction, force
+  double total_nN = 0;
   for (std::size_t a = 0; a < forces.size(); ++a) {
-    const double least_nN = norm(forces[a].force_nN) - 2 * forces[a].sigma_nN.value_or(0);
-    largest = std::max(largest, least_nN / adhesions[a].area_um2);
+    const double least_nN = std::max(0.0, norm(forces[a].force_nN) - 2 * forces[a].sigma_nN.value_or(0));
+    loads.emplace_back(least_nN / adhesions[a].area_um2, least_nN);
+    total_nN += least_nN;
   }
-  return largest;
+  std::ranges::sort(loads, std::greater());
+  double sum_nN = 0;
+  for (const auto& [traction_kPa, force_nN] : loads) {
+    sum_nN += force_nN;
+    if (2 * sum_nN >= total_nN) return traction_kPa;
+  }
+  return 0;
 }
 
 double surest_fibre_tension_nN(const std::vector<Tension>& tensions) {

@@ -60,9 +60,9 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um);
 
 // What errors leave sure of forces: a small adhesion's may be noise.
 
-/// The largest traction below an adhesion (kPa) that is there at least: its force less two standard errors, over its
-/// area. @param forces  by adhesion
-double surest_traction_kPa(const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions);
+/// Adhesions of this traction (kPa) or more bear half of the force that is there at least: forces less two standard
+/// errors, over areas. A single adhesion drawn too small does not change it. @param forces  by adhesion
+double traction_of_half_the_force_kPa(const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions);
 /// The largest of the lower limits (nN) of the fibres' tensions; of a tension without one, itself.
 double surest_fibre_tension_nN(const std::vector<Tension>& tensions);
 

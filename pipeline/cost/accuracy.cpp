@@ -47,7 +47,7 @@ RelativeError relative_error(const ErrorBudget& budget) {
     const ErrorParts& p = t.parts_nN;
     tensions += t.tension_nN * t.tension_nN;
     all += std::pow(total(p), 2);
-    beads += p.beads * p.beads;
+    beads += p.beads * p.beads + p.place.value_or(0) * p.place.value_or(0);  // of the same beads
     segmentation += p.segmentation * p.segmentation;
     model += p.model * p.model;
     error.is_complete = error.is_complete && p.mesh.has_value();

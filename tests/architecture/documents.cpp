@@ -77,7 +77,8 @@ TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
     const std::string source = read_text(fs::path(MBTFM_SOURCE_DIR) / file);
     const auto at = source.find(old);
     EXPECT_NE(at, source.npos) << name << ": no longer in " << file;
-    if (at != source.npos) EXPECT_EQ(source.find(old, at + 1), source.npos) << name << ": twice in " << file;
+    if (at == source.npos) return;
+    EXPECT_EQ(source.find(old, at + 1), source.npos) << name << ": twice in " << file;
   };
   for (std::string line; std::getline(list, line);) {
     if (line.starts_with("fault: ")) {

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "mbtfm/fit_results.h"
+#include "pipeline/contract/errors.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -70,7 +71,7 @@ TEST(CommonMotion, what_was_planted_is_found_within_its_stated_error) {
     move(scene.beads, kMotion);
     LinearData data = with_motions(scene, scene.beads);
     const EnsembleFit fit = fit_of(scene, data);
-    const FoundMotion found = motion_beside(data, fit);
+    const FoundMotion found = common_motion_among(motions_beside(data, fit), data.position_um);
     const CommonMotion& m = found.motion;
     const Vec2 shift = m.shift_um - kMotion.at(m.centre_um);
     Eigen::VectorXd error(6);
@@ -80,6 +81,50 @@ TEST(CommonMotion, what_was_planted_is_found_within_its_stated_error) {
   }
   // a mean of 60 squared normal numbers has a standard deviation of .18
   for (const double square : squares) EXPECT_NEAR(square, 1, 4 * 0.18);
+}
+
+TEST(CommonMotion, a_bent_one_is_found_and_noise_is_taken_for_none) {
+  TensionScene scene = test::tension_scene("case_21", 400, 0.05, 1);
+  constexpr int kDraws = 40;
+  double mean = 0;
+  for (unsigned draw = 1; draw <= kDraws; ++draw) {
+    test::measure(scene, 0.05, draw);
+    LinearData data = with_motions(scene, scene.beads);
+    mean += curved_motion_beside(data, scene.beads, fit_of(scene, data)).chi_squared / kDraws;
+  }
+  EXPECT_NEAR(mean, 14, 4 * std::sqrt(2 * 14.0 / kDraws)) << "chi squared of 14 degrees of freedom";
+  const double sigma_um = scene.beads.front().sigma_um;
+  Vec2 centre;
+  for (const Bead& bead : scene.beads) centre += 1.0 / 400 * bead.position_um;
+  double squares = 0;
+  // as a lens distorts, by twice the noise 40 um out: 800 components then add more than 100 to chi squared
+  for (Bead& bead : scene.beads) {
+    const Vec2 d = 1.0 / 40 * (bead.position_um - centre);
+    const Vec2 bent = 2 * sigma_um * dot(d, d) * d;
+    squares += dot(bent, bent) / 400;
+    bead.displacement_um += bent;
+  }
+  LinearData data = with_motions(scene, scene.beads);
+  const CurvedMotion found = curved_motion_beside(data, scene.beads, fit_of(scene, data));
+  EXPECT_GT(found.chi_squared, 36.1);
+  EXPECT_GT(found.rms_um, 0.2 * std::sqrt(squares)) << "most of it is even growth, which is taken off";
+  EXPECT_LT(found.rms_um, 2 * std::sqrt(squares));
+}
+
+TEST(CommonMotion, beads_that_a_contracting_cell_cannot_move_so_are_refused) {
+  TensionScene scene = test::tension_scene("case_21", 400, 0.05, 1);
+  const auto start = [&](const DisplacementField& beads) {
+    const LinearData data = with_motions(scene, beads);
+    return uniform_start({scene.cables, data.reduced, scene.adhesion_ids});
+  };
+  EXPECT_NO_THROW(start(scene.beads));
+  DisplacementField reversed = scene.beads, still = scene.beads;
+  for (Bead& bead : reversed) bead.displacement_um = -1 * bead.displacement_um;
+  EXPECT_THROW(start(reversed), InvalidData);
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 1);
+  for (Bead& bead : still) bead.displacement_um = {bead.sigma_um * normal(random), bead.sigma_um * normal(random)};
+  EXPECT_NO_THROW(start(still)) << "a cell that pulls at nothing is a cell";
 }
 
 TEST(CommonMotion, reduced_data_are_those_of_the_projected_displacements) {

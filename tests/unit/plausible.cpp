@@ -123,6 +123,18 @@ TEST(Plausible, inputs_that_nobody_gave_are_listed_as_assumed) {
   EXPECT_TRUE(assumed_inputs(list).empty()) << "given is given, also where it is the default";
 }
 
+TEST(Plausible, one_adhesion_that_was_drawn_too_small_makes_no_traction_unusual) {
+  std::vector<Adhesion> adhesions(4, {.adhesion_id = 1, .position_um = {}, .area_um2 = 1});
+  adhesions[2].area_um2 = 0.01;
+  std::vector<AdhesionForce> forces;
+  for (const double force_nN : {3., 4., 2., 5.}) {
+    forces.push_back(
+        {.adhesion_id = 1, .force_nN = {force_nN, 0}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}});
+  }
+  EXPECT_DOUBLE_EQ(traction_of_half_the_force_kPa(forces, adhesions), 5) << "200 kPa on a seventh of the force";
+  EXPECT_DOUBLE_EQ(traction_of_half_the_force_kPa({}, {}), 0);
+}
+
 TEST(Plausible, a_traction_or_a_tension_counts_as_far_as_its_error_leaves_it_sure) {
   const std::vector<Adhesion> adhesions(2, {.adhesion_id = 1, .position_um = {}, .area_um2 = 0.1});
   std::vector<AdhesionForce> forces(2);
@@ -132,7 +144,7 @@ TEST(Plausible, a_traction_or_a_tension_counts_as_far_as_its_error_leaves_it_sur
                .connected = false,
                .moment_nN_um = {}};  // 50 kPa, all of it noise
   forces[1] = {.adhesion_id = 2, .force_nN = {0, 1}, .sigma_nN = 0.25, .connected = false, .moment_nN_um = {}};
-  EXPECT_DOUBLE_EQ(surest_traction_kPa(forces, adhesions), 5);
+  EXPECT_DOUBLE_EQ(traction_of_half_the_force_kPa(forces, adhesions), 5);
   const std::vector<Tension> tensions = {
       {.fibre_id = 0, .tension_nN = 99, .low_nN = {}, .high_nN = {}},  // the network's is no fibre's
       {.fibre_id = 1, .tension_nN = 50, .low_nN = 2, .high_nN = 98},

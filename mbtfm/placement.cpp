@@ -1,0 +1,232 @@
+#include "mbtfm/placement.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mbtfm/fit_results.h"
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
+#include "pipeline/contract/parallel.h"
+#include "substrate/half_space.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+using substrate::Ellipse;
+
+constexpr double kDegree = 180 / std::numbers::pi;
+
+/// d/dx and d/dy of a displacement.
+struct Slopes {
+  Vec2 by_x, by_y;
+};
+
+/// Of Cerruti's point force u = k/r [(1 − nu) F + nu (e·F) e], k = (1 + nu)/(pi E).
+Slopes slopes_of_point(const Gel& gel, Vec2 offset_um, Vec2 F) {
+  const double r = norm(offset_um), nu = gel.poisson_ratio;
+  const double scale = (1 + nu) / (std::numbers::pi * gel.youngs_modulus_kPa * r * r);
+  const Vec2 e = (1 / r) * offset_um;
+  const double along = dot(e, F);
+  const Vec2 fall = (1 - nu) * F + 3 * nu * along * e;
+  return {scale * (-e.x * fall + nu * F.x * e + Vec2{nu * along, 0}),
+          scale * (-e.y * fall + nu * F.y * e + Vec2{0, nu * along})};
+}
+
+/// Of the force spread over the ellipse, by differences of the exact field.
+Slopes slopes_of_ellipse(const substrate::HalfSpaceEllipse& field, double step_um, Vec2 at, Vec2 F) {
+  const auto difference = [&](Vec2 h) {
+    const substrate::Sym2 a = field.compliance_um_per_nN(at + h), b = field.compliance_um_per_nN(at - h);
+    const substrate::Sym2 d = 1 / (2 * step_um) * substrate::Sym2{a.xx - b.xx, a.xy - b.xy, a.yy - b.yy};
+    return Vec2{d.xx * F.x + d.xy * F.y, d.xy * F.x + d.yy * F.y};
+  };
+  return {difference({step_um, 0}), difference({0, step_um})};
+}
+
+/// Shift x, y and turn with standard errors, of what the fit leaves of the beads, tensions and common motion following.
+struct Step {
+  Eigen::Vector3d value, sigma;
+};
+
+Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& derivatives,
+             const Eigen::MatrixXd& placement) {
+  const Eigen::VectorXd weight = squared_weights(data);
+  Eigen::MatrixXd B(data.displacement_um.size(), 3 + derivatives.cols());
+  B << placement, data.response->displace(derivatives);
+  for (Eigen::Index i = 0; i < derivatives.cols(); ++i) {
+    if (trial.tensions_nN[i] <= 0) B.col(3 + i).setZero();  // at its bound
+  }
+  B = less_motion(data, std::move(B));
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * B;
+  const Eigen::MatrixXd inverse = (weighted.transpose() * B).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::VectorXd found = inverse * (weighted.transpose() * residual_um(data, trial.forces_nN));
+  return {.value = found.head<3>(), .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
+}
+
+double mean_semi_minor_um(const Cell& cell) {
+  double sum = 0;
+  for (const Adhesion& a : cell.adhesions) sum += substrate::ellipse_of(a).semi_minor_um;
+  return sum / std::max<double>(1, static_cast<double>(cell.adhesions.size()));
+}
+
+std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
+  return "(" + brief(shift_um.x) + ", " + brief(shift_um.y) + ") +- (" + brief(sigma[0]) + ", " + brief(sigma[1]) +
+         ") um";
+}
+
+Vec2 centre_of(const Cell& cell) {
+  Vec2 sum;
+  for (const Adhesion& a : cell.adhesions) sum += a.position_um;
+  return (1 / std::max<double>(1, static_cast<double>(cell.adhesions.size()))) * sum;
+}
+
+}  // namespace
+
+Vec2 Placement::of(Vec2 place_um) const {
+  const double c = std::cos(turn_rad), s = std::sin(turn_rad);
+  const Vec2 d = place_um - centre_um;
+  return centre_um + shift_um + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
+}
+
+Cell placed(Cell cell, const Placement& placement) {
+  const auto move = [&](auto& points) {
+    for (Vec2& p : points) p = placement.of(p);
+  };
+  for (Adhesion& a : cell.adhesions) {
+    a.position_um = placement.of(a.position_um);
+    a.angle_rad += placement.turn_rad;
+  }
+  for (Fibre& fibre : cell.fibres) move(fibre.points_um);
+  move(cell.outline_um);
+  for (Polygon& hole : cell.holes_um) move(hole);
+  return cell;
+}
+
+Network placed(Network network, const Placement& placement) {
+  for (Vec2& p : network.vertices_um) p = placement.of(p);
+  return network;
+}
+
+std::vector<network::CableNetwork> placed_networks(const std::vector<network::CableNetwork>& networks,
+                                                   const Placement& placement) {
+  std::vector<network::CableNetwork> result;
+  for (const network::CableNetwork& n : networks) result.emplace_back(placed(n.network(), placement), n.parameters());
+  return result;
+}
+
+Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& ellipses,
+                                  const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
+                                  const Eigen::VectorXd& model_um, Vec2 centre_um, int threads) {
+  constexpr double kPoint = 4;    // semi-axes: from there on the field is a point force's within (1/4)² / 2
+  constexpr double kStep = 0.05;  // of the semi-minor axis, over which differences are taken
+  std::vector<substrate::HalfSpaceEllipse> fields;
+  for (const Ellipse& e : ellipses) fields.emplace_back(gel, e);
+  Eigen::MatrixXd motions(model_um.size(), 3);
+  parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
+    const Vec2 at = beads_um[static_cast<std::size_t>(b)];
+    Slopes sum;
+    for (std::size_t k = 0; k < ellipses.size(); ++k) {
+      const Ellipse& e = ellipses[k];
+      const Vec2 offset = at - e.centre_um;
+      const Vec2 F{forces_nN[2 * static_cast<Eigen::Index>(k)], forces_nN[2 * static_cast<Eigen::Index>(k) + 1]};
+      const double reach = kPoint * e.semi_major_um;
+      const Slopes one = dot(offset, offset) > reach * reach
+                             ? slopes_of_point(gel, offset, F)
+                             : slopes_of_ellipse(fields[k], kStep * e.semi_minor_um, at, F);
+      sum.by_x += one.by_x;
+      sum.by_y += one.by_y;
+    }
+    // a cell that goes forth leaves the beads behind; a turn carries the displacement along
+    const Vec2 d = at - centre_um;
+    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const Vec2 turned = Vec2{-model_um[row + 1], model_um[row]} + d.y * sum.by_x - d.x * sum.by_y;
+    motions.middleRows<2>(row) << -sum.by_x.x, -sum.by_y.x, turned.x, -sum.by_x.y, -sum.by_y.y, turned.y;
+  });
+  return motions;
+}
+
+PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, LinearData data, const DataOf& data_of,
+                      const Gel& gel, const FitParameters& parameters, const Trial& start, const std::string& setting,
+                      int threads) {
+  const Stopwatch watch;
+  constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
+  constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
+  constexpr int kMostPasses = 12;     // far off it takes four
+  const double width_um = mean_semi_minor_um(cell);
+  PlacedCell result{.placement = {.centre_um = centre_of(cell), .shift_um = {}},
+                    .cell = cell,
+                    .data = {},
+                    .start_nN = start.tensions_nN,
+                    .effect = {}};
+  const auto off = [&](const std::string& why) {
+    result.placement = {.centre_um = result.placement.centre_um, .shift_um = {}};
+    result.cell = cell;
+    result.effect = decided(kChannelShift, setting, false, why);
+    return result;
+  };
+  if (setting == "off") {
+    result.data = std::move(data);
+    return off("as told: cell and beads lie on each other");
+  }
+  FitParameters rough = parameters;
+  rough.tolerance = std::max(rough.tolerance, 1e-3);
+  LinearData there = data;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    const network::CableNetwork moved(placed(network.network(), result.placement), network.parameters());
+    const TensionProblem problem(moved, there.reduced, adhesion_ids_of(cell), {}, threads);
+    const TensionFit fit = fit_tensions(
+        problem, rough, threads,
+        pass == 0 ? problem.evaluate(start.tensions_nN, &start) : scaled_to_data(problem, result.start_nN));
+    result.start_nN = fit.trial.tensions_nN;
+    const Eigen::MatrixXd motions = placement_motions(gel, ellipses_of(result.cell), fit.trial.forces_nN,
+                                                      there.position_um, there.response->displace(fit.trial.forces_nN),
+                                                      result.placement.centre_um + result.placement.shift_um, threads);
+    const Step step = step_of(there, fit.trial, problem.force_derivatives(fit.trial), motions);
+    const Vec2 shift{step.value[0], step.value[1]};
+    const double sigma = std::max(step.sigma[0], step.sigma[1]);
+    if (setting == "auto" && !(sigma < 0.5 * width_um)) {
+      result.data = std::move(data);
+      return off("the beads do not tell it: " + in_words(result.placement.shift_um + shift, step.sigma));
+    }
+    if (norm(shift) < kLinear * width_um) {
+      result.data = std::move(there);
+      add_motions(result.data, motions);
+      result.effect = decided(kChannelShift, setting, true, "found with the tensions");
+      result.effect.seconds = watch.seconds();
+      return result;
+    }
+    // steps no longer than the field is linear for
+    const double damping = std::min(1.0, width_um / norm(shift));
+    result.placement.shift_um += damping * shift;
+    result.placement.turn_rad += damping * step.value[2];
+    if (norm(result.placement.shift_um) > kFarthest_um) break;
+    result.cell = placed(cell, result.placement);
+    there = data_of(result.cell);
+  }
+  result.data = std::move(data);
+  return off("no place within " + brief(kFarthest_um) + " um suits the beads");
+}
+
+FoundPlacement placement_among(const MotionsBeside& motions, Placement placement) {
+  const Eigen::Vector3d rest = motions.values.tail<3>();
+  placement.shift_um += Vec2{rest[0], rest[1]};
+  placement.turn_rad += rest[2];
+  return {.placement = placement, .sigma = motions.sigma.tail<3>()};
+}
+
+Figures figures_of(const FoundPlacement& found) {
+  return {{"channel_shift_x_um", found.placement.shift_um.x},
+          {"channel_shift_y_um", found.placement.shift_um.y},
+          {"channel_shift_sigma_um", std::max(found.sigma[0], found.sigma[1])},
+          {"channel_turn_deg", kDegree * found.placement.turn_rad},
+          {"channel_turn_sigma_deg", kDegree * found.sigma[2]}};
+}
+
+std::string sentence_of(const FoundPlacement& found) {
+  return in_words(found.placement.shift_um, found.sigma) + ", turned by " + brief(kDegree * found.placement.turn_rad) +
+         " +- " + brief(kDegree * found.sigma[2]) + " degrees";
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,80 @@
+/// Where the cell lies on the beads. The camera sees them through other filters than the cell, or after the stage has
+/// moved, so that both are off by some pixels. The cell is therefore a rigid body with three unknowns, a shift s and a
+/// turn Q about its centre c, which are found with the tensions:
+///
+///   u(x) = Q G(Qᵀ (x − c − s)) F
+///
+/// In a small rest of them u is linear. That rest stays among the motions that the beads may have besides
+/// (linear_data.h), so that the error bars hold what the beads do not know of the cell's place.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/common_motion.h"
+#include "mbtfm/linear_data.h"
+#include "mbtfm/tension_fit.h"
+#include "network/cables.h"
+#include "pipeline/contract/report.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::inverse {
+
+/// A turn about the centre, then a shift.
+struct Placement {
+  Vec2 centre_um, shift_um;
+  double turn_rad = 0;  ///< from +x towards +y
+  Vec2 of(Vec2 place_um) const;
+};
+Cell placed(Cell cell, const Placement& placement);
+Network placed(Network network, const Placement& placement);
+std::vector<network::CableNetwork> placed_networks(const std::vector<network::CableNetwork>& networks,
+                                                   const Placement& placement);
+
+/// Displacement of the beads per shift of the cell along x and y (um/um) and per turn about the centre (um/rad), forces
+/// and all: 2·beads × 3. By the half-space's field, beyond four semi-axes that of a point force: the base and the sides
+/// of a gel change little so near to an adhesion that its place matters.
+/// @param model_um  displacement of the beads by these forces, 2·beads
+Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
+                                  const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
+                                  const Eigen::VectorXd& model_um, Vec2 centre_um, int threads);
+
+/// A cell where the beads want it.
+struct PlacedCell {
+  Placement placement;
+  Cell cell;
+  LinearData data;           ///< of the cell there, what is left of shift and turn among its motions
+  Eigen::VectorXd start_nN;  ///< tensions
+  Effect effect;             ///< off: the cell is where it was
+};
+
+/// The data of the cell's beads for its adhesions at some place.
+using DataOf = std::function<LinearData(const Cell&)>;
+
+inline constexpr const char* kChannelShift = "channel shift";
+
+/// Gauss–Newton over shift and turn on one network, tensions fitted at each place, until what is left is linear.
+///
+/// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
+/// field is linear in it, or where no place is found within kFarthest.
+/// @param data  of the cell where it is
+PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, LinearData data, const DataOf& data_of,
+                      const Gel& gel, const FitParameters& parameters, const Trial& start, const std::string& setting,
+                      int threads);
+
+/// What came of it beside the fit: shift x, y (um) and turn (rad) with standard errors.
+struct FoundPlacement {
+  Placement placement;
+  Eigen::Vector3d sigma;
+};
+/// @param motions  the last three those of placement_motions()
+FoundPlacement placement_among(const MotionsBeside& motions, Placement placement);
+/// Of fit.json.
+Figures figures_of(const FoundPlacement& found);
+/// "(0.31, -0.12) +- (0.02, 0.02) um, turned by 0.1 +- 0.2 degrees"
+std::string sentence_of(const FoundPlacement& found);
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,185 @@
+#include "mbtfm/placement.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Geometry>
+#include <cmath>
+
+#include "mbtfm/error_budget.h"
+#include "mbtfm/fit_results.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::TensionScene;
+
+constexpr Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+
+/// A round cell with two fibres whose images lie off its beads.
+struct ShiftedCell {
+  Cell cell;  ///< as the images have it
+  TensionScene scene;
+  Placement truth;
+
+  LinearData data_of(const Cell& at) const {
+    const auto gel = substrate::make_greens(kGel, {.model = "layer"}, 1);
+    return reduce(scene.beads, substrate::dense_response(gel->compliance_um_per_nN(scene.points_um, ellipses_of(at))),
+                  {}, 1, affine_motions(scene.beads));
+  }
+
+  /// Fitted on the network that made the forces.
+  std::pair<EnsembleFit, FoundPlacement> fit(const std::string& setting = "auto") const {
+    std::vector<network::CableNetwork> networks;
+    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
+    LinearData data = data_of(cell);
+    const Trial start = uniform_start({networks.front(), data.reduced, scene.adhesion_ids});
+    PlacedCell place = place_cell(
+        cell, networks.front(), data, [&](const Cell& at) { return data_of(at); }, kGel, {}, start, setting, 1);
+    const auto placed = placed_networks(networks, place.placement);
+    EnsembleFit found = fit_ensemble(placed, place.data, scene.adhesion_ids, {}, 1, {});
+    if (!place.effect.is_on) return {std::move(found), {place.placement, Eigen::Vector3d::Zero()}};
+    const MotionsBeside motions = motions_beside(place.data, found);
+    return {std::move(found), placement_among(motions, place.placement)};
+  }
+};
+
+ShiftedCell shifted_cell(Vec2 shift_um, double turn_rad, double noise, unsigned seed) {
+  Cell cell = test::round_cell(12, 9);
+  test::add_ventral(cell, 1, 5);
+  test::add_ventral(cell, 2, 7);
+  ShiftedCell result{.cell = cell,
+                     .scene = test::scene_of(cell, Eigen::Vector3d(0.1, 6, 3), 900, noise, 5),
+                     .truth = {.centre_um = {30, 30}, .shift_um = shift_um, .turn_rad = turn_rad}};
+  // the beads and what they do lie elsewhere
+  const double c = std::cos(turn_rad), s = std::sin(turn_rad);
+  TensionScene& scene = result.scene;
+  for (std::size_t i = 0; i < scene.points_um.size(); ++i) {
+    scene.points_um[i] = result.truth.of(scene.points_um[i]);
+    auto u = scene.displacement_um.segment<2>(2 * static_cast<Eigen::Index>(i));
+    u = Eigen::Vector2d(c * u[0] - s * u[1], s * u[0] + c * u[1]);
+  }
+  test::measure(scene, noise, seed);
+  return result;
+}
+
+TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
+  const Cell cell = test::round_cell(12, 7);
+  std::vector<Vec2> beads;
+  for (int i = 0; i < 400; ++i) beads.push_back({13 + 1.7 * (i % 20), 13 + 1.7 * (i / 20)});
+  Eigen::VectorXd forces(14);
+  for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
+  const auto model = [&](const Placement& at) -> Eigen::VectorXd {
+    Eigen::VectorXd turned(14);
+    for (int a = 0; a < 7; ++a) {
+      turned.segment<2>(2 * a) = Eigen::Rotation2Dd(at.turn_rad) * forces.segment<2>(2 * a);
+    }
+    const auto gel = substrate::make_greens(kGel, {.model = "half-space"}, 1);
+    return gel->compliance_um_per_nN(beads, ellipses_of(placed(cell, at))) * turned;
+  };
+  const Vec2 centre{30, 30};
+  const Eigen::MatrixXd motions = placement_motions(kGel, ellipses_of(cell), forces, beads,
+                                                    model({.centre_um = centre, .shift_um = {}}), centre, 2);
+  constexpr double kStep = 1e-3;
+  const Placement steps[] = {{centre, {kStep, 0}, 0}, {centre, {0, kStep}, 0}, {centre, {}, kStep}};
+  for (int k = 0; k < 3; ++k) {
+    const Placement back{centre, -1 * steps[k].shift_um, -steps[k].turn_rad};
+    const Eigen::VectorXd wanted = (model(steps[k]) - model(back)) / (2 * kStep);
+    // beyond four semi-axes a point force's: (1/4)² / 2 of a part that is small
+    EXPECT_LE((motions.col(k) - wanted).norm(), 0.01 * wanted.norm()) << k;
+  }
+}
+
+TEST(Placement, wherever_the_images_say_the_cell_lies_the_tensions_are_the_same) {
+  const auto [still, no_shift] = shifted_cell({}, 0, 0.03, 4).fit();
+  for (const Vec2 shift : {Vec2{0.3, -0.2}, Vec2{-1, 0.6}}) {
+    const ShiftedCell off = shifted_cell(shift, 0.01, 0.03, 4);
+    const auto [fit, found] = off.fit();
+    EXPECT_LE((values_of(fit) - values_of(still)).norm(), 0.3 * std::sqrt(still.covariance_nN2.trace()))
+        << "what is left of the shift is linear to a fraction of the error";
+    EXPECT_LE(norm(found.placement.shift_um - shift - no_shift.placement.shift_um), 0.5 * found.sigma.head(2).norm());
+    EXPECT_NEAR(found.placement.turn_rad, 0.01 + no_shift.placement.turn_rad, 0.5 * found.sigma[2]);
+  }
+}
+
+TEST(Placement, is_found_within_its_stated_error) {
+  constexpr int kDraws = 40;
+  Eigen::Vector3d squares = Eigen::Vector3d::Zero();
+  for (unsigned seed = 1; seed <= kDraws; ++seed) {
+    const ShiftedCell off = shifted_cell({0.2, 0.1}, 0.005, 0.05, seed);
+    const auto [fit, found] = off.fit();
+    const Placement& p = found.placement;
+    // the same place, told of another centre
+    const Vec2 shift = p.of(off.truth.centre_um) - off.truth.centre_um;
+    const Eigen::Vector3d error(shift.x - 0.2, shift.y - 0.1, p.turn_rad - 0.005);
+    squares += error.cwiseQuotient(found.sigma).cwiseAbs2() / kDraws;
+  }
+  // a mean of 40 squared normal numbers has a standard deviation of .22
+  for (const double square : squares) EXPECT_NEAR(square, 1, 4 * 0.22);
+}
+
+TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
+  const ShiftedCell noisy = shifted_cell({0.2, 0.1}, 0, 3, 1);
+  const LinearData data = noisy.data_of(noisy.cell);
+  const Trial start = uniform_start({noisy.scene.cables, data.reduced, noisy.scene.adhesion_ids});
+  const auto place = [&](const std::string& setting) {
+    return place_cell(
+        noisy.cell, noisy.scene.cables, data, [&](const Cell& at) { return noisy.data_of(at); }, kGel, {}, start,
+        setting, 1);
+  };
+  for (const std::string setting : {"auto", "off"}) {
+    const PlacedCell stays = place(setting);
+    EXPECT_FALSE(stays.effect.is_on) << setting;
+    EXPECT_EQ(norm(stays.placement.shift_um), 0) << setting;
+    EXPECT_EQ(stays.data.motions.cols(), 6) << setting;
+  }
+}
+
+TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_known) {
+  const ShiftedCell still = shifted_cell({}, 0, 0.05, 3);
+  std::vector<network::CableNetwork> networks;
+  networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
+  LinearData known = still.data_of(still.cell);
+  const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1, {});
+  LinearData unknown = known;
+  const Eigen::VectorXd& forces = with_known.forces_nN;
+  add_motions(unknown, placement_motions(kGel, still.scene.ellipses, forces, still.scene.points_um,
+                                         known.response->displace(forces), {30, 30}, 1));
+  const EnsembleFit fit = fit_ensemble(networks, unknown, still.scene.adhesion_ids, {}, 1, {});
+  const ErrorBudget budget = error_budget({.fit = fit,
+                                           .data = unknown,
+                                           .networks = networks,
+                                           .cell = still.cell,
+                                           .beads = still.scene.beads,
+                                           .gel = kGel,
+                                           .segmentation = {},
+                                           .n_of_place = 3},
+                                          1);
+  const auto noise = [](const EnsembleFit& of) -> Eigen::VectorXd {
+    return of.meshes.front().noise_covariance_nN2.diagonal() / of.variance;
+  };
+  for (Eigen::Index i = 0; i < 3; ++i) {
+    const double more = fit.variance * (noise(fit)[i] - noise(with_known)[i]);
+    ASSERT_TRUE(budget.tensions[static_cast<std::size_t>(i)].parts_nN.place);
+    // the two fits end at tensions that differ by a fraction of an error
+    EXPECT_NEAR(std::pow(*budget.tensions[static_cast<std::size_t>(i)].parts_nN.place, 2), more, 0.1 * more) << i;
+    EXPECT_GT(more, 0);
+  }
+}
+
+TEST(Placement, added_motions_reduce_as_if_they_had_been_there_from_the_first) {
+  const TensionScene scene = test::tension_scene("case_21", 80, 0.05, 7);
+  const Eigen::MatrixXd affine = affine_motions(scene.beads);
+  LinearData once = reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine);
+  LinearData twice =
+      reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine.leftCols(2));
+  add_motions(twice, affine.rightCols(4));
+  EXPECT_EQ(once.n_used, twice.n_used);
+  EXPECT_NEAR(once.reduced.floor_squared, twice.reduced.floor_squared, 1e-9 * once.reduced.floor_squared);
+  const Eigen::VectorXd forces = scene.forces_nN;
+  EXPECT_NEAR((displace(once.reduced, forces) - once.reduced.target).norm(),
+              (displace(twice.reduced, forces) - twice.reduced.target).norm(), 1e-8 * once.reduced.target.norm());
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
