@@ -185,8 +185,8 @@ void declare(ParameterList& list, FibreParameters& p) {
            "points are left out where the line moves less (um)");
 }
 
-std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
-                               double pixel_size_um, const FibreParameters& p) {
+std::vector<Fibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
+                                const FibreParameters& p) {
   const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
   const Ridges ridges = find_ridges(field.image, field.is_inside, scales_of(p, field.pixel_um));
   const auto traces = trace_lines(ridges, field.is_inside, rule_of(p, field.pixel_um));
@@ -197,13 +197,24 @@ std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, co
     fibre.width_um = c.profile.width_px * field.pixel_um;
     fibre.mean_intensity = c.profile.height;
     fibre.confidence = chance_of_fibre(c.expected_false);
-    tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
-    if (length_um(fibre.points_um) >= p.fibre_shortest_um) fibres.push_back(fibre);
+    fibres.push_back(std::move(fibre));
   }
+  return fibres;
+}
+
+std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
+                        const FibreParameters& p) {
+  for (Fibre& fibre : fibres) tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+  std::erase_if(fibres, [&](const Fibre& f) { return length_um(f.points_um) < p.fibre_shortest_um; });
   std::stable_sort(fibres.begin(), fibres.end(),
                    [](const Fibre& a, const Fibre& b) { return length_um(a.points_um) > length_um(b.points_um); });
   for (std::size_t i = 0; i < fibres.size(); ++i) fibres[i].fibre_id = static_cast<int>(i) + 1;
   return fibres;
+}
+
+std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
+                               double pixel_size_um, const FibreParameters& p) {
+  return tied(trace_fibres(image, outline_um, pixel_size_um, p), adhesions, outline_um, p);
 }
 
 }  // namespace mbtfm::segment

@@ -29,17 +29,25 @@ struct FibreParameters {
 
 void declare(ParameterList& list, FibreParameters& parameters);
 
-/// Find stress fibres: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
+/// Lines of an actin image that are stress fibres, not yet tied to adhesions: without type and label.
+/// @param outline_um  lines whose middle lies outside are no fibres; empty: anywhere
+/// @param pixel_size_um  > 0
+/// @throws InvalidData where a pixel is not finite
+std::vector<Fibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
+                                const FibreParameters& parameters);
+/// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
+/// out.
+std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
+                        const FibreParameters& parameters);
+
+/// Both: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
 /// collinear pieces joined. A line is a fibre where its mean height over the texture around it is so significant that
 /// the meshwork of the whole cell would make fewer than `fibre_false_per_cell` such lines by chance; steps (the cell's
 /// edge) and folds near the edge are left out. Ends are tied to the adhesions they reach, and their number is the type
 /// (Hotulainen & Lappalainen, J Cell Biol 173:383, 2006), with its chance to be right and its reason.
 ///
 /// A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
-/// `mean_intensity` the mean height above both sides in grey levels. Sorted by length, longest first, ids from 1.
-/// @param outline_um  lines whose middle lies outside are no fibres; empty: anywhere
-/// @param pixel_size_um  > 0
-/// @throws InvalidData where a pixel is not finite
+/// `mean_intensity` the mean height above both sides in grey levels.
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
                                double pixel_size_um, const FibreParameters& parameters);
 

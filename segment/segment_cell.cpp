@@ -21,6 +21,9 @@ void declare(ParameterList& list, SegmentParameters& p) {
       "which cell of the image, by area from 1, the largest; 0: all, each in a folder cell_1, cell_2, … of its own");
   declare(list, p.adhesion_plane, "adhesion", "the adhesion image");
   declare(list, p.actin_plane, "actin", "the actin image");
+  list.add("align_channels", p.align_channels,
+           "move fibres and outline to where the adhesion image has them; auto: where fibre ends tell a shift",
+           {"auto", "off"});
   list.add("contact_sheet", p.contact_sheet,
            "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
   declare(list, p.adhesions);
@@ -75,6 +78,22 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& c
   return {std::move(cells[static_cast<std::size_t>(p.cell - 1)])};
 }
 
+/// Move what the actin image shows to where the adhesion image has it.
+void align(Segmentation& s, CellOutline& outline, std::vector<Fibre>& fibres, const std::vector<Adhesion>& adhesions,
+           const SegmentParameters& p) {
+  s.alignment = align_channels(fibres, adhesions);
+  if (!s.alignment || p.align_channels == "off" || !s.alignment->is_significant()) return;
+  s.is_aligned = true;
+  const auto move = [&](auto& points) {
+    for (Vec2& point : points) point = s.alignment->of(point);
+  };
+  move(outline.outer_um);
+  for (Polygon& hole : outline.holes_um) move(hole);
+  s.cell.outline_um = outline.outer_um;
+  s.cell.holes_um = outline.holes_um;
+  for (Fibre& fibre : fibres) move(fibre.points_um);
+}
+
 }  // namespace
 
 std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
@@ -100,7 +119,11 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                    .n_cells = static_cast<int>(outlines.size()),
                    .area_um2 = outline.area_um2,
                    .is_cut_by_border = outline.is_cut_by_border};
-    s.cell.adhesions = inside(outline, found);
+    std::vector<Fibre> traced;
+    if (actin && !drawn.fibres) traced = trace_fibres(actin->image, s.cell.outline_um, pixel_um, p.fibres);
+    CellOutline around = outline;
+    if (adhesion && !drawn.outline) align(s, around, traced, found, p);
+    s.cell.adhesions = inside(around, found);
     s.n_adhesions_outside = static_cast<int>(found.size() - s.cell.adhesions.size());
     if (!found.empty() && s.cell.adhesions.empty() && p.cell != 0)
       throw InputError(drawn.adhesions ? drawn.adhesions->name : adhesion->name, "adhesions inside the cell's outline",
@@ -109,7 +132,7 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
     if (drawn.fibres)
       s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres);
     else if (actin)
-      s.cell.fibres = find_fibres(actin->image, s.cell.outline_um, s.cell.adhesions, pixel_um, p.fibres);
+      s.cell.fibres = tied(std::move(traced), s.cell.adhesions, s.cell.outline_um, p.fibres);
     result.push_back(std::move(s));
   }
   return result;

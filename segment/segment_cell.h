@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/types.h"
 #include "segment/adhesions.h"
+#include "segment/channel_alignment.h"
 #include "segment/channels.h"
 #include "segment/fibres.h"
 #include "segment/hand_drawn.h"
@@ -19,7 +20,8 @@ struct SegmentParameters {
   int binning = 1;                      ///< to be quick: everything that is found becomes coarser with the pixels
   int cell = 1;                         ///< most images are of one cell
   PlaneChoice adhesion_plane, actin_plane;
-  std::string contact_sheet;  ///< none: it takes a segmentation for each of its pictures
+  std::string align_channels = "auto";  ///< actin on adhesions
+  std::string contact_sheet;            ///< none: it takes a segmentation for each of its pictures
   AdhesionParameters adhesions;
   FibreParameters fibres;
   OutlineParameters outline;
@@ -30,10 +32,12 @@ void declare(ParameterList& list, SegmentParameters& parameters);
 struct Segmentation {
   Cell cell;
   double pixel_size_um = 0;
-  int n_cells = 1;                ///< that the image shows
-  double area_um2 = 0;            ///< of the cell, less its holes
-  bool is_cut_by_border = false;  ///< the image ends before the cell does
-  int n_adhesions_outside = 0;    ///< found beyond the cell and left out
+  int n_cells = 1;                            ///< that the image shows
+  double area_um2 = 0;                        ///< of the cell, less its holes
+  bool is_cut_by_border = false;              ///< the image ends before the cell does
+  int n_adhesions_outside = 0;                ///< found beyond the cell and left out
+  std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
+  bool is_aligned = false;                    ///< fibres and outline were moved by it
 };
 
 /// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions.

@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <numbers>
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/contract/csv.h"
@@ -51,11 +52,27 @@ StageReport report_of(const Segmentation& s) {
                     {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
                     {"is_cut_by_border", s.is_cut_by_border},
                     {"n_cells_in_image", static_cast<std::int64_t>(s.n_cells)}};
+  if (s.alignment) {
+    const ChannelAlignment& a = *s.alignment;
+    report.figures.insert(report.figures.end(),
+                          {{"actin_shift_x_um", a.shift_um.x},
+                           {"actin_shift_y_um", a.shift_um.y},
+                           {"actin_shift_sigma_um", std::max(a.shift_sigma_um.x, a.shift_sigma_um.y)},
+                           {"actin_turn_deg", 180 / std::numbers::pi * a.turn_rad},
+                           {"actin_growth", a.growth},
+                           {"is_actin_aligned", s.is_aligned}});
+  }
   report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
                    std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
                    " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
   for (std::optional<Finding> found :
        {noticed(FindingKind::cell_cut, s.is_cut_by_border ? 1 : 0, "The image's border cuts the cell."),
+        noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
+                s.alignment ? "Fibres end beside their adhesions: the adhesion image shows them shifted by " +
+                                  sentence_of(*s.alignment) + "." +
+                                  (s.is_aligned ? " They were moved there." : " They were left where they are.")
+                            : std::string(),
+                s.is_aligned ? Severity::note : Severity::caution),
         noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
                 std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out.")}) {
     if (found) report.findings.push_back(std::move(*found));

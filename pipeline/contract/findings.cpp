@@ -28,6 +28,12 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Record the whole cell. Else distrust the fibres and adhesions near the cut, and the total force."},
       {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
        "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
+      {actin_shift, "actin-shift", "segment", note, "1 where the actin image is shifted against the adhesion image", 0,
+       "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
+       "above "
+       "27 elsewhere",
+       "Nothing where the fibres were moved. If it recurs, measure the shift between the filters with beads that shine "
+       "in both."},
       {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by three standard errors",
        0.98, "chance moves 1 bead in 90 by that much",
        "Check that the two bead images belong to this cell, and that the cell was removed between them."},

@@ -24,6 +24,7 @@ enum class FindingKind {
   // segment
   cell_cut,
   adhesions_left_out,
+  actin_shift,
   // track
   nothing_moves,
   moves_outward,
