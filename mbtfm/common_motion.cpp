@@ -49,23 +49,6 @@ Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
 
 namespace {
 
-/// Covariance of numbers that are linear in what is left of the beads.
-/// @param of_noise  of the numbers for noise of variance 1, the tensions held
-/// @param by_force  the numbers by adhesion force
-/// @param sign  of what the tensions' answer to noise adds: + for estimates beside the tensions, − for scores
-Eigen::MatrixXd covariance_of(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise, const Eigen::MatrixXd& by_force,
-                              int sign) {
-  const MeshFit& mesh = fit.meshes.front();
-  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
-  Eigen::MatrixXd covariance =
-      fit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
-  if (fit.model_error) {
-    const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
-    covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
-  }
-  return covariance;
-}
-
 /// 2·beads × 14, about the beads' centre and of size 1 or so.
 Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
   constexpr int kPowers[7][2] = {{2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}};
@@ -93,7 +76,7 @@ MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
   const Eigen::MatrixXd by_force = data.motion_inverse * data.response->pull_back(weighted).transpose();
   return {.values = motion_in(data, data.displacement_um - data.response->displace(fit.forces_nN)),
-          .sigma = covariance_of(fit, data.motion_inverse, by_force, +1).diagonal().cwiseMax(0).cwiseSqrt()};
+          .sigma = covariance_of_estimates(fit, data.motion_inverse, by_force).diagonal().cwiseMax(0).cwiseSqrt()};
 }
 
 FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um) {
@@ -113,7 +96,7 @@ CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementFiel
   const Eigen::VectorXd scores = weighted.transpose() * residual_um(data, fit.forces_nN);
   const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
   const Eigen::MatrixXd of_noise = weighted.transpose() * motions;
-  const auto inverse = covariance_of(fit, of_noise, by_force, -1).completeOrthogonalDecomposition();
+  const auto inverse = covariance_of_scores(fit, of_noise, by_force).completeOrthogonalDecomposition();
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
   const Eigen::MatrixXd information =

@@ -308,6 +308,32 @@ Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
   return along;
 }
 
+namespace {
+/// @param sign  of what the tensions' answer to noise adds: + to estimates beside them, − to scores
+Eigen::MatrixXd covariance_beside(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                  const Eigen::MatrixXd& by_force, int sign) {
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  Eigen::MatrixXd covariance =
+      fit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
+  if (fit.model_error) {
+    const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
+    covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
+  }
+  return covariance;
+}
+}  // namespace
+
+Eigen::MatrixXd covariance_of_estimates(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                        const Eigen::MatrixXd& by_force) {
+  return covariance_beside(fit, of_noise, by_force, +1);
+}
+
+Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                     const Eigen::MatrixXd& by_force) {
+  return covariance_beside(fit, of_noise, by_force, -1);
+}
+
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
   Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;

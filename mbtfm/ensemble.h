@@ -86,6 +86,15 @@ Eigen::VectorXd values_of(const EnsembleFit& fit);
 /// along them.
 Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN);
 
+/// Covariance of numbers that are linear in what the fit leaves of the beads, from their noise and the model's error,
+/// the tensions following both: of estimates of what the beads do besides, and of scores for what they might do.
+/// @param of_noise  of the numbers for noise of variance 1, the tensions held
+/// @param by_force  the numbers by adhesion force: some × 2·adhesions
+Eigen::MatrixXd covariance_of_estimates(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                        const Eigen::MatrixXd& by_force);
+Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                     const Eigen::MatrixXd& by_force);
+
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);
 

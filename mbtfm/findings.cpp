@@ -126,6 +126,20 @@ Noticed missing_fibres_noticed(const FitOutcome& o) {
   return noticed(FindingKind::missing_fibre, static_cast<double>(o.missing.size()), text + ".");
 }
 
+Noticed missing_adhesions_noticed(const FitOutcome& o) {
+  const std::vector<MissingAdhesion>& missing = o.missing_adhesions;
+  std::string text = "The beads call for " + counted(static_cast<std::int64_t>(missing.size()), "force", "forces") +
+                     " where no adhesion was found: ";
+  constexpr std::size_t kMost = 4;
+  for (std::size_t i = 0; i < std::min(kMost, missing.size()); ++i) {
+    const MissingAdhesion& a = missing[i];
+    text += (i > 0 ? "; " : "") + brief(norm(a.force_nN)) + " nN at (" + brief(a.position_um.x) + ", " +
+            brief(a.position_um.y) + ") um";
+  }
+  if (missing.size() > kMost) text += "; ... (missing_adhesions.csv)";
+  return noticed(FindingKind::missing_adhesion, static_cast<double>(missing.size()), text + ".");
+}
+
 Noticed fibres_without_tension(const FitOutcome& o) {
   std::vector<int> ids;
   for (const Fibre& fibre : o.cell.fibres) {
@@ -241,10 +255,10 @@ Imbalance imbalance_of(const EnsembleFit& fit) {
 std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
-  for (Noticed found : {common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o), unexplained(o),
-                        beads_disagree(o), noise_unknown(o), noise_disagrees(o), not_identifiable(o),
-                        network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
-                        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
+  for (Noticed found : {common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o),
+                        missing_adhesions_noticed(o), unexplained(o), beads_disagree(o), noise_unknown(o),
+                        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o),
+                        single_mesh(o), out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
                         out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"),
                         wide_intervals(o), tensions_at_zero(o)}) {
     if (found) findings.push_back(std::move(*found));

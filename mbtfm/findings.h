@@ -6,6 +6,7 @@
 
 #include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
+#include "mbtfm/missing_adhesions.h"
 #include "mbtfm/model_checks.h"
 #include "mbtfm/placement.h"
 #include "pipeline/contract/findings.h"
@@ -20,6 +21,7 @@ struct FitOutcome {
   const FitSummary& summary;
   const std::vector<Tension>& tensions;
   const std::vector<MissingFibre>& missing;
+  const std::vector<MissingAdhesion>& missing_adhesions;
   const std::optional<FoundMotion>& motion;
   const std::optional<CurvedMotion>& curved;
   const std::optional<FoundPlacement>& place;

@@ -317,11 +317,13 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const Influence influence = influence_of(fit, data);
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence);
   const std::vector<MissingFibre> missing = missing_fibres(fit, inputs.cell.adhesions, context.threads);
+  const std::vector<MissingAdhesion> missing_places = missing_adhesions(fit, data, inputs.cell, p.gel, context.threads);
   for (const auto& figure : figures_of(fit, models, left_out, missing)) summary.more.push_back(figure);
   write_correlations(context.output("out", "correlations.csv"), fit);
   write_models(context.output("out", "models.csv"), models);
   write_fibres_left_out(context.output("out", "fibres_left_out.csv"), left_out);
   write_missing_fibres(context.output("out", "missing_fibres.csv"), missing);
+  write_missing_adhesions(context.output("out", "missing_adhesions.csv"), missing_places);
   const auto drawn = cross_validation_of(fit, data, networks.front(), inputs.cell, p.fit, context.threads);
   if (drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *drawn);
   write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
@@ -364,7 +366,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   report.figures.emplace_back("error_budget_s", budget_s);
   context.notice(noticed(FindingKind::modulus_error_unknown, p.gel.youngs_modulus_sigma_kPa ? 0 : 1,
                          "No error of Young's modulus is given. An error of 10 % would change every force by 10 %."));
-  report.findings = findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, motion, curved, found_place});
+  report.findings =
+      findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, missing_places, motion, curved, found_place});
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0)

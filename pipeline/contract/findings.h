@@ -38,6 +38,7 @@ enum class FindingKind {
   beads_disagree_by_region,
   // fit: the cell
   missing_fibre,
+  missing_adhesion,
   fibre_without_tension,
   // fit: the answer
   not_identifiable,

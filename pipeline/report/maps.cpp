@@ -182,8 +182,15 @@ Figure segmentation_map(const CellResults& results) {
               fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN",
                           f.start_adhesion_id, f.end_adhesion_id, readable(f.tension_nN), readable(f.sigma_nN)));
   }
+  for (const MissingAdhesion& a : results.missing_adhesions) {
+    const Adhesion circle{.adhesion_id = 0, .position_um = a.position_um, .major_axis_um = 2, .minor_axis_um = 2};
+    map.polygon(ellipse_corners(circle, 24),
+                std::string("fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:") +
+                    (is_dark ? "#ffe14d" : "#b00020"),
+                fmt::format("a force that the beads call for, no adhesion found\n{} nN", readable(norm(a.force_nN))));
+  }
   const std::string missing =
-      results.missing_fibres.empty()
+      results.missing_fibres.empty() && results.missing_adhesions.empty()
           ? ""
           : fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>missing (dashed)</span>",
                         is_dark ? "#ffe14d" : "#b00020");

@@ -58,6 +58,17 @@ std::vector<MissingFibre> missing_fibres_in(const Path& file, const Cell& cell) 
   return fibres;
 }
 
+std::vector<MissingAdhesion> missing_adhesions_in(const Path& file) {
+  std::vector<MissingAdhesion> adhesions;
+  if (!is_own_file(file)) return adhesions;
+  const CsvTable table(file);
+  for (int row = 0; row < table.n_rows(); ++row) {
+    adhesions.push_back({.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
+                         .force_nN = {table.number(row, "fx_nN"), table.number(row, "fy_nN")}});
+  }
+  return adhesions;
+}
+
 }  // namespace
 
 CellResults read_results(const Path& cell) {
@@ -80,6 +91,7 @@ CellResults read_results(const Path& cell) {
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
   results.images = images_of(cell / "1_segment");
   results.missing_fibres = missing_fibres_in(cell / "4_fit/missing_fibres.csv", results.cell);
+  results.missing_adhesions = missing_adhesions_in(cell / "4_fit/missing_adhesions.csv");
   return results;
 }
 

@@ -28,6 +28,11 @@ struct MissingFibre {
   double tension_nN = 0, sigma_nN = 0;
 };
 
+/// A force that the beads call for away from all adhesions.
+struct MissingAdhesion {
+  Vec2 position_um, force_nN;
+};
+
 struct CellResults {
   Path folder;
   std::string name;
@@ -43,6 +48,7 @@ struct CellResults {
   std::optional<Comparison> comparison;  ///< of a simulated cell
   std::optional<Images> images;
   std::vector<MissingFibre> missing_fibres;
+  std::vector<MissingAdhesion> missing_adhesions;
 };
 
 /// @throws InputError where a file that the stages write lacks or is malformed
