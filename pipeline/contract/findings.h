@@ -27,6 +27,8 @@ enum class FindingKind {
   // track
   nothing_moves,
   moves_outward,
+  tracked_by_correlation,
+  defocused,
   // fit: the displacement
   common_motion,
   unexplained_displacement,
