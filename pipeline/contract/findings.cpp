@@ -41,7 +41,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Nothing, if the window is smaller than what you look for. Brighter, sharper or fewer beads give a finer "
        "field."},
       {defocused, "defocused", "track", caution, "size of the beads in the blurrier image over that in the sharper one",
-       1.25, "XXX",
+       1.5,
+       "of simulated pairs the errors are 1.0 to 1.1 times sigma up to a ratio of 1.47, and 1.2 to 1.7 times at 1.6",
        "Focus both images on the same plane of beads. Of a stack, choose the plane with relaxed_z or stressed_z."},
       {common_motion, "common-motion", "fit", note,
        "largest of growth, shears and turn of the whole field, over its standard error", 3,

@@ -140,12 +140,12 @@ TEST(RealBeads, a_growth_cone_moves_its_gel_as_published_tracks_say) {
   for (std::size_t k = 0; k < places_m.size(); ++k) {
     // they count pixels from 1, with the place in the pixel's middle
     const Vec2 place = 1e6 * places_m[k] - Vec2{0.5 * kPixel_um, 0.5 * kPixel_um};
-    const auto nearest = ours.within(place, 2 * kPixel_um, 1);
+    const auto nearest = ours.within(place, kPixel_um, 1);  // beyond it lies another bead
     if (nearest.empty() || !tracking.field[nearest[0]].flag.empty()) continue;
     found.push_back(tracking.field[nearest[0]].displacement_um);
     theirs.push_back(1e6 * displacements_m[k]);
   }
-  EXPECT_GE(static_cast<double>(found.size()), 0.8 * static_cast<double>(places_m.size()));
+  EXPECT_GE(static_cast<double>(found.size()), 0.75 * static_cast<double>(places_m.size()));
   const test::Agreement agreement = test::agreement(less_median(found), less_median(theirs));
   RecordProperty("median_nm", std::to_string(1e3 * agreement.median_px));
   EXPECT_LE(agreement.median_px, 0.010);  // um: the bar of the data set

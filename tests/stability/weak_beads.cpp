@@ -95,6 +95,15 @@ TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
   EXPECT_EQ(hint(one.relaxed, other.stressed), "");
 }
 
+TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto pair =
+        test::draw_bead_pair(test::ring_of_adhesions(192, 4), {.width = 192, .n_beads = 500, .seed = seed});
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2);
+    EXPECT_NEAR(tracking.size_ratio, 1, 0.05) << "seed " << seed;  // a tenth of what the finding asks
+  }
+}
+
 TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
   const auto peaks = test::ring_of_adhesions(384, 6);
   for (const double blur : {1.0, 1.5}) {
