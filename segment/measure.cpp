@@ -204,10 +204,8 @@ std::optional<Motion> inverse(const Motion& forward) {
 
 void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
   Window window = scene.narrow;
-  if (!scene.averages_there_and_back) {
-    window.max_steps = 6;
-    window.settled_px = 0.02;
-  }
+  window.max_steps = 6;
+  window.settled_px = 0.02;
   Window with_error = window;
   window.states_error = false;
   for_each_bead(scene, [&](int k) {
@@ -229,8 +227,7 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     const auto returned = [&](const Window& by) {
       return registered(scene.stressed.image, scene.relaxed->image.spline, there, *back, by, others);
     };
-    const Registered came_back = returned(window);
-    const double missed = norm(came_back.motion.u + forward.u);
+    const double missed = norm(returned(window).motion.u + forward.u);
     const double granted = 0.5 + 4 * track.found.sigma_px;
     if (missed > granted) {  // then the way back's own error, too, is granted
       const double sigma = std::hypot(track.found.sigma_px, returned(with_error).sigma_px);
@@ -238,9 +235,6 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     }
     // Both ways see the same noise: what they differ by is what the registration itself is unsure of.
     track.found.sigma_px = std::hypot(track.found.sigma_px, missed / 2);
-    if (scene.averages_there_and_back && came_back.is_converged) {
-      track.found.motion.u = 0.5 * (track.found.motion.u - came_back.motion.u);
-    }
   });
 }
 

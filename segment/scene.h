@@ -33,8 +33,6 @@ struct Scene {
   Side stressed;
   Window wide;    ///< finds a bead: about three beads weigh in it
   Window narrow;  ///< measures it: the bead alone
-  /// Either way takes its slopes from one image; where noise is as steep as the light, the mean of both knows more.
-  bool averages_there_and_back = false;
   int threads = 1;
   double bead_sigma() const { return relaxed->bead_sigma; }
   double spacing() const { return relaxed->spacing; }

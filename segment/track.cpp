@@ -264,14 +264,9 @@ RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& paramete
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
   const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
   if (method != TrackMethod::correlation) {
-    try {
-      Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
-      side.around = beads_around(side, threads);
-      side_ = std::make_shared<const Side>(std::move(side));
-    } catch (const NotFollowed& error) {
-      no_beads_ = error;
-      if (method == TrackMethod::beads || !(bead_sigma > 0)) throw;
-    }
+    Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
+    side.around = beads_around(side, threads);
+    side_ = std::make_shared<const Side>(std::move(side));
   }
   if (method != TrackMethod::beads) {
     texture_ = std::make_shared<const Texture>(texture_of(relaxed, bead_sigma, "relaxed"));
@@ -305,7 +300,6 @@ Tracking RelaxedBeads::track_by_any(const Image& stressed, double pixel_size_um,
     return result;
   }
   try {
-    if (no_beads_) throw *no_beads_;
     Tracking result = by(TrackMethod::beads);
     result.windows = decided(kCorrelationWindows, "auto", false, "single beads can be followed");
     return result;
@@ -371,8 +365,9 @@ Tracking RelaxedBeads::track_as(TrackMethod method, const std::string& setting, 
     const Plane light = by_beads ? without_background(stressed, background_sigma(spot_sigma))
                                  : texture_of(stressed, spot_sigma, "stressed").plane;
     turn = turn_between(plane, light, spot_sigma, threads_);
+    if (!turn && by_beads) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
     if (!turn)
-      throw NotFollowed("the stressed image", "the relaxed image, turned and shifted", "no turn that stands out");
+      throw NotFollowed("the stressed image", "the relaxed image's texture, turned", "no turn that stands out");
   }
   const Image unturned = turn ? turned_back(stressed, *turn, threads_) : stressed;
   tell(0, by_beads ? "following beads" : "following windows");

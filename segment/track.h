@@ -110,7 +110,9 @@ struct Texture;
 /// The beads, and the texture, of the relaxed image, found once for any number of stressed ones.
 class RelaxedBeads {
  public:
-  /// @throws NotFollowed where the image shows no beads, nor anything else if windows may be followed
+  /// Where no beads stand out, windows are followed if they are asked for and not by themselves: they would follow the
+  /// pattern of a camera's pixels, too, which never moves.
+  /// @throws NotFollowed where the image shows no beads
   RelaxedBeads(const Image& relaxed, const TrackParameters& parameters, int threads);
 
   /// Displacement of each bead of the relaxed image.
@@ -143,9 +145,8 @@ class RelaxedBeads {
                     const Progress& progress) const;
   std::string remedy(const Image& stressed, double pixel_size_um) const;
   Image relaxed_;
-  std::shared_ptr<const Side> side_;  ///< none where `no_beads_` says why
-  std::shared_ptr<const Texture> texture_;
-  std::optional<NotFollowed> no_beads_;
+  std::shared_ptr<const Side> side_;        ///< unless windows alone are asked for
+  std::shared_ptr<const Texture> texture_;  ///< unless beads alone are
   TrackParameters parameters_;
   int threads_;
 };

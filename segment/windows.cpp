@@ -150,7 +150,6 @@ Windows windows_on(const Texture& relaxed, const Texture& stressed, double windo
   scene.relaxed = std::make_shared<const Side>(windows_side(relaxed, spacing, std::move(places), threads));
   scene.stressed = windows_side(stressed, spacing, {}, threads);
   scene.threads = threads;
-  scene.averages_there_and_back = true;
   constexpr double kSpot = 6;  // spot sigmas: what a spot in one image only leaves is as wide as it is after averaging
   const int alike = static_cast<int>(std::ceil(kSpot * relaxed.spot_sigma_px));
   scene.narrow = {.sigma = window_sigma,

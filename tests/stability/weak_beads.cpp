@@ -33,7 +33,7 @@ double squared_over_variance(const Tracking& tracking, const std::vector<test::P
 }
 
 TEST(WeakBeads, windows_follow_dense_weak_and_mottled_beads_and_their_standard_errors_hold) {
-  test::hard_case("40 beads in 100 px², light of 5 electrons over noise of 13 in 40 grey levels, a mottled ground",
+  test::hard_case("8 beads in 100 px²; beads of 25 electrons over noise of 13, in 40 grey levels; a mottled ground",
                   "two windows in three, rms of error over sigma 0.8 to 1.3");
   const auto peaks = wide_adhesions();
   const Vec2 drift{1.7, -0.6};
@@ -45,6 +45,7 @@ TEST(WeakBeads, windows_follow_dense_weak_and_mottled_beads_and_their_standard_e
   const Case cases[] = {{"dense", {.n_beads = 20000}, {}},
                         {"weak, few grey levels", {.brightness = 25}, {.levels = 40}},
                         {"mottled", {.brightness = 60}, {.mottle = 30, .levels = 60}}};
+  std::string out;
   for (Case c : cases) {
     double sum = 0;
     constexpr int kSeeds = 2;
@@ -58,13 +59,16 @@ TEST(WeakBeads, windows_follow_dense_weak_and_mottled_beads_and_their_standard_e
       EXPECT_GE(tracking.n_good, 2.0 / 3 * static_cast<double>(tracking.field.size()));
       sum += squared_over_variance(tracking, peaks, drift) / kSeeds;
     }
-    test::came_out(std::string(c.name) + ": " + test::two_digits(std::sqrt(sum)));
+    out += (out.empty() ? "" : "; ") + std::string(c.name) + " " + test::two_digits(std::sqrt(sum));
     EXPECT_GE(std::sqrt(sum), 0.8) << c.name;
     EXPECT_LE(std::sqrt(sum), 1.3) << c.name;
   }
+  test::came_out(out);
 }
 
 TEST(WeakBeads, are_followed_by_windows_of_themselves_and_strong_ones_are_not) {
+  test::hard_case("beads of 25 electrons over noise of 13, in 40 grey levels",
+                  "refused as single beads; followed by windows unasked");
   const auto peaks = wide_adhesions();
   const auto strong = test::draw_bead_pair(peaks, {.seed = 1});
   const Tracking by_beads = track_beads(strong.relaxed, strong.stressed, 1.0, by(TrackMethod::automatic), 2);
@@ -79,6 +83,8 @@ TEST(WeakBeads, are_followed_by_windows_of_themselves_and_strong_ones_are_not) {
 }
 
 TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
+  test::hard_case("weak beads as single ones; pictures of two places",
+                  "an error; its hint names track.method, or nothing");
   const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
   const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 1});
   const auto weak =
@@ -96,6 +102,7 @@ TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
 }
 
 TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
+  test::hard_case("twenty pairs in equal focus", "sizes equal within 5 %");
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
     const auto pair =
         test::draw_bead_pair(test::ring_of_adhesions(192, 4), {.width = 192, .n_beads = 500, .seed = seed});
@@ -105,6 +112,8 @@ TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
 }
 
 TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
+  test::hard_case("the stressed image blurred: beads 1.5 times as wide",
+                  "the ratio of sizes, within a quarter of the difference");
   const auto peaks = test::ring_of_adhesions(384, 6);
   for (const double blur : {1.0, 1.5}) {
     for (std::uint64_t seed = 1; seed <= 3; ++seed) {
