@@ -359,7 +359,7 @@ StageReport track(TrackParameters parameters, int binning, StageContext& context
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
-  context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
+  if (!tracking.windows.is_on) context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
   write_field(context, tracking.field, "displacement");
   return report_of(tracking, pixel_size_um);
 }
