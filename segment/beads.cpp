@@ -28,6 +28,8 @@ struct BandPass {
   }
 };
 
+BandPass band_for(double bead_sigma) { return {0.8 * bead_sigma, 1.6 * bead_sigma}; }
+
 Plane filtered(const Plane& plane, const BandPass& band) {
   Plane result = blurred(plane, band.narrow);
   const Plane wide = blurred(plane, band.wide);
@@ -170,6 +172,8 @@ DetectedBead improved(const DetectedBead& bead, const Plane& rest, double sigma)
 
 }  // namespace
 
+Plane spot_light(const Plane& plane, double bead_sigma) { return filtered(plane, band_for(bead_sigma)); }
+
 double background_sigma(double bead_sigma) { return std::max(6 * bead_sigma, 8.0); }
 
 std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, std::vector<int> wanted,
@@ -200,7 +204,7 @@ std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedB
 
 std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, double noise, double detection_snr,
                                      int threads) {
-  const BandPass band{0.8 * bead_sigma, 1.6 * bead_sigma};
+  const BandPass band = band_for(bead_sigma);
   const Plane answers = filtered(plane, band);
   std::vector<DetectedBead> beads =
       peaks(answers, detection_snr * noise * band.noise_gain(), 1 / band.answer(bead_sigma));

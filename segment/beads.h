@@ -15,6 +15,9 @@ std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, doub
 std::vector<DetectedBead> fitted_spots(const Plane& plane, std::vector<DetectedBead> spots, std::vector<int> wanted,
                                        double bead_sigma, int rounds, int threads);
 
+/// What is as wide as a spot: the difference of two Gaussian averages, which spots are looked for in.
+Plane spot_light(const Plane& plane, double bead_sigma);
+
 /// Smoothing width (px) of the background for beads of that size: wide enough to leave a bead 95 % of its height.
 double background_sigma(double bead_sigma);
 

@@ -129,17 +129,6 @@ Plane reduced(const Plane& plane, int scale) {
   return result;
 }
 
-GridField grid_over(const Plane& plane, double spacing) {
-  GridField field;
-  field.spacing = spacing;
-  field.nx = std::max(1, static_cast<int>(plane.width / spacing));
-  field.ny = std::max(1, static_cast<int>(plane.height / spacing));
-  field.first = {0.5 * (plane.width - 1 - (field.nx - 1) * spacing),
-                 0.5 * (plane.height - 1 - (field.ny - 1) * spacing)};
-  field.u.resize(static_cast<std::size_t>(field.nx) * field.ny);
-  return field;
-}
-
 /// Shift of the target as a whole: phase correlation.
 Vec2 drift_of(const Plane& reference, const Plane& target) {
   const auto as_mat = [](const Plane& p) {
@@ -152,6 +141,17 @@ Vec2 drift_of(const Plane& reference, const Plane& target) {
 }
 
 }  // namespace
+
+GridField grid_over(const Plane& plane, double spacing) {
+  GridField field;
+  field.spacing = spacing;
+  field.nx = std::max(1, static_cast<int>(plane.width / spacing));
+  field.ny = std::max(1, static_cast<int>(plane.height / spacing));
+  field.first = {0.5 * (plane.width - 1 - (field.nx - 1) * spacing),
+                 0.5 * (plane.height - 1 - (field.ny - 1) * spacing)};
+  field.u.resize(static_cast<std::size_t>(field.nx) * field.ny);
+  return field;
+}
 
 Plane compressed(const Plane& plane) {
   std::vector<double> sample;

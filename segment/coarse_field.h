@@ -16,6 +16,9 @@ struct GridField {
   Motion at(Vec2 place) const;
 };
 
+/// A grid over the whole plane, as far from one border as from the other; no displacements yet.
+GridField grid_over(const Plane& plane, double spacing);
+
 /// Light compressed to −1 … 1, so that a few bright clumps do not decide a window.
 Plane compressed(const Plane& plane);
 

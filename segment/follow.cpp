@@ -130,7 +130,7 @@ void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads) {
   constexpr double kFewest = 0.2, kMost = 2.0 / 3;
   const int n_found = std::min(n_by_grid, n_in_the_end);
   if (n_found >= kFewest * n_beads || n_in_the_end >= kMost * n_beads) return;
-  throw InvalidData("the stressed image", "the beads of the relaxed image, displaced",
+  throw NotFollowed("the stressed image", "the beads of the relaxed image, displaced",
                     std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
 }
 

@@ -22,7 +22,7 @@ Followed follow(const Scene& scene, const GridField& grid, const TrackParameters
 /// Of unrelated pictures the wide window finds one bead in twenty "again", by chance, and all that comes after finds up
 /// to two in five; of related ones each finds most. Of beads that scatter by more than their width, but by less than
 /// a quarter of their distance, the window finds few and what comes after three in four.
-/// @throws InvalidData where fewer than two in three are found in the end, and fewer than one in five there or by the
+/// @throws NotFollowed where fewer than two in three are found in the end, and fewer than one in five there or by the
 /// grid
 void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads);
 

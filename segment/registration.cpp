@@ -283,6 +283,25 @@ MBTFM_EIGHT_AT_ONCE double variance_of(const Patch& patch, const Warp& warp, con
   return 0.5 * sum;
 }
 
+/// The same where residuals are alike over squares of `side` px: the sum over each counts as one.
+double variance_of_squares(const Patch& patch, const Mat6& inverse, const Compared& now, double prior, int side) {
+  float reach = 0;
+  for (const Pixel& p : patch.pixels) reach = std::max({reach, std::abs(p.x), std::abs(p.y)});
+  const int n = 1 + static_cast<int>(2 * reach) / side;
+  const auto square_of = [&](float offset) { return static_cast<int>(offset + reach) / side; };
+  std::vector<Vec2> squares(static_cast<std::size_t>(n) * n);
+  for (const Pixel& p : patch.pixels) {
+    double ux = 0, uy = 0;
+    for (int a = 0; a < 6; ++a) ux += inverse(0, a) * p.slope[a], uy += inverse(1, a) * p.slope[a];
+    const double weighted = p.weight * ((p.target - now.mean) / now.gain - p.value());
+    squares[static_cast<std::size_t>(square_of(p.y)) * n + square_of(p.x)] += weighted * Vec2{ux, uy};
+  }
+  double sum = 0;
+  for (const Vec2 moved : squares) sum += dot(moved, moved);
+  for (int a = 2; a < 6; ++a) sum += prior * (inverse(0, a) * inverse(0, a) + inverse(1, a) * inverse(1, a));
+  return 0.5 * sum;
+}
+
 /// x → W(V⁻¹(x)), with V(x) = x + step(x).
 Motion composed(const Motion& motion, const Vec6& step) {
   const cv::Matx22d moved(1 + motion.ux_x, motion.ux_y, motion.uy_x, 1 + motion.uy_y);
@@ -380,8 +399,12 @@ Registered registered(const SmoothImage& reference, const Spline& target, Vec2 p
   result.variance = patch.variance;
   result.gain = now.gain;
   if (!window.states_error) return result;
-  result.sigma_px = std::sqrt(std::max(0.0, variance_of(patch, Warp(place, result.motion), inverse, now,
-                                                        stiffness * window.noise * window.noise, window.is_thinned)));
+  const double prior_variance = stiffness * window.noise * window.noise;
+  const double variance =
+      window.alike_px > 1
+          ? variance_of_squares(patch, inverse, now, prior_variance, window.alike_px)
+          : variance_of(patch, Warp(place, result.motion), inverse, now, prior_variance, window.is_thinned);
+  result.sigma_px = std::sqrt(std::max(0.0, variance));
   return result;
 }
 

@@ -39,6 +39,7 @@ struct Window {
   bool is_thinned = false;   ///< every other pixel, as on a chessboard: enough to find what is measured later
   double settled_px = 2e-3;  ///< the last step: a tenth of the best standard errors
   bool states_error = true;  ///< sigma_px is found
+  int alike_px = 1;          ///< the residual is alike over so many px: what is there of it counts as one
 };
 
 /// Pictures of other beads that a registration takes away from both images: Gaussians of one width.
@@ -66,7 +67,9 @@ struct Registered {
 /// Minimises Σ w (a target(x + u(x)) + b − reference(x))² + (G − G₀)² noise²/gradient_sd² over u, G, a, b by
 /// inverse-compositional Gauss–Newton steps: slopes and normal matrix come from the reference and stay. Gain and
 /// offset are projected out. The standard error is that of a weighted fit with the window's own residual:
-/// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹. What has not converged is no further than 50 px from the guess.
+/// H⁻¹ (Σ w² s sᵀ residual²) H⁻¹; where residuals are alike over some pixels, Σ w s residual of each square of that
+/// side takes the place of a pixel's (Liang & Zeger, Biometrika 73:13, 1986). What has not converged is no further than
+/// 50 px from the guess.
 Registered registered(const SmoothImage& reference, const Spline& target, Vec2 place, const Motion& guess,
                       const Window& window, const Others& others = {});
 

@@ -11,7 +11,7 @@
 namespace mbtfm::segment {
 
 Side side_of(const Image& image, double bead_sigma, double detection_snr, const char* which, int threads) {
-  const InvalidData no_beads(std::string("the ") + which + " image", "bright beads on a darker ground", "none");
+  const NotFollowed no_beads(std::string("the ") + which + " image", "bright beads on a darker ground", "none");
   if (!(bead_sigma > 0)) throw no_beads;
   Side side;
   side.bead_sigma = bead_sigma;
@@ -21,7 +21,7 @@ Side side_of(const Image& image, double bead_sigma, double detection_snr, const 
   constexpr std::size_t kFewest = 8;  // an affine map and a scatter about it take six beads
   if (side.beads.empty()) throw no_beads;
   if (side.beads.size() < kFewest) {
-    throw InvalidData(no_beads.element, std::to_string(kFewest) + " beads at least", std::to_string(side.beads.size()));
+    throw NotFollowed(no_beads.element, std::to_string(kFewest) + " beads at least", std::to_string(side.beads.size()));
   }
   for (const DetectedBead& bead : side.beads) side.positions.push_back(bead.position_px);
   const double n_beads = static_cast<double>(side.beads.size());

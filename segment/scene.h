@@ -24,7 +24,7 @@ struct Side {
   std::vector<std::vector<int>> around;
 };
 /// Without `around`.
-/// @throws InvalidData for `which` image where it shows fewer beads than a field needs
+/// @throws NotFollowed for `which` image where it shows fewer beads than a field needs
 Side side_of(const Image& image, double bead_sigma, double detection_snr, const char* which, int threads);
 std::vector<std::vector<int>> beads_around(const Side& side, int threads);
 

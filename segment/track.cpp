@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/effects.h"
@@ -10,24 +11,36 @@
 #include "segment/beads.h"
 #include "segment/coarse_field.h"
 #include "segment/common_motion.h"
+#include "segment/focus.h"
 #include "segment/follow.h"
 #include "segment/given_field.h"
 #include "segment/measure.h"
 #include "segment/pool.h"
 #include "segment/scene.h"
+#include "segment/windows.h"
 
 namespace mbtfm::segment {
 namespace {
 
-int search_window(const Scene& scene, const TrackParameters& parameters, double pixel_size_um) {
-  // sixteen beads make the right peak stand out; shifts are found up to half a window
-  double needed = std::max(64.0, 4 * scene.spacing());
+constexpr const char* kCorrelationWindows = "correlation windows";  // the effect's name
+
+/// @param least_px  that makes the right peak stand out: sixteen beads
+int search_window(double least_px, const TrackParameters& parameters, double pixel_size_um) {
+  double needed = std::max(64.0, least_px);
+  // shifts are found up to half a window
   if (parameters.largest_displacement_um > 0) {
     needed = std::max(needed, 2.2 * parameters.largest_displacement_um / pixel_size_um);
   }
   int window = 32;
   while (window < needed) window *= 2;
   return window;
+}
+
+TrackMethod method_of(const TrackParameters& parameters) {
+  for (const auto& [method, word] : kTrackMethods) {
+    if (parameters.method == word) return method;
+  }
+  throw UsageError("track.method is " + parameters.method);
 }
 
 void require_numbers(const Image& image, const char* which) {
@@ -40,13 +53,18 @@ void require_numbers(const Image& image, const char* which) {
   }
 }
 
+/// The motion of each place, px: of a bead, or of a window.
 struct Measured {
+  std::shared_ptr<const Scene> scene;
   std::vector<Track> tracks;
   Pooling pooling;
+  std::optional<SizeRatio> size_ratio = {};
+  double window_px = 0;  ///< Gaussian sigma of the windows; 0: beads
 };
 
 /// What moved the good beads together, px. @param setting  as of TrackParameters::drift_affine
-MotionTaken motion_of_all(const Scene& scene, const Measured& measured, const std::string& setting, double tolerance) {
+MotionTaken motion_of_all(const Measured& measured, const std::string& setting, double tolerance) {
+  const Scene& scene = *measured.scene;
   std::vector<Vec2> positions, displacements;
   for (int k = 0; k < scene.n_beads(); ++k) {
     if (!measured.tracks[k].is_good()) continue;
@@ -75,18 +93,87 @@ void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& t
   }
 }
 
-/// Measured in the narrow window, even where beads are loose or not resolved and single ones scatter: a wider window
-/// would hide the scatter and flatten the peaks.
-Measured measured_beads(const Scene& scene, std::vector<Track> tracks, const std::optional<Turn>& turn,
-                        const TrackParameters& parameters) {
-  measure(scene, parameters.least_similarity, tracks);
-  verify(scene, tracks);
-  if (turn) flag_turned_out(scene, *turn, tracks);
-  flag_outliers(scene, parameters.outlier_threshold, tracks);
-  recover(scene, parameters.least_similarity, tracks);
-  if (turn) flag_turned_out(scene, *turn, tracks);  // those found again
-  Pooling pooling = pooled(scene, tracks);
-  return {std::move(tracks), std::move(pooling)};
+/// Found from the grid with the wide window, measured in the narrow one, even where beads are loose or not resolved and
+/// single ones scatter: a wider window would hide the scatter and flatten the peaks.
+Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& turn, const TrackParameters& parameters,
+                               int window) {
+  const GridField grid = coarse_field(scene.relaxed->image.plane, scene.stressed.image.plane, window, scene.threads);
+  Followed followed = follow(scene, grid, parameters);
+  measure(scene, parameters.least_similarity, followed.tracks);
+  verify(scene, followed.tracks);
+  if (turn) flag_turned_out(scene, *turn, followed.tracks);
+  flag_outliers(scene, parameters.outlier_threshold, followed.tracks);
+  return followed;
+}
+
+Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const Image& stressed,
+                        const std::optional<Turn>& turn, const TrackParameters& parameters, double pixel_size_um,
+                        int threads) {
+  const auto scene = std::make_shared<const Scene>(scene_of(
+      relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
+  auto [tracks, n_by_grid] =
+      followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
+  recover(*scene, parameters.least_similarity, tracks);
+  if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
+  require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
+  Pooling pooling = pooled(*scene, tracks);
+  const SizeRatio sizes = size_ratio(*scene, tracks);
+  return {.scene = scene, .tracks = std::move(tracks), .pooling = std::move(pooling), .size_ratio = sizes};
+}
+
+/// What a size of window gives.
+struct Tried {
+  Measured measured;
+  int n_by_grid = 0;
+  bool is_sound = false;  ///< two windows in three are found again, and their errors are known
+  double median_sigma_px = 0;
+  double knowledge = 0;  ///< sum of 1/sigma²
+};
+
+Tried tried_windows(const Texture& relaxed, const Texture& stressed, double window_px, const std::optional<Turn>& turn,
+                    TrackParameters parameters, double pixel_size_um, int threads) {
+  const Windows windows = windows_on(relaxed, stressed, window_px, threads);
+  const auto scene = std::make_shared<const Scene>(windows.scene);
+  parameters.least_similarity = least_similarity(relaxed, window_px);
+  // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
+  auto [tracks, n_by_grid] =
+      followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um));
+  Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px}, .n_by_grid = n_by_grid};
+  auto pooling = calibrated(windows, result.measured.tracks);
+  if (!pooling) return result;
+  std::vector<double> sigmas;
+  for (int k = 0; k < scene->n_beads(); ++k) {
+    if (!result.measured.tracks[k].is_good()) continue;
+    const double sigma_px = pooling->beads[k].sigma_px;
+    sigmas.push_back(sigma_px);
+    result.knowledge += 1 / (sigma_px * sigma_px);
+  }
+  result.is_sound = 3 * sigmas.size() >= 2 * result.measured.tracks.size();
+  result.median_sigma_px = quantile(std::move(sigmas), 0.5);
+  result.measured.pooling = std::move(*pooling);
+  return result;
+}
+
+/// In the smallest windows that are fine enough; where none are, in those that know most together.
+Measured measured_windows(const Texture& relaxed, const Image& stressed, const std::optional<Turn>& turn,
+                          const TrackParameters& parameters, double pixel_size_um, int threads) {
+  const Texture moved = texture_of(stressed, relaxed.spot_sigma_px, "stressed");
+  std::optional<Tried> best;
+  int n_by_grid = 0, n_found = 0, n_tried = 0;
+  for (const double window_px : window_sigmas(relaxed)) {
+    Tried tried = tried_windows(relaxed, moved, window_px, turn, parameters, pixel_size_um, threads);
+    constexpr double kFineEnough = 0.1;  // px: a tenth of what moves in a picture worth tracking
+    const bool is_fine = tried.is_sound && tried.median_sigma_px <= kFineEnough;
+    n_by_grid = tried.n_by_grid, n_found = n_good(tried.measured.tracks), n_tried = tried.measured.scene->n_beads();
+    if (tried.is_sound && (is_fine || !best || tried.knowledge > best->knowledge)) best = std::move(tried);
+    if (is_fine) break;
+  }
+  if (!best) {
+    throw NotFollowed(
+        "the stressed image", "the relaxed image's texture, displaced",
+        std::to_string(std::min(n_by_grid, n_found)) + " of " + std::to_string(n_tried) + " windows of it");
+  }
+  return std::move(best->measured);
 }
 
 CommonMotion in_um(CommonMotion common, double pixel_size_um) {
@@ -102,14 +189,21 @@ CommonMotion turned_as_before(CommonMotion common, const Turn& turn, Vec2 centre
   return common;
 }
 
-Tracking tracking_of(const Scene& scene, const Measured& measured, const MotionTaken& all, double pixel_size_um) {
-  const auto& [tracks, pooling] = measured;
+Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pixel_size_um) {
+  const Scene& scene = *measured.scene;
+  const std::vector<Track>& tracks = measured.tracks;
+  const Pooling& pooling = measured.pooling;
   Tracking result;
   result.far_field_rms_um = pixel_size_um * all.rms;
   result.noise_um = pixel_size_um * all.noise;
   result.scatter_um = pixel_size_um * pooling.scatter_px;
   result.bead_sigma_um = pixel_size_um * scene.bead_sigma();
   result.n_beads_stressed = static_cast<int>(scene.stressed.beads.size());
+  result.window_um = pixel_size_um * measured.window_px;
+  if (measured.size_ratio) {
+    result.size_ratio = measured.size_ratio->ratio;
+    result.size_ratio_sigma = measured.size_ratio->sigma;
+  }
   result.affine = all.affine;
   for (int k = 0; k < scene.n_beads(); ++k) {
     const Pooled& found = pooling.beads[k];
@@ -125,6 +219,10 @@ Tracking tracking_of(const Scene& scene, const Measured& measured, const MotionT
 
 }  // namespace
 
+const char* word_of(TrackMethod method) {
+  return std::ranges::find(kTrackMethods, method, &std::pair<TrackMethod, const char*>::first)->second;
+}
+
 void declare(ParameterList& list, TrackParameters& p) {
   list.table("");
   list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
@@ -135,6 +233,11 @@ void declare(ParameterList& list, TrackParameters& p) {
   list.add(
       "stressed_last", p.stressed_last, {.low = 0},
       "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
+  std::vector<std::string> methods;
+  for (const auto& [method, word] : kTrackMethods) methods.emplace_back(word);
+  list.add("method", p.method,
+           "what is followed: single beads, or the texture in windows (correlation); auto: windows where beads fail",
+           methods);
   list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
            "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
@@ -155,74 +258,125 @@ void declare(ParameterList& list, TrackParameters& p) {
 }
 
 RelaxedBeads::RelaxedBeads(const Image& relaxed, const TrackParameters& parameters, int threads)
-    : parameters_(parameters), threads_(threads) {
+    : relaxed_(relaxed), parameters_(parameters), threads_(threads) {
   require_numbers(relaxed, "relaxed");
+  const TrackMethod method = method_of(parameters);
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
   const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
-  Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
-  side.around = beads_around(side, threads);
-  side_ = std::make_shared<const Side>(std::move(side));
+  if (method != TrackMethod::correlation) {
+    Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
+    side.around = beads_around(side, threads);
+    side_ = std::make_shared<const Side>(std::move(side));
+  }
+  if (method != TrackMethod::beads) {
+    texture_ = std::make_shared<const Texture>(texture_of(relaxed, bead_sigma, "relaxed"));
+  }
 }
 
 Tracking RelaxedBeads::track(const Image& stressed, double pixel_size_um, const Progress& progress) const {
-  if (parameters_.drift_affine != "auto") return track_as(parameters_.drift_affine, stressed, pixel_size_um, progress);
-  const auto turned_back_first = [&] {
-    Tracking turned = track_as("on", stressed, pixel_size_um, progress);
+  const auto size = [](const Image& image) {
+    return std::to_string(image.width) + " x " + std::to_string(image.height);
+  };
+  if (size(relaxed_) != size(stressed)) {
+    throw InvalidData("the stressed image", "the relaxed image's " + size(relaxed_) + " pixels", size(stressed));
+  }
+  require_numbers(stressed, "stressed");
+  try {
+    return track_by_any(stressed, pixel_size_um, progress);
+  } catch (NotFollowed& error) {
+    error.hint = remedy(stressed, pixel_size_um);
+    throw;
+  }
+}
+
+/// Single beads first: where they can be followed, each knows more of its place than a window does.
+Tracking RelaxedBeads::track_by_any(const Image& stressed, double pixel_size_um, const Progress& progress) const {
+  const auto by = [&](TrackMethod method) { return track_by(method, stressed, pixel_size_um, progress); };
+  const TrackMethod method = method_of(parameters_);
+  if (method != TrackMethod::automatic) {
+    Tracking result = by(method);
+    const bool is_on = method == TrackMethod::correlation;
+    result.windows = decided(kCorrelationWindows, is_on ? "on" : "off", is_on, "as asked");
+    return result;
+  }
+  try {
+    Tracking result = by(TrackMethod::beads);
+    result.windows = decided(kCorrelationWindows, "auto", false, "single beads can be followed");
+    return result;
+  } catch (const NotFollowed& beads) {
+    const Stopwatch watch;
+    std::optional<Tracking> result;
+    try {
+      result = by(TrackMethod::correlation);
+    } catch (const NotFollowed&) {
+      throw beads;
+    }
+    result->windows = decided(kCorrelationWindows, "auto", true,
+                              "single beads cannot be followed: of " + beads.element + " " + beads.expected +
+                                  " were expected, " + beads.found + " found");
+    result->windows.seconds = watch.seconds();
+    return *result;
+  }
+}
+
+Tracking RelaxedBeads::track_by(TrackMethod method, const Image& stressed, double pixel_size_um,
+                                const Progress& progress) const {
+  const auto as = [&](const std::string& setting) {
+    return track_as(method, setting, stressed, pixel_size_um, progress);
+  };
+  if (parameters_.drift_affine != "auto") return as(parameters_.drift_affine);
+  std::optional<Tracking> unturned;
+  std::exception_ptr refused;
+  try {
+    unturned = as("auto");
+  } catch (const ExchangedImages&) {
+    throw;
+  } catch (const InvalidData&) {  // turned so far that its beads are not met with again?
+    refused = std::current_exception();
+  }
+  // A turn is its angle and nothing else while it is small: 0.01 shortens lengths by 5e-5.
+  constexpr double kSmall_rad = 0.01;
+  if (unturned && !(unturned->affine.is_on && std::abs(unturned->common.turn_rad) > kSmall_rad)) return *unturned;
+  try {
+    Tracking turned = as("on");
     turned.affine = decided(
         turned.affine.name, "auto", true,
         "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
     return turned;
-  };
-  try {
-    Tracking unturned = track_as("auto", stressed, pixel_size_um, progress);
-    // A turn is its angle and nothing else while it is small: 0.01 shortens lengths by 5e-5.
-    constexpr double kSmall_rad = 0.01;
-    return std::abs(unturned.common.turn_rad) <= kSmall_rad ? unturned : turned_back_first();
   } catch (const ExchangedImages&) {
     throw;
-  } catch (const InvalidData& unturned) {  // turned so far that its beads are not met with again?
-    try {
-      return turned_back_first();
-    } catch (const InvalidData&) {
-      throw unturned;
-    }
+  } catch (const InvalidData&) {
+    if (unturned) return *unturned;
+    std::rethrow_exception(refused);
   }
 }
 
-Tracking RelaxedBeads::track_as(const std::string& setting, const Image& stressed, double pixel_size_um,
-                                const Progress& progress) const {
+Tracking RelaxedBeads::track_as(TrackMethod method, const std::string& setting, const Image& stressed,
+                                double pixel_size_um, const Progress& progress) const {
   const auto tell = [&](double fraction, const char* what) {
     if (progress) progress(fraction, what);
   };
-  const Plane& plane = side_->image.plane;
-  const auto size = [](int width, int height) { return std::to_string(width) + " x " + std::to_string(height); };
-  if (plane.width != stressed.width || plane.height != stressed.height) {
-    throw InvalidData("the stressed image", "the relaxed image's " + size(plane.width, plane.height) + " pixels",
-                      size(stressed.width, stressed.height));
-  }
-  require_numbers(stressed, "stressed");
-  tell(0, "finding beads");
+  const bool by_beads = method == TrackMethod::beads;
+  const Plane& plane = by_beads ? side_->image.plane : texture_->plane;
+  const double spot_sigma = by_beads ? side_->bead_sigma : texture_->spot_sigma_px;
   std::optional<Turn> turn;
   if (setting == "on") {
-    const Plane light = without_background(stressed, background_sigma(side_->bead_sigma));
-    turn = turn_between(plane, light, side_->bead_sigma, threads_);
-    if (!turn) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
+    tell(0, "turning the image back");
+    const Plane light = by_beads ? without_background(stressed, background_sigma(spot_sigma))
+                                 : texture_of(stressed, spot_sigma, "stressed").plane;
+    turn = turn_between(plane, light, spot_sigma, threads_);
+    if (!turn && by_beads) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
+    if (!turn)
+      throw NotFollowed("the stressed image", "the relaxed image's texture, turned", "no turn that stands out");
   }
-  const Scene scene = scene_of(side_,
-                               side_of(turn ? turned_back(stressed, *turn, threads_) : stressed, side_->bead_sigma,
-                                       parameters_.detection_snr, "stressed", threads_),
-                               threads_);
-  tell(0.3, "correlating windows");
-  const Plane& moved = scene.stressed.image.plane;
-  const GridField grid = coarse_field(plane, moved, search_window(scene, parameters_, pixel_size_um), threads_);
-  tell(0.5, "registering beads");
-  Followed followed = follow(scene, grid, parameters_);
-  tell(0.7, "measuring beads");
-  const Measured measured = measured_beads(scene, std::move(followed.tracks), turn, parameters_);
-  require_common_beads(followed.n_by_grid, n_good(measured.tracks), scene.n_beads());
-  const MotionTaken all = motion_of_all(scene, measured, setting, parameters_.effect_tolerance);
+  const Image unturned = turn ? turned_back(stressed, *turn, threads_) : stressed;
+  tell(0, by_beads ? "following beads" : "following windows");
+  const Measured measured = by_beads
+                                ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_)
+                                : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
+  const MotionTaken all = motion_of_all(measured, setting, parameters_.effect_tolerance);
   require_shift_alone(all);
-  Tracking result = tracking_of(scene, measured, all, pixel_size_um);
+  Tracking result = tracking_of(measured, all, pixel_size_um);
   const CommonMotion common = turn ? turned_as_before(all.common, *turn, all.motion.centre) : all.common;
   result.common = in_um(common, pixel_size_um);
   const bool is_affine_left = all.is_affine && !all.affine.is_on;
@@ -232,6 +386,39 @@ Tracking RelaxedBeads::track_as(const std::string& setting, const Image& stresse
                               " of -1, inward, to 1), as if the stressed and the relaxed image were exchanged");
   }
   return result;
+}
+
+/// Tried out one by one: an error has the time, and a hint that does not help costs the reader more.
+std::string RelaxedBeads::remedy(const Image& stressed, double pixel_size_um) const {
+  const auto helps = [&](const auto& change) {
+    TrackParameters changed = parameters_;
+    change(changed);
+    try {
+      RelaxedBeads(relaxed_, changed, threads_).track_by_any(stressed, pixel_size_um, {});
+      return true;
+    } catch (const InvalidData&) {
+      return false;
+    }
+  };
+  std::vector<std::string> found;
+  if (method_of(parameters_) != TrackMethod::automatic && helps([](auto& p) { p.method = "auto"; })) {
+    found.push_back("track.method = auto");
+  }
+  if (parameters_.drift_affine == "off" && helps([](auto& p) { p.drift_affine = "auto"; })) {
+    found.push_back("effects.drift_affine = auto: one image is turned against the other");
+  }
+  const double further_um = 0.25 * std::min(stressed.width, stressed.height) * pixel_size_um;
+  if (parameters_.largest_displacement_um < further_um &&
+      helps([&](auto& p) { p.largest_displacement_um = further_um; })) {
+    found.push_back("track.largest_displacement_um = " + brief(further_um) + ": what moved, moved far");
+  }
+  constexpr double kLow = 3;  // below 3 sd most of what is found is noise
+  if (parameters_.detection_snr > kLow && helps([](auto& p) { p.detection_snr = kLow; })) {
+    found.push_back("track.detection_snr = " + brief(kLow) + ": the beads are weak");
+  }
+  std::string text;
+  for (const std::string& way : found) text += (text.empty() ? "" : "; or ") + way;
+  return text;
 }
 
 Tracking track_beads(const Image& relaxed, const Image& stressed, double pixel_size_um,

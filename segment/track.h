@@ -13,11 +13,22 @@
 
 namespace mbtfm::segment {
 
+/// What is followed from one image to the other.
+enum class TrackMethod {
+  automatic,   ///< single beads; where they cannot be followed, windows
+  beads,       ///< each bead by itself
+  correlation  ///< the texture in windows on a lattice, whatever it shows
+};
+inline constexpr std::pair<TrackMethod, const char*> kTrackMethods[] = {
+    {TrackMethod::automatic, "auto"}, {TrackMethod::beads, "beads"}, {TrackMethod::correlation, "correlation"}};
+const char* word_of(TrackMethod method);
+
 struct TrackParameters {
   std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
   PlaneChoice stressed_plane;           ///< of a time series the first
   PlaneChoice relaxed_plane;
   int stressed_last = 0;               ///< of a time series the last time or page; 0: a single image
+  std::string method = "auto";         ///< of kTrackMethods: single beads know most where they can be told apart
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
   /// on, off or auto: a stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too
@@ -73,9 +84,19 @@ struct Tracking {
   double noise_um = 0;          ///< the same as robust standard deviation
   double bead_sigma_um = 0;     ///< of a bead's picture
   double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
+  double size_ratio = 1;  ///< of the beads in the stressed image over those in the relaxed one (focus.h)
+  double size_ratio_sigma = 0;  ///< its standard error; 0: not known
   int n_good = 0;
   Effect affine{};           ///< whether turn, growth and shear were taken off, and why
+  Effect windows{};          ///< whether windows were followed in place of single beads, and why
+  double window_um = 0;      ///< Gaussian sigma of the windows; 0: single beads
   int n_beads_stressed = 0;  ///< found in the stressed image
+};
+
+/// The beads, or the texture, of one image are not met with again in the other.
+struct NotFollowed : InvalidData {
+  using InvalidData::InvalidData;
+  std::string hint;  ///< the parameters that help, as was tried out; empty: none of them does
 };
 
 /// The two images seem to be exchanged.
@@ -84,11 +105,14 @@ struct ExchangedImages : InvalidData {
 };
 
 struct Side;
+struct Texture;
 
-/// The beads of the relaxed image, found once, for any number of stressed ones.
+/// The beads, and the texture, of the relaxed image, found once for any number of stressed ones.
 class RelaxedBeads {
  public:
-  /// @throws InvalidData where the image shows no beads
+  /// Where no beads stand out, windows are followed if they are asked for and not by themselves: they would follow the
+  /// pattern of a camera's pixels, too, which never moves.
+  /// @throws NotFollowed where the image shows no beads
   RelaxedBeads(const Image& relaxed, const TrackParameters& parameters, int threads);
 
   /// Displacement of each bead of the relaxed image.
@@ -106,14 +130,23 @@ class RelaxedBeads {
   /// 5. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
   ///
   /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
-  /// @throws InvalidData where the stressed image shows no beads, others than the relaxed one, or the sizes differ
+  ///
+  /// By correlation, steps 1 to 3 are those of windows on a lattice in place of beads (windows.h): the smallest whose
+  /// standard error is a tenth of a pixel. Nothing is weighed in.
+  /// @throws NotFollowed where the stressed image shows no beads, or others than the relaxed one
+  /// @throws InvalidData where the sizes differ, or a turn is found and must not be taken off
   /// @throws ExchangedImages where the gel is pushed outward as if the images were exchanged (given_field.h)
   Tracking track(const Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
 
  private:
-  Tracking track_as(const std::string& setting, const Image& stressed, double pixel_size_um,
+  Tracking track_by_any(const Image& stressed, double pixel_size_um, const Progress& progress) const;
+  Tracking track_by(TrackMethod method, const Image& stressed, double pixel_size_um, const Progress& progress) const;
+  Tracking track_as(TrackMethod method, const std::string& setting, const Image& stressed, double pixel_size_um,
                     const Progress& progress) const;
-  std::shared_ptr<const Side> side_;
+  std::string remedy(const Image& stressed, double pixel_size_um) const;
+  Image relaxed_;
+  std::shared_ptr<const Side> side_;        ///< unless windows alone are asked for
+  std::shared_ptr<const Texture> texture_;  ///< unless beads alone are
   TrackParameters parameters_;
   int threads_;
 };

@@ -101,19 +101,48 @@ void add_figures(StageReport& report, const CommonMotion& c) {
   report.figures.insert(report.figures.end(), figures.begin(), figures.end());
 }
 
+std::string with_error(double value, double error) { return brief(value) + " +- " + brief(error); }
+
+/// What the images themselves call for.
+std::vector<Finding> findings_of(const Tracking& tracking) {
+  std::vector<Finding> findings;
+  const auto add = [&](std::optional<Finding> found) {
+    if (found) findings.push_back(std::move(*found));
+  };
+  if (tracking.windows.is_on && tracking.windows.setting == "auto") {
+    add(noticed(FindingKind::tracked_by_correlation, 1,
+                "Windows of " + brief(tracking.window_um) + " um were followed: " + tracking.windows.why + "."));
+  }
+  const double ratio = tracking.size_ratio, larger = std::max(ratio, 1 / ratio);
+  constexpr double kCertain = 3;  // standard errors
+  if (std::abs(ratio - 1) > kCertain * tracking.size_ratio_sigma) {
+    add(noticed(FindingKind::defocused, larger,
+                "The beads of the " + std::string(ratio > 1 ? "stressed" : "relaxed") +
+                    " image are wider by a factor of " +
+                    with_error(larger, tracking.size_ratio_sigma * larger / ratio) + "."));
+  }
+  return findings;
+}
+
 StageReport report_of(const Tracking& tracking, double pixel_size_um) {
   StageReport report = report_of(tracking.field);
-  report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(tracking.field.size()) + " beads tracked" +
-                   report.summary;
+  const bool has_windows = tracking.windows.is_on;
+  report.summary = std::to_string(tracking.n_good) + " of " + std::to_string(tracking.field.size()) +
+                   (has_windows ? " windows tracked" : " beads tracked") + report.summary;
+  for (Finding& finding : findings_of(tracking)) report.findings.push_back(std::move(finding));
   const Figures more = {{"pixel_size_um", pixel_size_um},
                         {"n_beads_stressed", static_cast<std::int64_t>(tracking.n_beads_stressed)},
                         {"bead_sigma_um", tracking.bead_sigma_um},
                         {"far_field_residual_um", tracking.far_field_rms_um},
                         {"noise_um", tracking.noise_um},
-                        {"scatter_um", tracking.scatter_um}};
+                        {"scatter_um", tracking.scatter_um},
+                        {"method", std::string(word_of(has_windows ? TrackMethod::correlation : TrackMethod::beads))},
+                        {"window_sigma_um", tracking.window_um},
+                        {"bead_size_ratio", tracking.size_ratio},
+                        {"bead_size_ratio_sigma", tracking.size_ratio_sigma}};
   report.figures.insert(report.figures.end(), more.begin(), more.end());
   add_figures(report, tracking.common);
-  report.effects = {tracking.affine};
+  report.effects = {tracking.affine, tracking.windows};
   return report;
 }
 
@@ -171,6 +200,13 @@ auto with_names(const std::string& names, const Body& body) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
                      "exchange the files of --stressed and --relaxed (beads_stressed and beads_relaxed in cell.toml); "
                      "if this cell does push outward, set track.may_push = true");
+  } catch (const NotFollowed& error) {
+    throw InputError(names + ": " + error.element, error.expected, error.found,
+                     error.hint.empty()
+                         ? "are these the bead channels of one place, in focus? Check the planes; neither windows "
+                           "(track.method), a longer reach (track.largest_displacement_um), weaker beads "
+                           "(track.detection_snr) nor a turn (effects.drift_affine) made them fit together"
+                         : "tried out, this helps: " + error.hint);
   } catch (const InvalidData& error) {
     throw InputError(names + ": " + error.element, error.expected, error.found,
                      "are these the bead channels of one place, in focus? Check the planes, detection_snr, and where "
@@ -323,7 +359,7 @@ StageReport track(TrackParameters parameters, int binning, StageContext& context
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
-  context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
+  if (!tracking.windows.is_on) context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
   write_field(context, tracking.field, "displacement");
   return report_of(tracking, pixel_size_um);
 }

@@ -28,6 +28,8 @@ enum class FindingKind {
   // track
   nothing_moves,
   moves_outward,
+  tracked_by_correlation,
+  defocused,
   // fit: the displacement
   common_motion,
   curved_motion,

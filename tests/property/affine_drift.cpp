@@ -35,6 +35,22 @@ TEST(AffineDrift, is_left_where_nothing_is_turned) {
   }
 }
 
+/// Some 30 beads that are turned by more than a small angle: no turn stands out of their correlation. In the first
+/// picture the turn was taken off, in the second nothing was and the angle is chance.
+TEST(AffineDrift, a_field_that_was_found_is_kept_where_turning_back_fails) {
+  for (const auto& [peak_px, seed] : {std::pair(0.0, 1), std::pair(3.0, 2)}) {
+    const auto peaks = peak_px > 0 ? test::ring_of_adhesions(96, peak_px) : std::vector<test::Peak>{};
+    const auto pair = test::draw_bead_pair(
+        peaks, {.width = 96, .n_beads = 30, .turn_rad = 0.0105, .seed = static_cast<std::uint64_t>(seed)});
+    TrackParameters parameters{.method = "beads", .drift_affine = "on"};
+    EXPECT_THROW(track_beads(pair.relaxed, pair.stressed, 0.1, parameters), NotFollowed);
+    parameters.drift_affine = "auto";
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 0.1, parameters);
+    EXPECT_GT(std::abs(tracking.common.turn_rad), 0.01);
+    EXPECT_EQ(tracking.affine.is_on, peak_px == 0);
+  }
+}
+
 TEST(AffineDrift, the_question_changes_nothing_where_the_answer_is_no) {
   const DisplacementField asked = tracked(0, 1).field, not_asked = tracked(0, 1, "off").field;
   ASSERT_EQ(asked.size(), not_asked.size());

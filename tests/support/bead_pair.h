@@ -69,6 +69,7 @@ struct BeadScene {
   double offset = 0;
   double turn_rad = 0;  ///< of the stressed image about its centre, before the drift
   double growth = 0;    ///< relative, of the same
+  double defocus = 1;   ///< width of a bead in the stressed image over that in the relaxed one, of the same light
   Vec2 drift{};
   std::uint64_t seed = 1;
 };
@@ -116,7 +117,9 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
     const double larger = 1 + scene.growth, c = larger * std::cos(scene.turn_rad),
                  s = larger * std::sin(scene.turn_rad);
     const Vec2 there = centre + scene.drift + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
-    if (is_in_stressed) add_bead(pair.stressed, there, peak, scene.bead_sigma);
+    if (is_in_stressed) {
+      add_bead(pair.stressed, there, peak / (scene.defocus * scene.defocus), scene.defocus * scene.bead_sigma);
+    }
     const bool is_inside = at.x >= 0 && at.y >= 0 && at.x <= scene.width - 1 && at.y <= scene.width - 1;
     if (!is_inside || !is_in_relaxed || !is_in_stressed) continue;
     pair.positions.push_back(at);

@@ -1,0 +1,131 @@
+/// Bead images that single beads cannot be followed in, and two of unequal focus.
+#include "tests/support/weak_beads.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "segment/track.h"
+#include "tests/support/hard_case.h"
+
+namespace mbtfm::segment {
+namespace {
+
+TrackParameters by(TrackMethod method) { return {.method = word_of(method)}; }
+
+/// Wider than the windows: narrower ones no window shows.
+std::vector<test::Peak> wide_adhesions() {
+  auto peaks = test::ring_of_adhesions(512, 2);
+  for (test::Peak& peak : peaks) peak.radius *= 4;
+  return peaks;
+}
+
+/// Mean square of the errors of good places over their variances; 1 where sigma is right.
+double squared_over_variance(const Tracking& tracking, const std::vector<test::Peak>& peaks, Vec2 drift) {
+  double sum = 0;
+  for (const Bead& place : tracking.field) {
+    if (!place.flag.empty()) continue;
+    const Vec2 error = place.displacement_um + tracking.common.drift_um - drift -
+                       test::displacement(peaks, place.position_um - Vec2{0.5, 0.5});
+    sum += 0.5 * dot(error, error) / (place.sigma_um * place.sigma_um);
+  }
+  return sum / tracking.n_good;
+}
+
+TEST(WeakBeads, windows_follow_dense_weak_and_mottled_beads_and_their_standard_errors_hold) {
+  test::hard_case("8 beads in 100 px²; beads of 25 electrons over noise of 13, in 40 grey levels; a mottled ground",
+                  "two windows in three, rms of error over sigma 0.8 to 1.3");
+  const auto peaks = wide_adhesions();
+  const Vec2 drift{1.7, -0.6};
+  struct Case {
+    const char* name;
+    test::BeadScene scene;
+    test::Weakness weakness;
+  };
+  const Case cases[] = {{"dense", {.n_beads = 20000}, {}},
+                        {"weak, few grey levels", {.brightness = 25}, {.levels = 40}},
+                        {"mottled", {.brightness = 60}, {.mottle = 30, .levels = 60}}};
+  std::string out;
+  for (Case c : cases) {
+    double sum = 0;
+    constexpr int kSeeds = 2;
+    for (std::uint64_t seed = 1; seed <= kSeeds; ++seed) {
+      SCOPED_TRACE(std::string(c.name) + ", seed " + std::to_string(seed));
+      c.scene.drift = drift;
+      c.scene.seed = seed;
+      const auto pair = test::weakened(test::draw_bead_pair(peaks, c.scene), c.weakness, seed);
+      const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::correlation), 2);
+      EXPECT_TRUE(tracking.windows.is_on);
+      EXPECT_GE(tracking.n_good, 2.0 / 3 * static_cast<double>(tracking.field.size()));
+      sum += squared_over_variance(tracking, peaks, drift) / kSeeds;
+    }
+    out += (out.empty() ? "" : "; ") + std::string(c.name) + " " + test::two_digits(std::sqrt(sum));
+    EXPECT_GE(std::sqrt(sum), 0.8) << c.name;
+    EXPECT_LE(std::sqrt(sum), 1.3) << c.name;
+  }
+  test::came_out(out);
+}
+
+TEST(WeakBeads, are_followed_by_windows_of_themselves_and_strong_ones_are_not) {
+  test::hard_case("beads of 25 electrons over noise of 13, in 40 grey levels",
+                  "refused as single beads; followed by windows unasked");
+  const auto peaks = wide_adhesions();
+  const auto strong = test::draw_bead_pair(peaks, {.seed = 1});
+  const Tracking by_beads = track_beads(strong.relaxed, strong.stressed, 1.0, by(TrackMethod::automatic), 2);
+  EXPECT_FALSE(by_beads.windows.is_on);
+  EXPECT_EQ(by_beads.window_um, 0);
+  const auto weak = test::weakened(test::draw_bead_pair(peaks, {.brightness = 25, .seed = 1}), {.levels = 40}, 1);
+  EXPECT_THROW(track_beads(weak.relaxed, weak.stressed, 1.0, by(TrackMethod::beads), 2), NotFollowed);
+  const Tracking by_windows = track_beads(weak.relaxed, weak.stressed, 1.0, by(TrackMethod::automatic), 2);
+  EXPECT_TRUE(by_windows.windows.is_on);
+  EXPECT_GT(by_windows.window_um, 0);
+  EXPECT_NE(by_windows.windows.why.find("single beads cannot be followed"), std::string::npos);
+}
+
+TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
+  test::hard_case("weak beads as single ones; pictures of two places",
+                  "an error; its hint names track.method, or nothing");
+  const auto other = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 2});
+  const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 1});
+  const auto weak =
+      test::weakened(test::draw_bead_pair(wide_adhesions(), {.brightness = 25, .seed = 1}), {.levels = 40}, 1);
+  const auto hint = [&](const Image& relaxed, const Image& stressed) -> std::string {
+    try {
+      track_beads(relaxed, stressed, 1.0, by(TrackMethod::beads), 2);
+    } catch (const NotFollowed& error) {
+      return error.hint;
+    }
+    return "found";
+  };
+  EXPECT_EQ(hint(weak.relaxed, weak.stressed).substr(0, 19), "track.method = auto");
+  EXPECT_EQ(hint(one.relaxed, other.stressed), "");
+}
+
+TEST(Focus, of_twenty_sound_pairs_is_never_called_different) {
+  test::hard_case("twenty pairs in equal focus", "sizes equal within 5 %");
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const auto pair =
+        test::draw_bead_pair(test::ring_of_adhesions(192, 4), {.width = 192, .n_beads = 500, .seed = seed});
+    const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2);
+    EXPECT_NEAR(tracking.size_ratio, 1, 0.05) << "seed " << seed;  // a tenth of what the finding asks
+  }
+}
+
+TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
+  test::hard_case("the stressed image blurred: beads 1.5 times as wide",
+                  "the ratio of sizes, within a quarter of the difference");
+  const auto peaks = test::ring_of_adhesions(384, 6);
+  for (const double blur : {1.0, 1.5}) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      SCOPED_TRACE(seed);
+      const auto pair = test::draw_bead_pair(peaks, {.width = 384, .n_beads = 1500, .defocus = blur, .seed = seed});
+      const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, by(TrackMethod::beads), 2);
+      // neighbours in the wider window take a quarter of the difference away at most
+      EXPECT_NEAR(tracking.size_ratio, blur, 0.25 * (blur - 1) + 5 * tracking.size_ratio_sigma);
+      EXPECT_LT(tracking.size_ratio_sigma, 0.02);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
