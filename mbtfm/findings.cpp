@@ -31,6 +31,19 @@ double squared_ratio(const FitSummary& summary) {
   return summary.expected_relative_l2 > 0 ? std::pow(summary.relative_l2 / summary.expected_relative_l2, 2) : 0;
 }
 
+Noticed explains_little(const FitOutcome& o) {
+  const double left = o.summary.relative_l2 * o.summary.relative_l2;
+  const double noise = o.summary.expected_relative_l2 * o.summary.expected_relative_l2;  // of the beads' own squares
+  if (noise <= 0 || noise >= 1) return {};
+  const double share = (left - noise) / (1 - noise);
+  // of the noise's squares, which far beads tell, and of what is left
+  const double sigma =
+      2 * noise / (1 - noise) / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, o.data.n_used)));
+  return noticed(FindingKind::explains_little, share - 3 * sigma,
+                 "The model explains " + brief(100 * (1 - share)) +
+                     " % of what the beads do beyond their noise. It is the wrong model of these beads.");
+}
+
 Noticed unexplained(const FitOutcome& o) {
   const double ratio = squared_ratio(o.summary);
   return noticed(FindingKind::unexplained_displacement, ratio,
@@ -255,12 +268,13 @@ Imbalance imbalance_of(const EnsembleFit& fit) {
 std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
-  for (Noticed found : {common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o),
-                        missing_adhesions_noticed(o), unexplained(o), beads_disagree(o), noise_unknown(o),
-                        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o),
-                        single_mesh(o), out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
-                        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"),
-                        wide_intervals(o), tensions_at_zero(o)}) {
+  for (Noticed found :
+       {common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o), missing_adhesions_noticed(o),
+        explains_little(o), unexplained(o), beads_disagree(o), noise_unknown(o), noise_disagrees(o),
+        not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
+        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
+        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),
+        tensions_at_zero(o)}) {
     if (found) findings.push_back(std::move(*found));
   }
   return findings;

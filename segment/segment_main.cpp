@@ -29,6 +29,16 @@ std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument
   return set;
 }
 
+/// Length over width, mean weighed by area; 0 of none.
+double aspect_ratio(const std::vector<Adhesion>& adhesions) {
+  double sum = 0, area_um2 = 0;
+  for (const Adhesion& a : adhesions) {
+    sum += a.area_um2 * a.major_axis_um / a.minor_axis_um;
+    area_um2 += a.area_um2;
+  }
+  return area_um2 > 0 ? sum / area_um2 : 0;
+}
+
 StageReport report_of(const Segmentation& s) {
   StageReport report;
   const auto n_of = [&](FibreType type) {
@@ -67,6 +77,9 @@ StageReport report_of(const Segmentation& s) {
                    " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
   for (std::optional<Finding> found :
        {noticed(FindingKind::cell_cut, s.is_cut_by_border ? 1 : 0, "The image's border cuts the cell."),
+        noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
+                "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +
+                    " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
         noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
                 s.alignment ? "Fibres end beside their adhesions: the adhesion image shows them shifted by " +
                                   sentence_of(*s.alignment) + "." +

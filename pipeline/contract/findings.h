@@ -25,6 +25,7 @@ enum class FindingKind {
   cell_cut,
   adhesions_left_out,
   actin_shift,
+  adhesions_long,
   // track
   nothing_moves,
   moves_outward,
@@ -34,6 +35,7 @@ enum class FindingKind {
   common_motion,
   curved_motion,
   channel_shift,
+  explains_little,
   unexplained_displacement,
   noise_unknown,
   noise_disagrees,

@@ -1,6 +1,7 @@
-/// degradations FOLDER [first seed] [cells] [names]: what a cell's images go through in a laboratory, and what the
-/// program says of it. Each cell is simulated with images, degraded in one way, run whole (`mbtfm run`) and compared
-/// with its truth. A table (CSV) on stdout; `names` are separated by commas, "sound" is the undegraded one.
+/// degradations FOLDER FIRST_SEED [cells] [names], or degradations page TABLE.csv > docs/degradations.md: what a cell's
+/// images go through in a laboratory, and what the program says of it. Each cell is simulated with images, degraded in
+/// one way, run whole (`mbtfm run`) and compared with its truth. A table (CSV) on stdout; `names` are separated by
+/// commas, "sound" is the undegraded one.
 ///
 /// A degraded cell is told where the program refuses it, has an open finding, or its error bars hold: at least 90 % of
 /// the tensions' 95 % intervals hold the truth, and the total force lies within three of its standard errors.
@@ -10,6 +11,7 @@
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 #include <random>
@@ -368,12 +370,68 @@ void study(const Degradation& d, int seed, const fs::path& folder) {
 
 }  // namespace
 
+namespace {
+
+/// docs/degradations.md, of a table that this program wrote.
+void print_page(const fs::path& file) {
+  const CsvTable table(file);
+  std::printf(
+      "# Degraded images\n\n"
+      "What images go through in a laboratory, and what the program says of it. Simulated cells (scenario `u2os`, "
+      "images of\n"
+      "ordinary quality) were degraded in one way each and run as they are (`mbtfm run`). Made by "
+      "`docs/make_degradations.sh`.\n\n"
+      "- **bars hold**: cells of which at least 90 %% of the tensions' 95 %% intervals hold the truth (one fibre more "
+      "may miss,\n"
+      "  as one of twenty does by chance) and the total force lies within three standard errors of the truth. Of a "
+      "cell that\n"
+      "  the border cuts, the truth counts the whole.\n"
+      "- **error**: of the tensions, relative, median of the cells.\n"
+      "- **open findings** ([list](findings.md)): those of at least half of the cells. A cell with one has no green "
+      "tick.\n\n"
+      "| degradation | what was done | cells | refused | bars hold | error | open findings |\n"
+      "|---|---|---|---|---|---|---|\n");
+  for (const Degradation& d : degradations()) {
+    int n = 0, n_refused = 0, n_held = 0, n_untold = 0;
+    std::vector<double> errors;
+    std::map<std::string, int> findings;
+    for (int row = 0; row < table.n_rows(); ++row) {
+      if (table.text(row, "degradation") != d.name) continue;
+      ++n;
+      n_refused += table.integer(row, "exit_code", 0) != 0;
+      n_held += table.text(row, "bars_hold") == "true";
+      n_untold += table.text(row, "told") != "true";
+      const std::string error = table.text(row, "tension_error");
+      if (!error.empty() && error.find("nan") == error.npos) errors.push_back(std::stod(error));
+      std::istringstream ids(table.text(row, "findings"));
+      for (std::string id; std::getline(ids >> std::ws, id, ';');) ++findings[id];
+    }
+    if (n == 0) continue;
+    std::ranges::sort(errors);
+    std::string names;
+    for (const auto& [id, times] : findings) {
+      if (2 * times >= n) names += (names.empty() ? "`" : ", `") + id + "`";
+    }
+    char error[16] = "–";
+    if (!errors.empty()) std::snprintf(error, sizeof error, "%.2f", errors[errors.size() / 2]);
+    std::printf("| `%s` | %s | %d | %d | %d | %s | %s%s |\n", d.name.c_str(), d.what.c_str(), n, n_refused, n_held,
+                error, names.empty() ? "–" : names.c_str(),
+                n_untold > 0 ? (" **" + std::to_string(n_untold) + " not told**").c_str() : "");
+  }
+}
+
+}  // namespace
+
 int main(int argc, char** argv) {
-  if (argc < 2) {
+  if (argc < 3) {
     for (const Degradation& d : degradations()) std::printf("| `%s` | %s |\n", d.name.c_str(), d.what.c_str());
     return 0;
   }
-  const int first = argc > 2 ? std::atoi(argv[2]) : 61, n = argc > 3 ? std::atoi(argv[3]) : 3;
+  if (std::string(argv[1]) == "page") {
+    print_page(argv[2]);
+    return 0;
+  }
+  const int first = std::atoi(argv[2]), n = argc > 3 ? std::atoi(argv[3]) : 3;
   std::string names = argc > 4 ? "," + std::string(argv[4]) + "," : "";
   std::printf("degradation,cell,exit_code,fibres,held,tension_error,total_z,bars_hold,told,findings,refused\n");
   for (const Degradation& d : degradations()) {
