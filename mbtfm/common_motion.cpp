@@ -58,8 +58,7 @@ FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit) {
                     .sigma = {}};
   // The beads' own noise, and what errors of the tensions and of the model's forces look like to the motions.
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
-  const Eigen::MatrixXd inverse =
-      (data.motions.transpose() * weighted).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::MatrixXd inverse = motion_covariance(data);
   const Eigen::MatrixXd by_force = inverse * data.response->pull_back(weighted).transpose();  // motion_in(G)
   const MeshFit& mesh = fit.meshes.front();
   const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
@@ -68,9 +67,9 @@ FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit) {
     const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
     covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
   }
-  found.sigma = covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  const Eigen::VectorXd strain = a.tail<4>();
-  found.chi_squared = strain.dot(covariance.bottomRightCorner<4, 4>().completeOrthogonalDecomposition().solve(strain));
+  found.sigma = covariance.diagonal().head<6>().cwiseMax(0).cwiseSqrt();
+  const Eigen::VectorXd strain = a.segment<4>(2);
+  found.chi_squared = strain.dot(covariance.block<4, 4>(2, 2).completeOrthogonalDecomposition().solve(strain));
   return found;
 }
 

@@ -37,7 +37,7 @@ struct FoundMotion {
   Eigen::VectorXd sigma;
   double chi_squared = 0;  ///< of turn, growth and shears against none, 4 degrees of freedom
 };
-/// @param forces_nN  of the fit, by adhesion
+/// @param data  whose first motions are affine_motions()
 FoundMotion motion_beside(const LinearData& data, const EnsembleFit& fit);
 
 inline constexpr const char* kCommonMotion = "common motion";

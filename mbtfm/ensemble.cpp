@@ -38,6 +38,7 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
   mesh.network_forces_nN = network_forces_nN(problem, trial);
   mesh.network_part_nN = problem.network_part_nN(trial);
   mesh.torques_nN_um = problem.torques_nN_um(trial);
+  mesh.cut = problem.cut_reaction(trial);
   return mesh;
 }
 
@@ -170,6 +171,26 @@ std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
   return magnitudes;
 }
 
+/// Its errors are those of the adhesions' forces, which it balances.
+CutForce cut_force_of(const EnsembleFit& all) {
+  CutForce cut;
+  for (const MeshFit& mesh : all.meshes) {
+    cut.reaction.force_nN += mesh.cut.force_nN / static_cast<double>(all.meshes.size());
+    cut.reaction.torque_nN_um += mesh.cut.torque_nN_um / static_cast<double>(all.meshes.size());
+  }
+  const auto along_of = [&](const Eigen::Vector2d& direction) -> Estimate {
+    const Eigen::VectorXd along = along_cut(direction, all.forces_nN.size());
+    return estimate_of(
+        all, [&](const MeshFit& mesh) { return direction.dot(mesh.cut.force_nN); },
+        [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, along);
+  };
+  const double size = cut.reaction.force_nN.norm();
+  cut.x_nN = along_of({1, 0});
+  cut.y_nN = along_of({0, 1});
+  cut.magnitude_nN = along_of(size > 0 ? Eigen::Vector2d(cut.reaction.force_nN / size) : Eigen::Vector2d(1, 0));
+  return cut;
+}
+
 /// A tension's interval: the mean of the meshes'.
 Sides mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
   Sides mean;
@@ -233,7 +254,7 @@ void add_means(EnsembleFit& all) {
   }
 }
 
-void add_estimates(EnsembleFit& all) {
+void add_estimates(EnsembleFit& all, bool is_cut) {
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   all.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
   for (const MeshFit& mesh : all.meshes) {
@@ -246,6 +267,7 @@ void add_estimates(EnsembleFit& all) {
   all.force_magnitudes_nN = force_magnitudes_of(all);
   all.total_force_nN = total_force_of(all);
   all.network_force_nN = network_force_of(all);
+  if (is_cut) all.cut = cut_force_of(all);
 }
 
 struct FirstFit {
@@ -308,6 +330,10 @@ Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
   return along;
 }
 
+Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces) {
+  return -direction.replicate(n_forces / 2, 1);
+}
+
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
   Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;
@@ -362,7 +388,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   all.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data, adhesion_ids), threads);
-  add_estimates(all);
+  add_estimates(all, !networks.front().network().held_by_cut.empty());
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;
 }

@@ -37,7 +37,15 @@ struct MeshFit {
   Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
   std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
+  CutReaction cut;
   Eigen::VectorXd network_part_nN;                   ///< of the forces: what the links of the actin network bring
+};
+
+/// The force that passes through the cut: the part of the cell that is seen pulls the unseen one with it, and so much
+/// do the adhesions out there exert on the gel together. Mean over the meshes.
+struct CutForce {
+  CutReaction reaction;
+  Estimate x_nN, y_nN, magnitude_nN;  ///< magnitude: along the mean
 };
 
 struct EnsembleFit {
@@ -47,6 +55,7 @@ struct EnsembleFit {
   Eigen::VectorXd forces_nN;                  ///< by adhesion: fx, fy; mean over the meshes
   Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
   std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
+  std::optional<CutForce> cut;                ///< none: the image shows the whole cell
   Eigen::VectorXd network_forces_nN;          ///< with every fibre at the network's tension: the network's part
   /// Sums of the magnitudes of both, less what noise and the bounds t >= 0 add to them on average.
   Estimate total_force_nN, network_force_nN;
@@ -85,6 +94,10 @@ Eigen::VectorXd values_of(const EnsembleFit& fit);
 /// Unit vectors of forces (fx, fy by adhesion), zero where a force is: the change of the sum of their magnitudes is
 /// along them.
 Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN);
+
+/// By force (fx, fy by adhesion): how a force through the cut in this direction answers to those of the adhesions, which
+/// it balances.
+Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces);
 
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);

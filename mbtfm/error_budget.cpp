@@ -17,7 +17,17 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using substrate::Ellipse;
 
-/// Linear answers of the tensions and, in the last row, of the total force.
+/// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.
+MatrixXd sums_of(const EnsembleFit& fit) {
+  MatrixXd sums = directions_of(fit.forces_nN);
+  if (!fit.cut) return sums;
+  sums.conservativeResize(Eigen::NoChange, 2);
+  const Eigen::Vector2d force = fit.cut->reaction.force_nN;
+  sums.col(1) = along_cut(force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0), sums.rows());
+  return sums;
+}
+
+/// Linear answers of the tensions and, in the last rows, of the sums of forces.
 struct Gain {
   MatrixXd of_tensions;  ///< where the tensions change
   MatrixXd of_forces;    ///< where the beads show these forces in excess of the model's, by adhesion
@@ -27,12 +37,12 @@ struct Gain {
 /// dt = Cov Jᵀ C e / s² for an error e of the forces; total force: d|R| = eᵀ (dR/dt dt + dR).
 Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
   const Index n = mesh.covariance_nN2.rows();
-  const VectorXd e = directions_of(fit.forces_nN);
-  Gain gain{MatrixXd::Identity(n + 1, n), {}, {}};
-  gain.of_tensions.row(n) = e.transpose() * mesh.force_derivatives;
+  const MatrixXd sums = sums_of(fit);
+  Gain gain{MatrixXd::Identity(n + sums.cols(), n), {}, {}};
+  gain.of_tensions.bottomRows(sums.cols()) = sums.transpose() * mesh.force_derivatives;
   gain.of_forces = gain.of_tensions * mesh.by_force;
   gain.of_model = gain.of_forces;
-  gain.of_model.row(n) -= e.transpose();
+  gain.of_model.bottomRows(sums.cols()) -= sums.transpose();
   return gain;
 }
 
@@ -64,7 +74,7 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
 }
 
 MeanVariances mean_variances(const BudgetInputs& in) {
-  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + 1;
+  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + (in.fit.cut ? 2 : 1);
   const double n = static_cast<double>(in.fit.meshes.size());
   MeanVariances mean{VectorXd::Zero(n_rows), VectorXd::Zero(n_rows), VectorXd::Zero(n_rows), VectorXd::Zero(n_rows)};
   for (const MeshFit& mesh : in.fit.meshes) {
@@ -164,7 +174,7 @@ VectorXd variance_of_ends(const BudgetInputs& in, const network::GeometryGradien
   }
   VectorXd variance = VectorXd::Zero(gradient.by_link.cols());
   for (std::size_t v = 0; v < links_of.size(); ++v) {
-    if (links_of[v].size() != 1 || network.adhesion_id[v] != 0) continue;
+    if (links_of[v].size() != 1 || is_held(network, v)) continue;
     const Link& link = network.links[links_of[v].front()];
     const auto group = std::lower_bound(fibre_ids.begin(), fibre_ids.end(), link.fibre_id) - fibre_ids.begin();
     const double tension_nN = link.share * in.fit.tensions_nN[static_cast<std::size_t>(group)].value;
@@ -347,7 +357,7 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   MeanVariances mean = mean_variances(in);
   add_room_above(in.fit, mean);
   if (in.fit.model_error)
-    mean.mesh[mean.mesh.size() - 1] += std::pow(roughness_of_total(in.fit.forces_nN, *in.fit.model_error).sigma_nN, 2);
+    mean.mesh[static_cast<Index>(in.fit.fibre_ids.size())] += std::pow(roughness_of_total(in.fit.forces_nN, *in.fit.model_error).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
   const VectorXd substrate = substrate_variances(in, gain, answers);
   const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
@@ -372,6 +382,7 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   }
   budget.total_force_nN = total_nN(in.fit.forces_nN);
   budget.total_force_parts_nN = parts(n);
+  if (in.fit.cut) budget.cut_force = {.force_nN = in.fit.cut->magnitude_nN.value, .parts_nN = parts(n + 1)};
   return budget;
 }
 

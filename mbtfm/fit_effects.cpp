@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "mbtfm/beyond_cut.h"
 #include "mbtfm/common_motion.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/parallel.h"
@@ -68,9 +69,26 @@ std::optional<Change> with_loss(const Effect& e, const FittedCell& c, int thread
 
 std::optional<Change> with_motion(const Effect& e, const FittedCell& c, int threads) {
   LinearData with = c.data;
-  allow_motions(with, affine_motions(c.inputs.beads));
+  const Eigen::MatrixXd affine = affine_motions(c.inputs.beads);
+  Eigen::MatrixXd motions(affine.rows(), affine.cols() + with.motions.cols());
+  motions.leftCols(affine.cols()) = affine;
+  motions.rightCols(with.motions.cols()) = with.motions;
+  Eigen::VectorXd precision;
+  if (with.motion_precision.size() > 0) {
+    precision = Eigen::VectorXd::Zero(motions.cols());
+    precision.tail(with.motions.cols()) = with.motion_precision;
+  }
+  allow_motions(with, std::move(motions), std::move(precision));
   return change_between(e.name, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
+}
+
+/// None where the image shows the whole cell.
+std::optional<Change> with_forces_beyond(const Effect& e, const FittedCell& c, int threads) {
+  if (cuts_of(c.cell).empty()) return {};
+  LinearData with = unweighted(c.data);
+  allow_forces_beyond(with, c.cell, c.parameters.gel);
+  return change_between(e.name, c.fit, fit_again(c, c.networks, std::move(with), c.parameters.fit.loss, threads));
 }
 
 /// What it changes of the network's tension.
@@ -90,6 +108,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
   if (e.name == "robust loss") return with_loss(e, c, threads);
   if (e.name == kCommonMotion) return with_motion(e, c, threads);
+  if (e.name == kBeyondCut) return with_forces_beyond(e, c, threads);
   return {};
 }
 
@@ -97,6 +116,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
 std::string in_words(const std::string& name) {
   if (name == "vertical displacement") return "would change no tension: nothing along the surface depends on it";
   if (name == "time coupling") return "would change no tension but by the fit's tolerance: only where the fit begins";
+  if (name == kBeyondCut) return "would change no tension: the image shows the whole cell";
   return "would change nothing that can be told: there is no datum of it";
 }
 
@@ -146,7 +166,7 @@ void declare(ParameterList& list, FitStageParameters& p) {
   list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
   declare(list, p.effects,
           {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
-           "common_motion", "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
+           "common_motion", "beyond_cut", "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
 }
 
 std::vector<int> adhesion_ids_of(const Cell& cell) {

@@ -100,6 +100,17 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"method", parameters.method},
             {"loss", fit.loss},
             {"reason", fit.report.reason}};
+  if (fit.cut) {
+    const Interval interval = interval_95(fit.cut->magnitude_nN);
+    s.more.insert(s.more.end(), {{"cut_force_x_nN", fit.cut->x_nN.value},
+                                 {"cut_force_x_sigma_nN", fit.cut->x_nN.standard_error},
+                                 {"cut_force_y_nN", fit.cut->y_nN.value},
+                                 {"cut_force_y_sigma_nN", fit.cut->y_nN.standard_error},
+                                 {"cut_force_nN", fit.cut->magnitude_nN.value},
+                                 {"cut_force_sigma_nN", fit.cut->magnitude_nN.standard_error},
+                                 {"cut_force_low_nN", interval.low},
+                                 {"cut_force_high_nN", interval.high}});
+  }
   return s;
 }
 

@@ -37,19 +37,40 @@ Root root_of(Eigen::MatrixXd A, double trace, int threads) {
   return {std::move(A), n_felt};
 }
 
+/// MᵀW²M + Λ, each motion as a multiple of `size` of itself, so that motions of different units go together.
+struct MotionNormal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd size;
+};
+
+/// @param square  MᵀW²M
+MotionNormal motion_normal(const LinearData& data, Eigen::MatrixXd square) {
+  MotionNormal normal{std::move(square), Eigen::VectorXd::Ones(data.motions.cols())};
+  if (data.motion_precision.size() == 0) return normal;
+  normal.matrix.diagonal() += data.motion_precision;
+  normal.size = normal.matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  normal.matrix = normal.size.asDiagonal() * normal.matrix * normal.size.asDiagonal();
+  return normal;
+}
+
 /// Gᵀ W² P G, on and above its diagonal, of Gᵀ W² G.
 Eigen::MatrixXd less_motions(Eigen::MatrixXd gram, const LinearData& data, const Eigen::VectorXd& weight) {
   if (data.motions.cols() == 0) return gram;
-  // M Q with (M Q)ᵀ W² (M Q) = 1, of those motions that differ
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(data.motions.transpose() * weight.asDiagonal() *
-                                                             data.motions);
+  // M Q with (M Q)ᵀ W² (M Q) + Qᵀ Λ Q = 1, of those motions that differ
+  const MotionNormal normal = motion_normal(data, data.motions.transpose() * weight.asDiagonal() * data.motions);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal.matrix);
   constexpr double kRounding = 1e-13;
   const Eigen::VectorXd scale = eigen.eigenvalues().unaryExpr(
       [&](double square) { return square > kRounding * eigen.eigenvalues().maxCoeff() ? 1 / std::sqrt(square) : 0.0; });
-  const Eigen::MatrixXd unit = data.motions * (eigen.eigenvectors() * scale.asDiagonal());
+  const Eigen::MatrixXd unit = data.motions * (normal.size.asDiagonal() * eigen.eigenvectors() * scale.asDiagonal());
   const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
   add_upper_gram(pulled.transpose(), gram, data.threads, -1);
   return gram;
+}
+
+/// Motions that cost a component of the beads each, as nothing is known of their sizes.
+Eigen::Index n_unexpected(const Eigen::MatrixXd& motions, const Eigen::VectorXd& precision) {
+  return motions.cols() - (precision.array() > 0).count();
 }
 
 }  // namespace
@@ -83,18 +104,27 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   return data;
 }
 
-void allow_motions(LinearData& data, Eigen::MatrixXd motions) {
-  data.n_used += data.motions.cols() - motions.cols();
+void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
+  MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
+  data.n_used += n_unexpected(data.motions, data.motion_precision) - n_unexpected(motions, precision);
   data.motions = std::move(motions);
+  data.motion_precision = std::move(precision);
   reweight(data, Eigen::VectorXd(data.bead_weight));
 }
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const MotionNormal normal = motion_normal(data, data.motions.transpose() * weighted);
   // by rank: beads in one place tell no turn from a shift
-  return (data.motions.transpose() * weighted)
-      .completeOrthogonalDecomposition()
-      .solve(weighted.transpose() * displacements);
+  return normal.size.asDiagonal() * normal.matrix.completeOrthogonalDecomposition().solve(
+                                        normal.size.asDiagonal() * (weighted.transpose() * displacements));
+}
+
+Eigen::MatrixXd motion_covariance(const LinearData& data) {
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const MotionNormal normal = motion_normal(data, data.motions.transpose() * weighted);
+  return normal.size.asDiagonal() * normal.matrix.completeOrthogonalDecomposition().pseudoInverse() *
+         normal.size.asDiagonal();
 }
 
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
@@ -123,7 +153,11 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.reduced.n_felt = n_felt;
   data.reduced.is_upper = true;
   data.reduced.n_components = data.n_used;
-  data.reduced.floor_squared = std::max(0.0, weighted_u.dot(u) - target.squaredNorm());
+  double squares = weighted_u.dot(u);
+  if (data.motion_precision.size() > 0) {
+    squares += motion_in(data, data.displacement_um).cwiseAbs2().col(0).dot(data.motion_precision);
+  }
+  data.reduced.floor_squared = std::max(0.0, squares - target.squaredNorm());
 }
 
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {

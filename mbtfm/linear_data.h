@@ -11,7 +11,8 @@
 
 namespace mbtfm::inverse {
 
-/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best.
+/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best (and what
+/// is expected of their sizes counts: aᵀΛa is part of the left side).
 /// White noise of W u is white in y.
 struct ReducedData {
   std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
@@ -31,7 +32,9 @@ struct LinearData {
   Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
-  Eigen::Index n_used = 0;             ///< components of the beads that are used, less one for each motion
+  Eigen::VectorXd motion_precision;    ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its
+                                       ///< size, in units of the noise's; 0 where nothing is known of it; empty: all 0
+  Eigen::Index n_used = 0;             ///< components of the beads that are used, less one for each motion of precision 0
   bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
   int threads = 1;                     ///< to reduce it with
   ReducedData reduced;                 ///< of all that, bead_weight included
@@ -47,11 +50,15 @@ LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_
                   const std::vector<bool>& is_used = {});
 
 /// Let the beads move by any sum of these (2·beads × some) besides. Reduces again.
-void allow_motions(LinearData& data, Eigen::MatrixXd motions);
-/// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed:
-/// (MᵀW²M)⁻¹ MᵀW² D
+/// @param precision  by motion, see LinearData::motion_precision
+void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
+/// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
+/// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
-/// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M)⁻¹ MᵀW².
+/// (MᵀW²M + Λ)⁻¹: the covariance of the motions' sizes by noise of variance 1.
+Eigen::MatrixXd motion_covariance(const LinearData& data);
+/// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M + Λ)⁻¹ MᵀW². With Λ, W²P is the inverse of the
+/// covariance W⁻² + M Λ⁻¹ Mᵀ of noise and motions together.
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
 /// What forces and motions leave: P (u − G R), um.
 Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);

@@ -186,7 +186,7 @@ void declare(ParameterList& list, FibreParameters& p) {
 }
 
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
-                               double pixel_size_um, const FibreParameters& p) {
+                               double pixel_size_um, const FibreParameters& p, const Cuts& cuts) {
   const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
   const Ridges ridges = find_ridges(field.image, field.is_inside, scales_of(p, field.pixel_um));
   const auto traces = trace_lines(ridges, field.is_inside, rule_of(p, field.pixel_um));
@@ -198,6 +198,7 @@ std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, co
     fibre.mean_intensity = c.profile.height;
     fibre.confidence = chance_of_fibre(c.expected_false);
     tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+    lead_to_cut(fibre, cuts, p.fibre_reach_um);
     if (length_um(fibre.points_um) >= p.fibre_shortest_um) fibres.push_back(fibre);
   }
   std::stable_sort(fibres.begin(), fibres.end(),

@@ -39,8 +39,9 @@ void declare(ParameterList& list, FibreParameters& parameters);
 /// `mean_intensity` the mean height above both sides in grey levels. Sorted by length, longest first, ids from 1.
 /// @param outline_um  lines whose middle lies outside are no fibres; empty: anywhere
 /// @param pixel_size_um  > 0
+/// @param cuts  of the outline: see lead_to_cut()
 /// @throws InvalidData where a pixel is not finite
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
-                               double pixel_size_um, const FibreParameters& parameters);
+                               double pixel_size_um, const FibreParameters& parameters, const Cuts& cuts = {});
 
 }  // namespace mbtfm::segment

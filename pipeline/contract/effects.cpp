@@ -27,6 +27,8 @@ const std::vector<Key>& switches() {
        "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
       {"common_motion", &S::common_motion,
        "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
+      {"beyond_cut", &S::beyond_cut,
+       "forces beyond the cut of a cell that its image cuts; auto: where the outline has a cut"},
       {"cable_elasticity", &S::cable_elasticity,
        "cables resist to be longer than at rest; auto: where any would be longer"},
       {"robust_loss", &S::robust_loss, "outlying beads count less; auto: where tails cost more than the loss does"},

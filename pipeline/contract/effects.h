@@ -22,6 +22,7 @@ struct EffectSwitches {
   std::string vertical_displacement = "auto";
   std::string drift_affine = "auto";
   std::string common_motion = "auto";
+  std::string beyond_cut = "auto";
   std::string cable_elasticity = "auto";
   std::string robust_loss = "auto";
   std::string time_coupling = "auto";

@@ -22,7 +22,6 @@ enum class FindingKind {
   lossy_image,
   saturated,
   // segment
-  cell_cut,
   adhesions_left_out,
   // track
   nothing_moves,
@@ -34,6 +33,7 @@ enum class FindingKind {
   noise_disagrees,
   beads_disagree_by_region,
   // fit: the cell
+  cell_cut,
   missing_fibre,
   fibre_without_tension,
   // fit: the answer
