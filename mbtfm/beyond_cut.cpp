@@ -169,10 +169,11 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::
   }
   const Spectrum spectrum = spectrum_of(data, Z);
   const double kappa = likeliest_kappa(spectrum);
-  ForcesBeyond found{.n_places = static_cast<Eigen::Index>(places.size()),
-                     .n_motions = 0,
-                     .intensity_nN_per_um = std::sqrt(kappa * spectrum.variance)};
-  // Of unit variance. What together stands out by a tenth of the noise of one component changes no weight by a per cent.
+  ForcesBeyond found;
+  found.n_places = static_cast<Eigen::Index>(places.size());
+  found.intensity_nN_per_um = std::sqrt(kappa * spectrum.variance);
+  // Of unit variance. What together stands out by a tenth of the noise of one component changes no weight by a per
+  // cent.
   constexpr double kUnseen = 0.01;
   const Eigen::MatrixXd square = kappa * transposed_product(Z, squared_weights(data).asDiagonal() * Z);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(square);
@@ -187,15 +188,51 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::
   return found;
 }
 
+void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
+  constexpr double kUnseen_um = 3;
+  std::vector<Eigen::Index> near;
+  for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
+    const Adhesion& adhesion = cell.adhesions[a];
+    if (distance_to_cut_um(cell, adhesion.position_um) - 0.5 * adhesion.major_axis_um < kUnseen_um)
+      near.push_back(static_cast<Eigen::Index>(a));
+  }
+  // mean square of the free forces, less their noise, each by what the beads tell of it
+  const Eigen::Index n_forces = data.response->cols();
+  const double variance = noise_variance(data);
+  const Eigen::VectorXd noise =
+      variance * solve_normal(data.reduced, Eigen::MatrixXd::Identity(n_forces, n_forces)).diagonal();
+  const Eigen::VectorXd squares = free_forces_nN(data.reduced).cwiseAbs2();
+  const double mean_square =
+      (squares - noise).cwiseQuotient(noise).sum() / std::max(noise.cwiseInverse().sum(), 1e-300);
+  if (near.empty() || mean_square <= 0) return;
+  found.n_own = static_cast<Eigen::Index>(near.size());
+  found.own_nN = std::sqrt(mean_square);
+  const Eigen::Index before = data.motions.cols(), n_own = 2 * found.n_own;
+  Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(n_forces, before + n_own);
+  for (Eigen::Index k = 0; k < found.n_own; ++k) {
+    forces.block<2, 2>(2 * near[static_cast<std::size_t>(k)], before + 2 * k)
+        .diagonal()
+        .setConstant(std::sqrt(mean_square / variance));
+  }
+  Eigen::MatrixXd motions(data.motions.rows(), before + n_own);
+  motions << data.motions, data.response->displace(forces.rightCols(n_own));
+  Eigen::VectorXd precision = Eigen::VectorXd::Ones(before + n_own);
+  precision.head(before) = data.motion_precision;
+  allow_motions(data, std::move(motions), std::move(precision));
+  data.forces_by_motion = std::move(forces);
+}
+
 ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing) {
   DisplacementField beads;
   for (const Vec2 p : data.position_um) beads.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
   const double density = beads_per_um2(beads);
   if (density <= 0) return {};
   const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
-  return allow_forces_beyond(
+  ForcesBeyond found = allow_forces_beyond(
       data, places,
       substrate::make_greens(gel, {.model = "layer"}, data.threads)->compliance_um_per_nN(data.position_um, places));
+  allow_own_forces(data, cell, found);
+  return found;
 }
 
 bool allows_forces_beyond(const EffectSwitches& switches, const Cell& cell) {
@@ -211,8 +248,9 @@ Effect beyond_cut_effect(const std::string& setting, const Cell& cell, const std
                  cut_um == 0 ? "the image shows the whole cell"
                  : found     ? "the image cuts the cell along " + brief(cut_um) + " um; forces at " +
                                std::to_string(found->n_places) + " places beyond, of " +
-                               brief(found->intensity_nN_per_um) + " nN times the root of their area in um²"
-                             : "the image cuts the cell along " + brief(cut_um) + " um");
+                               brief(found->intensity_nN_per_um) + " nN times the root of their area in um², and at " +
+                               std::to_string(found->n_own) + " adhesions near the cut"
+                         : "the image cuts the cell along " + brief(cut_um) + " um");
 }
 
 }  // namespace mbtfm::inverse

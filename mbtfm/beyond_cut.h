@@ -36,6 +36,10 @@ struct ForcesBeyond {
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
   double intensity_nN_per_um = 0;
+  /// Adhesions so near to the cut that a fibre from beyond may end on them unseen, and the standard deviation that is
+  /// expected of a component of what it brings them.
+  Eigen::Index n_own = 0;
+  double own_nN = 0;
 };
 
 /// Add the motions to those that the data have. The forces are taken for random, independent of each other and of one
@@ -45,7 +49,13 @@ struct ForcesBeyond {
 /// @param compliance_um_per_nN  2·beads × 2·places
 ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
                                  const Eigen::MatrixXd& compliance_um_per_nN);
-/// The same for the places of this cell, on a layer of this gel (of gels with sides or a graded modulus it differs by
+/// Let the adhesions nearer to the cut than 3 um have forces of their own, beside the network's: a fibre of which so
+/// little is in view is not segmented (segment.fibre_shortest_um), and at the cut the network is held where it is,
+/// while the cell's own gave way. They pass through the cut. Expected is the size that adhesions of this cell have, as
+/// forces independent of each other tell it.
+/// @param adhesions  those of the data, in their order
+void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found);
+/// Both, for the places of this cell, on a layer of this gel (of gels with sides or a graded modulus it differs by
 /// less than the intensity is known to).
 ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing = {});
 

@@ -19,11 +19,10 @@ using substrate::Ellipse;
 
 /// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.
 MatrixXd sums_of(const EnsembleFit& fit) {
-  MatrixXd sums = directions_of(fit.forces_nN);
+  MatrixXd sums = directions_of(adhesion_forces_nN(fit));
   if (!fit.cut) return sums;
   sums.conservativeResize(Eigen::NoChange, 2);
-  const Eigen::Vector2d force = fit.cut->reaction.force_nN;
-  sums.col(1) = along_cut(force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0), sums.rows());
+  sums.col(1) = along_cut(fit.cut->direction(), sums.rows());
   return sums;
 }
 
@@ -39,8 +38,9 @@ Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
   const Index n = mesh.covariance_nN2.rows();
   const MatrixXd sums = sums_of(fit);
   Gain gain{MatrixXd::Identity(n + sums.cols(), n), {}, {}};
-  gain.of_tensions.bottomRows(sums.cols()) = sums.transpose() * mesh.force_derivatives;
+  gain.of_tensions.bottomRows(sums.cols()) = by_network_force(fit, sums).transpose() * mesh.force_derivatives;
   gain.of_forces = gain.of_tensions * mesh.by_force;
+  gain.of_forces.bottomRows(sums.cols()) += (sums - by_network_force(fit, sums)).transpose();  // as forces of their own
   gain.of_model = gain.of_forces;
   gain.of_model.bottomRows(sums.cols()) -= sums.transpose();
   return gain;
@@ -355,9 +355,12 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const Gain gain = gain_of(in.fit, in.fit.meshes.front());
   const BeadAnswers answers = answers_of(in, gain);
   MeanVariances mean = mean_variances(in);
+  const MatrixXd sums = sums_of(in.fit);
+  mean.beads.tail(sums.cols()) += own_variances(in.fit, sums);
   add_room_above(in.fit, mean);
   if (in.fit.model_error)
-    mean.mesh[static_cast<Index>(in.fit.fibre_ids.size())] += std::pow(roughness_of_total(in.fit.forces_nN, *in.fit.model_error).sigma_nN, 2);
+    mean.mesh[static_cast<Index>(in.fit.fibre_ids.size())] +=
+        std::pow(roughness_of_total(adhesion_forces_nN(in.fit), *in.fit.model_error).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
   const VectorXd substrate = substrate_variances(in, gain, answers);
   const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
@@ -380,7 +383,7 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
     budget.tensions.push_back(
         {.fibre_id = in.fit.fibre_ids[at], .tension_nN = in.fit.tensions_nN[at].value, .parts_nN = parts(i)});
   }
-  budget.total_force_nN = total_nN(in.fit.forces_nN);
+  budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit));
   budget.total_force_parts_nN = parts(n);
   if (in.fit.cut) budget.cut_force = {.force_nN = in.fit.cut->magnitude_nN.value, .parts_nN = parts(n + 1)};
   return budget;

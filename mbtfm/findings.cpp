@@ -195,13 +195,14 @@ Noticed out_of_balance(FindingKind kind, double imbalance, const std::string& wh
 Noticed cell_cut(const FitOutcome& o) {
   if (!o.fit.cut) return {};
   const Estimate& force = o.fit.cut->magnitude_nN;
-  return noticed(FindingKind::cell_cut, 1,
-                 "The image's border cuts the cell. The fit holds the network along the cut; " +
-                     brief(force.value) + " +- " + brief(force.standard_error) + " nN pass through it. " +
-                     (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
-                               : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
-                                 "taken for forces of the adhesions near it."),
-                 o.beyond ? Severity::note : Severity::caution);
+  return noticed(
+      FindingKind::cell_cut, 1,
+      "The image's border cuts the cell. The fit holds the network along the cut; " + brief(force.value) + " +- " +
+          brief(force.standard_error) + " nN pass through it. " +
+          (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
+                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
+                      "taken for forces of the adhesions near it."),
+      o.beyond ? Severity::note : Severity::caution);
 }
 
 Noticed common_motion(const FitOutcome& o) {

@@ -78,6 +78,11 @@ std::optional<Change> with_motion(const Effect& e, const FittedCell& c, int thre
     precision = Eigen::VectorXd::Zero(motions.cols());
     precision.tail(with.motions.cols()) = with.motion_precision;
   }
+  Eigen::MatrixXd forces = std::move(with.forces_by_motion);
+  if (forces.size() > 0) {
+    with.forces_by_motion = Eigen::MatrixXd::Zero(forces.rows(), motions.cols());
+    with.forces_by_motion.rightCols(forces.cols()) = forces;
+  }
   allow_motions(with, std::move(motions), std::move(precision));
   return change_between(e.name, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));

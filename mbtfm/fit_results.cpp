@@ -47,16 +47,17 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
     if (f.start_adhesion_id) connected.insert(*f.start_adhesion_id);
     if (f.end_adhesion_id) connected.insert(*f.end_adhesion_id);
   }
+  const Eigen::VectorXd exerted_nN = adhesion_forces_nN(fit);  // forces of their own act at the centres
   std::vector<AdhesionForce> forces;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
     const auto at = 2 * static_cast<Eigen::Index>(a);
-    const Vec2 force_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
+    const Vec2 network_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
     const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
     forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
-                      .force_nN = force_nN,
+                      .force_nN = {exerted_nN[at], exerted_nN[at + 1]},
                       .sigma_nN = fit.force_magnitudes_nN[a].standard_error,
                       .connected = connected.contains(cell.adhesions[a].adhesion_id),
-                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, force_nN)});
+                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, network_nN)});
   }
   return forces;
 }

@@ -127,6 +127,17 @@ Eigen::MatrixXd motion_covariance(const LinearData& data) {
          normal.size.asDiagonal();
 }
 
+std::optional<OwnForces> own_forces_in(const LinearData& data) {
+  const Eigen::MatrixXd& E = data.forces_by_motion;
+  if (E.size() == 0) return std::nullopt;
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const Eigen::MatrixXd gain = E * motion_covariance(data);
+  return OwnForces{
+      .left = Eigen::MatrixXd::Identity(E.rows(), E.rows()) - gain * data.response->pull_back(weighted).transpose(),
+      .found_nN = gain * (weighted.transpose() * data.displacement_um),
+      .covariance = gain * E.transpose()};
+}
+
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
   if (data.motions.cols() > 0) displacements -= data.motions * motion_in(data, displacements);
   return displacements;

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -34,10 +35,12 @@ struct LinearData {
   Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
   Eigen::VectorXd motion_precision;    ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its
                                        ///< size, in units of the noise's; 0 where nothing is known of it; empty: all 0
-  Eigen::Index n_used = 0;             ///< components of the beads that are used, less one for each motion of precision 0
-  bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
-  int threads = 1;                     ///< to reduce it with
-  ReducedData reduced;                 ///< of all that, bead_weight included
+  Eigen::MatrixXd forces_by_motion;  ///< E: by motion, the forces of adhesions that it comes of, beside those found as
+                                     ///< forces; 2·adhesions × motions; empty: none
+  Eigen::Index n_used = 0;           ///< components of the beads that are used, less one for each motion of precision 0
+  bool has_errors = false;           ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  int threads = 1;                   ///< to reduce it with
+  ReducedData reduced;               ///< of all that, bead_weight included
 };
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
@@ -55,6 +58,16 @@ void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd pr
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
 /// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
+/// Forces that adhesions have of their own, E a beside R: the a that explain best what R leaves. Linear in R, so
+/// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
+struct OwnForces {
+  Eigen::MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G
+  Eigen::VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u
+  Eigen::MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ
+};
+/// None where no motion comes of them.
+std::optional<OwnForces> own_forces_in(const LinearData& data);
+
 /// (MᵀW²M + Λ)⁻¹: the covariance of the motions' sizes by noise of variance 1.
 Eigen::MatrixXd motion_covariance(const LinearData& data);
 /// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M + Λ)⁻¹ MᵀW². With Λ, W²P is the inverse of the

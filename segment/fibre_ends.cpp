@@ -160,8 +160,8 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
 
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
   if (cuts.empty()) return;
-  constexpr double kCourse_um = 1;       // of the line's end tells where it points
-  constexpr double kOnIt_um = 1e-6;      // ends there already
+  constexpr double kCourse_um = 1;   // of the line's end tells where it points
+  constexpr double kOnIt_um = 1e-6;  // ends there already
   const auto leads = [&](Polyline& line) {
     const Polyline last = last_part(line, kCourse_um);
     const Vec2 from = last.front(), ahead = direction_of_end(last);

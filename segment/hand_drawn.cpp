@@ -219,8 +219,8 @@ CellOutline hand_drawn_outline(const RoiSet& set, const Field& field) {
                        "keep the cell's alone: an image of several cells is segmented cell by cell");
     }
   }
-  CutRing cut = cut_by_border(cell.outer_um, {field.width_px * field.pixel_um, field.height_px * field.pixel_um},
-                              field.pixel_um);
+  CutRing cut =
+      cut_by_border(cell.outer_um, {field.width_px * field.pixel_um, field.height_px * field.pixel_um}, field.pixel_um);
   cell.outer_um = std::move(cut.points_um);
   cell.is_cut = std::move(cut.is_cut);
   return cell;

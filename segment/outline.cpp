@@ -264,8 +264,7 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
   std::vector<bool> result;
   for (const Vec2 p : ring_um) {
     const double border = std::min({p.x, p.y, field_um.x - p.x, field_um.y - p.y});
-    result.push_back(border > border_um &&
-                     std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
+    result.push_back(border > border_um && std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
                        return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
                      }));
   }

@@ -26,9 +26,9 @@ void declare(ParameterList& list, OutlineParameters& parameters);
 struct CellOutline {
   Polygon outer_um;
   std::vector<Polygon> holes_um;
-  double area_um2 = 0;          ///< without the holes
-  bool is_sheet = false;        ///< larger than any single cell; its holes are left out
-  std::vector<bool> is_cut{};   ///< by piece of the outer ring: the image ends there before the cell does
+  double area_um2 = 0;         ///< without the holes
+  bool is_sheet = false;       ///< larger than any single cell; its holes are left out
+  std::vector<bool> is_cut{};  ///< by piece of the outer ring: the image ends there before the cell does
   bool is_cut_by_border() const { return std::ranges::find(is_cut, true) != is_cut.end(); }
 };
 

@@ -109,9 +109,10 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                        "do both channels show the same cell at the same place?");
     if (drawn.fibres)
       s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres,
-                                         cuts_of(s.cell));
+                                        cuts_of(s.cell));
     else if (actin)
-      s.cell.fibres = find_fibres(actin->image, s.cell.outline_um, s.cell.adhesions, pixel_um, p.fibres, cuts_of(s.cell));
+      s.cell.fibres =
+          find_fibres(actin->image, s.cell.outline_um, s.cell.adhesions, pixel_um, p.fibres, cuts_of(s.cell));
     result.push_back(std::move(s));
   }
   return result;
