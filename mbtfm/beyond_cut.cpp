@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "mbtfm/common_motion.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
@@ -184,17 +185,29 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::
   motions.rightCols(found.n_motions) = std::sqrt(kappa) * Z * eigen.eigenvectors().rightCols(found.n_motions);
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
   precision.head(n_free).setZero();
+  if (n_free > 0) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
   allow_motions(data, std::move(motions), std::move(precision));
   return found;
 }
 
+/// Standard deviation that a component of an adhesion's own force is expected to have at this distance from the cut, in
+/// that of the cell's adhesion forces. By unseen fibres as much as any adhesion has. By the network, whose own gave way
+/// at the cut: measured as forces of the cells 1 to 8 less those of their networks held at cuts (`cut_cells profile`).
+double expected_own(double distance_um) {
+  constexpr double kUnseen_um = 3, kOfNetwork = 0.23, kFade_um = 10;
+  return distance_um < kUnseen_um ? 1 : kOfNetwork * std::exp(-distance_um / kFade_um);
+}
+
 void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
-  constexpr double kUnseen_um = 3;
+  constexpr double kLeast = 0.02;  // nothing beside the errors that forces have in whole cells, too (0.1)
   std::vector<Eigen::Index> near;
+  std::vector<double> expected;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
     const Adhesion& adhesion = cell.adhesions[a];
-    if (distance_to_cut_um(cell, adhesion.position_um) - 0.5 * adhesion.major_axis_um < kUnseen_um)
-      near.push_back(static_cast<Eigen::Index>(a));
+    const double of_own = expected_own(distance_to_cut_um(cell, adhesion.position_um) - 0.5 * adhesion.major_axis_um);
+    if (of_own < kLeast) continue;
+    near.push_back(static_cast<Eigen::Index>(a));
+    expected.push_back(of_own);
   }
   // mean square of the free forces, less their noise, each by what the beads tell of it
   const Eigen::Index n_forces = data.response->cols();

@@ -36,8 +36,8 @@ struct ForcesBeyond {
   /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
   /// independent of each other over an area A have a sum of this times √A.
   double intensity_nN_per_um = 0;
-  /// Adhesions so near to the cut that a fibre from beyond may end on them unseen, and the standard deviation that is
-  /// expected of a component of what it brings them.
+  /// Adhesions so near to the cut that they may have forces beside the network's, and the standard deviation of a
+  /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
   Eigen::Index n_own = 0;
   double own_nN = 0;
 };
@@ -45,15 +45,17 @@ struct ForcesBeyond {
 /// Add the motions to those that the data have. The forces are taken for random, independent of each other and of one
 /// intensity: the one that makes the data most likely, whatever the forces inside of the image are (restricted maximum
 /// likelihood; Patterson & Thompson, Biometrika 58 (1971) 545). With too few beads at the cut to tell it is zero.
-/// @param data  whose motions are of precision 0
+/// What lies out there pulls the image's border outwards or inwards as a growth would: growth and shears are from here
+/// on expected to be of usual size (kUsualGrowth).
+/// @param data  whose motions are affine_motions(), of precision 0, or none
 /// @param compliance_um_per_nN  2·beads × 2·places
 ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
                                  const Eigen::MatrixXd& compliance_um_per_nN);
-/// Let the adhesions nearer to the cut than 3 um have forces of their own, beside the network's: a fibre of which so
-/// little is in view is not segmented (segment.fibre_shortest_um), and at the cut the network is held where it is,
-/// while the cell's own gave way. They pass through the cut. Expected is the size that adhesions of this cell have, as
-/// forces independent of each other tell it.
-/// @param adhesions  those of the data, in their order
+/// Let adhesions near the cut have forces of their own, beside the network's: a fibre of which less than 3 um is in
+/// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
+/// is, while the cell's own gave way, which fades over 10 um. They pass through the cut. Expected is a part of the size
+/// that adhesion forces of this cell have, as forces independent of each other tell it.
+/// @param cell  whose adhesions are those of the data
 void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found);
 /// Both, for the places of this cell, on a layer of this gel (of gels with sides or a graded modulus it differs by
 /// less than the intensity is known to).

@@ -103,6 +103,12 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"reason", fit.report.reason}};
   if (fit.cut) {
     const Interval interval = interval_95(fit.cut->magnitude_nN);
+    double torque_nN_um = fit.cut->reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
+    const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces_nN;
+    for (std::size_t a = 0; a < inputs.cell.adhesions.size(); ++a) {
+      const auto at = 2 * static_cast<Eigen::Index>(a);
+      torque_nN_um -= cross(inputs.cell.adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
+    }
     s.more.insert(s.more.end(), {{"cut_force_x_nN", fit.cut->x_nN.value},
                                  {"cut_force_x_sigma_nN", fit.cut->x_nN.standard_error},
                                  {"cut_force_y_nN", fit.cut->y_nN.value},
@@ -110,7 +116,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
                                  {"cut_force_nN", fit.cut->magnitude_nN.value},
                                  {"cut_force_sigma_nN", fit.cut->magnitude_nN.standard_error},
                                  {"cut_force_low_nN", interval.low},
-                                 {"cut_force_high_nN", interval.high}});
+                                 {"cut_force_high_nN", interval.high},
+                                 {"cut_torque_nN_um", torque_nN_um}});
   }
   return s;
 }

@@ -1,9 +1,10 @@
-/// cut_cells [cells] [first seed]: simulated cells that the image cuts, against the truth of the whole cell. A table
-/// (CSV) on stdout: by cell and cut, relative error of the identifiable tensions (and that of the same fibres where the
-/// whole cell is fitted), coverage of their 95 % intervals; root mean square error over standard error of the
+/// cut_cells fits [cells] [first seed]: simulated cells that the image cuts, against the truth of the whole cell. A
+/// table (CSV) on stdout: by cell and cut, relative error of the identifiable tensions (and that of the same fibres
+/// where the whole cell is fitted), coverage of their 95 % intervals; root mean square error over standard error of the
 /// adhesions' forces, coverage; force through the cut, true and found, error over standard error by component.
 #include <cstdio>
 #include <cstdlib>
+#include <cstring>
 
 #include "tests/support/cut_cell.h"
 
@@ -56,37 +57,75 @@ Score adhesions(const inverse::EnsembleFit& fit, const test::CutCell& cut, const
   return score;
 }
 
+/// The cell as far as it is right of a part of its width and, with two sides, below a quarter of its height.
+test::Window window_of(const Cell& cell, int sides, double part) {
+  Vec2 low = cell.outline_um.front(), high = low;
+  for (const Vec2 q : cell.outline_um) {
+    low = {std::min(low.x, q.x), std::min(low.y, q.y)};
+    high = {std::max(high.x, q.x), std::max(high.y, q.y)};
+  }
+  test::Window window{{-1e4, -1e4}, {1e4, 1e4}};
+  window.low_um.x = low.x + part * (high.x - low.x);
+  if (sides == 2) window.low_um.y = low.y + 0.25 * (high.y - low.y);
+  return window;
+}
+
+samples::Experiment experiment(int seed) {
+  samples::ScenarioParameters p;
+  p.seed = static_cast<std::uint64_t>(seed);
+  return samples::simulate(p, 2);
+}
+
+/// Forces of the adhesions in the cell less those of a network held at the cut with the true tensions, by distance.
+void profile(int n_cells, int first) {
+  std::printf("cell,part,distance_um,difference_nN,true_nN\n");
+  for (int seed = first; seed < first + n_cells; ++seed) {
+    const samples::Experiment e = experiment(seed);
+    for (const double part : {0.25, 0.35, 0.5}) {
+      const test::CutCell cut = test::cut_cell(e.cell, e.forces, window_of(e.cell, 1, part));
+      const network::CableNetwork cables(network::generate_network(cut.cell, {}).network);
+      std::vector<double> tensions_nN;
+      for (const int id : cables.fibre_ids())
+        tensions_nN.push_back(std::ranges::find(e.tensions, id, &Tension::fibre_id)->tension_nN);
+      const Eigen::VectorXd forces = cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN));
+      for (const Adhesion& a : cut.cell.adhesions) {
+        if (cut.share_inside.at(a.adhesion_id) < 1) continue;
+        const auto row = 2 * (std::ranges::find(cables.adhesion_ids(), a.adhesion_id) - cables.adhesion_ids().begin());
+        const Vec2 truth = std::ranges::find(e.forces, a.adhesion_id, &AdhesionForce::adhesion_id)->force_nN;
+        std::printf("%d,%g,%.3f,%.4f,%.4f\n", seed, part, distance_to_cut_um(cut.cell, a.position_um),
+                    norm(truth - Vec2{forces[row], forces[row + 1]}), norm(truth));
+      }
+    }
+  }
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   std::setvbuf(stdout, nullptr, _IOLBF, 1 << 12);
-  const int n_cells = argc > 1 ? std::atoi(argv[1]) : 6, first = argc > 2 ? std::atoi(argv[2]) : 41;
+  const int n_cells = argc > 2 ? std::atoi(argv[2]) : 6, first = argc > 3 ? std::atoi(argv[3]) : 41;
+  if (argc > 1 && std::strcmp(argv[1], "profile") == 0) {
+    profile(n_cells, first);
+    return 0;
+  }
   std::printf(
       "cell,sides,part,beyond,fibres,tension_error,of_whole,covered,adhesions,force_over_sigma,force_covered,true_x,"
       "true_y,"
       "cut_x,cut_y,sigma_x,sigma_y,over_sigma_x,over_sigma_y,places,motions,intensity,chi_squared,growth_over_sigma\n");
   for (int seed = first; seed < first + n_cells; ++seed) {
-    samples::ScenarioParameters p;
-    p.seed = static_cast<std::uint64_t>(seed);
-    const samples::Experiment e = samples::simulate(p, 2);
+    const Gel gel = samples::ScenarioParameters{}.gel;
+    const samples::Experiment e = experiment(seed);
     DisplacementField measured = e.measured;
     for (Bead& b : measured) b.sigma_um = e.noise_um;
-    const test::CutFit whole = test::fit_cut(e.cell, measured, p.gel, 4);
-    Vec2 low = e.cell.outline_um.front(), high = low;
-    for (const Vec2 q : e.cell.outline_um) {
-      low = {std::min(low.x, q.x), std::min(low.y, q.y)};
-      high = {std::max(high.x, q.x), std::max(high.y, q.y)};
-    }
+    const test::CutFit whole = test::fit_cut(e.cell, measured, gel, 4);
     for (const int sides : {1, 2}) {
       for (const double part : {0.25, 0.35, 0.5}) {
-        test::Window window{{-1e4, -1e4}, {1e4, 1e4}};
-        window.low_um.x = low.x + part * (high.x - low.x);
-        if (sides == 2) window.low_um.y = low.y + 0.25 * (high.y - low.y);
+        const test::Window window = window_of(e.cell, sides, part);
         const test::CutCell cut = test::cut_cell(e.cell, e.forces, window);
         const DisplacementField beads = test::beads_in(measured, window);
         for (const Beyond allow : {Beyond::allowed, Beyond::ignored}) {
           if (allow == Beyond::ignored && part != 0.35) continue;
-          const test::CutFit found = test::fit_cut(cut.cell, beads, p.gel, 4, allow);
+          const test::CutFit found = test::fit_cut(cut.cell, beads, gel, 4, allow);
           Cell known = cut.cell;  // its fibres whose tensions are identifiable
           std::erase_if(known.fibres, [&, all = inverse::tensions_of(found.fit)](const Fibre& fibre) {
             const auto at = std::ranges::find(all, fibre.fibre_id, &Tension::fibre_id);
