@@ -82,8 +82,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the choice of the mesh is usually a larger error than the noise of the beads, and one mesh cannot show it",
        "Use fit.n_meshes = 2 or more."},
       {forces_out_of_balance, "forces-out-of-balance", "fit", bad,
-       "length of the sum of the adhesion forces, over the sum of their lengths", 1e-6,
-       "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
+       "length of the sum of the adhesion forces and of the force through a cut, over the sum of the lengths of the "
+       "adhesion forces",
+       1e-6, "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
        "Report this with the cell: it should not happen."},
       {torques_out_of_balance, "torques-out-of-balance", "fit", bad,
        "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,

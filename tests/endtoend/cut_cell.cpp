@@ -1,6 +1,7 @@
 /// Images that end before the cell does, through the whole chain.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/contract/csv.h"

@@ -1,6 +1,7 @@
 /// Simulated cells that the image cuts, against the truth of the whole cell.
 #include <gtest/gtest.h>
 
+#include <Eigen/LU>
 #include <cmath>
 
 #include "mbtfm/findings.h"
