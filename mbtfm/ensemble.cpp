@@ -38,6 +38,7 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
   mesh.network_forces_nN = network_forces_nN(problem, trial);
   mesh.network_part_nN = problem.network_part_nN(trial);
   mesh.torques_nN_um = problem.torques_nN_um(trial);
+  mesh.cut = problem.cut_reaction(trial);
   return mesh;
 }
 
@@ -103,9 +104,10 @@ struct Quantities {
 /// @param along  each by force (forces × quantities): its own error is the model's, beside that of the tensions; empty
 ///               for tensions
 /// @param is_single  each quantity is of one adhesion
+/// @param more_noise  further variances by the beads' noise; empty: none
 template <class OfMesh>
 std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const Eigen::MatrixXd& along = {},
-                                   bool is_single = false) {
+                                   bool is_single = false, const Eigen::VectorXd& more_noise = {}) {
   const auto n_meshes = static_cast<double>(all.meshes.size());
   Eigen::VectorXd value, noise;
   Eigen::MatrixXd model;  // variances by force
@@ -124,6 +126,7 @@ std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh
     if (along.size() > 0) by_force -= (is_single ? std::sqrt(all.model_error->of_single) : 1.0) * along;
     model += all.model_error->force_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
   }
+  if (more_noise.size() > 0) noise += more_noise;
   std::vector<Estimate> estimates;
   for (Eigen::Index i = 0; i < value.size(); ++i) {
     const double from_noise = std::max(0.0, noise[i]);
@@ -147,18 +150,42 @@ Estimate estimate_of(const EnsembleFit& all, const ValueOf& value_of, const Grad
   return estimates_of(all, of_mesh, Eigen::MatrixXd(along)).front();
 }
 
+/// Sums of the forces that adhesions exert, those of their own included. @param sums  weights by force × sums
+template <class ValueOf>
+std::vector<Estimate> with_own_forces(const EnsembleFit& all, const Eigen::MatrixXd& sums, const ValueOf& value_of,
+                                      bool is_single = false) {
+  const Eigen::MatrixXd along = by_network_force(all, sums);
+  const auto of_mesh = [&](const MeshFit& mesh) {
+    return Quantities{value_of(mesh), mesh.force_derivatives.transpose() * along};
+  };
+  return estimates_of(all, of_mesh, along, is_single, own_variances(all, sums));
+}
+
+/// R + E a, of one mesh.
+Eigen::VectorXd exerted_nN(const EnsembleFit& all, const Eigen::VectorXd& network_nN) {
+  return all.own ? Eigen::VectorXd(all.own->left * network_nN + all.own->found_nN) : network_nN;
+}
+
 /// Of the adhesions' forces, along the mean over meshes.
 std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
   constexpr Eigen::Index kAtOnce = 256;  // adhesions: some MB of numbers
   const Eigen::Index n = all.forces_nN.size() / 2;
+  const Eigen::VectorXd forces_nN = adhesion_forces_nN(all);
   std::vector<Estimate> magnitudes;
   for (Eigen::Index first = 0; first < n; first += kAtOnce) {
     const Eigen::Index count = std::min(kAtOnce, n - first);
     Eigen::MatrixXd along = Eigen::MatrixXd::Zero(all.forces_nN.size(), count);
     for (Eigen::Index k = 0; k < count; ++k) {
-      const Eigen::Vector2d force = all.forces_nN.segment<2>(2 * (first + k));
+      const Eigen::Vector2d force = forces_nN.segment<2>(2 * (first + k));
       along.col(k).segment<2>(2 * (first + k)) =
           force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+    }
+    if (all.own) {
+      const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+        return along.transpose() * exerted_nN(all, mesh.fit.trial.forces_nN);
+      };
+      for (const Estimate& magnitude : with_own_forces(all, along, value_of, true)) magnitudes.push_back(magnitude);
+      continue;
     }
     const Eigen::MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
     const auto of_mesh = [&](const MeshFit& mesh) {
@@ -168,6 +195,28 @@ std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
     for (const Estimate& magnitude : estimates_of(all, of_mesh, along, true)) magnitudes.push_back(magnitude);
   }
   return magnitudes;
+}
+
+/// Its errors are those of the adhesions' forces, which it balances.
+CutForce cut_force_of(const EnsembleFit& all) {
+  CutForce cut;
+  for (const MeshFit& mesh : all.meshes) {
+    cut.reaction.force_nN += mesh.cut.force_nN / static_cast<double>(all.meshes.size());
+    cut.reaction.torque_nN_um += mesh.cut.torque_nN_um / static_cast<double>(all.meshes.size());
+  }
+  const auto along_of = [&](const Eigen::Vector2d& direction) -> Estimate {
+    const Eigen::VectorXd along = along_cut(direction, all.forces_nN.size());
+    const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+      const Eigen::VectorXd& network_nN = mesh.fit.trial.forces_nN;
+      return Eigen::VectorXd::Constant(
+          1, direction.dot(mesh.cut.force_nN) + along.dot(exerted_nN(all, network_nN) - network_nN));
+    };
+    return with_own_forces(all, along, value_of).front();
+  };
+  cut.x_nN = along_of({1, 0});
+  cut.y_nN = along_of({0, 1});
+  cut.magnitude_nN = along_of(cut.direction());
+  return cut;
 }
 
 /// A tension's interval: the mean of the meshes'.
@@ -182,16 +231,17 @@ Sides mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
 
 /// Errors by way of the forces' directions in the mean over meshes.
 Estimate total_force_of(const EnsembleFit& all) {
-  const Eigen::VectorXd along = directions_of(all.forces_nN);
-  Estimate total = estimate_of(
-      all,
-      [&](const MeshFit& mesh) {
-        return along.dot(mesh.fit.trial.forces_nN + mesh.force_derivatives * mesh.past_bounds_nN) -
-               magnitude_bias_nN(all.forces_nN, mesh.force_derivatives, mesh.covariance_nN2);
-      },
-      [&](const MeshFit& mesh) -> Eigen::VectorXd { return mesh.force_derivatives.transpose() * along; }, along);
+  const Eigen::VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
+  const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+    const Eigen::MatrixXd derivatives =
+        all.own ? Eigen::MatrixXd(all.own->left * mesh.force_derivatives) : mesh.force_derivatives;
+    return Eigen::VectorXd::Constant(
+        1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + derivatives * mesh.past_bounds_nN) -
+               magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
+  };
+  Estimate total = with_own_forces(all, along, value_of).front();
   if (!all.model_error) return total;
-  const RoughnessOfTotal roughness = roughness_of_total(all.forces_nN, *all.model_error);
+  const RoughnessOfTotal roughness = roughness_of_total(forces_nN, *all.model_error);
   total.value += roughness.lacking_nN;
   total.standard_error = std::hypot(total.standard_error, roughness.sigma_nN);
   return total;
@@ -233,7 +283,7 @@ void add_means(EnsembleFit& all) {
   }
 }
 
-void add_estimates(EnsembleFit& all) {
+void add_estimates(EnsembleFit& all, bool is_cut) {
   const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
   all.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
   for (const MeshFit& mesh : all.meshes) {
@@ -246,6 +296,7 @@ void add_estimates(EnsembleFit& all) {
   all.force_magnitudes_nN = force_magnitudes_of(all);
   all.total_force_nN = total_force_of(all);
   all.network_force_nN = network_force_of(all);
+  if (is_cut) all.cut = cut_force_of(all);
 }
 
 struct FirstFit {
@@ -334,6 +385,26 @@ Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::Matrix
   return covariance_beside(fit, of_noise, by_force, -1);
 }
 
+Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces_nN); }
+
+Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
+  return fit.own ? Eigen::MatrixXd(fit.own->left.transpose() * sums) : sums;
+}
+
+Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
+  if (!fit.own) return Eigen::VectorXd::Zero(sums.cols());
+  return fit.variance * sums.cwiseProduct(fit.own->covariance * sums).colwise().sum().transpose();
+}
+
+Eigen::Vector2d CutForce::direction() const {
+  const Eigen::Vector2d force(x_nN.value, y_nN.value);
+  return force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+}
+
+Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces) {
+  return -direction.replicate(n_forces / 2, 1);
+}
+
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
   Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
   for (const int i : indices) ones[i] = 1;
@@ -377,6 +448,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
     tell();
   });
   add_means(all);
+  all.own = own_forces_in(data);
   all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
                                static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
   all.variance = misfit_variance(data, all.forces_nN, n_tensions, all.loss);
@@ -388,7 +460,7 @@ EnsembleFit fit_ensemble(const std::vector<network::CableNetwork>& networks, Lin
   parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   all.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data, adhesion_ids), threads);
-  add_estimates(all);
+  add_estimates(all, !networks.front().network().held_by_cut.empty());
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;
 }

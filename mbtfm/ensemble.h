@@ -37,16 +37,27 @@ struct MeshFit {
   Eigen::VectorXd past_bounds_nN;                    ///< from the tensions to the unbounded minimum
   std::vector<Sides> intervals_95;                   ///< of the tensions, from noise and model
   Eigen::VectorXd network_forces_nN, torques_nN_um;  ///< by adhesion; see EnsembleFit
-  Eigen::VectorXd network_part_nN;                   ///< of the forces: what the links of the actin network bring
+  CutReaction cut;
+  Eigen::VectorXd network_part_nN;  ///< of the forces: what the links of the actin network bring
+};
+
+/// The force that passes through the cut: the part of the cell that is seen pulls the unseen one with it, and so much
+/// do the adhesions out there exert on the gel together. Mean over the meshes.
+struct CutForce {
+  CutReaction reaction;               ///< the network's; the others hold the adhesions' own forces, too
+  Estimate x_nN, y_nN, magnitude_nN;  ///< magnitude: along direction()
+  Eigen::Vector2d direction() const;  ///< of length 1
 };
 
 struct EnsembleFit {
   std::vector<int> fibre_ids;  ///< front() is 0, the actin network
   std::vector<Estimate> tensions_nN;
   Eigen::MatrixXd covariance_nN2;             ///< of the tensions; mean over the meshes
-  Eigen::VectorXd forces_nN;                  ///< by adhesion: fx, fy; mean over the meshes
+  Eigen::VectorXd forces_nN;                  ///< of the network, by adhesion: fx, fy; mean over the meshes
+  std::optional<OwnForces> own;               ///< that adhesions near a cut have beside these
   Eigen::VectorXd torques_nN_um;              ///< by adhesion, about the origin; mean over the meshes
   std::vector<Estimate> force_magnitudes_nN;  ///< by adhesion
+  std::optional<CutForce> cut;                ///< none: the image shows the whole cell
   Eigen::VectorXd network_forces_nN;          ///< with every fibre at the network's tension: the network's part
   /// Sums of the magnitudes of both, less what noise and the bounds t >= 0 add to them on average.
   Estimate total_force_nN, network_force_nN;
@@ -94,6 +105,17 @@ Eigen::MatrixXd covariance_of_estimates(const EnsembleFit& fit, const Eigen::Mat
                                         const Eigen::MatrixXd& by_force);
 Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
                                      const Eigen::MatrixXd& by_force);
+
+/// What the adhesions exert on the gel: the network's forces and their own.
+Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit);
+/// How sums of these answer to the network's: weights by force × sums, of the network's.
+Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums);
+/// Variances of such sums by the beads' noise, the tensions held.
+Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums);
+
+/// By force (fx, fy by adhesion): how a force through the cut in this direction answers to those of the adhesions,
+/// which it balances.
+Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces);
 
 /// Of the sum of these tensions.
 Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices);

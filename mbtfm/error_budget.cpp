@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/LU>
-#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <numbers>
@@ -20,7 +19,16 @@ using Eigen::MatrixXd;
 using Eigen::VectorXd;
 using substrate::Ellipse;
 
-/// Linear answers of the tensions and, in the last row, of the total force.
+/// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.
+MatrixXd sums_of(const EnsembleFit& fit) {
+  MatrixXd sums = directions_of(adhesion_forces_nN(fit));
+  if (!fit.cut) return sums;
+  sums.conservativeResize(Eigen::NoChange, 2);
+  sums.col(1) = along_cut(fit.cut->direction(), sums.rows());
+  return sums;
+}
+
+/// Linear answers of the tensions and, in the last rows, of the sums of forces.
 struct Gain {
   MatrixXd of_tensions;  ///< where the tensions change
   MatrixXd of_forces;    ///< where the beads show these forces in excess of the model's, by adhesion
@@ -30,12 +38,13 @@ struct Gain {
 /// dt = Cov Jᵀ C e / s² for an error e of the forces; total force: d|R| = eᵀ (dR/dt dt + dR).
 Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
   const Index n = mesh.covariance_nN2.rows();
-  const VectorXd e = directions_of(fit.forces_nN);
-  Gain gain{MatrixXd::Identity(n + 1, n), {}, {}};
-  gain.of_tensions.row(n) = e.transpose() * mesh.force_derivatives;
+  const MatrixXd sums = sums_of(fit);
+  Gain gain{MatrixXd::Identity(n + sums.cols(), n), {}, {}};
+  gain.of_tensions.bottomRows(sums.cols()) = by_network_force(fit, sums).transpose() * mesh.force_derivatives;
   gain.of_forces = gain.of_tensions * mesh.by_force;
+  gain.of_forces.bottomRows(sums.cols()) += (sums - by_network_force(fit, sums)).transpose();  // as forces of their own
   gain.of_model = gain.of_forces;
-  gain.of_model.row(n) -= e.transpose();
+  gain.of_model.bottomRows(sums.cols()) -= sums.transpose();
   return gain;
 }
 
@@ -66,20 +75,14 @@ VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& g
   return (gain.of_tensions * step).cwiseAbs() + imbalance * (gain.of_tensions * mesh.local.tensions_nN).cwiseAbs();
 }
 
-/// Motions of the cell's place, pulled back to the forces: Gᵀ W² U with Uᵀ W² U = 1, the other motions taken off.
+/// Motions of the cell's place, pulled back to the forces: Gᵀ W² U with Uᵀ W² U = 1, the other motions taken off. With
+/// B = (MᵀW²M + Λ)⁻¹ and L Lᵀ its block of the place, U = M B_place L⁻ᵀ.
 MatrixXd pulled_place(const BudgetInputs& in) {
-  const Index n = in.n_of_place, n_others = in.data.motions.cols() - n;
-  const VectorXd weight = squared_weights(in.data);
-  const auto less = [&](const MatrixXd& others, const MatrixXd& motions) -> MatrixXd {
-    if (others.cols() == 0) return motions;
-    const MatrixXd weighted = weight.asDiagonal() * others;
-    const auto square = (weighted.transpose() * others).completeOrthogonalDecomposition();
-    return motions - others * square.solve(weighted.transpose() * motions);
-  };
-  const MatrixXd beside = less(in.data.motions.leftCols(n_others), in.data.motions.rightCols(n));
-  const MatrixXd weighted = weight.asDiagonal() * beside;
-  const MatrixXd upper = (weighted.transpose() * beside).llt().matrixU();
-  return in.data.response->pull_back(weighted * upper.inverse());
+  const Index n = in.n_of_place;
+  const MatrixXd columns = in.data.motion_inverse.rightCols(n);
+  const MatrixXd upper = columns.bottomRows(n).llt().matrixU();
+  return in.data.response->pull_back(squared_weights(in.data).asDiagonal() *
+                                     (in.data.motions * columns * upper.inverse()));
 }
 
 /// What the beads would tell more of the tensions if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.
@@ -91,7 +94,7 @@ MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const 
 }
 
 MeanVariances mean_variances(const BudgetInputs& in) {
-  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + 1;
+  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + (in.fit.cut ? 2 : 1);
   const double n = static_cast<double>(in.fit.meshes.size());
   const VectorXd none = VectorXd::Zero(n_rows);
   MeanVariances mean{none, none, none, none, none};
@@ -197,7 +200,7 @@ VectorXd variance_of_ends(const BudgetInputs& in, const network::GeometryGradien
   }
   VectorXd variance = VectorXd::Zero(gradient.by_link.cols());
   for (std::size_t v = 0; v < links_of.size(); ++v) {
-    if (links_of[v].size() != 1 || network.adhesion_id[v] != 0) continue;
+    if (links_of[v].size() != 1 || is_held(network, v)) continue;
     const Link& link = network.links[links_of[v].front()];
     const auto group = std::lower_bound(fibre_ids.begin(), fibre_ids.end(), link.fibre_id) - fibre_ids.begin();
     const double tension_nN = link.share * in.fit.tensions_nN[static_cast<std::size_t>(group)].value;
@@ -379,9 +382,12 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
   const Gain gain = gain_of(in.fit, in.fit.meshes.front());
   const BeadAnswers answers = answers_of(in, gain);
   MeanVariances mean = mean_variances(in);
+  const MatrixXd sums = sums_of(in.fit);
+  mean.beads.tail(sums.cols()) += own_variances(in.fit, sums);
   add_room_above(in.fit, mean);
   if (in.fit.model_error)
-    mean.mesh[mean.mesh.size() - 1] += std::pow(roughness_of_total(in.fit.forces_nN, *in.fit.model_error).sigma_nN, 2);
+    mean.mesh[static_cast<Index>(in.fit.fibre_ids.size())] +=
+        std::pow(roughness_of_total(adhesion_forces_nN(in.fit), *in.fit.model_error).sigma_nN, 2);
   const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
   const VectorXd substrate = substrate_variances(in, gain, answers);
   const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
@@ -406,8 +412,9 @@ ErrorBudget error_budget(const BudgetInputs& in, int threads) {
     budget.tensions.push_back(
         {.fibre_id = in.fit.fibre_ids[at], .tension_nN = in.fit.tensions_nN[at].value, .parts_nN = parts(i)});
   }
-  budget.total_force_nN = total_nN(in.fit.forces_nN);
+  budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit));
   budget.total_force_parts_nN = parts(n);
+  if (in.fit.cut) budget.cut_force = {.force_nN = in.fit.cut->magnitude_nN.value, .parts_nN = parts(n + 1)};
   return budget;
 }
 

@@ -219,6 +219,19 @@ Noticed out_of_balance(FindingKind kind, double imbalance, const std::string& wh
                  "The " + what + " do not sum to zero: |sum| / sum of magnitudes = " + brief(imbalance) + ".");
 }
 
+Noticed cell_cut(const FitOutcome& o) {
+  if (!o.fit.cut) return {};
+  const Estimate& force = o.fit.cut->magnitude_nN;
+  return noticed(
+      FindingKind::cell_cut, 1,
+      "The image's border cuts the cell. The fit holds the network along the cut; " + brief(force.value) + " +- " +
+          brief(force.standard_error) + " nN pass through it. " +
+          (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
+                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
+                      "taken for forces of the adhesions near it."),
+      o.beyond ? Severity::note : Severity::caution);
+}
+
 Noticed common_motion(const FitOutcome& o) {
   if (!o.motion) return {};
   const CommonMotion& m = o.motion->motion;
@@ -260,18 +273,20 @@ Noticed channel_shift(const FitOutcome& o) {
 Imbalance imbalance_of(const EnsembleFit& fit) {
   Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
   for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
+  const CutReaction cut = fit.cut ? fit.cut->reaction : CutReaction{};
   constexpr double kTiny = 1e-300;  // a cell without any force is balanced
-  return {.force = net_nN.norm() / std::max(total_nN(fit.forces_nN), kTiny),
-          .torque = std::abs(fit.torques_nN_um.sum()) / std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
+  return {.force = (net_nN + cut.force_nN).norm() / std::max(total_nN(fit.forces_nN), kTiny),
+          .torque = std::abs(fit.torques_nN_um.sum() + cut.torque_nN_um) /
+                    std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
 }
 
 std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
   for (Noticed found :
-       {common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o), missing_adhesions_noticed(o),
-        explains_little(o), unexplained(o), beads_disagree(o), noise_unknown(o), noise_disagrees(o),
-        not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
+       {cell_cut(o), common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o),
+        missing_adhesions_noticed(o), explains_little(o), unexplained(o), beads_disagree(o), noise_unknown(o),
+        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
         out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
         out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),
         tensions_at_zero(o)}) {

@@ -4,6 +4,7 @@
 #include <optional>
 #include <vector>
 
+#include "mbtfm/beyond_cut.h"
 #include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/missing_adhesions.h"
@@ -25,12 +26,14 @@ struct FitOutcome {
   const std::optional<FoundMotion>& motion;
   const std::optional<CurvedMotion>& curved;
   const std::optional<FoundPlacement>& place;
+  const std::optional<ForcesBeyond>& beyond;  ///< none: not allowed for
 };
 
 /// In the order in which a user should read them.
 std::vector<Finding> findings_of(const FitOutcome& outcome);
 
-/// |sum of forces| and |sum of torques| over the sums of their magnitudes: rounding only.
+/// |sum of forces| and |sum of torques| over the sums of the adhesions' magnitudes, what passes through a cut included:
+/// rounding only.
 struct Imbalance {
   double force = 0, torque = 0;
 };

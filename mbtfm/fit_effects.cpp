@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <optional>
 
+#include "mbtfm/beyond_cut.h"
 #include "mbtfm/common_motion.h"
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/parallel.h"
@@ -73,6 +74,14 @@ std::optional<Change> with_motion(const Effect& e, const FittedCell& c, int thre
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
 
+/// None where the image shows the whole cell.
+std::optional<Change> with_forces_beyond(const Effect& e, const FittedCell& c, int threads) {
+  if (cuts_of(c.cell).empty()) return {};
+  LinearData with = unweighted(c.data);
+  allow_forces_beyond(with, c.cell, c.parameters.gel);
+  return change_between(e.name, c.fit, fit_again(c, c.networks, std::move(with), c.parameters.fit.loss, threads));
+}
+
 /// What it changes of the network's tension.
 std::optional<Change> with_fibres(const Effect& e, const FittedCell& c, int threads) {
   if (c.cell.fibres.empty()) return {};
@@ -90,6 +99,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
   if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
   if (e.name == "robust loss") return with_loss(e, c, threads);
   if (e.name == kCommonMotion) return with_motion(e, c, threads);
+  if (e.name == kBeyondCut) return with_forces_beyond(e, c, threads);
   return {};
 }
 
@@ -97,6 +107,7 @@ std::optional<Change> change_with(const Effect& e, const FittedCell& c, int thre
 std::string in_words(const std::string& name) {
   if (name == "vertical displacement") return "would change no tension: nothing along the surface depends on it";
   if (name == "time coupling") return "would change no tension but by the fit's tolerance: only where the fit begins";
+  if (name == kBeyondCut) return "would change no tension: the image shows the whole cell";
   return "would change nothing that can be told: there is no datum of it";
 }
 
@@ -146,7 +157,8 @@ void declare(ParameterList& list, FitStageParameters& p) {
   list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
   declare(list, p.effects,
           {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
-           "common_motion", "channel_shift", "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"});
+           "common_motion", "channel_shift", "beyond_cut", "cable_elasticity", "robust_loss", "time_coupling",
+           "effect_tolerance"});
 }
 
 }  // namespace mbtfm::inverse

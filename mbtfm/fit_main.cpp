@@ -5,6 +5,7 @@
 #include <map>
 #include <numbers>
 
+#include "mbtfm/beyond_cut.h"
 #include "mbtfm/common_motion.h"
 #include "mbtfm/cross_validation.h"
 #include "mbtfm/effects.h"
@@ -65,6 +66,13 @@ void check_fibres(const FitInputs& inputs, const Effect& fibres, const Path& fil
   if (fibres.is_on || std::ranges::none_of(inputs.network.links, has_fibre)) return;
   throw InputError(file.string(), "a network without stress fibres, as effects.stress_fibres says", "fibres",
                    "span it anew: mbtfm-network with the same cell.toml");
+}
+
+/// … and be held where the image cuts it.
+void check_cut(const FitInputs& inputs, const Path& file) {
+  if (cuts_of(inputs.cell).empty() == inputs.network.held_by_cut.empty()) return;
+  throw InputError(file.string(), "a network that the cut of outline.csv holds", "of an outline with another cut",
+                   "span it anew: mbtfm-network with the same cell");
 }
 
 network::CableParameters inelastic(network::CableParameters cables) {
@@ -197,11 +205,13 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
 /// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
 std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::SharedResponse& response,
                        const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
-                       const FitParameters& p, bool moves, bool is_coupled, StageContext& context) {
+                       const FitParameters& p, bool moves, const std::function<void(LinearData&)>& allow,
+                       bool is_coupled, StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
       frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, moves,
       is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
-      next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{});
+      next_start(first), context.has_input("kept") ? read_fits(context.inputs_.at("kept")) : std::vector<FrameFit>{},
+      allow);
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
   write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
@@ -231,15 +241,19 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   Effect fibres = network::take_fibres(inputs.cell, p.effects.stress_fibres);
   check_fibres(inputs, fibres, context.inputs_.at("network"));
+  check_cut(inputs, context.inputs_.at("network"));
   const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
-  Responses responses = responses_of(inputs.beads, series, [&](const DisplacementField& b) {
+  const auto response_on = [&](const DisplacementField& b) {
     return substrate->response(points_of(b), ellipses_of(inputs.cell));
-  });
+  };
+  Responses responses = responses_of(inputs.beads, series, response_on);
   const bool moves = allows_common_motion(p.effects);
   LinearData data =
       reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit),
              context.threads, moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
+  std::optional<ForcesBeyond> beyond;
+  if (allows_forces_beyond(p.effects, cell)) beyond = allow_forces_beyond(data, cell, p.gel);
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -262,11 +276,11 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
       network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
   const auto data_of = [&](const Cell& placed) {
-    responses = responses_of(inputs.beads, series, [&](const DisplacementField& b) {
-      return substrate->response(points_of(b), ellipses_of(placed));
-    });
-    return reduce(inputs.beads, responses.of_beads, beads_in_region(inputs.beads, placed, p.fit), context.threads,
-                  moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
+    LinearData there = reduce(inputs.beads, substrate->response(points_of(inputs.beads), ellipses_of(placed)),
+                              beads_in_region(inputs.beads, placed, p.fit), context.threads,
+                              moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
+    if (beyond) beyond = allow_forces_beyond(there, placed, p.gel);
+    return there;
   };
   context.progress(0.35, "placing the cell on the beads");
   PlacedCell place = place_cell(inputs.cell, networks.front(), data, data_of, p.gel, p.fit, start,
@@ -276,6 +290,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
     inputs.cell = place.cell;
     networks = placed_networks(networks, place.placement);
     start = TensionProblem(networks.front(), data.reduced, adhesion_ids).evaluate(place.start_nN);
+    if (!series.empty()) responses = responses_of(inputs.beads, series, response_on);
   }
   const auto fit_all = [&] {
     return fit_ensemble(
@@ -336,9 +351,11 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      field_of(models.front().forces_nN, inputs, data));
   write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
                          {most_informed_array(influence), weight_array(data)});
+  std::function<void(LinearData&)> allow;
+  if (beyond) allow = [&](LinearData& of_frame) { allow_forces_beyond(of_frame, cell, p.gel); };
   const std::string of_series = series.empty() ? ""
                                                : fit_frames(series, responses.of_series, inputs.cell, networks, fit,
-                                                            p.fit, moves, coupling.is_on, context);
+                                                            p.fit, moves, allow, coupling.is_on, context);
   context.progress(0.95, "surface of the gel");
   write_surface(context.output("out", "substrate.vtu"), *substrate, inputs.cell, forces, p.fit.surface_lines);
   context.progress(1, "done");
@@ -353,9 +370,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      .findings = {}};
   report.effects = substrate->effects();
   report.effects.insert(report.effects.begin(), fibres);
-  report.effects.insert(report.effects.end(),
-                        {common_motion_effect(p.effects.common_motion, motion), place.effect, elasticity,
-                         robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
+  report.effects.insert(report.effects.end(), {common_motion_effect(p.effects.common_motion, motion), place.effect,
+                                               beyond_cut_effect(p.effects.beyond_cut, cell, beyond), elasticity,
+                                               robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
   if (p.explain) {
     context.progress(0.97, "explaining what is off");
     const std::vector<Change> changes =
@@ -366,8 +383,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   report.figures.emplace_back("error_budget_s", budget_s);
   context.notice(noticed(FindingKind::modulus_error_unknown, p.gel.youngs_modulus_sigma_kPa ? 0 : 1,
                          "No error of Young's modulus is given. An error of 10 % would change every force by 10 %."));
-  report.findings =
-      findings_of(FitOutcome{fit, data, cell, summary, tensions, missing, missing_places, motion, curved, found_place});
+  report.findings = findings_of(
+      FitOutcome{fit, data, cell, summary, tensions, missing, missing_places, motion, curved, found_place, beyond});
   const std::string together = names_of_groups(fit);
   if (!together.empty()) report.summary += "; not told apart, but their sum: fibres " + together;
   if (n_unidentifiable > 0)

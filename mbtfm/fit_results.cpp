@@ -65,16 +65,17 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
     if (f.start_adhesion_id) connected.insert(*f.start_adhesion_id);
     if (f.end_adhesion_id) connected.insert(*f.end_adhesion_id);
   }
+  const Eigen::VectorXd exerted_nN = adhesion_forces_nN(fit);  // forces of their own act at the centres
   std::vector<AdhesionForce> forces;
   for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
     const auto at = 2 * static_cast<Eigen::Index>(a);
-    const Vec2 force_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
+    const Vec2 network_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
     const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
     forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
-                      .force_nN = force_nN,
+                      .force_nN = {exerted_nN[at], exerted_nN[at + 1]},
                       .sigma_nN = fit.force_magnitudes_nN[a].standard_error,
                       .connected = connected.contains(cell.adhesions[a].adhesion_id),
-                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, force_nN)});
+                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, network_nN)});
   }
   return forces;
 }
@@ -117,6 +118,24 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"method", parameters.method},
             {"loss", fit.loss},
             {"reason", fit.report.reason}};
+  if (fit.cut) {
+    const Interval interval = interval_95(fit.cut->magnitude_nN);
+    double torque_nN_um = fit.cut->reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
+    const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces_nN;
+    for (std::size_t a = 0; a < inputs.cell.adhesions.size(); ++a) {
+      const auto at = 2 * static_cast<Eigen::Index>(a);
+      torque_nN_um -= cross(inputs.cell.adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
+    }
+    s.more.insert(s.more.end(), {{"cut_force_x_nN", fit.cut->x_nN.value},
+                                 {"cut_force_x_sigma_nN", fit.cut->x_nN.standard_error},
+                                 {"cut_force_y_nN", fit.cut->y_nN.value},
+                                 {"cut_force_y_sigma_nN", fit.cut->y_nN.standard_error},
+                                 {"cut_force_nN", fit.cut->magnitude_nN.value},
+                                 {"cut_force_sigma_nN", fit.cut->magnitude_nN.standard_error},
+                                 {"cut_force_low_nN", interval.low},
+                                 {"cut_force_high_nN", interval.high},
+                                 {"cut_torque_nN_um", torque_nN_um}});
+  }
   return s;
 }
 

@@ -37,20 +37,29 @@ Root root_of(Eigen::MatrixXd A, double trace, int threads) {
   return {std::move(A), n_felt};
 }
 
-/// (MᵀW²M)⁻¹, by rank: beads in one place tell no turn from a shift.
-Eigen::MatrixXd inverse_of_motions(const Eigen::MatrixXd& motions, const Eigen::VectorXd& weight) {
-  if (motions.cols() == 0) return {};
-  const Eigen::MatrixXd square = motions.transpose() * (weight.asDiagonal() * motions);
-  return square.completeOrthogonalDecomposition().pseudoInverse();
+/// (MᵀW²M + Λ)⁻¹, by rank. With Λ motions of different units go together: each counts as a multiple of itself.
+/// @param square  MᵀW²M
+Eigen::MatrixXd inverse_of_motions(Eigen::MatrixXd square, const Eigen::VectorXd& precision) {
+  if (square.cols() == 0) return square;
+  if (precision.size() == 0) return square.completeOrthogonalDecomposition().pseudoInverse();
+  square.diagonal() += precision;
+  const Eigen::VectorXd size = square.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  square = size.asDiagonal() * square * size.asDiagonal();
+  return size.asDiagonal() * square.completeOrthogonalDecomposition().pseudoInverse() * size.asDiagonal();
 }
 
-/// Take off a Gram matrix Gᵀ W² G, on and above its diagonal, what these motions explain of G.
+Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd& weight) {
+  return inverse_of_motions(data.motions.transpose() * (weight.asDiagonal() * data.motions), data.motion_precision);
+}
+
+/// Take off a Gram matrix Gᵀ W² P G, on and above its diagonal, what these motions explain of G.
+/// @param inverse  of their own square, Λ included
 void take_off(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
               const Eigen::MatrixXd& inverse, Eigen::MatrixXd& gram) {
   if (motions.cols() == 0) return;
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse);
   const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
-  const Eigen::MatrixXd unit = motions * (eigen.eigenvectors() * root.asDiagonal());  // unitᵀ W² unit = 1
+  const Eigen::MatrixXd unit = motions * (eigen.eigenvectors() * root.asDiagonal());
   const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
   add_upper_gram(pulled.transpose(), gram, data.threads, -1);
 }
@@ -65,10 +74,16 @@ void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Eigen::MatrixX
   solve_upper_transposed(root, target);
   data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root)),
                   .target = target,
-                  .floor_squared = std::max(0.0, weighted_u.dot(u) - target.squaredNorm()),
+                  .floor_squared = std::max(
+                      0.0, weighted_u.dot(data.displacement_um) - target.squaredNorm()),  // uᵀ W² P u, Λ included
                   .n_components = data.n_used,
                   .n_felt = n_felt,
                   .is_upper = true};
+}
+
+/// Motions that cost a component of the beads each, as nothing is known of their sizes.
+Eigen::Index n_unexpected(const Eigen::MatrixXd& motions, const Eigen::VectorXd& precision) {
+  return motions.cols() - (precision.array() > 0).count();
 }
 
 }  // namespace
@@ -102,24 +117,52 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
   return data;
 }
 
+void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
+  MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
+  data.n_used += n_unexpected(data.motions, data.motion_precision) - n_unexpected(motions, precision);
+  data.motions = std::move(motions);
+  data.motion_precision = std::move(precision);
+  reweight(data, Eigen::VectorXd(data.bead_weight));
+}
+
 void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
   const Eigen::VectorXd weight = squared_weights(data);
-  const Eigen::MatrixXd beside = less_motion(data, motions);  // W-orthogonal to those that are there
+  const Eigen::MatrixXd beside = less_motion(data, motions);
   const Eigen::MatrixXd& root = *data.reduced.compliance;
   Eigen::MatrixXd A = Eigen::MatrixXd::Zero(root.cols(), root.cols());
   add_upper_gram(root, A, data.threads);
   const double trace = A.diagonal().sum();
-  take_off(data, weight, beside, inverse_of_motions(beside, weight), A);
-  data.n_used -= motions.cols();
-  data.motions.conservativeResize(motions.rows(), data.motions.cols() + motions.cols());
-  data.motions.rightCols(motions.cols()) = motions;
-  data.motion_inverse = inverse_of_motions(data.motions, weight);
+  take_off(data, weight, beside, inverse_of_motions(motions.transpose() * (weight.asDiagonal() * beside), {}), A);
+  const Eigen::Index before = data.motions.cols(), n = motions.cols();
+  data.n_used -= n;
+  data.motions.conservativeResize(motions.rows(), before + n);
+  data.motions.rightCols(n) = motions;
+  if (data.motion_precision.size() > 0) {
+    data.motion_precision.conservativeResize(before + n);
+    data.motion_precision.tail(n).setZero();
+  }
+  if (data.forces_by_motion.size() > 0) {
+    data.forces_by_motion.conservativeResize(Eigen::NoChange, before + n);
+    data.forces_by_motion.rightCols(n).setZero();
+  }
+  data.motion_inverse = inverse_of_motions(data, weight);
   set_reduced(data, weight, std::move(A), trace);
 }
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
   return data.motion_inverse * (weighted.transpose() * displacements);
+}
+
+std::optional<OwnForces> own_forces_in(const LinearData& data) {
+  const Eigen::MatrixXd& E = data.forces_by_motion;
+  if (E.size() == 0) return std::nullopt;
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const Eigen::MatrixXd gain = E * data.motion_inverse;
+  return OwnForces{
+      .left = Eigen::MatrixXd::Identity(E.rows(), E.rows()) - gain * data.response->pull_back(weighted).transpose(),
+      .found_nN = gain * (weighted.transpose() * data.displacement_um),
+      .covariance = gain * E.transpose()};
 }
 
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
@@ -135,7 +178,7 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory
   const Eigen::VectorXd weight = squared_weights(data);
-  data.motion_inverse = inverse_of_motions(data.motions, weight);
+  data.motion_inverse = inverse_of_motions(data, weight);
   Eigen::MatrixXd A = data.response->upper_gram(weight);
   const double trace = A.diagonal().sum();
   take_off(data, weight, data.motions, data.motion_inverse, A);

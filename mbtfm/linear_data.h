@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -11,7 +12,8 @@
 
 namespace mbtfm::inverse {
 
-/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best.
+/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best (and what
+/// is expected of their sizes counts: aᵀΛa is part of the left side).
 /// White noise of W u is white in y.
 struct ReducedData {
   std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
@@ -31,11 +33,16 @@ struct LinearData {
   Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
-  Eigen::MatrixXd motion_inverse;      ///< (MᵀW²M)⁻¹, by rank: beads in one place tell no turn from a shift
-  Eigen::Index n_used = 0;             ///< components of the beads that are used, less one for each motion
-  bool has_errors = false;             ///< the beads state their sigma; without, W is 1 and the misfit tells the error
-  int threads = 1;                     ///< to reduce it with
-  ReducedData reduced;                 ///< of all that, bead_weight included
+  Eigen::VectorXd motion_precision;    ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its
+                                       ///< size, in units of the noise's; 0 where nothing is known of it; empty: all 0
+  Eigen::MatrixXd motion_inverse;  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The
+                                   ///< covariance of the motions' sizes by noise of variance 1
+  Eigen::MatrixXd forces_by_motion;  ///< E: by motion, the forces of adhesions that it comes of, beside those found as
+                                     ///< forces; 2·adhesions × motions; empty: none
+  Eigen::Index n_used = 0;           ///< components of the beads that are used, less one for each motion of precision 0
+  bool has_errors = false;           ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  int threads = 1;                   ///< to reduce it with
+  ReducedData reduced;               ///< of all that, bead_weight included
 };
 
 /// @param beads  all with sigma_um > 0, or weights are the same for all
@@ -47,12 +54,26 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used = {});
 
-/// Let the beads move by any sum of these (2·beads × some) too, beside the motions that are allowed already.
+/// Let the beads move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
+/// @param precision  by motion, see LinearData::motion_precision
+void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
+/// Let them move by any sum of these too, of precision 0: quicker.
 void add_motions(LinearData& data, const Eigen::MatrixXd& motions);
-/// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed:
-/// (MᵀW²M)⁻¹ MᵀW² D
+/// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
+/// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
-/// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M)⁻¹ MᵀW².
+/// Forces that adhesions have of their own, E a beside R: the a that explain best what R leaves. Linear in R, so
+/// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
+struct OwnForces {
+  Eigen::MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G
+  Eigen::VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u
+  Eigen::MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ
+};
+/// None where no motion comes of them.
+std::optional<OwnForces> own_forces_in(const LinearData& data);
+
+/// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M + Λ)⁻¹ MᵀW². With Λ, W²P is the inverse of the
+/// covariance W⁻² + M Λ⁻¹ Mᵀ of noise and motions together.
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
 /// What forces and motions leave: P (u − G R), um.
 Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);

@@ -214,12 +214,13 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, int threads, const Progress& progress, Trial start,
-                                 const std::vector<FrameFit>& kept) {
+                                 const std::vector<FrameFit>& kept, const std::function<void(LinearData&)>& allow) {
   std::vector<FrameFit> fits;
   const auto fitted = [&](const SeriesFrame& frame) {
     FrameData good = good_beads_of(frame, response, is_used);
     LinearData data = reduce(good.beads, std::move(good.response), good.is_used, threads,
                              moves ? affine_motions(good.beads) : Eigen::MatrixXd());
+    if (allow) allow(data);
     return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start), data);
   };
   for (const SeriesFrame& frame : frames) {

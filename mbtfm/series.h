@@ -58,12 +58,14 @@ std::vector<FrameFit> read_fits(const Path& folder);
 /// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
 /// @param start  of the first frame, on the first network
 /// @param kept  fits of the same networks, compliance and parameters: taken for frames whose file is still the same
+/// @param allow  lets a frame's beads do more beside forces and common motion; none: they do not
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, int threads, const Progress& progress, Trial start,
-                                 const std::vector<FrameFit>& kept = {});
+                                 const std::vector<FrameFit>& kept = {},
+                                 const std::function<void(LinearData&)>& allow = {});
 
 /// By frame and fibre. @param interval_s  between frames, if known
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

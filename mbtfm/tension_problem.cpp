@@ -70,6 +70,19 @@ Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
   return torques;
 }
 
+CutReaction TensionProblem::cut_reaction(const Trial& trial) const {
+  const Network& network = cables_.network();
+  CutReaction cut;
+  if (network.held_by_cut.empty()) return cut;
+  const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
+  for (std::size_t v = 0; v < reactions.size(); ++v) {
+    if (!network.held_by_cut[v]) continue;
+    cut.force_nN += Eigen::Vector2d(reactions[v].x, reactions[v].y);
+    cut.torque_nN_um += cross(network.vertices_um[v], reactions[v]);
+  }
+  return cut;
+}
+
 Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
   return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium, threads_));
 }

@@ -23,6 +23,12 @@ struct Trial {
 /// |W (u(R) − u)|² with the displacement u(R) solved afresh for these adhesion forces, as the thesis does (3.2.5).
 using SolvedMisfit = std::function<double(const Eigen::VectorXd& forces_nN)>;
 
+/// What a cell's unseen part is pulled with through the cut: the pull of the network on the vertices held there.
+struct CutReaction {
+  Eigen::Vector2d force_nN{0, 0};
+  double torque_nN_um = 0;  ///< about the origin
+};
+
 class TensionProblem {
  public:
   /// @param adhesion_ids  the adhesion of each pair of forces of the data; every adhesion that holds the network must
@@ -44,6 +50,8 @@ class TensionProblem {
                  std::optional<double> force_tolerance = {}) const;
   /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
   Eigen::VectorXd torques_nN_um(const Trial& trial) const;
+  /// Zero where there is no cut. Balances the adhesions' forces: its derivatives are minus the sum of theirs.
+  CutReaction cut_reaction(const Trial& trial) const;
   /// The part of the forces that the actin network brings, by adhesion of the data.
   Eigen::VectorXd network_part_nN(const Trial& trial) const;
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.

@@ -42,7 +42,7 @@ FreeVertices free_vertices(const Network& network) {
   std::vector<int> unknown(network.vertices_um.size(), -1);
   int n_free = 0;
   for (std::size_t v = 0; v < unknown.size(); ++v)
-    if (network.adhesion_id[v] == 0) unknown[v] = n_free++;
+    if (!is_held(network, v)) unknown[v] = n_free++;
   std::vector<int> pair(network.links.size(), -1);
   std::vector<std::array<int, 2>> pairs;
   for (std::size_t k = 0; k < pair.size(); ++k) {
@@ -81,7 +81,7 @@ struct CableNetwork::Impl {
   CableParameters parameters;
   std::vector<int> fibre_ids, adhesion_ids;
   std::vector<int> group;     // by link
-  std::vector<int> adhesion;  // by vertex: index of the adhesion that holds it, or −1
+  std::vector<int> adhesion;  // by vertex: index of the adhesion that holds it, or −1: it is free or the cut holds it
   std::vector<int> held_vertices;
   double mean_rest_length_um = 0;
   FreeVertices free;
@@ -118,15 +118,18 @@ CableNetwork::CableNetwork(Network network, CableParameters parameters) {
   for (const Link& link : network.links) fibres.insert(link.fibre_id);
   for (const int id : network.adhesion_id)
     if (id != 0) adhesions.insert(id);
-  if (adhesions.size() < 2)
-    throw InvalidData("network", "at least two adhesions that hold it: with fewer it contracts to a point",
+  const bool is_cut = std::ranges::find(network.held_by_cut, true) != network.held_by_cut.end();
+  if (adhesions.size() < (is_cut ? 1u : 2u))
+    throw InvalidData("network",
+                      is_cut ? "an adhesion that holds it, beside the cut"
+                             : "at least two adhesions that hold it: with fewer it contracts to a point",
                       std::to_string(adhesions.size()));
   std::vector<int> fibre_ids(fibres.begin(), fibres.end()), adhesion_ids(adhesions.begin(), adhesions.end());
   std::vector<int> group, adhesion, held_vertices;
   for (const Link& link : network.links) group.push_back(index_of(fibre_ids, link.fibre_id));
   for (const int id : network.adhesion_id) adhesion.push_back(id == 0 ? -1 : index_of(adhesion_ids, id));
   for (std::size_t v = 0; v < adhesion.size(); ++v)
-    if (adhesion[v] >= 0) held_vertices.push_back(static_cast<int>(v));
+    if (is_held(network, v)) held_vertices.push_back(static_cast<int>(v));
   const double mean_rest = mean_rest_length_um(network);
   FreeVertices free = free_vertices(network);
   impl_ = std::make_unique<Impl>(Impl{std::move(network), parameters, std::move(fibre_ids), std::move(adhesion_ids),
@@ -150,8 +153,7 @@ Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, co
   if (positions.size() != impl_->network.vertices_um.size())
     throw InvalidData("start", std::to_string(impl_->network.vertices_um.size()) + " positions",
                       std::to_string(positions.size()));
-  for (std::size_t v = 0; v < positions.size(); ++v)
-    if (impl_->adhesion[v] >= 0) positions[v] = impl_->network.vertices_um[v];
+  for (const int v : impl_->held_vertices) positions[v] = impl_->network.vertices_um[v];
 
   double force = 0, largest_share = 0;
   for (const Cable& cable : cables) force = std::max(force, cable.tension_nN);
@@ -194,7 +196,7 @@ std::vector<Vec2> CableNetwork::reactions_nN(const std::vector<double>& tensions
     result[cables[k].vertex_b] += -1.0 * force;
   }
   for (std::size_t v = 0; v < result.size(); ++v)
-    if (impl_->adhesion[v] < 0) result[v] = {};
+    if (impl_->free.unknown[v] >= 0) result[v] = {};
   return result;
 }
 
@@ -273,9 +275,10 @@ Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<doubl
   const Eigen::MatrixXd by_vertex = reaction_derivatives(tensions_nN, equilibrium, threads);
   Eigen::MatrixXd result =
       Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->adhesion_ids.size()), by_vertex.cols());
-  for (std::size_t i = 0; i < impl_->held_vertices.size(); ++i)
-    result.middleRows<2>(2 * impl_->adhesion[impl_->held_vertices[i]]) +=
-        by_vertex.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+  for (std::size_t i = 0; i < impl_->held_vertices.size(); ++i) {
+    const int adhesion = impl_->adhesion[impl_->held_vertices[i]];
+    if (adhesion >= 0) result.middleRows<2>(2 * adhesion) += by_vertex.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+  }
   return result;
 }
 
@@ -303,8 +306,9 @@ GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tens
   h_ff.solve(w_f);
 
   const auto rows_of = [&](int v) -> Eigen::MatrixXd {
-    return impl_->adhesion[v] >= 0 ? weights.middleRows<2>(2 * impl_->adhesion[v])
-                                   : Eigen::MatrixXd(w_f.middleRows<2>(2 * impl_->free.unknown[v]));
+    if (impl_->adhesion[v] >= 0) return weights.middleRows<2>(2 * impl_->adhesion[v]);
+    if (impl_->free.unknown[v] >= 0) return w_f.middleRows<2>(2 * impl_->free.unknown[v]);
+    return Eigen::MatrixXd::Zero(2, weights.cols());  // no sum counts the cut's forces
   };
   GeometryGradient gradient{
       Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->held_vertices.size()), weights.cols()),
@@ -318,7 +322,7 @@ GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tens
     const Eigen::MatrixXd turned = stiffness(p, equilibrium.spans_um[k], 0, n) * apart;
     const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};
     for (int e = 0; e < 2; ++e) {
-      if (impl_->adhesion[ends[e]] < 0) continue;
+      if (impl_->free.unknown[ends[e]] >= 0) continue;
       gradient.by_held_vertex.middleRows<2>(2 * index_of(impl_->held_vertices, ends[e])) += (e == 0 ? 1 : -1) * turned;
     }
   }

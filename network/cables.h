@@ -51,7 +51,8 @@ struct GeometryGradient {
 /// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix.
 class CableNetwork {
  public:
-  /// @throws InvalidData where fewer than two adhesions hold the network: its equilibrium is a point
+  /// @throws InvalidData where fewer than two adhesions hold the network, or none beside a cut: its equilibrium is a
+  /// point, or pulls on no substrate
   explicit CableNetwork(Network network, CableParameters parameters = {});
   ~CableNetwork();
   CableNetwork(CableNetwork&&) noexcept;
@@ -63,7 +64,7 @@ class CableNetwork {
   const std::vector<int>& fibre_ids() const;
   /// Labels of the adhesions that hold vertices, in rising order.
   const std::vector<int>& adhesion_ids() const;
-  /// Vertices that adhesions hold, in rising order.
+  /// Vertices that adhesions or the cut hold, in rising order.
   const std::vector<int>& held_vertices() const;
 
   /// @param tensions_nN  by group, >= 0

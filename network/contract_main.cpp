@@ -75,7 +75,7 @@ int main(int argc, char** argv) {
        .files = {{"network", Kind::input, "network.vtu"},
                  {"tensions", Kind::input, "tensions.csv: fibre_id, tension_nN; fibre_id 0 is the actin network"},
                  {"out", Kind::output, "the contracted network (.vtu), with the force each cable carries"},
-                 {"reactions", Kind::output, "force on the substrate at each held vertex (.csv)"}}},
+                 {"reactions", Kind::output, "force on what holds it at each held vertex (.csv)"}}},
       argc, argv, [](const ContractParameters& parameters, StageContext& context) {
         const Path tensions_file = context.input("tensions");
         network::CableParameters cable_parameters = parameters.cables;
@@ -89,7 +89,7 @@ int main(int argc, char** argv) {
         std::vector<int> vertices;
         std::vector<Vec2> forces;
         for (std::size_t v = 0; v < by_vertex.size(); ++v)
-          if (cables.network().adhesion_id[v] != 0) {
+          if (is_held(cables.network(), v)) {
             vertices.push_back(static_cast<int>(v));
             forces.push_back(by_vertex[v]);
           }

@@ -46,6 +46,18 @@ void hold_adhesions(const Cell& cell, const Frame& frame, Network& network) {
   }
 }
 
+/// The cut holds the vertices on it that no adhesion holds. The mesh keeps those on the outline that lie within a
+/// quarter of an edge of it (frame.cpp), so a vertex as near as that to a cut lies on it.
+void hold_cut(const Cell& cell, const Frame& frame, Network& network) {
+  constexpr double kOnCut = 0.25;
+  if (cuts_of(cell).empty()) return;
+  for (std::size_t v = 0; v < network.vertices_um.size(); ++v) {
+    const Vec2 at = network.vertices_um[v];
+    network.held_by_cut.push_back(network.adhesion_id[v] == 0 &&
+                                  distance_to_cut_um(cell, at) < kOnCut * frame.size.at(at));
+  }
+}
+
 /// Leave out vertices that no link joins, as the tip of a whisker of the outline. An adhesion that would lose its last
 /// is joined to the nearest vertex that stays.
 void leave_out_loose_vertices(Network& network) {
@@ -155,6 +167,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   result.network.adhesion_id = frame.adhesion_id;
   result.network.adhesion_id.resize(mesh.points_um.size(), 0);
   if (parameters.adhesion_anchor != "centre") hold_adhesions(cell, frame, result.network);
+  hold_cut(cell, frame, result.network);
   result.network.links = links_of(frame, mesh, parameters);
   leave_out_loose_vertices(result.network);
   result.n_loose_parts = leave_out_loose_parts(result.network);

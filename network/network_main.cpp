@@ -34,10 +34,12 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
   const Network& net = generated.network;
   const int n_held = static_cast<int>(net.vertices_um.size()) -
                      static_cast<int>(std::count(net.adhesion_id.begin(), net.adhesion_id.end(), 0));
+  const auto n_by_cut = static_cast<std::int64_t>(std::ranges::count(net.held_by_cut, true));
   StageReport report;
   report.converged = generated.n_parts == 1;
   report.summary = std::to_string(net.vertices_um.size()) + " vertices, " + std::to_string(net.links.size()) +
-                   " links" + counted(generated.clipped_fibre_ids.size(), "fibres cut at the outline") +
+                   " links" + counted(static_cast<std::size_t>(n_by_cut), "of them held by the cut") +
+                   counted(generated.clipped_fibre_ids.size(), "fibres cut at the outline") +
                    counted(generated.snapped_adhesion_ids.size(), "adhesions outside the cell drawn in") +
                    counted(generated.separated_adhesion_ids.size(), "adhesions at one place moved apart") +
                    counted(generated.n_filled_holes, "holes smaller than a triangle filled") +
@@ -64,6 +66,7 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
                     {"clipped_fibre_ids", listed(generated.clipped_fibre_ids)},
                     {"snapped_adhesion_ids", listed(generated.snapped_adhesion_ids)},
                     {"separated_adhesion_ids", listed(generated.separated_adhesion_ids)}};
+  if (n_by_cut > 0) report.figures.emplace_back("n_held_by_cut", n_by_cut);
   return report;
 }
 

@@ -35,10 +35,12 @@ void keep_vertices(Network& network, const std::vector<char>& is_kept) {
     if (!is_kept[v]) continue;
     network.vertices_um[next] = network.vertices_um[v];
     network.adhesion_id[next] = network.adhesion_id[v];
+    if (!network.held_by_cut.empty()) network.held_by_cut[next] = network.held_by_cut[v];
     number[v] = next++;
   }
   network.vertices_um.resize(next);
   network.adhesion_id.resize(next);
+  if (!network.held_by_cut.empty()) network.held_by_cut.resize(next);
   std::erase_if(network.links, [&](const Link& link) { return !is_kept[link.vertex_a]; });
   for (Link& link : network.links) {
     link.vertex_a = number[link.vertex_a];

@@ -158,4 +158,32 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
   fibre.type = n_tied == 2 ? FibreType::ventral : n_tied == 1 ? FibreType::dorsal : FibreType::arc;
 }
 
+void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
+  if (cuts.empty()) return;
+  constexpr double kCourse_um = 1;   // of the line's end tells where it points
+  constexpr double kOnIt_um = 1e-6;  // ends there already
+  const auto leads = [&](Polyline& line) {
+    const Polyline last = last_part(line, kCourse_um);
+    const Vec2 from = last.front(), ahead = direction_of_end(last);
+    double way_um = kInfinite;
+    for (const auto& [a, b] : cuts) {
+      if (distance_to_segment_um(from, a, b) < kOnIt_um) return true;
+      const double across = cross(ahead, b - a);
+      if (across == 0) continue;
+      const double way = cross(a - from, b - a) / across, along = cross(a - from, ahead) / across;
+      if (way > 0 && along >= 0 && along <= 1) way_um = std::min(way_um, way);
+    }
+    if (way_um > reach_um) return false;
+    line.push_back(from + way_um * ahead);
+    return true;
+  };
+  bool leaves = !fibre.end_adhesion_id && leads(fibre.points_um);
+  std::reverse(fibre.points_um.begin(), fibre.points_um.end());
+  leaves = (!fibre.start_adhesion_id && leads(fibre.points_um)) || leaves;
+  std::reverse(fibre.points_um.begin(), fibre.points_um.end());
+  if (!leaves) return;
+  fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+  fibre.type_reason += "; leaves the image";
+}
+
 }  // namespace mbtfm::segment

@@ -18,4 +18,8 @@ namespace mbtfm::segment {
 /// @param outline_um  of the cell; empty: direction tells nothing
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um);
 
+/// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
+/// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.
+void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um);
+
 }  // namespace mbtfm::segment

@@ -203,8 +203,11 @@ std::vector<Fibre> trace_fibres(const Image& image, const Polygon& outline_um, d
 }
 
 std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
-                        const FibreParameters& p) {
-  for (Fibre& fibre : fibres) tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+                        const FibreParameters& p, const Cuts& cuts) {
+  for (Fibre& fibre : fibres) {
+    tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+    lead_to_cut(fibre, cuts, p.fibre_reach_um);
+  }
   std::erase_if(fibres, [&](const Fibre& f) { return length_um(f.points_um) < p.fibre_shortest_um; });
   std::stable_sort(fibres.begin(), fibres.end(),
                    [](const Fibre& a, const Fibre& b) { return length_um(a.points_um) > length_um(b.points_um); });
@@ -213,8 +216,8 @@ std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& 
 }
 
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
-                               double pixel_size_um, const FibreParameters& p) {
-  return tied(trace_fibres(image, outline_um, pixel_size_um, p), adhesions, outline_um, p);
+                               double pixel_size_um, const FibreParameters& p, const Cuts& cuts) {
+  return tied(trace_fibres(image, outline_um, pixel_size_um, p), adhesions, outline_um, p, cuts);
 }
 
 }  // namespace mbtfm::segment

@@ -36,9 +36,9 @@ void declare(ParameterList& list, FibreParameters& parameters);
 std::vector<Fibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
                                 const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
-/// out.
+/// out. @param cuts  of the outline: see lead_to_cut()
 std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
-                        const FibreParameters& parameters);
+                        const FibreParameters& parameters, const Cuts& cuts = {});
 
 /// Both: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
 /// collinear pieces joined. A line is a fibre where its mean height over the texture around it is so significant that
@@ -49,6 +49,6 @@ std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& 
 /// A tied end lies at its adhesion's centre. `width_um` is the full width at half maximum of the mean profile,
 /// `mean_intensity` the mean height above both sides in grey levels.
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
-                               double pixel_size_um, const FibreParameters& parameters);
+                               double pixel_size_um, const FibreParameters& parameters, const Cuts& cuts = {});
 
 }  // namespace mbtfm::segment

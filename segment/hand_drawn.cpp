@@ -219,10 +219,10 @@ CellOutline hand_drawn_outline(const RoiSet& set, const Field& field) {
                        "keep the cell's alone: an image of several cells is segmented cell by cell");
     }
   }
-  const double far_x_um = field.width_px * field.pixel_um, far_y_um = field.height_px * field.pixel_um;
-  cell.is_cut_by_border = std::any_of(cell.outer_um.begin(), cell.outer_um.end(), [&](Vec2 p) {
-    return std::min({p.x, p.y, far_x_um - p.x, far_y_um - p.y}) < field.pixel_um;
-  });
+  CutRing cut =
+      cut_by_border(cell.outer_um, {field.width_px * field.pixel_um, field.height_px * field.pixel_um}, field.pixel_um);
+  cell.outer_um = std::move(cut.points_um);
+  cell.is_cut = std::move(cut.is_cut);
   return cell;
 }
 
@@ -241,7 +241,7 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
 
 std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
                                      const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
-                                     const FibreParameters& p) {
+                                     const FibreParameters& p, const Cuts& cuts) {
   std::vector<Fibre> fibres;
   for (const Roi& roi : set.rois) {
     const std::string where = called(set, roi);
@@ -249,6 +249,7 @@ std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesi
     const std::optional<FibreType> stated = stated_type(roi, where);
     set_profile(fibre, roi, actin, field.pixel_um, p);
     tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
+    lead_to_cut(fibre, cuts, p.fibre_reach_um);
     if (fibre.points_um.size() < 2)
       throw InputError(where, "a line from one adhesion to another or beyond", "one within a single adhesion");
     fibre.confidence = 1;  // a person says that it is one

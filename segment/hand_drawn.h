@@ -48,7 +48,7 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
 /// types
 std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
                                      const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
-                                     const FibreParameters& parameters);
+                                     const FibreParameters& parameters, const Cuts& cuts = {});
 
 /// Area, centroid and the ellipse of equal second moments of a polygon, scaled to its area.
 ///

@@ -224,6 +224,9 @@ struct Scene {
   cv::Mat full, smooth;
   double pixel_um, full_pixel_um, band_px, noise;
   double px_of(double area_um2) const { return area_um2 / (pixel_um * pixel_um); }
+  Vec2 field_um() const { return {full.cols * full_pixel_um, full.rows * full_pixel_um}; }
+  /// A ring as near as this to the image's border is one that the border has made: rings go through pixels' centres.
+  double border_um() const { return 1.5 * pixel_um; }
 };
 
 Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameters& p) {
@@ -257,12 +260,11 @@ cv::Mat mask_of(const Scene& s, double smallest) {
 
 /// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel.
 std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Adhesion>& adhesions, Vec2 field_um,
-                          double pixel_um) {
+                          double border_um) {
   std::vector<bool> result;
   for (const Vec2 p : ring_um) {
     const double border = std::min({p.x, p.y, field_um.x - p.x, field_um.y - p.y});
-    result.push_back(border > 1.5 * pixel_um &&
-                     std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
+    result.push_back(border > border_um && std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
                        return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
                      }));
   }
@@ -279,8 +281,8 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
     coarse.push_back(to_um(point, s.pixel_um));
     full_ring.push_back(to_pixels(coarse.back(), s.full_pixel_um));
   }
-  const Vec2 field_um{s.full.cols * s.full_pixel_um, s.full.rows * s.full_pixel_um};
-  const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, field_um, s.pixel_um), s.full_pixel_um);
+  const Vec2 field_um = s.field_um();
+  const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, field_um, s.border_um()), s.full_pixel_um);
   for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), p.outline_spacing_um / s.full_pixel_um)) {
     const Vec2 at = to_um(point, s.full_pixel_um);
     polygon.push_back({std::clamp(at.x, 0.0, field_um.x), std::clamp(at.y, 0.0, field_um.y)});
@@ -291,12 +293,6 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
 /// A gap whose ring crosses the outline is a bay.
 bool is_inside(const Polygon& hole, const Polygon& outer) {
   return std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
-}
-
-bool touches_border(const cv::Mat& mask) {
-  return cv::countNonZero(mask.row(0)) + cv::countNonZero(mask.row(mask.rows - 1)) + cv::countNonZero(mask.col(0)) +
-             cv::countNonZero(mask.col(mask.cols - 1)) >
-         0;
 }
 
 }  // namespace
@@ -329,14 +325,15 @@ std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesi
   for (const Parts::Part& each : parts.parts) {
     CellOutline cell;
     const cv::Mat part = parts.mask(each);
-    cell.is_cut_by_border = touches_border(part);
     cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
     const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
     for (const auto& ring : rings) {
       const Polygon polygon = polygon_of(s, ring, adhesions, p);
       if (cell.outer_um.empty()) {
-        cell.outer_um = polygon;
-        cell.area_um2 = std::abs(signed_area_um2(polygon));
+        CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
+        cell.outer_um = std::move(cut.points_um);
+        cell.is_cut = std::move(cut.is_cut);
+        cell.area_um2 = std::abs(signed_area_um2(cell.outer_um));
       } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
         cell.holes_um.push_back(polygon);
         cell.area_um2 -= std::abs(signed_area_um2(polygon));
@@ -347,6 +344,47 @@ std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesi
   std::stable_sort(cells.begin(), cells.end(),
                    [](const CellOutline& a, const CellOutline& b) { return a.area_um2 > b.area_um2; });
   return cells;
+}
+
+CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
+  constexpr int kLeft = 1, kTop = 2, kRight = 4, kBottom = 8;
+  constexpr double kRound = 4;  // of the reach: a ring goes round a corner of the image so near to it
+  const std::size_t n = ring_um.size();
+  const auto sides_near = [&](Vec2 p) {
+    return (p.x <= reach_um ? kLeft : 0) | (p.y <= reach_um ? kTop : 0) | (p.x >= field_um.x - reach_um ? kRight : 0) |
+           (p.y >= field_um.y - reach_um ? kBottom : 0);
+  };
+  const auto put_onto = [&](Vec2& p, int sides) {
+    if (sides & kLeft) p.x = 0;
+    if (sides & kTop) p.y = 0;
+    if (sides & kRight) p.x = field_um.x;
+    if (sides & kBottom) p.y = field_um.y;
+  };
+  std::vector<int> near(n), onto(n, 0);
+  for (std::size_t i = 0; i < n; ++i) near[i] = sides_near(ring_um[i]);
+  CutRing result;
+  std::vector<std::size_t> index;  // of each point in the ring given; n: a corner of the image
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t next = (i + 1) % n;
+    const int common = near[i] & near[next];
+    Vec2 corner = ring_um[i];
+    put_onto(corner, near[i] | near[next]);
+    const bool is_round = common == 0 && near[i] != 0 && near[next] != 0 &&
+                          std::max(norm(ring_um[i] - corner), norm(ring_um[next] - corner)) <= kRound * reach_um;
+    onto[i] |= is_round ? near[i] : common;
+    onto[next] |= is_round ? near[next] : common;
+    result.points_um.push_back(ring_um[i]);
+    result.is_cut.push_back(common != 0 || is_round);
+    index.push_back(i);
+    if (!is_round) continue;
+    result.points_um.push_back(corner);
+    result.is_cut.push_back(true);
+    index.push_back(n);
+  }
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    if (index[k] < n) put_onto(result.points_um[k], onto[index[k]]);
+  }
+  return result;
 }
 
 Polygon find_outline(const Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,

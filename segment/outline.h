@@ -1,6 +1,7 @@
 /// The outlines of the cells.
 #pragma once
 
+#include <algorithm>
 #include <vector>
 
 #include "pipeline/contract/parameters.h"
@@ -25,10 +26,20 @@ void declare(ParameterList& list, OutlineParameters& parameters);
 struct CellOutline {
   Polygon outer_um;
   std::vector<Polygon> holes_um;
-  double area_um2 = 0;            ///< without the holes
-  bool is_sheet = false;          ///< larger than any single cell; its holes are left out
-  bool is_cut_by_border = false;  ///< the image ends before the cell does
+  double area_um2 = 0;         ///< without the holes
+  bool is_sheet = false;       ///< larger than any single cell; its holes are left out
+  std::vector<bool> is_cut{};  ///< by piece of the outer ring: the image ends there before the cell does
+  bool is_cut_by_border() const { return std::ranges::find(is_cut, true) != is_cut.end(); }
 };
+
+/// A ring, and which of its pieces run along the image's border.
+struct CutRing {
+  Polygon points_um;
+  std::vector<bool> is_cut;
+};
+/// A piece is cut where both its ends lie within `reach_um` of the same side of the image; they are put onto it. The
+/// image's corner is put in where the ring goes round it that closely.
+CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um);
 
 /// The cells of an image, the largest first. Cells that touch each other count as one.
 ///

@@ -114,11 +114,12 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
   if (actin && drawn.outline && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
   std::vector<Segmentation> result;
   for (const CellOutline& outline : chosen(outlines, shape, p)) {
-    Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um},
+    Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um, outline.is_cut},
                    .pixel_size_um = pixel_um,
                    .n_cells = static_cast<int>(outlines.size()),
                    .area_um2 = outline.area_um2,
-                   .is_cut_by_border = outline.is_cut_by_border};
+                   .is_cut_by_border = outline.is_cut_by_border()};
+    if (!s.is_cut_by_border) s.cell.is_cut.clear();
     std::vector<Fibre> traced;
     if (actin && !drawn.fibres) traced = trace_fibres(actin->image, s.cell.outline_um, pixel_um, p.fibres);
     CellOutline around = outline;
@@ -130,9 +131,10 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                        std::to_string(found.size()) + " outside and none inside",
                        "do both channels show the same cell at the same place?");
     if (drawn.fibres)
-      s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres);
+      s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres,
+                                        cuts_of(s.cell));
     else if (actin)
-      s.cell.fibres = tied(std::move(traced), s.cell.adhesions, s.cell.outline_um, p.fibres);
+      s.cell.fibres = tied(std::move(traced), s.cell.adhesions, s.cell.outline_um, p.fibres, cuts_of(s.cell));
     result.push_back(std::move(s));
   }
   return result;

@@ -32,12 +32,12 @@ void declare(ParameterList& list, SegmentParameters& parameters);
 struct Segmentation {
   Cell cell;
   double pixel_size_um = 0;
-  int n_cells = 1;                            ///< that the image shows
-  double area_um2 = 0;                        ///< of the cell, less its holes
-  bool is_cut_by_border = false;              ///< the image ends before the cell does
-  int n_adhesions_outside = 0;                ///< found beyond the cell and left out
+  int n_cells = 1;                              ///< that the image shows
+  double area_um2 = 0;                          ///< of the cell, less its holes
+  bool is_cut_by_border = false;                ///< the image ends before the cell does
+  int n_adhesions_outside = 0;                  ///< found beyond the cell and left out
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
-  bool is_aligned = false;                    ///< fibres and outline were moved by it
+  bool is_aligned = false;                      ///< fibres and outline were moved by it
 };
 
 /// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions.

@@ -76,8 +76,7 @@ StageReport report_of(const Segmentation& s) {
                    std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
                    " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
   for (std::optional<Finding> found :
-       {noticed(FindingKind::cell_cut, s.is_cut_by_border ? 1 : 0, "The image's border cuts the cell."),
-        noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
+       {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
                 "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +
                     " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
         noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
@@ -90,6 +89,7 @@ StageReport report_of(const Segmentation& s) {
                 std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out.")}) {
     if (found) report.findings.push_back(std::move(*found));
   }
+  if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
   if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;
 }
@@ -120,7 +120,7 @@ void write_cell(StageContext& context, const std::string& folder, const Segmenta
   const auto out = [&](const char* file) { return context.output("out", folder + file); };
   write_adhesions(out("adhesions.csv"), s.cell.adhesions);
   write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
-  write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um);
+  write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um, s.cell.is_cut);
   write_cell_vtp(out("cell.vtp"), s.cell);
   write_png(out("overlay.png"), overlay);
   write_jpeg(out("images.jpg"), ground.picture);

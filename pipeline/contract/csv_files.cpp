@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <cstdio>
 #include <map>
 #include <numbers>
@@ -132,9 +133,18 @@ std::vector<Vec2> read_points(const Path& file) {
   return points;
 }
 
-std::vector<Polygon> read_outline(const Path& file) {
+namespace {
+
+struct Outline {
+  std::vector<Polygon> rings_um;
+  std::vector<bool> is_cut;  ///< by piece of the outer ring; empty: none
+};
+
+Outline outline_in(const Path& file) {
   CsvTable table(file);
-  std::vector<Polygon> rings(1);
+  Outline outline{.rings_um = std::vector<Polygon>(1), .is_cut = {}};
+  std::vector<Polygon>& rings = outline.rings_um;
+  const bool tells_cuts = table.has("is_cut");
   for (int row = 0; row < table.n_rows(); ++row) {
     const int ring = table.has("ring") ? table.integer(row, "ring", 0) : 0;
     const int current = static_cast<int>(rings.size()) - 1;
@@ -143,28 +153,48 @@ std::vector<Polygon> read_outline(const Path& file) {
     }
     if (ring > current) rings.emplace_back();
     rings[ring].push_back({table.number(row, "x_um"), table.number(row, "y_um")});
+    if (!tells_cuts) continue;
+    const bool is_cut = read_flag(table, row, "is_cut");
+    if (ring > 0 && is_cut) table.fail(row, "is_cut", "false: the rim of a hole is no cut");
+    if (ring == 0) outline.is_cut.push_back(is_cut);
   }
   for (const Polygon& ring : rings) {
     if (ring.size() >= 3) continue;
     throw InputError(file.string(), "the corners of a closed outline, three at least", std::to_string(ring.size()));
   }
-  return rings;
+  if (std::ranges::find(outline.is_cut, true) == outline.is_cut.end()) outline.is_cut.clear();
+  return outline;
 }
 
-void write_outline(const Path& file, const Polygon& outer_um, const std::vector<Polygon>& holes_um) {
-  CsvText csv({"x_um", "y_um", "ring"});
-  for (const Vec2 p : outer_um) csv.add(p.x).add(p.y).add(0).end_row();
+}  // namespace
+
+std::vector<Polygon> read_outline(const Path& file) { return outline_in(file).rings_um; }
+
+void write_outline(const Path& file, const Polygon& outer_um, const std::vector<Polygon>& holes_um,
+                   const std::vector<bool>& is_cut) {
+  MBTFM_ASSERT(is_cut.empty() || is_cut.size() == outer_um.size());
+  const bool tells_cuts = std::ranges::find(is_cut, true) != is_cut.end();
+  std::vector<std::string> header = {"x_um", "y_um", "ring"};
+  if (tells_cuts) header.emplace_back("is_cut");
+  CsvText csv(header);
+  const auto add = [&](Vec2 p, int ring, bool cut) {
+    csv.add(p.x).add(p.y).add(ring);
+    if (tells_cuts) csv.add(text_of(cut));
+    csv.end_row();
+  };
+  for (std::size_t i = 0; i < outer_um.size(); ++i) add(outer_um[i], 0, tells_cuts && is_cut[i]);
   for (std::size_t i = 0; i < holes_um.size(); ++i)
-    for (const Vec2 p : holes_um[i]) csv.add(p.x).add(p.y).add(static_cast<int>(i) + 1).end_row();
+    for (const Vec2 p : holes_um[i]) add(p, static_cast<int>(i) + 1, false);
   write_text(file, csv.str());
 }
 
 Cell read_cell(const Path& folder) {
-  const std::vector<Polygon> rings = read_outline(folder / "outline.csv");
+  Outline outline = outline_in(folder / "outline.csv");
   Cell cell{.adhesions = read_adhesions(folder / "adhesions.csv"),
             .fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv"),
-            .outline_um = rings.front(),
-            .holes_um = {rings.begin() + 1, rings.end()}};
+            .outline_um = outline.rings_um.front(),
+            .holes_um = {outline.rings_um.begin() + 1, outline.rings_um.end()},
+            .is_cut = std::move(outline.is_cut)};
   check_read(folder, cell);
   return cell;
 }

@@ -29,6 +29,8 @@ const std::vector<Key>& switches() {
        "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
       {"channel_shift", &S::channel_shift,
        "shift and turn of the cell against the beads, found with the tensions; auto: on, where beads tell it"},
+      {"beyond_cut", &S::beyond_cut,
+       "forces beyond the cut of a cell that its image cuts; auto: where the outline has a cut"},
       {"cable_elasticity", &S::cable_elasticity,
        "cables resist to be longer than at rest; auto: where any would be longer"},
       {"robust_loss", &S::robust_loss, "outlying beads count less; auto: where tails cost more than the loss does"},

@@ -23,6 +23,7 @@ struct EffectSwitches {
   std::string drift_affine = "auto";
   std::string common_motion = "auto";
   std::string channel_shift = "auto";
+  std::string beyond_cut = "auto";
   std::string cable_elasticity = "auto";
   std::string robust_loss = "auto";
   std::string time_coupling = "auto";

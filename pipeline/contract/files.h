@@ -25,7 +25,9 @@ void write_fibres(const Path& fibres_file, const Path& points_file, const std::v
 
 /// Rings of a cell's outline: the outer one, then the holes. A file without the column `ring` is one ring.
 std::vector<Polygon> read_outline(const Path& file);
-void write_outline(const Path& file, const Polygon& outer_um, const std::vector<Polygon>& holes_um = {});
+/// @param is_cut  by piece of the outer ring (Cell::is_cut); the column of that name is written where there is a cut
+void write_outline(const Path& file, const Polygon& outer_um, const std::vector<Polygon>& holes_um = {},
+                   const std::vector<bool>& is_cut = {});
 
 /// What a segmented cell consists of.
 inline const std::vector<std::string> kCellFiles = {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"};
@@ -83,6 +85,11 @@ struct ErrorBudget {
   std::vector<TensionError> tensions;
   double total_force_nN = 0;
   ErrorParts total_force_parts_nN;
+  struct CutForce {
+    double force_nN = 0;
+    ErrorParts parts_nN;
+  };
+  std::optional<CutForce> cut_force;  ///< through the image's cut; none: the image shows the whole cell
 };
 
 /// What the fit found for the cell as a whole: fit.json.

@@ -23,9 +23,6 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "in an image that is not saturated one or two pixels have it; adhesions cover 0.01 of an image",
        "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
        "exposure."},
-      {cell_cut, "cell-cut", "segment", caution, "1 where the image's border cuts the cell", 0,
-       "what the cell does outside of the image is not seen, and its forces do not balance inside of it",
-       "Record the whole cell. Else distrust the fibres and adhesions near the cut, and the total force."},
       {adhesions_left_out, "adhesions-left-out", "segment", note, "adhesions that were found outside of the cell", 0,
        "only what lies in the outline can hold the network", "Check the outline in 1_segment/overlay.png."},
       {adhesions_long, "adhesions-long", "segment", caution, "length over width of the adhesions, mean weighed by area",
@@ -90,6 +87,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "noise alone does not reach 2 over the 30 beads that a region has at least",
        "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
        "adhesion that was not segmented."},
+      {cell_cut, "cell-cut", "fit", note, "1 where the image's border cuts the cell", 0,
+       "the total force is that of the adhesions in view, and what passes through the cut balances it",
+       "Record the whole cell if you can. A note where forces beyond the cut are allowed for; a caution where "
+       "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
        "a pair of adhesions is named where chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
@@ -118,8 +119,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the choice of the mesh is usually a larger error than the noise of the beads, and one mesh cannot show it",
        "Use fit.n_meshes = 2 or more."},
       {forces_out_of_balance, "forces-out-of-balance", "fit", bad,
-       "length of the sum of the adhesion forces, over the sum of their lengths", 1e-6,
-       "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
+       "length of the sum of the adhesion forces and of the force through a cut, over the sum of the lengths of the "
+       "adhesion forces",
+       1e-6, "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
        "Report this with the cell: it should not happen."},
       {torques_out_of_balance, "torques-out-of-balance", "fit", bad,
        "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,

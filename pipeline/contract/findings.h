@@ -22,7 +22,6 @@ enum class FindingKind {
   lossy_image,
   saturated,
   // segment
-  cell_cut,
   adhesions_left_out,
   actin_shift,
   adhesions_long,
@@ -41,6 +40,7 @@ enum class FindingKind {
   noise_disagrees,
   beads_disagree_by_region,
   // fit: the cell
+  cell_cut,
   missing_fibre,
   missing_adhesion,
   fibre_without_tension,

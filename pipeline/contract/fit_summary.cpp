@@ -68,6 +68,11 @@ nlohmann::ordered_json json_of_budget(const ErrorBudget& budget, const std::vect
   json["total_force"] = {{"total_force_nN", budget.total_force_nN},
                          {"parts_nN", json_of_parts(budget.total_force_parts_nN)},
                          {"total_nN", total(budget.total_force_parts_nN)}};
+  if (budget.cut_force) {
+    json["cut_force"] = {{"cut_force_nN", budget.cut_force->force_nN},
+                         {"parts_nN", json_of_parts(budget.cut_force->parts_nN)},
+                         {"total_nN", total(budget.cut_force->parts_nN)}};
+  }
   return json;
 }
 
@@ -81,6 +86,8 @@ ErrorBudget budget_of(const JsonRecord& record) {
   const JsonRecord force = record.at("total_force");
   budget.total_force_nN = force.at("total_force_nN").number();
   budget.total_force_parts_nN = parts_of(force.at("parts_nN"));
+  if (const auto cut = record.find("cut_force"))
+    budget.cut_force = {.force_nN = cut->at("cut_force_nN").number(), .parts_nN = parts_of(cut->at("parts_nN"))};
   return budget;
 }
 

@@ -93,6 +93,25 @@ double distance_to_boundary_um(const Polygon& polygon, Vec2 point) {
   return norm(point - nearest_on_boundary_um(polygon, point));
 }
 
+Cuts cuts_of(const Cell& cell) {
+  Cuts cuts;
+  const std::size_t n = cell.outline_um.size();
+  for (std::size_t i = 0; i < cell.is_cut.size(); ++i) {
+    if (cell.is_cut[i]) cuts.emplace_back(cell.outline_um[i], cell.outline_um[(i + 1) % n]);
+  }
+  return cuts;
+}
+
+double distance_to_cut_um(const Cell& cell, Vec2 point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const auto& [a, b] : cuts_of(cell)) least = std::min(least, distance_to_segment_um(point, a, b));
+  return least;
+}
+
+bool is_held(const Network& network, std::size_t vertex) {
+  return network.adhesion_id[vertex] != 0 || (!network.held_by_cut.empty() && network.held_by_cut[vertex]);
+}
+
 namespace {
 
 std::string shown(double value) { return "'" + std::to_string(value) + "'"; }
@@ -160,6 +179,8 @@ void check(const Cell& cell) {
   check(cell.adhesions);
   check(cell.fibres);
   check_ring(cell.outline_um, "outline");
+  require(cell.is_cut.empty() || cell.is_cut.size() == cell.outline_um.size(), "is_cut of the outline",
+          "one value a point", std::to_string(cell.is_cut.size()));
   for (std::size_t i = 0; i < cell.holes_um.size(); ++i) {
     const std::string element = "ring " + std::to_string(i + 1) + " of the outline";
     check_ring(cell.holes_um[i], element);
@@ -212,10 +233,14 @@ void check(const Network& network) {
   const int n_vertices = static_cast<int>(network.vertices_um.size());
   require(network.adhesion_id.size() == network.vertices_um.size(), "adhesion_id", "one value a vertex",
           std::to_string(network.adhesion_id.size()) + " values for " + std::to_string(n_vertices) + " vertices");
+  require(network.held_by_cut.empty() || network.held_by_cut.size() == network.vertices_um.size(), "held_by_cut",
+          "one value a vertex", std::to_string(network.held_by_cut.size()));
   for (int v = 0; v < n_vertices; ++v) {
     require_finite(network.vertices_um[v], "vertex " + std::to_string(v));
     require(network.adhesion_id[v] >= 0, "adhesion_id of vertex " + std::to_string(v), "an integer >= 0",
             "'" + std::to_string(network.adhesion_id[v]) + "'");
+    require(network.adhesion_id[v] == 0 || network.held_by_cut.empty() || !network.held_by_cut[v],
+            "vertex " + std::to_string(v), "an adhesion or the cut that holds it", "both");
   }
   for (std::size_t k = 0; k < network.links.size(); ++k) {
     const Link& link = network.links[k];

@@ -6,6 +6,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace mbtfm {
@@ -66,7 +67,14 @@ struct Cell {
   std::vector<Fibre> fibres;
   Polygon outline_um;
   std::vector<Polygon> holes_um;  ///< gaps in the cell, inside the outline
+  /// By piece of the outline, from its point to the next: it is a cut, along the image's border, and the cell goes on
+  /// beyond. Empty: none is.
+  std::vector<bool> is_cut{};
 };
+/// Of the outline's pieces that are cuts: their ends.
+using Cuts = std::vector<std::pair<Vec2, Vec2>>;
+Cuts cuts_of(const Cell& cell);
+double distance_to_cut_um(const Cell& cell, Vec2 point);
 
 /// Displacement (stressed minus relaxed position) of one bead.
 struct Bead {
@@ -104,7 +112,11 @@ struct Network {
   std::vector<Vec2> vertices_um;
   std::vector<int> adhesion_id;  ///< by vertex; the substrate holds it where it is not 0
   std::vector<Link> links;
+  std::vector<bool> held_by_cut{};  ///< by vertex: the part of the cell that the image does not show holds it; empty:
+                                    ///< none. No adhesion holds it, too
 };
+/// By an adhesion or by the cut.
+bool is_held(const Network& network, std::size_t vertex);
 
 struct Tension {
   int fibre_id = 0;  ///< 0: the actin network

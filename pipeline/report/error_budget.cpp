@@ -29,7 +29,7 @@ void expect_same_sources(const JsonRecord& record, const BudgetLine& line, const
 }
 
 std::string name_of(const BudgetLine& line) {
-  if (!line.fibre_id) return "total force";
+  if (!line.fibre_id) return line.type;
   return *line.fibre_id == 0 ? "network" : fmt::format("{} {}", line.type, *line.fibre_id);
 }
 
@@ -87,13 +87,19 @@ std::vector<BudgetLine> read_error_budget(const std::filesystem::path& run_file)
     if (!lines.empty()) expect_same_sources(record, line, lines.front());
     lines.push_back(std::move(line));
   };
+  const auto add_sum = [&](const JsonRecord& record, const char* name, const char* value) {
+    BudgetLine line = line_of(record, value);
+    line.type = name;
+    add(record, std::move(line));
+  };
   for (const JsonRecord& fibre : budget->at("fibres").list()) {
     BudgetLine line = line_of(fibre, "tension_nN");
     line.fibre_id = fibre.at("fibre_id").integer();
     line.type = fibre.at("type").text();
     add(fibre, std::move(line));
   }
-  if (const auto force = budget->find("total_force")) add(*force, line_of(*force, "total_force_nN"));
+  if (const auto force = budget->find("total_force")) add_sum(*force, "total force", "total_force_nN");
+  if (const auto force = budget->find("cut_force")) add_sum(*force, "force through the cut", "cut_force_nN");
   return lines;
 }
 
@@ -110,8 +116,8 @@ std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::
     // the network's tension is that of a cable, hundreds of times smaller
     if (line.fibre_id && *line.fibre_id > 0) fibres.push_back(line);
     std::vector<std::string> row = {html_escaped(name_of(line)), readable(line.value_nN), readable(line.total_nN)};
-    csv += fmt::format("\n{},{},{},{}", line.fibre_id ? std::to_string(*line.fibre_id) : "",
-                       line.fibre_id ? line.type : "total force", shortest(line.value_nN), shortest(line.total_nN));
+    csv += fmt::format("\n{},{},{},{}", line.fibre_id ? std::to_string(*line.fibre_id) : "", line.type,
+                       shortest(line.value_nN), shortest(line.total_nN));
     for (const auto& [source, part] : line.parts_nN) {
       row.push_back(part ? readable(*part) : "–");
       csv += "," + (part ? shortest(*part) : std::string());

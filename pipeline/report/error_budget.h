@@ -11,8 +11,8 @@ namespace mbtfm::report {
 
 /// A quantity with its standard error and what each source adds to it; in squares these add up.
 struct BudgetLine {
-  std::optional<int> fibre_id = {};  ///< none: the total force; 0: the actin network
-  std::string type = {};             ///< of the fibre
+  std::optional<int> fibre_id = {};  ///< none: a sum of forces; 0: the actin network
+  std::string type = {};             ///< of the fibre, or the sum's name
   double value_nN = 0, total_nN = 0;
   /// source, standard error; none where it is not known
   std::vector<std::pair<std::string, std::optional<double>>> parts_nN = {};

@@ -25,16 +25,29 @@ std::string counted(std::size_t n, const std::string& one, const std::string& ma
   return fmt::format("{} {}", n, n == 1 ? one : many);
 }
 
+/// Empty where the image shows the whole cell.
+std::string of_cut(const FitSummary& fit) {
+  const auto cut = cut_force_of(fit);
+  if (!cut) return {};
+  return fmt::format(
+      " The image cuts the cell: {} ± {} nN (x {} ± {}, y {} ± {}; y points down) pass through the cut and balance the "
+      "forces of the adhesions in view.",
+      readable(cut->force_nN), readable(cut->sigma_nN), readable(cut->x_nN), readable(cut->x_sigma_nN),
+      readable(cut->y_nN), readable(cut->y_sigma_nN));
+}
+
 std::string what(const CellResults& results) {
   int n_by_type[3] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
   return fmt::format(
-      "{} ({} dorsal, {}, {} ventral) and {}. The cell pulls with {} nN in total, summed over its adhesions: {} nN by "
-      "the fibres, {} nN by the actin network.",
-      counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
-      counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
-      counted(results.cell.adhesions.size(), "adhesion", "adhesions"), readable(results.fit.total_force_nN),
-      readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN));
+             "{} ({} dorsal, {}, {} ventral) and {}. The cell pulls with {} nN in total, summed over its adhesions: {} "
+             "nN by "
+             "the fibres, {} nN by the actin network.",
+             counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
+             counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
+             counted(results.cell.adhesions.size(), "adhesion", "adhesions"), readable(results.fit.total_force_nN),
+             readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN)) +
+         of_cut(results.fit);
 }
 
 std::string truth(const CellResults& results) {

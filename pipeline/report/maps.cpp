@@ -41,9 +41,30 @@ Chart empty_map(const Box& box, const std::string& title) {
   return map;
 }
 
+constexpr const char* kCutStyle = "fill:none;stroke:#777;stroke-width:2.6;stroke-dasharray:9 5";
+
+/// The outline, and over it where the image cuts the cell.
+void draw_outline(Chart& map, const Cell& cell, const std::string& style) {
+  map.polygon(cell.outline_um, style);
+  Polyline cut;
+  for (const auto& [a, b] : cuts_of(cell)) {
+    if (!cut.empty() && !(cut.back() == a)) {
+      map.curve(cut, kCutStyle);
+      cut.clear();
+    }
+    if (cut.empty()) cut.push_back(a);
+    cut.push_back(b);
+  }
+  if (!cut.empty()) map.curve(cut, kCutStyle);
+}
+
+std::string caption_of_cut(const Cell& cell) {
+  return cuts_of(cell).empty() ? "" : " Heavy grey dashes: the cut, where the image ends and the cell goes on.";
+}
+
 Chart new_map(const CellResults& results, const std::string& title) {
   Chart map = empty_map(map_box(results), title);
-  map.polygon(results.cell.outline_um, kOutlineStyle);
+  draw_outline(map, results.cell, kOutlineStyle);
   return map;
 }
 
@@ -160,7 +181,7 @@ Figure segmentation_map(const CellResults& results) {
     map.picture(results.images->low_um, results.images->high_um,
                 "data:image/jpeg;base64," + base64(read_text(results.images->file)));
   }
-  map.polygon(results.cell.outline_um, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
+  draw_outline(map, results.cell, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
   // nearly invisible fill: the mouse finds the whole ellipse
   draw_adhesions(map, results, "fill:#ff9be6;fill-opacity:0.12;stroke:#ff9be6;stroke-width:1.1", Hover::whole);
   std::string types;
@@ -195,9 +216,10 @@ Figure segmentation_map(const CellResults& results) {
           : fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>missing (dashed)</span>",
                         is_dark ? "#ffe14d" : "#b00020");
   return {map,
-          is_dark ? "Adhesions, fibres and outline over the images they were found in: actin grey, adhesions purple. "
-                    "Full size: 1_segment/overlay.png."
-                  : "Adhesions, fibres and outline.",
+          (is_dark ? "Adhesions, fibres and outline over the images they were found in: actin grey, adhesions purple. "
+                     "Full size: 1_segment/overlay.png."
+                   : "Adhesions, fibres and outline.") +
+              caption_of_cut(results.cell),
           legend(types + "<span><span class=\"type\" style=\"background:#ff9be6\"></span>adhesion</span>" + missing)};
 }
 
@@ -223,7 +245,8 @@ Figure adhesion_map(const CellResults& results) {
   }
   return {map,
           "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force of the cell on the "
-          "substrate. Dashed: the cell’s outline. The few highest tractions share the colour at the bar’s end.",
+          "substrate. Dashed: the cell’s outline. The few highest tractions share the colour at the bar’s end." +
+              caption_of_cut(results.cell),
           legend(arrow_legend(scale, "nN") + colour_bar(colours))};
 }
 

@@ -101,6 +101,25 @@ std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell) {
   return by_id;
 }
 
+std::optional<CutForce> cut_force_of(const FitSummary& fit) {
+  std::optional<CutForce> cut;
+  const auto read = [&](const char* name, double CutForce::*member) {
+    for (const auto& [known, value] : fit.more) {
+      if (known != name || !std::holds_alternative<double>(value)) continue;
+      if (!cut) cut.emplace();
+      (*cut).*member = std::get<double>(value);
+    }
+  };
+  read("cut_force_x_nN", &CutForce::x_nN);
+  read("cut_force_x_sigma_nN", &CutForce::x_sigma_nN);
+  read("cut_force_y_nN", &CutForce::y_nN);
+  read("cut_force_y_sigma_nN", &CutForce::y_sigma_nN);
+  read("cut_force_nN", &CutForce::force_nN);
+  read("cut_force_sigma_nN", &CutForce::sigma_nN);
+  read("cut_torque_nN_um", &CutForce::torque_nN_um);
+  return cut;
+}
+
 Balance balance_of(const CellResults& results) {
   const auto by_id = adhesions_by_id(results.cell);
   Vec2 centre;
@@ -119,6 +138,11 @@ Balance balance_of(const CellResults& results) {
     lever += norm(arm) * norm(force.force_nN);
   }
   if (!(magnitudes > 0)) return {};
+  if (const auto cut = cut_force_of(results.fit)) {
+    const Vec2 force_nN{cut->x_nN, cut->y_nN};
+    net += force_nN;
+    torque += cut->torque_nN_um - cross(centre, force_nN);
+  }
   return {.net_force = norm(net) / magnitudes,
           .net_torque = lever > 0 ? std::abs(torque) / lever : 0,
           .has_moments = has_moments};

@@ -64,4 +64,11 @@ struct Balance {
 };
 Balance balance_of(const CellResults& results);
 
+/// What passes through the image's cut, of fit.json.
+struct CutForce {
+  double x_nN = 0, x_sigma_nN = 0, y_nN = 0, y_sigma_nN = 0, force_nN = 0, sigma_nN = 0, torque_nN_um = 0;
+};
+/// None where the image shows the whole cell.
+std::optional<CutForce> cut_force_of(const FitSummary& fit);
+
 }  // namespace mbtfm::report

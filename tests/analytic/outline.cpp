@@ -92,9 +92,9 @@ TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
   ASSERT_EQ(cells.size(), 3u);
   EXPECT_GT(intersection_over_union(cells[0].outer_um, ellipse_polygon(large, 200)), 0.98);
   EXPECT_GT(intersection_over_union(cells[1].outer_um, ellipse_polygon(small, 200)), 0.97);
-  EXPECT_FALSE(cells[0].is_cut_by_border);
-  EXPECT_FALSE(cells[1].is_cut_by_border);
-  EXPECT_TRUE(cells[2].is_cut_by_border);
+  EXPECT_FALSE(cells[0].is_cut_by_border());
+  EXPECT_FALSE(cells[1].is_cut_by_border());
+  EXPECT_TRUE(cells[2].is_cut_by_border());
   for (const Vec2 p : cells[2].outer_um) EXPECT_LE(p.y, 40);
 }
 

@@ -149,9 +149,9 @@ TEST(HandDrawn, areas_within_the_outline_are_its_holes) {
     ASSERT_EQ(cell.holes_um.size(), 1u);
     EXPECT_NEAR(std::abs(signed_area_um2(cell.holes_um[0])), 2, 1e-9);
     EXPECT_NEAR(cell.area_um2, 48, 1e-9);
-    EXPECT_FALSE(cell.is_cut_by_border);
+    EXPECT_FALSE(cell.is_cut_by_border());
   }
-  EXPECT_TRUE(hand_drawn_outline(set_of({area({{0, 0}, {100, 0}, {100, 90}})}), kField).is_cut_by_border);
+  EXPECT_TRUE(hand_drawn_outline(set_of({area({{0, 0}, {100, 0}, {100, 90}})}), kField).is_cut_by_border());
 }
 
 std::string error_of(const auto& body) {
