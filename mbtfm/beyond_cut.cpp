@@ -42,7 +42,8 @@ class Tiling {
       low = {std::min(low.x, p.x), std::min(low.y, p.y)};
       high = {std::max(high.x, p.x), std::max(high.y, p.y)};
     }
-    reach_um_ = std::max(high.x - low.x, high.y - low.y);
+    constexpr double kSpreadCell_um = 60;
+    reach_um_ = std::max({high.x - low.x, high.y - low.y, kSpreadCell_um});
     // a corner of the squares lies on the first side, so that none of them reaches over it
     double half = finest_um;
     while (half < 2 * reach_um_) half *= 2;

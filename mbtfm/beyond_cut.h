@@ -25,7 +25,7 @@ struct BeyondSpacing {
 };
 
 /// Squares that tile the surface outside of the image round the cut, as discs of the same area. They reach as far as
-/// the part of the cell that is seen is long: as a rule no more than half of a cell is cut off.
+/// the part of the cell that is seen is long, and no less than a spread cell (60 um): an image may show a small part.
 /// @param finest_um  side of the smallest, > 0
 std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um, double growth);
 

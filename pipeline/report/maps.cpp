@@ -147,7 +147,8 @@ Figure original_network(const CellResults& results) {
           fmt::format("Stress fibres with their numbers, coloured by their fitted tension, in the network of the first "
                       "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: adhesions, which "
                       "hold the vertices inside them.",
-                      results.network.vertices_um.size(), results.network.links.size()),
+                      results.network.vertices_um.size(), results.network.links.size()) +
+              caption_of_cut(results.cell),
           legend(colour_bar(scale))};
 }
 

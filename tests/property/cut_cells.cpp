@@ -3,6 +3,7 @@
 
 #include <Eigen/LU>
 #include <cmath>
+#include <sstream>
 
 #include "mbtfm/findings.h"
 #include "pipeline/contract/errors.h"
@@ -54,6 +55,7 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
   constexpr int kCells = 4;
   int n_tensions = 0, n_covered = 0, n_forces = 0, n_forces_covered = 0;
   double squares = 0, error = 0, error_if_ignored = 0;
+  std::ostringstream cells;
   for (std::uint64_t seed = 41; seed < 41 + kCells; ++seed) {
     const Scene s = scene(seed);
     const CutFit found = test::fit_cut(s.cut.cell, s.beads, s.gel, 2),
@@ -82,6 +84,10 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
     const inverse::CutForce& c = *found.fit.cut;
     squares += std::pow((c.x_nN.value - s.cut.outside_nN.x) / c.x_nN.standard_error, 2) +
                std::pow((c.y_nN.value - s.cut.outside_nN.y) / c.y_nN.standard_error, 2);
+    cells << "seed " << seed << ": through the cut " << c.x_nN.value << " +- " << c.x_nN.standard_error << ", "
+          << c.y_nN.value << " +- " << c.y_nN.standard_error << " of " << s.cut.outside_nN.x << ", "
+          << s.cut.outside_nN.y << " nN; tensions " << std::sqrt(error) << ", ignored " << std::sqrt(error_if_ignored)
+          << " nN so far; own " << found.beyond->own_nN << " intensity " << found.beyond->intensity_nN_per_um << "\n";
     EXPECT_LT(inverse::imbalance_of(found.fit).force, 1e-6) << seed;
     EXPECT_LT(inverse::imbalance_of(found.fit).torque, 1e-6) << seed;
   }
@@ -89,8 +95,8 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
   EXPECT_GE(n_covered, 0.83 * n_tensions);
   EXPECT_GE(n_forces_covered, 0.90 * n_forces);
   // of 8 standard normal numbers the mean square is above 3.3 in one case of a thousand
-  EXPECT_LE(squares / (2 * kCells), 3.3);
-  EXPECT_LT(error, error_if_ignored);
+  EXPECT_LE(squares / (2 * kCells), 3.3) << cells.str();
+  EXPECT_LT(error, error_if_ignored) << cells.str();
 }
 
 TEST(CutCells, finer_places_change_nothing) {
