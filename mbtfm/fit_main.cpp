@@ -236,7 +236,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitInputs inputs = read_inputs(context);
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
   const Cell cell = inputs.cell;
-  const std::vector<SeriesFrame> series = read_series_of(context);
+  std::vector<SeriesFrame> series = read_series_of(context);
   if (!series.empty() && p.fit.substrate == "per-evaluation")
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   Effect fibres = network::take_fibres(inputs.cell, p.effects.stress_fibres);
@@ -275,22 +275,22 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   Effect elasticity =
       network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
-  const auto data_of = [&](const Cell& placed) {
-    LinearData there = reduce(inputs.beads, substrate->response(points_of(inputs.beads), ellipses_of(placed)),
-                              beads_in_region(inputs.beads, placed, p.fit), context.threads,
-                              moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
-    if (beyond) beyond = allow_forces_beyond(there, placed, p.gel);
+  const auto data_of = [&](const DisplacementField& beads) {
+    LinearData there = reduce(beads, response_on(beads), beads_in_region(beads, inputs.cell, p.fit), context.threads,
+                              moves ? affine_motions(beads) : Eigen::MatrixXd());
+    if (beyond) allow_forces_beyond(there, inputs.cell, p.gel);
     return there;
   };
   context.progress(0.35, "placing the cell on the beads");
-  PlacedCell place = place_cell(inputs.cell, networks.front(), data, data_of, p.gel, p.fit, start,
+  const DisplacementField measured = inputs.beads;
+  PlacedCell place = place_cell(inputs.cell, networks.front(), measured, data, data_of, p.gel, p.fit, start,
                                 p.effects.channel_shift, context.threads);
   data = std::move(place.data);
   if (place.effect.is_on) {
-    inputs.cell = place.cell;
-    networks = placed_networks(networks, place.placement);
-    start = TensionProblem(networks.front(), data.reduced, adhesion_ids).evaluate(place.start_nN);
+    inputs.beads = in_cell_frame(measured, place.placement);
+    for (SeriesFrame& frame : series) frame.beads = in_cell_frame(frame.beads, place.placement);
     if (!series.empty()) responses = responses_of(inputs.beads, series, response_on);
+    start = TensionProblem(networks.front(), data.reduced, adhesion_ids).evaluate(place.start_nN, &start);
   }
   const auto fit_all = [&] {
     return fit_ensemble(
@@ -309,7 +309,10 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
 
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
-  const DisplacementField fitted = field_of(fit.forces_nN, inputs, data);
+  const auto fitted_field = [&](const Eigen::VectorXd& forces_nN) {
+    return in_bead_frame(field_of(forces_nN, inputs, data), measured, place.placement);
+  };
+  const DisplacementField fitted = fitted_field(fit.forces_nN);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
   const MotionsBeside motions = motions_beside(data, fit);
   std::optional<FoundMotion> motion;
@@ -347,9 +350,8 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
-  write_displacement(context.output("out", "displacement_without_fibres.csv"),
-                     field_of(models.front().forces_nN, inputs, data));
-  write_displacement_vtp(context.output("out", "displacement.vtp"), inputs.beads, fitted,
+  write_displacement(context.output("out", "displacement_without_fibres.csv"), fitted_field(models.front().forces_nN));
+  write_displacement_vtp(context.output("out", "displacement.vtp"), measured, fitted,
                          {most_informed_array(influence), weight_array(data)});
   std::function<void(LinearData&)> allow;
   if (beyond) allow = [&](LinearData& of_frame) { allow_forces_beyond(of_frame, cell, p.gel); };

@@ -76,6 +76,13 @@ std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
          ") um";
 }
 
+/// The placement, then a small step in the cell's frame.
+Placement moved(Placement placement, const Eigen::Vector3d& step) {
+  placement.shift_um += placement.turned({step[0], step[1]});
+  placement.turn_rad += step[2];
+  return placement;
+}
+
 Vec2 centre_of(const Cell& cell) {
   Vec2 sum;
   for (const Adhesion& a : cell.adhesions) sum += a.position_um;
@@ -84,36 +91,28 @@ Vec2 centre_of(const Cell& cell) {
 
 }  // namespace
 
-Vec2 Placement::of(Vec2 place_um) const {
+Vec2 Placement::turned(Vec2 v) const {
   const double c = std::cos(turn_rad), s = std::sin(turn_rad);
-  const Vec2 d = place_um - centre_um;
-  return centre_um + shift_um + Vec2{c * d.x - s * d.y, s * d.x + c * d.y};
+  return {c * v.x - s * v.y, s * v.x + c * v.y};
 }
 
-Cell placed(Cell cell, const Placement& placement) {
-  const auto move = [&](auto& points) {
-    for (Vec2& p : points) p = placement.of(p);
-  };
-  for (Adhesion& a : cell.adhesions) {
-    a.position_um = placement.of(a.position_um);
-    a.angle_rad += placement.turn_rad;
+Vec2 Placement::of(Vec2 place_um) const { return centre_um + shift_um + turned(place_um - centre_um); }
+
+DisplacementField in_cell_frame(DisplacementField beads, const Placement& p) {
+  const Placement back{.centre_um = {}, .shift_um = {}, .turn_rad = -p.turn_rad};
+  for (Bead& bead : beads) {
+    bead.position_um = p.centre_um + back.turned(bead.position_um - p.centre_um - p.shift_um);
+    bead.displacement_um = back.turned(bead.displacement_um);
   }
-  for (Fibre& fibre : cell.fibres) move(fibre.points_um);
-  move(cell.outline_um);
-  for (Polygon& hole : cell.holes_um) move(hole);
-  return cell;
+  return beads;
 }
 
-Network placed(Network network, const Placement& placement) {
-  for (Vec2& p : network.vertices_um) p = placement.of(p);
-  return network;
-}
-
-std::vector<network::CableNetwork> placed_networks(const std::vector<network::CableNetwork>& networks,
-                                                   const Placement& placement) {
-  std::vector<network::CableNetwork> result;
-  for (const network::CableNetwork& n : networks) result.emplace_back(placed(n.network(), placement), n.parameters());
-  return result;
+DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementField& beads, const Placement& p) {
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    fitted[i].position_um = beads[i].position_um;
+    fitted[i].displacement_um = p.turned(fitted[i].displacement_um);
+  }
+  return fitted;
 }
 
 Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& ellipses,
@@ -147,50 +146,40 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& el
   return motions;
 }
 
-PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, LinearData data, const DataOf& data_of,
-                      const Gel& gel, const FitParameters& parameters, const Trial& start, const std::string& setting,
-                      int threads) {
+PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, const DisplacementField& beads,
+                      LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
+                      const Trial& start, const std::string& setting, int threads) {
   const Stopwatch watch;
   constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
   constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
   constexpr int kMostPasses = 12;     // far off it takes four
   const double width_um = mean_semi_minor_um(cell);
-  PlacedCell result{.placement = {.centre_um = centre_of(cell), .shift_um = {}},
-                    .cell = cell,
-                    .data = {},
-                    .start_nN = start.tensions_nN,
-                    .effect = {}};
+  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const Placement none{.centre_um = centre_of(cell), .shift_um = {}};
+  PlacedCell result{.placement = none, .data = {}, .start_nN = start.tensions_nN, .effect = {}};
   const auto off = [&](const std::string& why) {
-    result.placement = {.centre_um = result.placement.centre_um, .shift_um = {}};
-    result.cell = cell;
+    result.placement = none;
+    result.data = std::move(data);
     result.effect = decided(kChannelShift, setting, false, why);
     return result;
   };
-  if (setting == "off") {
-    result.data = std::move(data);
-    return off("as told: cell and beads lie on each other");
-  }
+  if (setting == "off") return off("as told: cell and beads lie on each other");
   FitParameters rough = parameters;
   rough.tolerance = std::max(rough.tolerance, 1e-3);
   LinearData there = data;
   for (int pass = 0; pass < kMostPasses; ++pass) {
-    const network::CableNetwork moved(placed(network.network(), result.placement), network.parameters());
-    const TensionProblem problem(moved, there.reduced, adhesion_ids_of(cell), {}, threads);
-    const TensionFit fit = fit_tensions(
-        problem, rough, threads,
-        pass == 0 ? problem.evaluate(start.tensions_nN, &start) : scaled_to_data(problem, result.start_nN));
+    const TensionProblem problem(network, there.reduced, adhesion_ids_of(cell), {}, threads);
+    const TensionFit fit = fit_tensions(problem, rough, threads, scaled_to_data(problem, result.start_nN, &start));
     result.start_nN = fit.trial.tensions_nN;
-    const Eigen::MatrixXd motions = placement_motions(gel, ellipses_of(result.cell), fit.trial.forces_nN,
-                                                      there.position_um, there.response->displace(fit.trial.forces_nN),
-                                                      result.placement.centre_um + result.placement.shift_um, threads);
+    const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
+    const Eigen::MatrixXd motions =
+        placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
     const Step step = step_of(there, fit.trial, problem.force_derivatives(fit.trial), motions);
-    const Vec2 shift{step.value[0], step.value[1]};
-    const double sigma = std::max(step.sigma[0], step.sigma[1]);
-    if (setting == "auto" && !(sigma < 0.5 * width_um)) {
-      result.data = std::move(data);
-      return off("the beads do not tell it: " + in_words(result.placement.shift_um + shift, step.sigma));
+    const double length_um = step.value.head<2>().norm(), sigma_um = std::max(step.sigma[0], step.sigma[1]);
+    if (setting == "auto" && !(sigma_um < 0.5 * width_um)) {
+      return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));
     }
-    if (norm(shift) < kLinear * width_um) {
+    if (length_um < kLinear * width_um) {
       result.data = std::move(there);
       add_motions(result.data, motions);
       result.effect = decided(kChannelShift, setting, true, "found with the tensions");
@@ -198,22 +187,15 @@ PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, Li
       return result;
     }
     // steps no longer than the field is linear for
-    const double damping = std::min(1.0, width_um / norm(shift));
-    result.placement.shift_um += damping * shift;
-    result.placement.turn_rad += damping * step.value[2];
+    result.placement = moved(result.placement, std::min(1.0, width_um / length_um) * step.value);
     if (norm(result.placement.shift_um) > kFarthest_um) break;
-    result.cell = placed(cell, result.placement);
-    there = data_of(result.cell);
+    there = data_of(in_cell_frame(beads, result.placement));
   }
-  result.data = std::move(data);
   return off("no place within " + brief(kFarthest_um) + " um suits the beads");
 }
 
 FoundPlacement placement_among(const MotionsBeside& motions, Placement placement) {
-  const Eigen::Vector3d rest = motions.values.tail<3>();
-  placement.shift_um += Vec2{rest[0], rest[1]};
-  placement.turn_rad += rest[2];
-  return {.placement = placement, .sigma = motions.sigma.tail<3>()};
+  return {.placement = moved(placement, motions.values.tail<3>()), .sigma = motions.sigma.tail<3>()};
 }
 
 Figures figures_of(const FoundPlacement& found) {

@@ -4,8 +4,9 @@
 ///
 ///   u(x) = Q G(Qᵀ (x − c − s)) F
 ///
-/// In a small rest of them u is linear. That rest stays among the motions that the beads may have besides
-/// (linear_data.h), so that the error bars hold what the beads do not know of the cell's place.
+/// The beads are taken into the cell's frame, where all results are. In a small rest of shift and turn u is linear.
+/// That rest stays among the motions that the beads may have besides (linear_data.h), so that the error bars hold what
+/// the beads do not know of the cell's place.
 #pragma once
 
 #include <Eigen/Core>
@@ -23,16 +24,17 @@
 
 namespace mbtfm::inverse {
 
-/// A turn about the centre, then a shift.
+/// From the cell's frame to that of the beads: a turn about the centre, then a shift.
 struct Placement {
   Vec2 centre_um, shift_um;
   double turn_rad = 0;  ///< from +x towards +y
+  Vec2 turned(Vec2 vector) const;
   Vec2 of(Vec2 place_um) const;
 };
-Cell placed(Cell cell, const Placement& placement);
-Network placed(Network network, const Placement& placement);
-std::vector<network::CableNetwork> placed_networks(const std::vector<network::CableNetwork>& networks,
-                                                   const Placement& placement);
+/// Beads, and how they move, as the cell sees them.
+DisplacementField in_cell_frame(DisplacementField beads, const Placement& placement);
+/// Displacements of the cell's frame at these beads.
+DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementField& beads, const Placement& placement);
 
 /// Displacement of the beads per shift of the cell along x and y (um/um) and per turn about the centre (um/rad), forces
 /// and all: 2·beads × 3. By the half-space's field, beyond four semi-axes that of a point force: the base and the sides
@@ -45,14 +47,13 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
 /// A cell where the beads want it.
 struct PlacedCell {
   Placement placement;
-  Cell cell;
-  LinearData data;           ///< of the cell there, what is left of shift and turn among its motions
+  LinearData data;           ///< of the beads in the cell's frame, what is left of shift and turn among its motions
   Eigen::VectorXd start_nN;  ///< tensions
   Effect effect;             ///< off: the cell is where it was
 };
 
-/// The data of the cell's beads for its adhesions at some place.
-using DataOf = std::function<LinearData(const Cell&)>;
+/// The data of these beads.
+using DataOf = std::function<LinearData(const DisplacementField&)>;
 
 inline constexpr const char* kChannelShift = "channel shift";
 
@@ -60,10 +61,10 @@ inline constexpr const char* kChannelShift = "channel shift";
 ///
 /// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
 /// field is linear in it, or where no place is found within kFarthest.
-/// @param data  of the cell where it is
-PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, LinearData data, const DataOf& data_of,
-                      const Gel& gel, const FitParameters& parameters, const Trial& start, const std::string& setting,
-                      int threads);
+/// @param data  of the beads as they are
+PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, const DisplacementField& beads,
+                      LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
+                      const Trial& start, const std::string& setting, int threads);
 
 /// What came of it beside the fit: shift x, y (um) and turn (rad) with standard errors.
 struct FoundPlacement {

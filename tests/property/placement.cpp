@@ -22,22 +22,22 @@ struct ShiftedCell {
   TensionScene scene;
   Placement truth;
 
-  LinearData data_of(const Cell& at) const {
+  LinearData data_of(const DisplacementField& beads) const {
     const auto gel = substrate::make_greens(kGel, {.model = "layer"}, 1);
-    return reduce(scene.beads, substrate::dense_response(gel->compliance_um_per_nN(scene.points_um, ellipses_of(at))),
-                  {}, 1, affine_motions(scene.beads));
+    return reduce(beads, substrate::dense_response(gel->compliance_um_per_nN(points_of(beads), ellipses_of(cell))), {},
+                  1, affine_motions(beads));
   }
 
   /// Fitted on the network that made the forces.
   std::pair<EnsembleFit, FoundPlacement> fit(const std::string& setting = "auto") const {
     std::vector<network::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    LinearData data = data_of(cell);
+    LinearData data = data_of(scene.beads);
     const Trial start = uniform_start({networks.front(), data.reduced, scene.adhesion_ids});
     PlacedCell place = place_cell(
-        cell, networks.front(), data, [&](const Cell& at) { return data_of(at); }, kGel, {}, start, setting, 1);
-    const auto placed = placed_networks(networks, place.placement);
-    EnsembleFit found = fit_ensemble(placed, place.data, scene.adhesion_ids, {}, 1, {});
+        cell, networks.front(), scene.beads, data, [&](const DisplacementField& at) { return data_of(at); }, kGel, {},
+        start, setting, 1);
+    EnsembleFit found = fit_ensemble(networks, place.data, scene.adhesion_ids, {}, 1, {});
     if (!place.effect.is_on) return {std::move(found), {place.placement, Eigen::Vector3d::Zero()}};
     const MotionsBeside motions = motions_beside(place.data, found);
     return {std::move(found), placement_among(motions, place.placement)};
@@ -70,12 +70,16 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
   Eigen::VectorXd forces(14);
   for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
   const auto model = [&](const Placement& at) -> Eigen::VectorXd {
-    Eigen::VectorXd turned(14);
-    for (int a = 0; a < 7; ++a) {
-      turned.segment<2>(2 * a) = Eigen::Rotation2Dd(at.turn_rad) * forces.segment<2>(2 * a);
-    }
+    DisplacementField places;
+    for (const Vec2 p : beads) places.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
     const auto gel = substrate::make_greens(kGel, {.model = "half-space"}, 1);
-    return gel->compliance_um_per_nN(beads, ellipses_of(placed(cell, at))) * turned;
+    const Eigen::VectorXd seen =
+        gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
+    Eigen::VectorXd u(seen.size());
+    for (Eigen::Index row = 0; row < seen.size(); row += 2) {
+      u.segment<2>(row) = Eigen::Rotation2Dd(at.turn_rad) * seen.segment<2>(row);
+    }
+    return u;
   };
   const Vec2 centre{30, 30};
   const Eigen::MatrixXd motions = placement_motions(kGel, ellipses_of(cell), forces, beads,
@@ -88,6 +92,15 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
     // beyond four semi-axes a point force's: (1/4)² / 2 of a part that is small
     EXPECT_LE((motions.col(k) - wanted).norm(), 0.01 * wanted.norm()) << k;
   }
+}
+
+TEST(Placement, frames_are_each_others_inverse) {
+  const Placement placement{.centre_um = {30, 20}, .shift_um = {0.4, -0.7}, .turn_rad = 0.3};
+  const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}, .flag = {}}};
+  const DisplacementField seen = in_cell_frame(beads, placement);
+  EXPECT_LE(norm(placement.of(seen[0].position_um) - beads[0].position_um), 1e-13);
+  const DisplacementField back = in_bead_frame(seen, beads, placement);
+  EXPECT_LE(norm(back[0].displacement_um - beads[0].displacement_um), 1e-15);
 }
 
 TEST(Placement, wherever_the_images_say_the_cell_lies_the_tensions_are_the_same) {
@@ -120,12 +133,12 @@ TEST(Placement, is_found_within_its_stated_error) {
 
 TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
   const ShiftedCell noisy = shifted_cell({0.2, 0.1}, 0, 3, 1);
-  const LinearData data = noisy.data_of(noisy.cell);
+  const LinearData data = noisy.data_of(noisy.scene.beads);
   const Trial start = uniform_start({noisy.scene.cables, data.reduced, noisy.scene.adhesion_ids});
   const auto place = [&](const std::string& setting) {
     return place_cell(
-        noisy.cell, noisy.scene.cables, data, [&](const Cell& at) { return noisy.data_of(at); }, kGel, {}, start,
-        setting, 1);
+        noisy.cell, noisy.scene.cables, noisy.scene.beads, data,
+        [&](const DisplacementField& at) { return noisy.data_of(at); }, kGel, {}, start, setting, 1);
   };
   for (const std::string setting : {"auto", "off"}) {
     const PlacedCell stays = place(setting);
@@ -139,7 +152,7 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   const ShiftedCell still = shifted_cell({}, 0, 0.05, 3);
   std::vector<network::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
-  LinearData known = still.data_of(still.cell);
+  LinearData known = still.data_of(still.scene.beads);
   const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1, {});
   LinearData unknown = known;
   const Eigen::VectorXd& forces = with_known.forces_nN;
