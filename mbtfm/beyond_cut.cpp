@@ -141,6 +141,28 @@ Spectrum spectrum_of(const LinearData& data, const Eigen::MatrixXd& Z) {
   return s;
 }
 
+/// Of a component of the adhesions' forces, as forces independent of each other have it: less their noise, and each by
+/// what the beads tell of it. @param variance  of the beads' weighted components
+double mean_square_force(const LinearData& data, double variance) {
+  const Eigen::Index n = data.response->cols();
+  const Eigen::VectorXd noise = variance * solve_normal(data.reduced, Eigen::MatrixXd::Identity(n, n)).diagonal();
+  const Eigen::VectorXd squares = free_forces_nN(data.reduced).cwiseAbs2();
+  return std::max(0.0, (squares - noise).cwiseQuotient(noise).sum() / std::max(noise.cwiseInverse().sum(), 1e-300));
+}
+
+/// These motions, and those by an even traction along x and along y: out there the cell pulls inwards as a whole, which
+/// is no chance, so nothing is expected of its size.
+Eigen::MatrixXd with_even_traction(const Eigen::MatrixXd& motions, const std::vector<substrate::Ellipse>& places,
+                                   const Eigen::MatrixXd& compliance_um_per_nN) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(compliance_um_per_nN.rows(), motions.cols() + 2);
+  if (motions.cols() > 0) result.leftCols(motions.cols()) = motions;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double area_um2 = std::numbers::pi * places[i].semi_major_um * places[i].semi_minor_um;
+    result.rightCols<2>() += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Eigen::Index>(i));
+  }
+  return result;
+}
+
 double length_um(const Cuts& cuts) {
   double sum = 0;
   for (const auto& [a, b] : cuts) sum += norm(b - a);
@@ -162,15 +184,20 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
 }
 
 ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
-                                 const Eigen::MatrixXd& compliance_um_per_nN) {
+                                 const Eigen::MatrixXd& compliance_um_per_nN, double area_um2) {
   MBTFM_ASSERT(data.motion_precision.size() == 0);
   Eigen::MatrixXd Z = compliance_um_per_nN;  // of forces of 1 nN/um times the root of the area
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
     Z.middleCols<2>(2 * static_cast<Eigen::Index>(i)) *= side_um;
   }
+  const bool has_affine = data.motions.cols() > 0;
+  allow_motions(data, with_even_traction(data.motions, places, compliance_um_per_nN));
   const Spectrum spectrum = spectrum_of(data, Z);
-  const double kappa = likeliest_kappa(spectrum);
+  // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
+  const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());
+  const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
+  const double kappa = std::max(seen, likeliest_kappa(spectrum));
   ForcesBeyond found;
   found.n_places = static_cast<Eigen::Index>(places.size());
   found.intensity_nN_per_um = std::sqrt(kappa * spectrum.variance);
@@ -186,7 +213,7 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::
   motions.rightCols(found.n_motions) = std::sqrt(kappa) * Z * eigen.eigenvectors().rightCols(found.n_motions);
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
   precision.head(n_free).setZero();
-  if (n_free > 0) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
+  if (has_affine) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
   allow_motions(data, std::move(motions), std::move(precision));
   return found;
 }
@@ -210,14 +237,8 @@ void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
     near.push_back(static_cast<Eigen::Index>(a));
     expected.push_back(of_own);
   }
-  // mean square of the free forces, less their noise, each by what the beads tell of it
   const Eigen::Index n_forces = data.response->cols();
-  const double variance = noise_variance(data);
-  const Eigen::VectorXd noise =
-      variance * solve_normal(data.reduced, Eigen::MatrixXd::Identity(n_forces, n_forces)).diagonal();
-  const Eigen::VectorXd squares = free_forces_nN(data.reduced).cwiseAbs2();
-  const double mean_square =
-      (squares - noise).cwiseQuotient(noise).sum() / std::max(noise.cwiseInverse().sum(), 1e-300);
+  const double variance = noise_variance(data), mean_square = mean_square_force(data, variance);
   if (near.empty() || mean_square <= 0) return;
   found.n_own = static_cast<Eigen::Index>(near.size());
   found.own_nN = std::sqrt(mean_square);
@@ -244,7 +265,8 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& 
   const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
   ForcesBeyond found = allow_forces_beyond(
       data, places,
-      substrate::make_greens(gel, {.model = "layer"}, data.threads)->compliance_um_per_nN(data.position_um, places));
+      substrate::make_greens(gel, {.model = "layer"}, data.threads)->compliance_um_per_nN(data.position_um, places),
+      std::abs(signed_area_um2(cell.outline_um)));
   allow_own_forces(data, cell, found);
   return found;
 }

@@ -44,13 +44,15 @@ struct ForcesBeyond {
 
 /// Add the motions to those that the data have. The forces are taken for random, independent of each other and of one
 /// intensity: the one that makes the data most likely, whatever the forces inside of the image are (restricted maximum
-/// likelihood; Patterson & Thompson, Biometrika 58 (1971) 545). With too few beads at the cut to tell it is zero.
+/// likelihood; Patterson & Thompson, Biometrika 58 (1971) 545), but no less than that of the forces in view.
+/// An even traction of any size is allowed for beside them.
 /// What lies out there pulls the image's border outwards or inwards as a growth would: growth and shears are from here
 /// on expected to be of usual size (kUsualGrowth).
 /// @param data  whose motions are affine_motions(), of precision 0, or none
 /// @param compliance_um_per_nN  2·beads × 2·places
+/// @param area_um2  of the part of the cell that is in view
 ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
-                                 const Eigen::MatrixXd& compliance_um_per_nN);
+                                 const Eigen::MatrixXd& compliance_um_per_nN, double area_um2);
 /// Let adhesions near the cut have forces of their own, beside the network's: a fibre of which less than 3 um is in
 /// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
 /// is, while the cell's own gave way, which fades over 10 um. They pass through the cut. Expected is a part of the size

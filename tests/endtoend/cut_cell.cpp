@@ -43,7 +43,8 @@ TEST(CutCell, cropped_images_are_fitted_and_the_force_through_the_cut_is_that_of
       run_program("mbtfm-simulate --scenario u2os --seed 41 --noise 0.07 --images --quiet --out " + cell.string());
   ASSERT_EQ(made.code, 0) << made.output;
   double low = 1e9, high = -1e9;
-  for (const Vec2 p : read_outline(cell / "truth/outline.csv").front()) {
+  const std::vector<Polygon> rings = read_outline(cell / "truth/outline.csv");
+  for (const Vec2 p : rings.front()) {
     low = std::min(low, p.x);
     high = std::max(high, p.x);
   }
