@@ -34,7 +34,7 @@ class DiscField {
     }
   }
   Block at(Vec2 offset_um) const {
-    const double r = norm(offset_um), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
+    const double r = std::sqrt(dot(offset_um, offset_um)), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
     const auto i = static_cast<std::size_t>(place);
     const double share = place - static_cast<double>(i);
     const Vec2 along_across = (1 - share) * table_[i] + share * table_[i + 1];
@@ -65,7 +65,8 @@ class BeadSquares {
         const auto square = squares_.find({i, j});
         if (square == squares_.end()) continue;
         for (const Eigen::Index b : square->second) {
-          if (norm(data_.position_um[static_cast<std::size_t>(b)] - place_um) < kReach_um) found.push_back(b);
+          const Vec2 d = data_.position_um[static_cast<std::size_t>(b)] - place_um;
+          if (dot(d, d) < kReach_um * kReach_um) found.push_back(b);
         }
       }
     }
@@ -132,7 +133,8 @@ bool is_free(const Cell& cell, Vec2 place_um) {
     if (contains(hole, place_um)) return false;
   }
   return std::ranges::none_of(cell.adhesions, [&](const Adhesion& a) {
-    return norm(a.position_um - place_um) < a.major_axis_um / 2 + kApart_um;
+    const Vec2 d = a.position_um - place_um;
+    return dot(d, d) < std::pow(a.major_axis_um / 2 + kApart_um, 2);
   });
 }
 
