@@ -290,7 +290,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
     inputs.beads = in_cell_frame(measured, place.placement);
     for (SeriesFrame& frame : series) frame.beads = in_cell_frame(frame.beads, place.placement);
     if (!series.empty()) responses = responses_of(inputs.beads, series, response_on);
-    start = TensionProblem(networks.front(), data.reduced, adhesion_ids).evaluate(place.start_nN, &start);
+    start = std::move(place.start);
   }
   const auto fit_all = [&] {
     return fit_ensemble(

@@ -34,7 +34,7 @@ class DiscField {
     }
   }
   Block at(Vec2 offset_um) const {
-    const double r = norm(offset_um), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
+    const double r = std::sqrt(dot(offset_um, offset_um)), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
     const auto i = static_cast<std::size_t>(place);
     const double share = place - static_cast<double>(i);
     const Vec2 along_across = (1 - share) * table_[i] + share * table_[i + 1];
@@ -65,7 +65,8 @@ class BeadSquares {
         const auto square = squares_.find({i, j});
         if (square == squares_.end()) continue;
         for (const Eigen::Index b : square->second) {
-          if (norm(data_.position_um[static_cast<std::size_t>(b)] - place_um) < kReach_um) found.push_back(b);
+          const Vec2 d = data_.position_um[static_cast<std::size_t>(b)] - place_um;
+          if (dot(d, d) < kReach_um * kReach_um) found.push_back(b);
         }
       }
     }
@@ -112,13 +113,28 @@ Question ask(Vec2 place_um, const BeadSquares& beads, const DiscField& disc, con
   return q;
 }
 
+/// The best place within a step of this one.
+template <class Ask>
+Question refined(Question best, const Ask& ask_at) {
+  constexpr int kFiner = 4;
+  const Vec2 middle = best.place_um;
+  for (int j = -kFiner; j <= kFiner; ++j) {
+    for (int i = -kFiner; i <= kFiner; ++i) {
+      Question q = ask_at(middle + kStep_um / kFiner * Vec2{double(i), double(j)});
+      if (q.gain > best.gain) best = std::move(q);
+    }
+  }
+  return best;
+}
+
 bool is_free(const Cell& cell, Vec2 place_um) {
   if (!contains(cell.outline_um, place_um)) return false;
   for (const Polygon& hole : cell.holes_um) {
     if (contains(hole, place_um)) return false;
   }
   return std::ranges::none_of(cell.adhesions, [&](const Adhesion& a) {
-    return norm(a.position_um - place_um) < a.major_axis_um / 2 + kApart_um;
+    const Vec2 d = a.position_um - place_um;
+    return dot(d, d) < std::pow(a.major_axis_um / 2 + kApart_um, 2);
   });
 }
 
@@ -138,15 +154,23 @@ std::vector<Vec2> free_places(const Cell& cell) {
   return places;
 }
 
-/// The gain with what noise and errors of the model's forces make of it, the tensions following.
-double whole_gain(const Question& q, const EnsembleFit& fit, const LinearData& data, const Eigen::VectorXd& weight) {
+/// With what noise and errors of the model's forces make of the score, the tensions following.
+MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const LinearData& data,
+                         const Eigen::VectorXd& weight) {
   Eigen::MatrixXd weighted = Eigen::MatrixXd::Zero(data.displacement_um.size(), 2);
   for (std::size_t k = 0; k < q.beads.size(); ++k) {
     weighted.middleRows<2>(2 * q.beads[k]) = weight[2 * q.beads[k]] * q.fields[k];
   }
   const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
   const Eigen::MatrixXd covariance = covariance_of_scores(fit, q.square, by_force);
-  return q.score.dot(covariance.ldlt().solve(q.score));
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd information =
+      q.square - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.variance;
+  const Eigen::Vector2d force = information.ldlt().solve(q.score);
+  return {.position_um = q.place_um,
+          .force_nN = {force[0], force[1]},
+          .chi_squared_gain = q.score.dot(covariance.ldlt().solve(q.score))};
 }
 
 }  // namespace
@@ -157,10 +181,10 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   const BeadSquares beads(data);
   const DiscField disc(gel);
   const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces_nN);
+  const auto ask_at = [&](Vec2 place_um) { return ask(place_um, beads, disc, data, weight, residual, fit.variance); };
   std::vector<Question> asked(places.size());
   parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
-    asked[static_cast<std::size_t>(i)] =
-        ask(places[static_cast<std::size_t>(i)], beads, disc, data, weight, residual, fit.variance);
+    asked[static_cast<std::size_t>(i)] = ask_at(places[static_cast<std::size_t>(i)]);
     if (asked[static_cast<std::size_t>(i)].gain < 1) asked[static_cast<std::size_t>(i)].fields = {};
   });
   // chi squared of two numbers exceeds x by chance exp(-x/2)
@@ -174,10 +198,10 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
     if (tried.size() >= kMost) break;
     if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
     tried.push_back(q.place_um);
-    const double gain = whole_gain(q, fit, data, weight);
-    if (gain < limit) continue;
-    const Eigen::Vector2d force = q.square.ldlt().solve(q.score);
-    found.push_back({.position_um = q.place_um, .force_nN = {force[0], force[1]}, .chi_squared_gain = gain});
+    if (const MissingAdhesion answer = answered(refined(q, ask_at), fit, data, weight);
+        answer.chi_squared_gain >= limit) {
+      found.push_back(answer);
+    }
   }
   std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
   return found;

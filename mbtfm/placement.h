@@ -47,9 +47,9 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
 /// A cell where the beads want it.
 struct PlacedCell {
   Placement placement;
-  LinearData data;           ///< of the beads in the cell's frame, what is left of shift and turn among its motions
-  Eigen::VectorXd start_nN;  ///< tensions
-  Effect effect;             ///< off: the cell is where it was
+  LinearData data;  ///< of the beads in the cell's frame, what is left of shift and turn among its motions
+  Trial start;      ///< of the network there
+  Effect effect;    ///< off: the cell is where it was
 };
 
 /// The data of these beads.

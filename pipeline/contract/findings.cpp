@@ -59,8 +59,10 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {curved_motion, "curved-motion", "fit", caution,
        "chi squared of displacements of second and third degree in x and y, 14 degrees of freedom", 36.1,
        "noise and the error of the model exceed it in one cell of a thousand",
-       "The whole field is bent, and no cell does that: look for stitched tiles, a drift during the scan, another lens "
-       "or an uneven gel. Record the bead images in one piece, or leave far beads out with fit.region_um."},
+       "Follow the other findings first: a missing adhesion or another cell bends the field, too. Otherwise look for "
+       "stitched tiles, a drift during the scan, another lens or an uneven gel. Record the bead images in one piece, "
+       "or "
+       "leave far beads out with fit.region_um."},
       {channel_shift, "channel-shift", "fit", note,
        "largest of shift and turn of the cell against the beads, over its standard error", 4,
        "chance alone takes one of three beyond 4 standard errors in one cell of five thousand",
@@ -108,7 +110,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {network_not_identifiable, "network-not-identifiable", "fit", bad,
        "1 where the tension of the actin network is not determined", 0,
        "then the network's share of the force and its surface tension are not known either",
-       "Disregard the tension and the force of the network; tensions of fibres and total force hold."},
+       "Disregard the tension and the force of the network."},
       {wide_interval, "wide-interval", "fit", note,
        "tensions whose 95 % interval is wider than twice the tension itself", 0,
        "of such a tension little more is known than that it is small", "Read the interval, not the value."},

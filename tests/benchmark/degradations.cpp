@@ -359,7 +359,8 @@ void study(const Degradation& d, int seed, const fs::path& folder) {
   if (run.code == 0) {
     const Score s = score_of(cell, truth);
     const std::string ids = open_findings(cell);
-    const bool holds = s.n_held >= 0.9 * s.n_fibres - 1 && std::abs(s.total_z) < 3;  // of 20 fibres one by chance
+    const bool holds =
+        s.n_fibres > 0 && s.n_held >= 0.9 * s.n_fibres - 1 && std::abs(s.total_z) < 3;  // of 20 fibres one by chance
     std::printf("%d,%d,%.3f,%.2f,%s,%s,\"%s\",\n", s.n_fibres, s.n_held, s.error, s.total_z, holds ? "true" : "false",
                 holds || !ids.empty() ? "true" : "false", ids.c_str());
   } else {
@@ -386,7 +387,7 @@ void print_page(const fs::path& file) {
       "  as one of twenty does by chance) and the total force lies within three standard errors of the truth. Of a "
       "cell that\n"
       "  the border cuts, the truth counts the whole.\n"
-      "- **error**: of the tensions, relative, median of the cells.\n"
+      "- **error**: of the tensions, relative; of two cells the larger, of more the median.\n"
       "- **open findings** ([list](findings.md)): those of at least half of the cells. A cell with one has no green "
       "tick.\n\n"
       "| degradation | what was done | cells | refused | bars hold | error | open findings |\n"

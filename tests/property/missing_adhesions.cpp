@@ -39,8 +39,8 @@ struct Hidden {
     const Eigen::Vector4d forces(kForce_nN.x, kForce_nN.y, -kForce_nN.x, -kForce_nN.y);
     scene.displacement_um += gel->compliance_um_per_nN(scene.points_um, discs) * forces;
   }
-  std::vector<MissingAdhesion> found(unsigned seed) {
-    test::measure(scene, 0.05, seed);
+  std::vector<MissingAdhesion> found(unsigned seed, double noise = 0.05) {
+    test::measure(scene, noise, seed);
     LinearData data =
         reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
     std::vector<network::CableNetwork> networks;
@@ -53,7 +53,7 @@ struct Hidden {
 TEST(MissingAdhesions, forces_that_no_adhesion_bears_are_found_where_they_act) {
   Hidden hidden;
   hidden.hide_forces();
-  const auto found = hidden.found(1);
+  const auto found = hidden.found(1, 0.02);
   ASSERT_EQ(found.size(), 2u);
   for (const Vec2 place : kPlaces) {
     const auto at = std::ranges::min_element(found, {}, [&](const auto& m) { return norm(m.position_um - place); });

@@ -1,0 +1,59 @@
+/// "Add it and run again": fibres that the beads call for, put beside the segmented ones.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/files.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+using test::Outcome;
+using test::run_program;
+
+TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
+  const test::TemporaryFolder folder;
+  const std::filesystem::path cell = folder / "cell";
+  ASSERT_EQ(run_program("mbtfm-simulate --images --quiet --seed 61 --out " + cell.string()).code, 0);
+  // strong fibres alone are segmented
+  write_text(cell / "cell.toml", read_text(cell / "cell.toml") + "\n[segment]\nfibre_start_noise = 60\n");
+  const auto fibres = [&] { return read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv"); };
+  const auto missing = [&] { return CsvTable(cell / "4_fit/missing_fibres.csv"); };
+  const Outcome first = run_program("mbtfm run --quiet " + cell.string());
+  ASSERT_EQ(first.code, 0) << first.output;
+  const std::size_t n_segmented = fibres().size();
+  const CsvTable named = missing();
+  ASSERT_GT(named.n_rows(), 0);
+
+  const Outcome added =
+      run_program("mbtfm-add-fibres --rois " + (cell / "1_segment/RoiSet.zip").string() + " --missing " +
+                  (cell / "4_fit/missing_fibres.csv").string() + " --out " + (cell / "fibres.zip").string());
+  ASSERT_EQ(added.code, 0) << added.output;
+  const Outcome second = run_program("mbtfm run --quiet " + cell.string());
+  ASSERT_EQ(second.code, 0) << second.output;
+  const std::vector<Fibre> now = fibres();
+  EXPECT_EQ(now.size(), n_segmented + static_cast<std::size_t>(named.n_rows()));
+  for (int row = 0; row < named.n_rows(); ++row) {
+    const int start = named.integer(row, "start_adhesion_id", 1), end = named.integer(row, "end_adhesion_id", 1);
+    EXPECT_TRUE(std::ranges::any_of(
+        now, [&](const Fibre& f) { return f.start_adhesion_id == start && f.end_adhesion_id == end; }))
+        << "from adhesion " << start << " to " << end;
+  }
+  const CsvTable left = missing();
+  EXPECT_NE(left.n_rows() > 0 ? left.integer(0, "start_adhesion_id", 1) : 0, named.integer(0, "start_adhesion_id", 1))
+      << "what was added first is called for no longer";
+}
+
+TEST(AddFibres, a_table_of_another_run_is_refused_by_name) {
+  const test::TemporaryFolder folder;
+  write_text(folder / "missing.csv", "start_adhesion_id,end_adhesion_id,tension_nN\n1,2,3\n");
+  const Outcome outcome = run_program("mbtfm-add-fibres --rois " + (folder / "none.zip").string() + " --missing " +
+                                      (folder / "missing.csv").string() + " --out " + (folder / "out.zip").string());
+  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  EXPECT_FALSE(std::filesystem::exists(folder / "out.zip"));
+}
+
+}  // namespace
+}  // namespace mbtfm
