@@ -147,7 +147,7 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
   inverse::FitParameters parameters;
   parameters.n_meshes = n_meshes;
   result.fit = inverse::fit_ensemble(networks, data, ids, parameters, 2, {});
-  result.motion = inverse::motion_beside(data, result.fit);
+  result.motion = inverse::common_motion_among(inverse::motions_beside(data, result.fit), data.position_um);
   return result;
 }
 
