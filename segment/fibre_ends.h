@@ -7,6 +7,21 @@
 
 namespace mbtfm::segment {
 
+/// The way on beyond an end, where a fibre may go on too faintly to be traced.
+struct WayOn {
+  Polyline points_um;              ///< from the end outwards
+  std::vector<double> over_noise;  ///< by point, the ridge's height in standard deviations of the texture
+};
+
+struct TracedFibre {
+  Fibre fibre;          ///< without type and label
+  WayOn before, after;  ///< its first point, its last
+};
+
+/// An end that reaches no adhesion is led on along its way to the first one there, if the way is brighter than texture
+/// up to it: near an adhesion a fibre thins out, and other fibres hide it.
+void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um);
+
 /// Tie each end to the adhesion it reaches: on the line's own course, at most `reach_um` ahead of the end or half of it
 /// aside; the nearest. A tied end is led to the adhesion's centre. Both ends never share an adhesion; the nearer one
 /// has it.

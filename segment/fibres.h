@@ -5,6 +5,7 @@
 
 #include "pipeline/contract/parameters.h"
 #include "pipeline/contract/types.h"
+#include "segment/fibre_ends.h"
 #include "segment/image.h"
 
 namespace mbtfm::segment {
@@ -12,10 +13,11 @@ namespace mbtfm::segment {
 struct FibreParameters {
   double fibre_width_um = 0.6;      ///< typical bundle seen through a microscope; half to twice of it is found
   double fibre_averaging_um = 0.7;  ///< along the fibre: straight over this length, long enough to beat noise
-  double fibre_start_noise = 6;     ///< no line of noise in 10^6 pixels
-  double fibre_follow_noise = 2.5;  ///< once begun a fibre may fade into the noise's upper per cent
+  double fibre_start_noise = 3;     ///< faint fibres begin there; their whole length decides what they are
+  double fibre_follow_noise = 2;    ///< once begun a fibre may fade into the noise
   double fibre_false_per_cell =
-      5;  ///< of meshwork: a fibre too many changes no other tension, one missed does (thesis 3.3)
+      2;  ///< of meshwork: a fibre too many changes no other tension, one missed does (thesis 3.3)
+  double fibre_faintest = 0.25;         ///< fainter lines are filaments of the mesh, beside what the fibres carry
   double fibre_smallest_radius_um = 6;  ///< of curvature: bundles under tension are straight or gently curved
   double fibre_gap_um = 1.5;            ///< a bundle may be hidden by a crossing one for this long
   double fibre_shortest_um = 3;         ///< shorter lines cannot be told from texture
@@ -24,20 +26,21 @@ struct FibreParameters {
   double fibre_edge_height = 0.8;       ///< … unless it is as bright as the cell's bright fibres
   double fibre_lamellipodium_um = 3;    ///< its width: this near to the edge a line that winds is a ruffle
   double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
+  double fibre_faint_um = 4;        ///< longest faint end of the fibres that experts drew on a real cell
   double fibre_simplify_um = 0.05;      ///< points are left out where the line moves less: half a pixel
 };
 
 void declare(ParameterList& list, FibreParameters& parameters);
 
-/// Lines of an actin image that are stress fibres, not yet tied to adhesions: without type and label.
+/// Lines of an actin image that are stress fibres, not yet tied to adhesions.
 /// @param outline_um  lines whose middle lies outside are no fibres; empty: anywhere
 /// @param pixel_size_um  > 0
 /// @throws InvalidData where a pixel is not finite
-std::vector<Fibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
+std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
                                 const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
 /// out. @param cuts  of the outline: see lead_to_cut()
-std::vector<Fibre> tied(std::vector<Fibre> fibres, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
+std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
                         const FibreParameters& parameters, const Cuts& cuts = {});
 
 /// Both: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,

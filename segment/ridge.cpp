@@ -134,28 +134,32 @@ Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeSc
     for (int i = tiles.start; i < tiles.end; ++i)
       filter_tile(padded, bank, {i % columns * step, i / columns * step}, ridges);
   });
-  ridges.noise = cv::max(texture_of({noise_magnitude(image)}, is_inside, scales.noise_radius_px) * bank.noise_gain,
-                         texture_of(ridges.response, is_inside, scales.noise_radius_px));
+  ridges.camera_noise = texture_of({noise_magnitude(image)}, is_inside, scales.noise_radius_px) * bank.noise_gain;
+  set_noise(ridges, is_inside, scales.noise_radius_px);
   return ridges;
+}
+
+void set_noise(Ridges& ridges, const cv::Mat& is_free, double radius_px) {
+  ridges.noise = cv::max(ridges.camera_noise, texture_of(ridges.response, is_free, radius_px));
 }
 
 namespace {
 
-/// Magnitudes of responses on a coarse grid, one pixel picked from each block, and where they are the cell's.
+/// Magnitudes of responses on a coarse grid, one pixel picked from each block, and where there is no fibre.
 struct Picked {
   std::vector<cv::Mat> magnitude;
-  cv::Mat is_inside;
+  cv::Mat is_free;
 };
 
-Picked pick(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, int factor) {
-  const cv::Size size((is_inside.cols + factor - 1) / factor, (is_inside.rows + factor - 1) / factor);
+Picked pick(const std::vector<cv::Mat>& responses, const cv::Mat& is_free, int factor) {
+  const cv::Size size((is_free.cols + factor - 1) / factor, (is_free.rows + factor - 1) / factor);
   const auto place = [&](int i, int n) { return std::min(i * factor + factor / 2, n - 1); };
   Picked picked{{}, cv::Mat(size, CV_8U)};
   for (std::size_t k = 0; k < responses.size(); k += 2) picked.magnitude.emplace_back(size, CV_32F);
   for (int y = 0; y < size.height; ++y)
     for (int x = 0; x < size.width; ++x) {
-      const cv::Point from(place(x, is_inside.cols), place(y, is_inside.rows));
-      picked.is_inside.at<std::uint8_t>(y, x) = is_inside.at<std::uint8_t>(from);
+      const cv::Point from(place(x, is_free.cols), place(y, is_free.rows));
+      picked.is_free.at<std::uint8_t>(y, x) = is_free.at<std::uint8_t>(from);
       for (std::size_t k = 0; k < picked.magnitude.size(); ++k)
         picked.magnitude[k].at<float>(y, x) = std::abs(responses[2 * k].at<float>(from));
     }
@@ -169,46 +173,59 @@ float quantile_of(std::vector<float>& values, double q) {
   return *place;
 }
 
-/// The spread around one place of the coarse grid; 0 where nothing of the cell is around.
-float spread_at(const Picked& picked, cv::Point2d centre, double radius, std::vector<float>& values,
-                std::vector<float>& medians) {
-  medians.clear();
-  for (const cv::Mat& magnitude : picked.magnitude) {
-    values.clear();
-    const int top = std::max(0, cvCeil(centre.y - radius)),
-              bottom = std::min(magnitude.rows - 1, cvFloor(centre.y + radius));
-    for (int y = top; y <= bottom; ++y) {
-      const double half = std::sqrt(radius * radius - (y - centre.y) * (y - centre.y));
-      const int left = std::max(0, cvCeil(centre.x - half)),
-                right = std::min(magnitude.cols - 1, cvFloor(centre.x + half));
-      for (int x = left; x <= right; ++x)
-        if (picked.is_inside.at<std::uint8_t>(y, x) != 0) values.push_back(magnitude.at<float>(y, x));
-    }
-    if (values.empty()) return 0;
-    medians.push_back(quantile_of(values, 0.5));
+/// Magnitudes at the free places of a disc.
+void collect(const cv::Mat& magnitude, const cv::Mat& is_free, cv::Point2d centre, double radius,
+             std::vector<float>& values) {
+  values.clear();
+  const int top = std::max(0, cvCeil(centre.y - radius)),
+            bottom = std::min(magnitude.rows - 1, cvFloor(centre.y + radius));
+  for (int y = top; y <= bottom; ++y) {
+    const double half = std::sqrt(radius * radius - (y - centre.y) * (y - centre.y));
+    const int left = std::max(0, cvCeil(centre.x - half)),
+              right = std::min(magnitude.cols - 1, cvFloor(centre.x + half));
+    for (int x = left; x <= right; ++x)
+      if (is_free.at<std::uint8_t>(y, x) != 0) values.push_back(magnitude.at<float>(y, x));
   }
-  return 1.4826f * quantile_of(medians, 0.25);  // the median magnitude of a normal variate is 0.6745 deviations
+}
+
+/// The spread around one place of the coarse grid; 0 where nothing free is around.
+float spread_at(const Picked& picked, cv::Point2d centre, double radius, std::vector<float>& values,
+                std::vector<float>& spreads) {
+  constexpr std::size_t kEnough = 40;  // the tenth largest of them is known to a tenth
+  constexpr double kFarthest = 4;      // radii
+  constexpr double kTail = 0.9, kNormalTail = 1.645;  // 9 of 10 normal variates are smaller, in deviations
+  double reach = radius;
+  collect(picked.magnitude.front(), picked.is_free, centre, reach, values);
+  while (values.size() < kEnough && reach < kFarthest * radius)
+    collect(picked.magnitude.front(), picked.is_free, centre, reach *= std::numbers::sqrt2, values);
+  if (values.empty()) return 0;
+  spreads.clear();
+  for (const cv::Mat& magnitude : picked.magnitude) {
+    collect(magnitude, picked.is_free, centre, reach, values);
+    spreads.push_back(quantile_of(values, kTail) / static_cast<float>(kNormalTail));
+  }
+  return quantile_of(spreads, 0.25);
 }
 
 }  // namespace
 
-cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px) {
+cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_free, double radius_px) {
   constexpr int kCellsInRadius = 6;  // about 113 values in a disc
   constexpr int kCellsApart = 2;     // a third of the radius from disc to disc
   const int factor = std::max(1, cvRound(radius_px / kCellsInRadius));
-  const Picked picked = pick(responses, is_inside, factor);
-  cv::Mat fine, spread((picked.is_inside.rows + kCellsApart - 1) / kCellsApart,
-                       (picked.is_inside.cols + kCellsApart - 1) / kCellsApart, CV_32F);
+  const Picked picked = pick(responses, is_free, factor);
+  cv::Mat fine, spread((picked.is_free.rows + kCellsApart - 1) / kCellsApart,
+                       (picked.is_free.cols + kCellsApart - 1) / kCellsApart, CV_32F);
   cv::parallel_for_(cv::Range(0, spread.rows), [&](const cv::Range& rows) {
-    std::vector<float> values, medians;
+    std::vector<float> values, spreads;
     for (int y = rows.start; y < rows.end; ++y)
       for (int x = 0; x < spread.cols; ++x) {
         const cv::Point2d centre((x + 0.5) * kCellsApart - 0.5, (y + 0.5) * kCellsApart - 0.5);
-        spread.at<float>(y, x) = spread_at(picked, centre, radius_px / factor, values, medians);
+        spread.at<float>(y, x) = spread_at(picked, centre, radius_px / factor, values, spreads);
       }
   });
   cv::resize(spread, fine, spread.size() * (factor * kCellsApart), 0, 0, cv::INTER_LINEAR);
-  return fine(cv::Rect(cv::Point(0, 0), is_inside.size())).clone();
+  return fine(cv::Rect(cv::Point(0, 0), is_free.size())).clone();
 }
 
 }  // namespace mbtfm::segment

@@ -10,6 +10,7 @@ namespace mbtfm::segment {
 struct Ridges {
   std::vector<cv::Mat> response;  ///< [k]: lines along k·π/n from +x towards +y, in grey levels of the line's height
   cv::Mat noise;                  ///< standard deviation of a response where there is no fibre
+  cv::Mat camera_noise;           ///< the part of it that the camera makes
   cv::Mat strongest;              ///< greatest response over the directions
   cv::Mat direction;              ///< its index (CV_8U)
 
@@ -26,14 +27,19 @@ struct RidgeScales {
 
 /// Second derivative of a Gaussian across, Gaussian along, normalised so that a straight line of Gaussian profile with
 /// the filter's own width and height 1 gives 1; for each direction the greatest response over the widths. The noise is
-/// the greater of the camera's white noise through the filter and the spread of the responses in the texture around.
-/// Filtered by tiles: time grows with the pixels and nothing else.
+/// as `set_noise` finds it. Filtered by tiles: time grows with the pixels and nothing else.
 /// @param is_inside  CV_8U, not 0 where the texture is the cell's; nothing outside of it counts as texture
 Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions = 16);
 
-/// Robust standard deviation of the responses within a disc, of zero mean and from what lies inside alone: the
-/// lower quartile over the directions, so that bundles that fill a neighbourhood in one direction, or two that cross,
-/// do not count as its texture.
-cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_inside, double radius_px);
+/// The noise of these responses from the places that are free of fibres: the greater of the camera's white noise
+/// through the filter and the spread of the responses in the texture around.
+/// @param is_free  CV_8U, not 0 where the cell's texture is to be seen
+void set_noise(Ridges& ridges, const cv::Mat& is_free, double radius_px);
+
+/// Standard deviation of the responses within a disc, of zero mean, as the tail of their distribution has it: filaments
+/// of a mesh make few strong responses among many weak ones, and lines of noise begin at the strong ones. Only free
+/// places count; where a disc holds too few of them it grows. The lower quartile over the directions, so that bundles
+/// that fill a neighbourhood in one direction, or two that cross, do not count as its texture.
+cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_free, double radius_px);
 
 }  // namespace mbtfm::segment

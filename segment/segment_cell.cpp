@@ -79,8 +79,10 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& c
 }
 
 /// Move what the actin image shows to where the adhesion image has it.
-void align(Segmentation& s, CellOutline& outline, std::vector<Fibre>& fibres, const std::vector<Adhesion>& adhesions,
+void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& traced, const std::vector<Adhesion>& adhesions,
            const SegmentParameters& p) {
+  std::vector<Fibre> fibres;
+  for (const TracedFibre& t : traced) fibres.push_back(t.fibre);
   s.alignment = align_channels(fibres, adhesions);
   if (!s.alignment || p.align_channels == "off" || !s.alignment->is_significant()) return;
   s.is_aligned = true;
@@ -91,7 +93,9 @@ void align(Segmentation& s, CellOutline& outline, std::vector<Fibre>& fibres, co
   for (Polygon& hole : outline.holes_um) move(hole);
   s.cell.outline_um = outline.outer_um;
   s.cell.holes_um = outline.holes_um;
-  for (Fibre& fibre : fibres) move(fibre.points_um);
+  for (TracedFibre& t : traced) {
+    for (Polyline* points : {&t.fibre.points_um, &t.before.points_um, &t.after.points_um}) move(*points);
+  }
 }
 
 }  // namespace
@@ -120,7 +124,7 @@ std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, 
                    .area_um2 = outline.area_um2,
                    .is_cut_by_border = outline.is_cut_by_border()};
     if (!s.is_cut_by_border) s.cell.is_cut.clear();
-    std::vector<Fibre> traced;
+    std::vector<TracedFibre> traced;
     if (actin && !drawn.fibres) traced = trace_fibres(actin->image, s.cell.outline_um, pixel_um, p.fibres);
     CellOutline around = outline;
     if (adhesion && !drawn.outline) align(s, around, traced, found, p);

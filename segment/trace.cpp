@@ -189,6 +189,20 @@ cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double 
   return l > 0 ? d / l : cv::Point2d(1, 0);
 }
 
+FaintEnd faint_end(const Ridges& ridges, const TraceRule& rule, const Trace& trace, LineEnd end) {
+  const cv::Point2d along = outward(trace.points, end, rule.end_window_px / 2);
+  Step now{end == LineEnd::first ? trace.points.front() : trace.points.back(), std::atan2(along.y, along.x), 0};
+  FaintEnd faint;
+  while (static_cast<double>(faint.points.size()) < rule.faint_px) {
+    now.point += unit(now.angle);
+    if (!is_on(ridges.noise, now.point)) break;
+    now = settle(ridges, rule, now);
+    faint.points.push_back(now.point);
+    faint.over_noise.push_back(now.height / std::max<double>(sample(ridges.noise, now.point), 1e-30));
+  }
+  return faint;
+}
+
 std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule) {
   Claims claims(ridges.noise.size(), ridges.n_directions());
   std::vector<Trace> traces;

@@ -25,6 +25,7 @@ struct TraceRule {
   double end_level = 0.5;     ///< a line ends where its height falls to this share of what it is before
   double end_window_px = 20;  ///< over this length
   double join_gap_px = 15;    ///< ends that point at each other from this far are one line
+  double faint_px = 40;       ///< how far beyond its end a line may go on faintly
 };
 
 /// Follow lines from the strongest ridge points down, both ways, in steps of a pixel, re-centred across the line and
@@ -33,8 +34,16 @@ struct TraceRule {
 /// @param is_inside  CV_8U, not 0 where a line may start
 std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, const TraceRule& rule);
 
-/// Unit vector from the inside of the line to its first or last point, over `reach` pixels.
+/// Where a line would go on beyond its end: points a pixel apart from there outwards, and by point the response in
+/// standard deviations of the noise, which may be none.
+struct FaintEnd {
+  std::vector<cv::Point2d> points;
+  std::vector<double> over_noise;
+};
 enum class LineEnd { first, last };
+FaintEnd faint_end(const Ridges& ridges, const TraceRule& rule, const Trace& trace, LineEnd end);
+
+/// Unit vector from the inside of the line to its first or last point, over `reach` pixels.
 cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach);
 
 }  // namespace mbtfm::segment

@@ -1,4 +1,4 @@
-/// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions]: how well simulated cells are segmented,
+/// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells are segmented,
 /// at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the adhesions.
 #include <cstdio>
 #include <cstdlib>
@@ -36,6 +36,7 @@ int main(int argc, char** argv) {
   const std::string scenario = argc > 1 ? argv[1] : "u2os";
   const int first = argc > 2 ? std::atoi(argv[2]) : 1, last = argc > 3 ? std::atoi(argv[3]) : 4;
   const bool has_true_adhesions = argc > 4 && std::string(argv[4]) == "true-adhesions";
+  const std::vector<std::string> settings(argv + std::min(argc, has_true_adhesions ? 5 : 4), argv + argc);
   std::map<std::string, std::map<std::string, double>> table;
   Calibration calibration;
   const std::vector<std::string> qualities = {"poor", "ordinary", "good"};
@@ -44,7 +45,11 @@ int main(int argc, char** argv) {
       const SimulatedCell cell = simulated_cell(scenario, quality, static_cast<std::uint64_t>(seed));
       Cell found;
       try {
-        const segment::SegmentParameters p;
+        segment::SegmentParameters p;
+        ParameterList list;
+        declare(list, p);
+        for (const std::string& s : settings)
+          set_from_text(parameter_named(list, s.substr(0, s.find('='))), s.substr(s.find('=') + 1));
         found = segment_cell(cell.adhesion, cell.actin, p).cell;
         if (has_true_adhesions) {
           found.adhesions = cell.truth.adhesions;

@@ -46,6 +46,23 @@ inline std::vector<LinePoint> line_points(const std::vector<Fibre>& fibres) {
   return points;
 }
 
+/// The drawing was read off a screenshot, and 14 % of its points have a direction more than 20 degrees off their
+/// neighbours'. Here each has the mean direction of those of its type within 1.5 um.
+inline std::vector<LinePoint> with_even_directions(const std::vector<LinePoint>& drawn) {
+  constexpr double kNear_um = 1.5;
+  std::vector<LinePoint> even = drawn;
+  for (LinePoint& p : even) {
+    double x = 0, y = 0;
+    for (const LinePoint& q : drawn) {
+      if (q.type != p.type || norm(q.position_um - p.position_um) > kNear_um) continue;
+      x += std::cos(2 * q.angle_rad);
+      y += std::sin(2 * q.angle_rad);
+    }
+    p.angle_rad = std::atan2(y, x) / 2;
+  }
+  return even;
+}
+
 /// A point of either side is met where the other has one within 0.8 um and 20 degrees.
 struct DrawnScore {
   double recall = 0, precision = 0, right_type = 0;
