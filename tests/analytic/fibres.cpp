@@ -14,6 +14,12 @@ std::vector<Fibre> fibres_of(const Image& image, const std::vector<Adhesion>& ad
   return find_fibres(image, {}, adhesions, 0.1, FibreParameters{});
 }
 
+/// Up to two lines of texture a cell are let through, and known to be doubtful.
+std::vector<Fibre> sure(std::vector<Fibre> fibres) {
+  std::erase_if(fibres, [](const Fibre& f) { return f.confidence < 0.5; });
+  return fibres;
+}
+
 Image drawn(const std::vector<Polyline>& lines, double height = 300, double width_um = 0.6) {
   Image image = even_image(256, 256, 100);
   for (const Polyline& line : lines) draw_line(image, line, height, width_um, 0.1);
@@ -30,7 +36,7 @@ TEST(Fibres, are_followed_through_a_crossing_and_typed_by_their_adhesions) {
   for (const double noise : {0.0, 10.0, 40.0}) {
     SCOPED_TRACE(noise);
     const DrawnScene scene = drawn_scene(noise, 2);
-    const auto fibres = fibres_of(scene.actin_image, scene.adhesions);
+    const auto fibres = sure(fibres_of(scene.actin_image, scene.adhesions));
     ASSERT_EQ(fibres.size(), 3u);
     EXPECT_EQ(fibres[0].type, FibreType::ventral);
     EXPECT_EQ(fibres[1].type, FibreType::ventral);

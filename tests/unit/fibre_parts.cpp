@@ -1,0 +1,94 @@
+/// The parts of the fibre finder: what lies beside fibres, what a faint end leads to, what counts as texture.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "segment/fibre_ends.h"
+#include "segment/fibre_significance.h"
+#include "segment/ridge.h"
+
+namespace mbtfm::segment {
+namespace {
+
+Polyline straight(Vec2 from, Vec2 to, double step_um = 0.2) {
+  const int n = static_cast<int>(norm(to - from) / step_um);
+  Polyline line;
+  for (int i = 0; i <= n; ++i) line.push_back(from + (1.0 * i / n) * (to - from));
+  return line;
+}
+
+TEST(FibreParts, a_line_is_beside_a_fibre_that_is_near_and_parallel) {
+  const Polyline fibre = straight({0, 0}, {20, 0});
+  EXPECT_DOUBLE_EQ(share_beside(straight({2, 1}, {12, 1}), {fibre}), 1);
+  EXPECT_DOUBLE_EQ(share_beside(straight({2, 4}, {12, 4}), {fibre}), 0);      // too far
+  EXPECT_DOUBLE_EQ(share_beside(straight({10, -5}, {10, 5}), {fibre}), 0);    // across
+  EXPECT_NEAR(share_beside(straight({15, 1}, {25, 1}), {fibre}), 0.78, 0.06);  // up to sqrt(3² - 1²) um beyond its end
+  EXPECT_DOUBLE_EQ(share_beside(straight({2, 1}, {12, 1}), {}), 0);
+}
+
+TEST(FibreParts, more_significant_lines_are_made_by_chance_less_often_and_by_more_texture_more_often) {
+  EXPECT_LT(expected_false_lines(12, 2000), expected_false_lines(11, 2000));
+  EXPECT_DOUBLE_EQ(expected_false_lines(11, 2000), 2 * expected_false_lines(11, 1000));
+}
+
+Adhesion adhesion_at(Vec2 position) {
+  Adhesion a;
+  a.adhesion_id = 7;
+  a.position_um = position;
+  a.major_axis_um = 1;
+  a.minor_axis_um = 0.5;
+  return a;
+}
+
+TracedFibre traced(double length_um, double over_noise) {
+  TracedFibre t;
+  t.fibre.points_um = straight({0, 0}, {length_um, 0});
+  t.after.points_um = straight({length_um + 0.2, 0}, {length_um + 4, 0});
+  t.after.over_noise.assign(t.after.points_um.size(), over_noise);
+  return t;
+}
+
+TEST(FibreParts, a_long_fibre_is_led_on_along_its_faint_end_to_the_adhesion_there) {
+  const std::vector<Adhesion> adhesions = {adhesion_at({23, 0})};
+  TracedFibre bright = traced(20, 2.5), dark = traced(20, 0.9), brief = traced(10, 2.5);
+  lead_on(bright, adhesions, {}, 1);
+  lead_on(dark, adhesions, {}, 1);
+  lead_on(brief, {adhesion_at({13, 0})}, {}, 1);
+  EXPECT_NEAR(bright.fibre.points_um.back().x, 22.5, 0.21);
+  EXPECT_NEAR(dark.fibre.points_um.back().x, 20, 1e-9);   // nothing is to be seen there
+  EXPECT_NEAR(brief.fibre.points_um.back().x, 10, 1e-9);  // it may be a dorsal fibre or an arc
+  tie_ends(bright.fibre, adhesions, {}, 1);
+  EXPECT_EQ(bright.fibre.end_adhesion_id, 7);
+  EXPECT_NEAR(norm(bright.fibre.points_um.back() - adhesions[0].position_um), 0, 1e-9);
+}
+
+TEST(FibreParts, a_way_that_reaches_no_adhesion_changes_nothing) {
+  TracedFibre t = traced(20, 3);
+  const Polyline before = t.fibre.points_um;
+  lead_on(t, {adhesion_at({22, 3})}, {}, 1);
+  EXPECT_EQ(t.fibre.points_um, before);
+}
+
+/// Normal variates have the deviation that was put in, from few free places as from many; a fibre's own responses do
+/// not count where they are masked.
+TEST(FibreParts, texture_is_the_deviation_of_what_is_free) {
+  constexpr int kSide = 200;
+  std::mt19937 random(1);
+  std::normal_distribution<float> normal(0, 3);
+  std::vector<cv::Mat> responses(4);
+  for (cv::Mat& r : responses) {
+    r.create(kSide, kSide, CV_32F);
+    for (float& v : cv::Mat_<float>(r)) v = normal(random);
+  }
+  cv::Mat is_free(kSide, kSide, CV_8U, cv::Scalar(255));
+  EXPECT_NEAR(cv::mean(texture_of(responses, is_free, 24))[0], 3, 0.3);  // the lower quartile of two directions
+  for (cv::Mat& r : responses) r(cv::Rect(80, 0, 40, kSide)).setTo(100);
+  is_free(cv::Rect(80, 0, 40, kSide)).setTo(0);
+  EXPECT_NEAR(cv::mean(texture_of(responses, is_free, 24))[0], 3, 0.35);
+  is_free.setTo(0);
+  EXPECT_EQ(cv::countNonZero(texture_of(responses, is_free, 24)), 0);  // nothing to tell it from
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
