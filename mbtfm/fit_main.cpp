@@ -180,8 +180,8 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
   for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
     const auto fibre = std::find_if(cell.fibres.begin(), cell.fibres.end(),
                                     [&](const Fibre& f) { return f.fibre_id == fit.fibre_ids[i]; });
-    types.push_back(fibre->type);
-    tensions[fibre->type].push_back(fit.tensions_nN[i].value);
+    types.push_back(fibre->type == FibreType::edge ? FibreType::ventral : fibre->type);  // held alike, at both ends
+    tensions[types.back()].push_back(fit.tensions_nN[i].value);
   }
   if (p.cross_validation == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) {
     return std::nullopt;

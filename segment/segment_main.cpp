@@ -57,6 +57,7 @@ StageReport report_of(const Segmentation& s) {
                     {"n_ventral", n_of(FibreType::ventral)},
                     {"n_dorsal", n_of(FibreType::dorsal)},
                     {"n_arc", n_of(FibreType::arc)},
+                    {"n_edge", n_of(FibreType::edge)},
                     {"fibre_length_um", length},
                     {"cell_area_um2", s.area_um2},
                     {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
@@ -74,7 +75,8 @@ StageReport report_of(const Segmentation& s) {
   }
   report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
                    std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
-                   " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
+                   " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs" +
+                   (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
   for (std::optional<Finding> found :
        {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
                 "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +

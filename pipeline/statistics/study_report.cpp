@@ -184,6 +184,20 @@ constexpr const char* kHowToRead =
     "freedom). "
     "Holm’s correction is over the pairs that one question compares.</p>\n";
 
+/// Which type edge fibres count as; empty without any.
+std::string on_edge_fibres(const Study& study) {
+  std::size_t n = 0;
+  for (const StudyCell& cell : study.cells)
+    n += static_cast<std::size_t>(
+        std::ranges::count_if(cell.cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; }));
+  if (n == 0) return "";
+  return fmt::format("<p class=\"sub\">{} edge {} a free piece of the outline and {} held at both ends. {}</p>\n", n,
+                     n == 1 ? "fibre runs along" : "fibres run along", n == 1 ? "is" : "are",
+                     study.n_fibre_types < 4
+                         ? "Here they count as ventral fibres; stats.fibre_types = 4 shows them as a type of their own."
+                         : "Here they are a type of their own.");
+}
+
 }  // namespace
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
@@ -209,7 +223,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   body += report::section("What the program noticed",
                           findings_text(study, with_file(findings_table(study), "findings.csv")));
   body += report::section("Figures", pictures);
-  body += report::section("Tension by fibre type", with_file(types_table(study, analysis), "types.csv"));
+  body += report::section("Tension by fibre type",
+                          on_edge_fibres(study) + with_file(types_table(study, analysis), "types.csv"));
   std::string tests;
   for (const Measure* m : analysis.measures()) {
     if (!m->comparisons.empty())
