@@ -134,11 +134,12 @@ std::string under(const Polyline& line, const Hold& start, const Hold& end, cons
 
 }  // namespace
 
-void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
+void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
+              EndsToTie ends) {
   Polyline& line = fibre.points_um;
-  Hold end = hold_of(line, adhesions, outline_um, reach_um);
+  Hold end = ends.end ? hold_of(line, adhesions, outline_um, reach_um) : Hold{};
   std::reverse(line.begin(), line.end());
-  Hold start = hold_of(line, adhesions, outline_um, reach_um);
+  Hold start = ends.start ? hold_of(line, adhesions, outline_um, reach_um) : Hold{};
   if (start.adhesion == end.adhesion && start.adhesion != nullptr)
     (start.effort_um <= end.effort_um ? end : start) = Hold{};
   fibre.type_confidence = start.certainty() * end.certainty();

@@ -7,6 +7,11 @@
 
 namespace mbtfm::segment {
 
+/// Which ends may be tied.
+struct EndsToTie {
+  bool start = true, end = true;
+};
+
 /// Tie each end to the adhesion it reaches: on the line's own course, at most `reach_um` ahead of the end or half of it
 /// aside; the nearest. A tied end is led to the adhesion's centre. Both ends never share an adhesion; the nearer one
 /// has it.
@@ -16,7 +21,9 @@ namespace mbtfm::segment {
 /// the latter. Sets the type by the number of tied ends (Hotulainen & Lappalainen 2006), the chance that it is right,
 /// and the reason in words.
 /// @param outline_um  of the cell; empty: direction tells nothing
-void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um);
+/// @param ends  the others stay as they are drawn, free
+void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
+              EndsToTie ends = {});
 
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.

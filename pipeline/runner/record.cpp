@@ -195,6 +195,8 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   std::vector<std::string> names = files_of(images_of(stage, images), cell, images);
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
+  std::ranges::copy_if(stage.reads_where_there, std::back_inserter(names),
+                       [&](const std::string& file) { return is_own_file(cell / file); });
   for (const PathArgument& argument : stage.arguments) {
     if (argument.where.empty() || !is_own_file(cell / argument.where)) continue;
     names.push_back(argument.where);
