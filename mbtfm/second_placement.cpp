@@ -41,9 +41,13 @@ ErrorBudget with_spread(ErrorBudget budget, const PlacementSpread& spread) {
   return budget;
 }
 
+bool has_candidates(const Cell& cell) {
+  return std::ranges::any_of(cell.adhesions,
+                             [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+}
+
 std::optional<Cell> second_placement(const Path& folder, const Cell& cell) {
-  const auto is_candidate = [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; };
-  if (std::ranges::none_of(cell.adhesions, is_candidate)) return std::nullopt;
+  if (!has_candidates(cell)) return std::nullopt;
   if (!std::ranges::all_of(kSecondPlacementFiles, [&](const std::string& name) { return is_own_file(folder / name); }))
     return std::nullopt;
   Cell second = cell;

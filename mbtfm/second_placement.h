@@ -22,6 +22,9 @@ PlacementSpread spread_between(const EnsembleFit& first, const EnsembleFit& seco
 /// The budget with the spread in its part `segmentation`.
 ErrorBudget with_spread(ErrorBudget budget, const PlacementSpread& spread);
 
+/// Adhesions that nobody saw are among the cell's.
+bool has_candidates(const Cell& cell);
+
 /// adhesions_2.csv, fibres_2.csv and fibre_points_2.csv of a segmentation.
 inline const std::vector<std::string> kSecondPlacementFiles = {"adhesions_2.csv", "fibres_2.csv", "fibre_points_2.csv"};
 /// The cell with its second placement. None where its adhesions were seen, or where the files are not there.
