@@ -98,13 +98,20 @@ Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const
   return best;
 }
 
-/// Let the line end at the centre: leave out the last points that lie past it or within a micrometre of it.
+/// Let the line end at the centre: leave out what lies past it, and the last points within a micrometre of it. Points of
+/// a line may lie far apart, so that it passes the centre between two of them.
 void lead_to(Polyline& line, const Adhesion& adhesion) {
   const Vec2 centre = adhesion.position_um;
   std::size_t nearest = 0;
-  for (std::size_t i = 1; i < line.size(); ++i)
-    if (norm(line[i] - centre) < norm(line[nearest] - centre)) nearest = i;
+  Vec2 foot = line.front();
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const Vec2 candidate = line[i] + nearest_share(line[i], line[i + 1], centre) * (line[i + 1] - line[i]);
+    if (norm(candidate - centre) > norm(foot - centre)) continue;
+    nearest = i;
+    foot = candidate;
+  }
   line.resize(nearest + 1);
+  if (!(foot == line.back())) line.push_back(foot);
   const double clear = std::max(0.5, adhesion.major_axis_um / 2);
   while (line.size() > 1 && norm(line.back() - centre) < clear) line.pop_back();
   line.push_back(centre);

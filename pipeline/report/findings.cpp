@@ -54,6 +54,14 @@ std::string adhesions_in_words(const Cell& cell) {
   return text.empty() ? "0 adhesions" : text;
 }
 
+std::string of_candidates(const Cell& cell) {
+  const auto is_one = [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; };
+  if (std::ranges::none_of(cell.adhesions, is_one)) return {};
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return is_assumed(a.origin); })
+             ? " No adhesion was seen: forces are placed where adhesions may be, on the candidates."
+             : " Forces act on the candidates, too, where nobody saw an adhesion.";
+}
+
 std::string what(const CellResults& results) {
   int n_by_type[std::size(kFibreTypes)] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
@@ -66,6 +74,7 @@ std::string what(const CellResults& results) {
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
              n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell), readable(results.fit.total_force_nN),
              readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN)) +
+         of_candidates(results.cell) +
          of_cut(results.fit);
 }
 

@@ -130,6 +130,18 @@ void draw_web(Chart& map, const CellResults& results, const Pieces& web, Hover h
 constexpr const char* kHalo = "stroke:#fff;stroke-width:7;stroke-linecap:round";
 constexpr const char* kThick = "stroke-width:3;stroke-linecap:round;stroke:";
 
+bool has_edge_fibres(const Cell& cell) {
+  return std::ranges::any_of(cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
+}
+
+bool has_origin(const Cell& cell, AdhesionOrigin origin) {
+  return std::ranges::any_of(cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
+}
+
+bool are_all_candidates(const Cell& cell) {
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+}
+
 Figure original_network(const CellResults& results) {
   Chart map = new_map(results, "Where the fibres are");
   const ColourScale scale = tension_scale(results, NetworkForm::original);
@@ -145,9 +157,10 @@ Figure original_network(const CellResults& results) {
   draw_fibre_ids(map, results);
   return {map,
           fmt::format("Stress fibres with their numbers, coloured by their fitted tension, in the network of the first "
-                      "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: adhesions, which "
+                      "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: {}, which "
                       "hold the vertices inside them.",
-                      results.network.vertices_um.size(), results.network.links.size()) +
+                      results.network.vertices_um.size(), results.network.links.size(),
+                      has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
               caption_of_cut(results.cell),
           legend(colour_bar(scale))};
 }
@@ -170,18 +183,6 @@ Figure contracted_network(const CellResults& results) {
           "The same network where its tensions have drawn it; each link of a fibre is coloured by the force that it "
           "carries.",
           legend(colour_bar(scale))};
-}
-
-bool has_edge_fibres(const Cell& cell) {
-  return std::ranges::any_of(cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
-}
-
-bool has_origin(const Cell& cell, AdhesionOrigin origin) {
-  return std::ranges::any_of(cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
-}
-
-bool are_all_candidates(const Cell& cell) {
-  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
 }
 
 /// Adhesions that were seen, and the dashed ones that nobody saw.

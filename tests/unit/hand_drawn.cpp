@@ -176,15 +176,23 @@ TEST(HandDrawn, fibres_that_meet_share_an_anchor) {
 }
 
 TEST(HandDrawn, an_end_a_little_outside_the_cell_is_held_on_its_edge_and_one_far_outside_is_refused) {
-  const CellOutline cell{.outer_um = {{4, 4}, {20, 4}, {20, 20}, {4, 20}}};
+  const CellOutline cell{.outer_um = {{4, 4}, {20, 4}, {20, 20}, {4, 20}}, .holes_um = {}};
   const auto near = held(set_of({line({{100, 100}, {209.5, 99.5}}, "ventral 1")}), {}, cell);
   EXPECT_NEAR(norm(near.anchors[0].position_um - Vec2{20, 10}), 0, 1e-9);
   EXPECT_EQ(near.fibres[0].points_um.back(), near.anchors[0].position_um);
   EXPECT_THROW(held(set_of({line({{100, 100}, {250, 100}}, "ventral 1")}), {}, cell), InputError);
 }
 
+TEST(HandDrawn, a_line_that_passes_an_adhesion_between_two_points_does_not_turn_back_to_it) {
+  const std::vector<Adhesion> adhesions = {test::ellipse(1, {14, 5.3}, 2, 2, 0)};
+  const HeldFibres result = held(set_of({line({{50, 50}, {150, 50}}, "dorsal 1")}), adhesions);
+  const Polyline& points = result.fibres[0].points_um;
+  EXPECT_EQ(points.back(), adhesions[0].position_um);
+  for (std::size_t i = 1; i < points.size(); ++i) EXPECT_GT(points[i].x, points[i - 1].x);
+}
+
 TEST(HandDrawn, no_anchor_is_made_where_a_fibre_leaves_the_image) {
-  const CellOutline cell{.outer_um = {{0, 4}, {20, 4}, {20, 20}, {0, 20}}};
+  const CellOutline cell{.outer_um = {{0, 4}, {20, 4}, {20, 20}, {0, 20}}, .holes_um = {}};
   const Cuts cuts = {{{0, 20}, {0, 4}}};
   const RoiSet set = set_of({line({{100, 100}, {2, 100}}, "ventral 1")});
   const HeldFibres result = hold_fibres(drawn_lines(set, std::nullopt, kField, {}), {}, cell, {}, kAnchor_um2, cuts);
