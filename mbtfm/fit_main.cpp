@@ -307,8 +307,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   PlacedCell place = place_cell(inputs.cell, networks.front(), measured, data, data_of, p.gel, p.fit, start,
                                 can_be_shifted ? p.effects.channel_shift : "off", context.threads);
   if (!can_be_shifted)
-    place.effect = decided(kChannelShift, p.effects.channel_shift, false,
-                           "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
+    place.effect =
+        decided(kChannelShift, p.effects.channel_shift, false,
+                "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
   data = std::move(place.data);
   if (place.effect.is_on) {
     inputs.beads = in_cell_frame(measured, place.placement);

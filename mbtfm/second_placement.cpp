@@ -42,8 +42,7 @@ ErrorBudget with_spread(ErrorBudget budget, const PlacementSpread& spread) {
 }
 
 bool has_candidates(const Cell& cell) {
-  return std::ranges::any_of(cell.adhesions,
-                             [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+  return std::ranges::any_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
 }
 
 std::optional<Cell> second_placement(const Path& folder, const Cell& cell) {

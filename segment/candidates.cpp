@@ -26,11 +26,12 @@ void declare(ParameterList& list, CandidateParameters& p) {
   list.table("segment");
   std::vector<std::string> choices = {"auto"};
   for (const AdhesionSource source : kAdhesionSources) choices.emplace_back(name_of(source));
-  list.add("adhesions", p.adhesions,
-           "where adhesions are; image: as the adhesion image, a mask or ROIs show them; pattern: candidates all over the "
-           "adhesion mask, which says where adhesion is possible; fibre-ends: candidates at the ends of the fibres; cell: "
-           "there and along the rim of the cell; auto: image where there is one, else cell",
-           choices);
+  list.add(
+      "adhesions", p.adhesions,
+      "where adhesions are; image: as the adhesion image, a mask or ROIs show them; pattern: candidates all over the "
+      "adhesion mask, which says where adhesion is possible; fibre-ends: candidates at the ends of the fibres; cell: "
+      "there and along the rim of the cell; auto: image where there is one, else cell",
+      choices);
   list.add("candidate_spacing_um", p.candidate_spacing_um, Range::size_um(),
            "distance of neighbouring candidates for adhesions, and their diameter (um)");
   list.add("candidate_band_um", p.candidate_band_um, Range::size_um(),

@@ -40,8 +40,8 @@ AdhesionSource source_of(const CandidateParameters& parameters, bool shows_adhes
 /// Two independent guesses where the candidates are: what differs between their answers is the error of guessing.
 enum class Placement { first, second };
 
-/// Discs on a hexagonal lattice, which touch their neighbours: those whose centre `is_possible`. The second placement is
-/// shifted by half a lattice cell along both axes. Ids from 1.
+/// Discs on a hexagonal lattice, which touch their neighbours: those whose centre `is_possible`. The second placement
+/// is shifted by half a lattice cell along both axes. Ids from 1.
 /// @param low_um,high_um  of the box to fill; the lattice has a point in its middle
 template <class IsPossible>
 std::vector<Adhesion> lattice_candidates(Vec2 low_um, Vec2 high_um, double spacing_um, Placement placement,

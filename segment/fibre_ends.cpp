@@ -98,8 +98,8 @@ Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const
   return best;
 }
 
-/// Let the line end at the centre: leave out what lies past it, and the last points within a micrometre of it. Points of
-/// a line may lie far apart, so that it passes the centre between two of them.
+/// Let the line end at the centre: leave out what lies past it, and the last points within a micrometre of it. Points
+/// of a line may lie far apart, so that it passes the centre between two of them.
 void lead_to(Polyline& line, const Adhesion& adhesion) {
   const Vec2 centre = adhesion.position_um;
   std::size_t nearest = 0;

@@ -14,7 +14,9 @@
 namespace mbtfm::segment {
 namespace {
 
-std::string size_of(int width, int height) { return std::to_string(width) + " x " + std::to_string(height) + " pixels"; }
+std::string size_of(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height) + " pixels";
+}
 
 /// Where four sides meet on the mask's grid of corners.
 struct Corner {
@@ -74,9 +76,7 @@ CutRing thinned(const CutRing& ring, int every, Vec2 field_um) {
   CutRing result;
   const std::size_t n = ring.points_um.size();
   const bool has_cut = !ring.is_cut.empty();
-  const auto is_corner = [&](Vec2 p) {
-    return (p.x <= 0 || p.x >= field_um.x) && (p.y <= 0 || p.y >= field_um.y);
-  };
+  const auto is_corner = [&](Vec2 p) { return (p.x <= 0 || p.x >= field_um.x) && (p.y <= 0 || p.y >= field_um.y); };
   int since = every;
   for (std::size_t i = 0; i < n; ++i) {
     const bool is_turn = has_cut && (ring.is_cut[i] != ring.is_cut[(i + n - 1) % n] || is_corner(ring.points_um[i]));
@@ -97,7 +97,7 @@ Polygon in_um(const Polygon& ring_px, double pixel_um) {
 double pixel_of(const LabelMask& mask, const Field& field) { return field.pixel_um / mask.binning; }
 
 int every_nth(std::size_t n_points, double pixel_um, double spacing_um) {
-  constexpr double kStep = 0.85;   // of a pixel: a ring's points lie 0.7 to 1 apart
+  constexpr double kStep = 0.85;    // of a pixel: a ring's points lie 0.7 to 1 apart
   constexpr int kFewestPoints = 8;  // of a small ring
   return std::clamp(static_cast<int>(spacing_um / (kStep * pixel_um)), 1,
                     std::max(1, static_cast<int>(n_points) / kFewestPoints));
@@ -147,12 +147,13 @@ std::optional<double> level_around(const LabelMask& mask, const Adhesion& a, con
     return std::clamp(static_cast<int>(std::floor(at_um / pixel_um)), 0, n - 1);
   };
   std::vector<float> around;
-  for (int j = pixel_at(a.position_um.y - reach_um, image.height); j <= pixel_at(a.position_um.y + reach_um, image.height);
-       ++j) {
-    for (int i = pixel_at(a.position_um.x - reach_um, image.width); i <= pixel_at(a.position_um.x + reach_um, image.width);
-         ++i) {
+  for (int j = pixel_at(a.position_um.y - reach_um, image.height);
+       j <= pixel_at(a.position_um.y + reach_um, image.height); ++j) {
+    for (int i = pixel_at(a.position_um.x - reach_um, image.width);
+         i <= pixel_at(a.position_um.x + reach_um, image.width); ++i) {
       const double distance_um = distance_to_ellipse_um(a, {(i + 0.5) * pixel_um, (j + 0.5) * pixel_um});
-      const bool is_free = mask.at_or_zero(i * mask.binning + mask.binning / 2, j * mask.binning + mask.binning / 2) == 0;
+      const bool is_free =
+          mask.at_or_zero(i * mask.binning + mask.binning / 2, j * mask.binning + mask.binning / 2) == 0;
       if (is_free && distance_um >= kBlur_um && distance_um <= kRing_um) around.push_back(image.at(i, j));
     }
   }

@@ -1,5 +1,5 @@
-/// Masks and label images, as Cellpose, StarDist, ilastik, napari and ImageJ write them: what belongs to the cell, where
-/// its adhesions are, or where they may be.
+/// Masks and label images, as Cellpose, StarDist, ilastik, napari and ImageJ write them: what belongs to the cell,
+/// where its adhesions are, or where they may be.
 #pragma once
 
 #include <filesystem>
@@ -42,8 +42,8 @@ LabelMask with_parts_labelled(LabelMask mask);
 /// Does the mask have a label there?
 bool covers(const LabelMask& mask, Vec2 point_um, const Field& field);
 
-/// Rings around a label's pixels, in pixels: through the middles of the pixels' sides, so that a ring around n pixels has an
-/// area of n - 1/2, whatever its direction. Outer rings turn from +x towards +y, holes back.
+/// Rings around a label's pixels, in pixels: through the middles of the pixels' sides, so that a ring around n pixels
+/// has an area of n - 1/2, whatever its direction. Outer rings turn from +x towards +y, holes back.
 std::vector<Polygon> rings_px(const LabelMask& mask, int label);
 
 /// The cells of a mask: of a binary one its parts, the largest first, or the part that `cell` names; of a label image

@@ -125,9 +125,7 @@ struct Outlines {
 Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
   const SegmentParameters& p = in.parameters;
   if (in.drawn.outline) {
-    return {chosen({hand_drawn_outline(*in.drawn.outline, in.field)}, in.actin ? *in.actin : *in.adhesion,
-                   p),
-            1};
+    return {chosen({hand_drawn_outline(*in.drawn.outline, in.field)}, in.actin ? *in.actin : *in.adhesion, p), 1};
   }
   if (in.drawn.outline_mask)
     return {mask_outlines(*in.drawn.outline_mask, p.cell, in.field, p.outline),
@@ -164,9 +162,8 @@ std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, c
     const std::vector<Adhesion> at_ends = candidates;
     const auto is_possible = [&](Vec2 point) {
       if (in.source == AdhesionSource::pattern) return covers(*in.drawn.adhesion_mask, point, in.field);
-      const bool is_taken = std::ranges::any_of(at_ends, [&](const Adhesion& end) {
-        return norm(end.position_um - point) < p.candidate_spacing_um;
-      });
+      const bool is_taken = std::ranges::any_of(
+          at_ends, [&](const Adhesion& end) { return norm(end.position_um - point) < p.candidate_spacing_um; });
       return !is_taken && distance_to_edge_um(whole, point) <= p.candidate_band_um;
     };
     Vec2 low = cell.outer_um.front(), high = low;
@@ -198,9 +195,8 @@ void require_candidates(const Inputs& in, const Cell& cell) {
 /// As tied(), but a fibre has the same id wherever the candidates are: that of its place among the traced ones, the
 /// longest first.
 std::vector<Fibre> tied_one_by_one(std::vector<Fibre> traced, const Cell& cell, const FibreParameters& p) {
-  std::stable_sort(traced.begin(), traced.end(), [](const Fibre& a, const Fibre& b) {
-    return length_um(a.points_um) > length_um(b.points_um);
-  });
+  std::stable_sort(traced.begin(), traced.end(),
+                   [](const Fibre& a, const Fibre& b) { return length_um(a.points_um) > length_um(b.points_um); });
   std::vector<Fibre> fibres;
   for (std::size_t i = 0; i < traced.size(); ++i) {
     for (Fibre& fibre : tied({traced[i]}, cell.adhesions, cell.outline_um, p, cuts_of(cell))) {
@@ -224,6 +220,11 @@ void hold(Cell& cell, std::vector<Adhesion> adhesions, Lines lines, const CellOu
     cell.fibres = tied(std::move(lines.traced), cell.adhesions, cell.outline_um, p.fibres, cuts_of(cell));
   } else {
     cell.fibres = tied_one_by_one(lines.traced, cell, p.fibres);
+    for (Fibre& fibre : cell.fibres) {
+      if (in.source == AdhesionSource::pattern) break;
+      fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+      fibre.type_reason += "; candidates were put at its ends";
+    }
   }
   for (Adhesion& a : cell.adhesions) a.edge_distance_um = distance_to_edge_um(cell, a.position_um);
 }
@@ -245,8 +246,8 @@ std::vector<std::string> unused_in(const Inputs& in) {
   return unused;
 }
 
-Inputs inputs_of(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin, const SegmentParameters& p,
-               const HandDrawn& drawn) {
+Inputs inputs_of(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                 const SegmentParameters& p, const HandDrawn& drawn) {
   if (!adhesion && !actin) throw UsageError("an adhesion image or an actin image is needed, best both");
   if (drawn.fibres && p.cell == 0)
     throw UsageError("fibres drawn by hand belong to one cell: choose it (cell), not all of them (cell = 0)");
@@ -273,7 +274,8 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
   if (!s.is_cut_by_border) s.cell.is_cut.clear();
   const bool is_given = in.drawn.outline || in.drawn.outline_mask;
   Lines lines{.traced = {}, .drawn = {}, .are_drawn = in.drawn.fibres.has_value()};
-  if (in.drawn.fibres) lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
+  if (in.drawn.fibres)
+    lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
   else if (in.actin)
     lines.traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
   CellOutline around = outline;

@@ -48,9 +48,9 @@ struct Segmentation {
   std::vector<std::string> unused{};  ///< inputs that others took the place of, a sentence each
 };
 
-/// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions. What is
-/// drawn by hand is used instead of each, or else a mask. Where nothing shows adhesions, or the parameters say so, there
-/// are candidates for them instead (candidates.h). Without actin there are no fibres.
+/// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions. What
+/// is drawn by hand is used instead of each, or else a mask. Where nothing shows adhesions, or the parameters say so,
+/// there are candidates for them instead (candidates.h). Without actin there are no fibres.
 /// @returns the cell that the parameters name, or all of them, the largest first
 /// @throws UsageError without any channel, where all cells are asked for and fibres are drawn by hand, or where the
 /// source of the adhesions is not there

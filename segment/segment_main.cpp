@@ -47,9 +47,13 @@ std::string assumption_of(const Segmentation& s, bool is_by_itself) {
     case AdhesionSource::pattern:
       return placed + "all over the adhesive pattern under the cell.";
     case AdhesionSource::fibre_ends:
-      return placed + "at the ends of the fibres. How much this choice matters is not in the error bars.";
+      return placed +
+             "at the ends of the fibres. Which ends are held in truth, and so the types of the fibres, is not "
+             "known. How much this choice matters is not in the error bars.";
     case AdhesionSource::cell:
-      return placed + "at the ends of the fibres and along the rim of the cell.";
+      return placed +
+             "at the ends of the fibres and along the rim of the cell. Which ends are held in truth, and so the "
+             "types of the fibres, is not known.";
   }
   throw InternalError("unknown source of adhesions");
 }
@@ -114,9 +118,10 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
   const std::int64_t n_candidates = n_adhesions - n_seen - s.n_anchors;
   report.summary = (n_seen > 0 || n_adhesions == 0 ? std::to_string(n_seen) + " adhesions, " : "") +
                    (n_candidates > 0 ? std::to_string(n_candidates) + " candidates for adhesions, " : "") +
-                   (s.n_anchors > 0 ? std::to_string(s.n_anchors) + " anchors, " : "") + std::to_string(s.cell.fibres.size()) + " fibres (" +
-                   std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
-                   " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs" +
+                   (s.n_anchors > 0 ? std::to_string(s.n_anchors) + " anchors, " : "") +
+                   std::to_string(s.cell.fibres.size()) + " fibres (" + std::to_string(n_of(FibreType::ventral)) +
+                   " ventral, " + std::to_string(n_of(FibreType::dorsal)) + " dorsal, " +
+                   std::to_string(n_of(FibreType::arc)) + " arcs" +
                    (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
   for (std::optional<Finding> found :
        {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
@@ -236,7 +241,8 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
   }
   if (!parameters.contact_sheet.empty())
     write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters, drawn));
-  StageReport report = parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), parameters.candidates.adhesions == "auto");
+  StageReport report =
+      parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), parameters.candidates.adhesions == "auto");
   add_drawn_by_hand(report, drawn);
   return report;
 }

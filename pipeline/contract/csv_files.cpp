@@ -55,8 +55,7 @@ std::vector<Adhesion> read_adhesions(const Path& file) {
       if (!origin) table.fail(row, "origin", "image, drawn, anchor or candidate");
       adhesions[row].origin = *origin;
     }
-    if (table.has("edge_distance_um"))
-      adhesions[row].edge_distance_um = table.optional_number(row, "edge_distance_um");
+    if (table.has("edge_distance_um")) adhesions[row].edge_distance_um = table.optional_number(row, "edge_distance_um");
   }
   check_read(file, adhesions);
   return adhesions;

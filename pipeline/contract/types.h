@@ -30,8 +30,8 @@ inline bool is_finite(Vec2 a) { return std::isfinite(a.x) && std::isfinite(a.y);
 using Polygon = std::vector<Vec2>;
 using Polyline = std::vector<Vec2>;
 
-/// Where an adhesion comes from: found in an image or a mask of one; drawn by hand; put where a fibre drawn by hand must
-/// be held and no adhesion is; or put where one may be, because nothing shows the adhesions.
+/// Where an adhesion comes from: found in an image or a mask of one; drawn by hand; put where a fibre drawn by hand
+/// must be held and no adhesion is; or put where one may be, because nothing shows the adhesions.
 enum class AdhesionOrigin { image, drawn, anchor, candidate };
 inline constexpr AdhesionOrigin kAdhesionOrigins[] = {AdhesionOrigin::image, AdhesionOrigin::drawn,
                                                       AdhesionOrigin::anchor, AdhesionOrigin::candidate};

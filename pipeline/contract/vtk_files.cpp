@@ -232,7 +232,8 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
     label(0, 0, a.adhesion_id, 1 + static_cast<int>(a.origin));
   }
   const auto poly = shapes.data();
-  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get(), origin.Get()}) poly->GetCellData()->AddArray(array);
+  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get(), origin.Get()})
+    poly->GetCellData()->AddArray(array);
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 

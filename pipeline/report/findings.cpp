@@ -67,15 +67,16 @@ std::string what(const CellResults& results) {
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
   const int n_edge = n_by_type[static_cast<int>(FibreType::edge)];
   return fmt::format(
-             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} nN in total, summed over its adhesions: {} "
+             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} nN in total, summed over its adhesions: "
+             "{} "
              "nN by "
              "the fibres, {} nN by the actin network.",
              counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
-             n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell), readable(results.fit.total_force_nN),
-             readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN)) +
-         of_candidates(results.cell) +
-         of_cut(results.fit);
+             n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
+             readable(results.fit.total_force_nN), readable(results.fit.fibre_force_nN),
+             readable(results.fit.network_force_nN)) +
+         of_candidates(results.cell) + of_cut(results.fit);
 }
 
 std::string truth(const CellResults& results) {

@@ -219,8 +219,8 @@ Figure segmentation_map(const CellResults& results) {
   std::string types;
   for (const FibreType type : kFibreTypes) {
     if (type == FibreType::edge && !has_edge_fibres(results.cell)) continue;
-    types += "<span>" + swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)) + full_name_of(type) +
-             "</span>";
+    types +=
+        "<span>" + swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)) + full_name_of(type) + "</span>";
   }
   for (const Fibre& fibre : results.cell.fibres) {
     map.curve(fibre.points_um,
@@ -288,8 +288,7 @@ Figure adhesion_map(const CellResults& results) {
                           : "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force") +
               " of the cell on the substrate. Dashed: the cell’s outline. The few highest tractions share the colour "
               "at the bar’s end." +
-              of_candidates +
-              caption_of_cut(results.cell),
+              of_candidates + caption_of_cut(results.cell),
           legend(arrow_legend(scale, "nN") + colour_bar(colours))};
 }
 

@@ -98,7 +98,8 @@ std::string adhesion_section(const CellResults& results) {
       balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
   if (are_candidates)
     html +=
-        "<p class=\"sub\">Candidates are places where an adhesion may be. Nobody saw one there: read their tractions as "
+        "<p class=\"sub\">Candidates are places where an adhesion may be. Nobody saw one there: read their tractions "
+        "as "
         "a traction density (force over the area of a lattice cell), and sums over neighbours rather than single "
         "forces.</p>\n";
   html += html_of(top, file_of(results, "4_fit/adhesion_forces.csv"));

@@ -13,9 +13,10 @@ namespace fs = std::filesystem;
 
 void declare(ParameterList& list, ImageNames& names) {
   list.table("images");
-  list.add("adhesion", names.adhesion,
-           "image of the adhesions: a file name or glob in the cell folder; without a file of the default name, forces are "
-           "placed on candidates (segment.adhesions)");
+  list.add(
+      "adhesion", names.adhesion,
+      "image of the adhesions: a file name or glob in the cell folder; without a file of the default name, forces are "
+      "placed on candidates (segment.adhesions)");
   list.add("actin", names.actin, "image of the actin");
   list.add("beads_stressed", names.beads_stressed, "image of the beads while the cell pulls");
   list.add("beads_relaxed", names.beads_relaxed, "image of the beads after the cell was removed");
@@ -24,9 +25,10 @@ void declare(ParameterList& list, ImageNames& names) {
   list.add("fibre_rois", names.fibre_rois, "ImageJ lines used as fibres, where the file is there");
   list.add("outline_mask", names.outline_mask,
            "mask or label image of the cell (TIFF or PNG), used as its outline, where the file is there");
-  list.add("adhesion_mask", names.adhesion_mask,
-           "mask or label image used as adhesions, where the file is there; with segment.adhesions = pattern the adhesive "
-           "pattern");
+  list.add(
+      "adhesion_mask", names.adhesion_mask,
+      "mask or label image used as adhesions, where the file is there; with segment.adhesions = pattern the adhesive "
+      "pattern");
   list.add("displacement", names.displacement,
            "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]");
 }
@@ -99,8 +101,12 @@ std::optional<fs::path> resolve_image(const fs::path& folder, const ImageNames& 
 
 std::optional<fs::path> resolve_optional_image(const fs::path& folder, const ImageNames& names,
                                                const std::string& key) {
-  const bool is_default = name_of_image(names, key) == name_of_image(ImageNames{}, key);
-  if (is_default && match_image(folder, name_of_image(names, key)).files.empty()) return std::nullopt;
+  const std::string& name = name_of_image(names, key);
+  const bool is_default = name == name_of_image(ImageNames{}, key);
+  // a link that leads nowhere is there, and somebody wants it
+  std::error_code error;
+  const bool is_there = fs::exists(fs::symlink_status(file_shown_as(folder, name), error));
+  if (is_default && !is_there && match_image(folder, name).files.empty()) return std::nullopt;
   return resolve_image(folder, names, key);
 }
 

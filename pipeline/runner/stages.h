@@ -28,10 +28,10 @@ struct Stage {
   std::vector<ImageInput> optional_images;  ///< used where they are there
   std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
   PathArgument output;
-  std::vector<std::string> reads;    ///< files behind `arguments`, relative to the cell folder
+  std::vector<std::string> reads;              ///< files behind `arguments`, relative to the cell folder
   std::vector<std::string> reads_where_there;  ///< further ones, which the stage before writes in some cases only
-  std::vector<std::string> writes;   ///< files without which the stage is not done
-  std::vector<std::string> series;   ///< globs: files that it writes in some cases only, as of a time series
+  std::vector<std::string> writes;             ///< files without which the stage is not done
+  std::vector<std::string> series;             ///< globs: files that it writes in some cases only, as of a time series
   std::vector<std::string> tables;   ///< of cell.toml that its result depends on; empty: above the first table
   std::vector<std::string> effects;  ///< keys of [effects] that it depends on
 };

@@ -77,8 +77,7 @@ Sample sample_tensions(const Study& study) {
   Sample sample = empty_sample(study, "tension_nN", "tension", "nN", "fibres", kinds);
   for (const MeasuredFibre& f : measured_fibres(study)) {
     add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()),
-        static_cast<int>(counted_type(study, f.fibre->type)),
-        f.tension->tension_nN, standard_error_nN(*f.tension));
+        static_cast<int>(counted_type(study, f.fibre->type)), f.tension->tension_nN, standard_error_nN(*f.tension));
   }
   return with_typical_errors(std::move(sample));
 }

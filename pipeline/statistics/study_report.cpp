@@ -165,7 +165,8 @@ std::string overview(const Study& study, const Analysis& analysis) {
   std::size_t n_fibres = 0, n_adhesions = 0;
   for (const StudyCell& c : study.cells) {
     n_fibres += c.cell.fibres.size();
-    n_adhesions += c.cell.adhesions.size();
+    n_adhesions += static_cast<std::size_t>(
+        std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
   }
   std::string html = fmt::format(
       "<p>{} cells{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter "

@@ -48,7 +48,7 @@ std::string cells_csv(const Study& study) {
       if (t.fibre_id == 0) network_tension = t.tension_nN;
     }
     csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(1).add("");
-    csv.add(static_cast<int>(c.cell.adhesions.size())).add(static_cast<int>(c.cell.fibres.size()));
+    csv.add(static_cast<int>(figures.n_adhesions)).add(static_cast<int>(c.cell.fibres.size()));
     for (const FibreType type : {FibreType::dorsal, FibreType::arc, FibreType::ventral}) csv.add(n_of[type]);
     csv.add(figures.cell_area_um2).add(figures.adhesion_area_um2);
     const auto where_known = [&](double value) { return is_network_known(c) ? std::optional(value) : std::nullopt; };

@@ -286,15 +286,16 @@ EnsembleFit answer_of(std::vector<int> ids, const std::vector<double>& tensions_
 
 TEST(ErrorBudget, two_placements_of_the_candidates_tell_the_error_of_placing_them) {
   // Of answers with the variance v, half the squared difference of two has the mean v.
-  const PlacementSpread spread = spread_between(answer_of({0, 1, 2, 4}, {0.1, 5, 3, 2}, 100),
-                                                answer_of({0, 1, 4}, {0.1, 8, 2}, 110));
+  const PlacementSpread spread =
+      spread_between(answer_of({0, 1, 2, 4}, {0.1, 5, 3, 2}, 100), answer_of({0, 1, 4}, {0.1, 8, 2}, 110));
   EXPECT_NEAR(spread.tensions_nN.at(1), 3 / std::sqrt(2.0), 1e-12);
   EXPECT_NEAR(spread.tensions_nN.at(0), 0, 1e-12);
   EXPECT_NEAR(spread.tensions_nN.at(4), 0, 1e-12);
   EXPECT_FALSE(spread.tensions_nN.contains(2));  // too short where the other candidates hold it
   EXPECT_NEAR(spread.total_force_nN, 10 / std::sqrt(2.0), 1e-12);
   ErrorBudget budget;
-  for (const int id : {0, 1, 2, 4}) budget.tensions.push_back({.fibre_id = id, .tension_nN = 1, .parts_nN = {.segmentation = 0.5}});
+  for (const int id : {0, 1, 2, 4})
+    budget.tensions.push_back({.fibre_id = id, .tension_nN = 1, .parts_nN = {.segmentation = 0.5}});
   budget.total_force_parts_nN.segmentation = 1;
   const ErrorBudget whole = with_spread(budget, spread);
   EXPECT_NEAR(whole.tensions[1].parts_nN.segmentation, std::hypot(0.5, 3 / std::sqrt(2.0)), 1e-12);

@@ -63,8 +63,7 @@ struct Scene {
 };
 
 bool are_candidates(const Cell& cell) {
-  return std::ranges::all_of(cell.adhesions,
-                             [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
 }
 
 void expect_apart(const Cell& cell, double least_um) {
@@ -91,7 +90,10 @@ TEST(Candidates, without_an_adhesion_image_stand_at_the_ends_of_the_fibres_and_a
   EXPECT_TRUE(are_candidates(s.cell));
   expect_apart(s.cell, scene.parameters.candidates.candidate_spacing_um);
   ASSERT_FALSE(s.cell.fibres.empty());
-  for (const Fibre& f : s.cell.fibres) EXPECT_EQ(f.type, FibreType::ventral) << f.type_reason;
+  for (const Fibre& f : s.cell.fibres) {
+    EXPECT_EQ(f.type, FibreType::ventral) << f.type_reason;
+    EXPECT_LE(f.type_confidence, 0.5);  // nobody saw what holds it
+  }
   const double band_um = scene.parameters.candidates.candidate_band_um;
   for (const Adhesion& a : s.cell.adhesions) {
     const bool is_end = std::ranges::any_of(s.cell.fibres, [&](const Fibre& f) {

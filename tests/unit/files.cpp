@@ -223,7 +223,8 @@ TEST(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
 }
 
 TEST(Files, a_candidate_stands_for_the_cell_of_its_lattice) {
-  const Adhesion disc{.position_um = {}, .area_um2 = 3.14159265, .origin = AdhesionOrigin::candidate};  // of 2 um, on a lattice of 2 um
+  const Adhesion disc{
+      .position_um = {}, .area_um2 = 3.14159265, .origin = AdhesionOrigin::candidate};  // of 2 um, on a lattice of 2 um
   EXPECT_NEAR(area_stood_for_um2(disc), std::sqrt(3.0) / 2 * 4, 1e-6);
   EXPECT_EQ(area_stood_for_um2({.position_um = {}, .area_um2 = 1.5}), 1.5);
 }

@@ -145,7 +145,8 @@ TEST(HandDrawn, a_fibre_is_held_at_as_many_ends_as_its_type_says_with_or_without
   const std::vector<Adhesion> at_both = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
   for (const FibreType type : kFibreTypes) {
     for (const auto& adhesions : {std::vector<Adhesion>{}, at_both}) {
-      const HeldFibres result = held(set_of({line({{50, 50}, {150, 50}}, std::string(name_of(type)) + " 1")}), adhesions);
+      const HeldFibres result =
+          held(set_of({line({{50, 50}, {150, 50}}, std::string(name_of(type)) + " 1")}), adhesions);
       const Fibre& f = result.fibres.front();
       EXPECT_EQ(f.type, type);
       EXPECT_EQ(f.start_adhesion_id.has_value(), n_held_ends(type) >= 1) << name_of(type);
@@ -165,13 +166,13 @@ TEST(HandDrawn, a_dorsal_fibre_is_held_at_its_last_point_where_that_alone_reache
 }
 
 TEST(HandDrawn, fibres_that_meet_share_an_anchor) {
-  const HeldFibres result =
-      held(set_of({line({{60, 200}, {52, 52}}, "a"), line({{50, 50}, {150, 50}}, "edge 1"),
-                   line({{150, 52}, {150, 200}}, "ventral 2")}),
-           {});
+  const HeldFibres result = held(set_of({line({{60, 200}, {52, 52}}, "a"), line({{50, 50}, {150, 50}}, "edge 1"),
+                                         line({{150, 52}, {150, 200}}, "ventral 2")}),
+                                 {});
   EXPECT_EQ(result.anchors.size(), 3u);
   EXPECT_EQ(result.fibres[1].end_adhesion_id, result.fibres[2].start_adhesion_id);
-  EXPECT_EQ(result.fibres[0].end_adhesion_id, result.fibres[1].start_adhesion_id);  // of no stated type: what it reaches
+  EXPECT_EQ(result.fibres[0].end_adhesion_id,
+            result.fibres[1].start_adhesion_id);  // of no stated type: what it reaches
   EXPECT_EQ(result.fibres[0].type, FibreType::dorsal);
 }
 
@@ -239,9 +240,7 @@ TEST(HandDrawn, what_cannot_be_used_is_named) {
   const auto adhesion = [](const Roi& roi) {
     return error_of([&] { hand_drawn_adhesions(set_of({roi}), std::nullopt, kField); });
   };
-  const auto fibre = [](const Roi& roi) {
-    return error_of([&] { held(set_of({roi}), {}); });
-  };
+  const auto fibre = [](const Roi& roi) { return error_of([&] { held(set_of({roi}), {}); }); };
   const Roi square = area({{10, 10}, {20, 10}, {20, 20}, {10, 20}}, "a 1");
   EXPECT_EQ(adhesion(square), "no error");
   EXPECT_EQ(adhesion(line({{10, 10}, {20, 20}}, "a 1")), "rois.zip: 'a 1': a segmented line");

@@ -203,8 +203,9 @@ TEST(Mask, a_cell_is_segmented_by_masks_and_selections_count_more) {
   Image outline = empty(), spots = empty();
   paint_disc(outline, 255, {128, 128}, 105);
   for (const Adhesion& a : scene.adhesions)
-    paint(spots, static_cast<float>(a.adhesion_id),
-          [&](double x, double y) { return distance_to_ellipse_um(a, kPixel_um * Vec2{x, y}) < 0; });
+    paint(spots, static_cast<float>(a.adhesion_id), [&](double x, double y) {
+      return distance_to_ellipse_um(a, kPixel_um * Vec2{x, y}) < 0;
+    });
   SegmentParameters p;
   p.pixel_size_um = kPixel_um;
   HandDrawn drawn;
