@@ -14,6 +14,7 @@
 #include "mbtfm/fit_effects.h"
 #include "mbtfm/model_checks.h"
 #include "mbtfm/placement.h"
+#include "mbtfm/second_placement.h"
 #include "mbtfm/series.h"
 #include "mbtfm/solved_misfit.h"
 #include "network/effects.h"
@@ -124,6 +125,18 @@ ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
                       threads);
 }
 
+/// The fit of the cell with its candidates for adhesions at other places; beads, gel and cables as in the first.
+EnsembleFit fit_of(const Cell& second, const DisplacementField& beads, const substrate::Substrate& substrate,
+                   const network::CableParameters& cables, const FitStageParameters& p, int threads) {
+  const Eigen::MatrixXd motions = allows_common_motion(p.effects) ? affine_motions(beads) : Eigen::MatrixXd();
+  LinearData data = reduce(beads, substrate.response(points_of(beads), ellipses_of(second)),
+                           beads_in_region(beads, second, p.fit), threads, motions);
+  if (allows_forces_beyond(p.effects, second)) allow_forces_beyond(data, second, p.gel);
+  const Network network = network::generate_network(second, p.network).network;
+  return fit_ensemble(of_cables(span_ensemble(network, second, p, threads), cables), data, adhesion_ids_of(second),
+                      p.fit, threads, {});
+}
+
 /// The checks of the model in a few figures.
 Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models,
                    const std::vector<FibreLeftOut>& left_out, const std::vector<MissingFibre>& missing) {
@@ -180,14 +193,21 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
   for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
     const auto fibre = std::find_if(cell.fibres.begin(), cell.fibres.end(),
                                     [&](const Fibre& f) { return f.fibre_id == fit.fibre_ids[i]; });
-    types.push_back(fibre->type);
-    tensions[fibre->type].push_back(fit.tensions_nN[i].value);
+    types.push_back(fibre->type == FibreType::edge ? FibreType::ventral : fibre->type);  // held alike, at both ends
+    tensions[types.back()].push_back(fit.tensions_nN[i].value);
   }
   if (p.cross_validation == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) {
     return std::nullopt;
   }
   const TensionProblem problem(network, data.reduced, adhesion_ids_of(cell));
   return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
+}
+
+/// Registers the files that it reads.
+std::optional<Cell> second_placement_of(StageContext& context, const Cell& cell) {
+  std::optional<Cell> second = second_placement(context.inputs_.at("cell"), cell);
+  if (second) context.input("cell", kSecondPlacementFiles);
+  return second;
 }
 
 /// Registers the files that it reads.
@@ -283,8 +303,13 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   };
   context.progress(0.35, "placing the cell on the beads");
   const DisplacementField measured = inputs.beads;
+  const bool can_be_shifted = p.effects.channel_shift != "auto" || !has_candidates(cell);
   PlacedCell place = place_cell(inputs.cell, networks.front(), measured, data, data_of, p.gel, p.fit, start,
-                                p.effects.channel_shift, context.threads);
+                                can_be_shifted ? p.effects.channel_shift : "off", context.threads);
+  if (!can_be_shifted)
+    place.effect =
+        decided(kChannelShift, p.effects.channel_shift, false,
+                "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
   data = std::move(place.data);
   if (place.effect.is_on) {
     inputs.beads = in_cell_frame(measured, place.placement);
@@ -324,6 +349,14 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   expect_plausible(context, summary, tensions, forces, inputs.cell.adhesions);
   const auto budget_start = std::chrono::steady_clock::now();
   summary.error_budget = budget_of(fit, data, networks, inputs, *substrate, p, place.effect.is_on, context.threads);
+  if (std::optional<Cell> second = second_placement_of(context, cell)) {
+    context.progress(0.9, "candidates at other places");
+    if (!fibres.is_on) second->fibres.clear();
+    const PlacementSpread spread = spread_between(
+        fit, fit_of(*second, inputs.beads, *substrate, networks.front().parameters(), p, context.threads));
+    summary.error_budget = with_spread(std::move(*summary.error_budget), spread);
+    summary.more.emplace_back("total_force_spread_by_placement_nN", spread.total_force_nN);
+  }
   const double budget_s = std::chrono::duration<double>(std::chrono::steady_clock::now() - budget_start).count();
   if (motion) {
     for (const auto& figure : figures_of(*motion)) summary.more.push_back(figure);

@@ -173,7 +173,7 @@ void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<A
   PointArray traction{.name = "traction_kPa", .scalars = {}, .vectors = {}};
   for (std::size_t a = 0; a < forces.size(); ++a) {
     force.vectors.push_back(forces[a].force_nN);
-    traction.vectors.push_back(1 / cell.adhesions[a].area_um2 * forces[a].force_nN);
+    traction.vectors.push_back(1 / area_stood_for_um2(cell.adhesions[a]) * forces[a].force_nN);
   }
   write_ellipses_vtp(file, cell.adhesions, {force, traction});
 }

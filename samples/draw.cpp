@@ -22,6 +22,7 @@ LogNormal tension_distribution(const TensionParameters& p, FibreType type) {
     case FibreType::arc:
       return {p.arc_median_nN, p.arc_log_sd, low, high};
     case FibreType::ventral:
+    case FibreType::edge:
       return {p.ventral_median_nN, p.ventral_log_sd, low, high};
   }
   throw InternalError("unknown fibre type");

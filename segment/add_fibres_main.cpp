@@ -15,12 +15,13 @@ void declare(ParameterList& list, AddFibresParameters& parameters) {
   (void)parameters;
 }
 
-/// Of the ellipse `adhesion 12`, as lines count: from the centre of the first pixel.
+/// Of the ellipse `adhesion 12`, `anchor 12` or `candidate 12`, as lines count: from the centre of the first pixel.
 Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std::string& file) {
   constexpr double kCentre_px = 0.5;
-  const std::string name = "adhesion " + std::to_string(adhesion_id);
+  const std::string id = " " + std::to_string(adhesion_id), name = "adhesion" + id;
   for (const Roi& roi : rois) {
-    if (roi.name == name && roi.points_px.size() == 2)
+    const bool is_it = roi.name == name || roi.name == "anchor" + id || roi.name == "candidate" + id;
+    if (is_it && roi.points_px.size() == 2)
       return 0.5 * (roi.points_px[0] + roi.points_px[1]) - Vec2{kCentre_px, kCentre_px};
   }
   throw InputError(file, "an ellipse called '" + name + "'", "none",

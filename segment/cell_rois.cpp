@@ -15,6 +15,11 @@ std::vector<Vec2> in_px(const std::vector<Vec2>& points_um, double pixel_um, dou
   return points_px;
 }
 
+/// "adhesion 12"; of those that nobody saw "anchor 12" or "candidate 12".
+std::string name_in_set(const Adhesion& a) {
+  return std::string(is_assumed(a.origin) ? name_of(a.origin) : "adhesion") + " " + std::to_string(a.adhesion_id);
+}
+
 }  // namespace
 
 std::vector<Roi> rois_of(const Cell& cell, double pixel_um) {
@@ -32,7 +37,7 @@ std::vector<Roi> rois_of(const Cell& cell, double pixel_um) {
         in_px(cell.holes_um[i], pixel_um, 0);
   for (const Adhesion& a : cell.adhesions) {
     const Vec2 half = 0.5 * a.major_axis_um * Vec2{std::cos(a.angle_rad), std::sin(a.angle_rad)};
-    Roi& roi = add(RoiShape::ellipse, "adhesion " + std::to_string(a.adhesion_id), kAdhesionColour);
+    Roi& roi = add(RoiShape::ellipse, name_in_set(a), kAdhesionColour);
     roi.points_px = in_px({a.position_um - half, a.position_um + half}, pixel_um, 0);
     roi.aspect_ratio = a.minor_axis_um / a.major_axis_um;
   }

@@ -8,9 +8,9 @@
 
 namespace mbtfm::segment {
 
-/// The outline as a polygon `outline`, its holes as `hole 1`, adhesions as ellipses `adhesion 12`, fibres as segmented
-/// lines `ventral 3`, each in its colour of the overlay. No groups: ImageJ would paint over the colours with its own of
-/// the group.
+/// The outline as a polygon `outline`, its holes as `hole 1`, adhesions as ellipses `adhesion 12`, `anchor 13` or
+/// `candidate 14`, fibres as segmented lines `ventral 3`, each in its colour of the overlay. No groups: ImageJ would
+/// paint over the colours with its own of the group.
 std::vector<Roi> rois_of(const Cell& cell, double pixel_size_um);
 
 }  // namespace mbtfm::segment

@@ -46,7 +46,8 @@ std::string outcome_of(const Segmentation& s) {
 }
 
 Trial trial_of(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-               SegmentParameters parameters, const std::vector<std::pair<std::string, std::string>>& settings) {
+               SegmentParameters parameters, const HandDrawn& drawn,
+               const std::vector<std::pair<std::string, std::string>>& settings) {
   ParameterList list;
   declare(list, parameters);
   Trial trial;
@@ -55,7 +56,7 @@ Trial trial_of(const std::optional<Channel>& adhesion, const std::optional<Chann
     trial.values += (trial.values.empty() ? "" : ", ") + name + " = " + value;
   }
   try {
-    trial.segmentation = segment_cell(adhesion, actin, parameters);
+    trial.segmentation = segment_cell(adhesion, actin, parameters, drawn);
     trial.outcome = outcome_of(*trial.segmentation);
   } catch (const InputError& error) {  // nothing found with these values: the sheet is there to show that
     trial.outcome = error.found;
@@ -101,7 +102,7 @@ std::vector<SheetAxis> parse_axes(const std::string& text) {
 }
 
 Picture draw_contact_sheet(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                           const SegmentParameters& parameters) {
+                           const SegmentParameters& parameters, const HandDrawn& drawn) {
   const std::vector<SheetAxis> axes = parse_axes(parameters.contact_sheet);
   const SheetAxis rows = axes.size() == 2 ? axes[1] : SheetAxis{"", {""}};
   std::vector<Trial> trials;
@@ -109,7 +110,7 @@ Picture draw_contact_sheet(const std::optional<Channel>& adhesion, const std::op
     for (const std::string& across : axes[0].values) {
       std::vector<std::pair<std::string, std::string>> settings = {{axes[0].parameter, across}};
       if (!rows.parameter.empty()) settings.emplace_back(rows.parameter, below);
-      trials.push_back(trial_of(adhesion, actin, parameters, settings));
+      trials.push_back(trial_of(adhesion, actin, parameters, drawn, settings));
     }
   const Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
   Segmentation nothing;

@@ -22,8 +22,9 @@ std::vector<SheetAxis> parse_axes(const std::string& text);
 
 /// A segmentation for each pair of values of `parameters.contact_sheet`, drawn in columns and rows; a caption tells
 /// what was found, or why nothing was.
+/// @param drawn  is used in all of them
 /// @throws UsageError where an axis names no parameter of the segmentation or a value is out of its range
 Picture draw_contact_sheet(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                           const SegmentParameters& parameters);
+                           const SegmentParameters& parameters, const HandDrawn& drawn = {});
 
 }  // namespace mbtfm::segment

@@ -22,21 +22,6 @@ bool is_long(const Polyline& line) {
   return length_um(line) > kLong_um;
 }
 
-/// The adhesion that an end reaches best.
-struct Hold {
-  const Adhesion* adhesion = nullptr;
-  double effort_um = kInfinite;  ///< way ahead to it and twice the way aside
-  double gap_um = kInfinite;     ///< from the line's end to its rim, 0 inside
-  double reach_um = 0;           ///< the effort up to which this end is held
-  bool is_held() const { return adhesion != nullptr && effort_um <= reach_um; }
-  /// That it is held, or not held as the case may be: 1 far from the limit, ½ on it. The place of an end is known to a
-  /// third of the reach.
-  double certainty() const {
-    if (adhesion == nullptr) return 1;
-    return 0.5 * (1 + std::erf(std::abs(effort_um - reach_um) / (reach_um / 3) / std::sqrt(2.0)));
-  }
-};
-
 /// The line's last point and those before it, 0.1 um apart over a length, the last first.
 Polyline last_part(const Polyline& line, double length_um) {
   constexpr double kStep_um = 0.1;
@@ -51,6 +36,39 @@ Polyline last_part(const Polyline& line, double length_um) {
   }
   return points;
 }
+
+/// Does it run along the outline, for most of its length, where that is straight or bent inwards? A bundle along a free
+/// edge spans between adhesions at its ends and draws the edge in (Bischofs et al., Biophys J 95:3488, 2008).
+bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um) {
+  if (outline_um.empty() || line.size() < 2) return false;
+  constexpr double kBeside_um = 1.5, kParallel = 0.866, kMost = 0.6, kStraight = 0.02;  // cosine of 30°
+  const Polyline points = last_part(line, length_um(line));
+  std::size_t n_along = 0;
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+    const Vec2 d = points[i + 1] - points[i], away = points[i] - nearest_on_boundary_um(outline_um, points[i]);
+    n_along += norm(away) < kBeside_um && std::abs(cross(d, away)) >= kParallel * norm(d) * norm(away);
+  }
+  if (static_cast<double>(n_along) < kMost * static_cast<double>(points.size() - 1)) return false;
+  const Vec2 middle = points[points.size() / 2], chord = 0.5 * (points.front() + points.back());
+  const Vec2 nearest = nearest_on_boundary_um(outline_um, middle);
+  const Vec2 inward = contains(outline_um, middle) ? middle - nearest : nearest - middle;
+  return dot(middle - chord, inward) >= -kStraight * length_um(line) * norm(inward);
+}
+
+/// The adhesion that an end reaches best.
+struct Hold {
+  const Adhesion* adhesion = nullptr;
+  double effort_um = kInfinite;  ///< way ahead to it and twice the way aside
+  double gap_um = kInfinite;     ///< from the line's end to its rim, 0 inside
+  double reach_um = 0;           ///< the effort up to which this end is held
+  bool is_held() const { return adhesion != nullptr && effort_um <= reach_um; }
+  /// That it is held, or not held as the case may be: 1 far from the limit, ½ on it. The place of an end is known to a
+  /// third of the reach.
+  double certainty() const {
+    if (adhesion == nullptr) return 1;
+    return 0.5 * (1 + std::erf(std::abs(effort_um - reach_um) / (reach_um / 3) / std::sqrt(2.0)));
+  }
+};
 
 Vec2 direction_of_end(const Polyline& last) {
   const Vec2 d = last.front() - last.back();
@@ -88,7 +106,8 @@ double outwardness(const Polyline& last, const Polygon& outline_um) {
 /// The adhesion at the line's last point.
 Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
   constexpr double kDirectionCounts = 0.3;  // of the reach: it decides near the limit and nowhere else
-  if (is_long(line)) reach_um *= 2;
+  const bool is_along_edge = runs_along_free_edge(line, outline_um);
+  if (is_long(line) || is_along_edge) reach_um *= 2;
   const Polyline last = last_part(line, reach_um);
   Hold best;
   double least = kInfinite;
@@ -102,17 +121,24 @@ Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const
       best = {&a, effort, std::max(0.0, distance_to_ellipse_um(a, line.back())), 0};
     }
   }
-  best.reach_um = reach_um * (1 + kDirectionCounts * outwardness(last, outline_um));
+  best.reach_um = reach_um * (1 + kDirectionCounts * (is_along_edge ? 0 : outwardness(last, outline_um)));
   return best;
 }
 
-/// Let the line end at the centre: leave out the last points that lie past it or within a micrometre of it.
+/// Let the line end at the centre: leave out what lies past it, and the last points within a micrometre of it. Points
+/// of a line may lie far apart, so that it passes the centre between two of them.
 void lead_to(Polyline& line, const Adhesion& adhesion) {
   const Vec2 centre = adhesion.position_um;
   std::size_t nearest = 0;
-  for (std::size_t i = 1; i < line.size(); ++i)
-    if (norm(line[i] - centre) < norm(line[nearest] - centre)) nearest = i;
+  Vec2 foot = line.front();
+  for (std::size_t i = 0; i + 1 < line.size(); ++i) {
+    const Vec2 candidate = line[i] + nearest_share(line[i], line[i + 1], centre) * (line[i + 1] - line[i]);
+    if (norm(candidate - centre) > norm(foot - centre)) continue;
+    nearest = i;
+    foot = candidate;
+  }
   line.resize(nearest + 1);
+  if (!(foot == line.back())) line.push_back(foot);
   const double clear = std::max(0.5, adhesion.major_axis_um / 2);
   while (line.size() > 1 && norm(line.back() - centre) < clear) line.pop_back();
   line.push_back(centre);
@@ -166,11 +192,13 @@ void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const 
   }
 }
 
-void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
+void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
+              EndsToTie ends) {
   Polyline& line = fibre.points_um;
-  Hold end = hold_of(line, adhesions, outline_um, reach_um);
+  const bool is_along_edge = runs_along_free_edge(line, outline_um);
+  Hold end = ends.end ? hold_of(line, adhesions, outline_um, reach_um) : Hold{};
   std::reverse(line.begin(), line.end());
-  Hold start = hold_of(line, adhesions, outline_um, reach_um);
+  Hold start = ends.start ? hold_of(line, adhesions, outline_um, reach_um) : Hold{};
   if (start.adhesion == end.adhesion && start.adhesion != nullptr)
     (start.effort_um <= end.effort_um ? end : start) = Hold{};
   fibre.type_confidence = start.certainty() * end.certainty();
@@ -187,7 +215,10 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
     fibre.end_adhesion_id = end.adhesion->adhesion_id;
   }
   const int n_tied = fibre.start_adhesion_id.has_value() + fibre.end_adhesion_id.has_value();
-  fibre.type = n_tied == 2 ? FibreType::ventral : n_tied == 1 ? FibreType::dorsal : FibreType::arc;
+  fibre.type = n_tied == 2   ? is_along_edge ? FibreType::edge : FibreType::ventral
+               : n_tied == 1 ? FibreType::dorsal
+                             : FibreType::arc;
+  if (fibre.type == FibreType::edge) fibre.type_reason += "; along a free edge";
 }
 
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {

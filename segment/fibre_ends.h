@@ -22,6 +22,11 @@ struct TracedFibre {
 /// up to it: near an adhesion a fibre thins out, and other fibres hide it.
 void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um);
 
+/// Which ends may be tied.
+struct EndsToTie {
+  bool start = true, end = true;
+};
+
 /// Tie each end to the adhesion it reaches: on the line's own course, at most `reach_um` ahead of the end or half of it
 /// aside; the nearest. A tied end is led to the adhesion's centre. Both ends never share an adhesion; the nearer one
 /// has it.
@@ -31,7 +36,9 @@ void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const 
 /// the latter. Sets the type by the number of tied ends (Hotulainen & Lappalainen 2006), the chance that it is right,
 /// and the reason in words.
 /// @param outline_um  of the cell; empty: direction tells nothing
-void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um);
+/// @param ends  the others stay as they are drawn, free
+void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,
+              EndsToTie ends = {});
 
 /// A fibre that leaves the image: a free end that points at a cut of the outline from at most `reach_um` away is led to
 /// it. Whether an adhesion holds the fibre out there nobody sees, so its type is as likely wrong as right.

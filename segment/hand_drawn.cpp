@@ -4,7 +4,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "segment/candidates.h"
 #include "segment/ellipse.h"
 #include "segment/fibre_ends.h"
 #include "segment/fibre_profile.h"
@@ -129,19 +131,34 @@ double height_within(const Polygon& area_um, const Adhesion& adhesion, const Ima
   return inside - *middle;
 }
 
+/// The words of a selection's name, in small letters.
+std::vector<std::string> words_of(const std::string& name) {
+  std::vector<std::string> words(1);
+  for (const char c : name) {
+    if (std::isalpha(static_cast<unsigned char>(c)))
+      words.back() += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+    else if (!words.back().empty())
+      words.emplace_back();
+  }
+  return words;
+}
+
+/// The program's own anchors and candidates, given back by hand, stay what they are.
+AdhesionOrigin stated_origin(const std::string& name) {
+  for (const std::string& word : words_of(name)) {
+    const std::optional<AdhesionOrigin> origin = adhesion_origin_of(word);
+    if (origin && is_assumed(*origin)) return *origin;
+  }
+  return AdhesionOrigin::drawn;
+}
+
 /// The type that a name's words or the group state; none where neither does.
 std::optional<FibreType> stated_type(const Roi& roi, const std::string& where) {
   std::optional<FibreType> type;
-  std::string word;
-  for (const char c : roi.name + " ") {
-    if (std::isalpha(static_cast<unsigned char>(c))) {
-      word += static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-      continue;
-    }
+  for (const std::string& word : words_of(roi.name)) {
     const std::optional<FibreType> named = fibre_type_of(word);
     if (named && type && *named != *type) throw InputError(where, "one fibre type in its name", "two");
     if (named) type = named;
-    word.clear();
   }
   const bool is_type = roi.group >= 1 && roi.group <= static_cast<int>(std::size(kFibreTypes));
   if (!type && is_type) type = kFibreTypes[roi.group - 1];
@@ -233,35 +250,127 @@ std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optiona
     const Polygon polygon_um = area_um(set, roi, field);
     Adhesion a = ellipse_of(roi, polygon_um, field, called(set, roi));
     a.adhesion_id = static_cast<int>(adhesions.size()) + 1;
+    a.origin = stated_origin(roi.name);
     if (adhesion) a.mean_intensity = height_within(polygon_um, a, adhesion->image, field.pixel_um);
     adhesions.push_back(a);
   }
   return adhesions;
 }
 
-std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
-                                     const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
-                                     const FibreParameters& p, const Cuts& cuts) {
-  std::vector<Fibre> fibres;
+std::vector<DrawnLine> drawn_lines(const RoiSet& set, const std::optional<Channel>& actin, const Field& field,
+                                   const FibreParameters& p) {
+  std::vector<DrawnLine> lines;
   for (const Roi& roi : set.rois) {
     const std::string where = called(set, roi);
-    Fibre fibre = drawn_fibre(set, roi, field);
-    const std::optional<FibreType> stated = stated_type(roi, where);
-    set_profile(fibre, roi, actin, field.pixel_um, p);
-    tie_ends(fibre, adhesions, outline_um, p.fibre_reach_um);
-    lead_to_cut(fibre, cuts, p.fibre_reach_um);
-    if (fibre.points_um.size() < 2)
-      throw InputError(where, "a line from one adhesion to another or beyond", "one within a single adhesion");
-    fibre.confidence = 1;  // a person says that it is one
-    if (stated) {
-      fibre.type = *stated;
-      fibre.type_confidence = 1;
-      fibre.type_reason = "named or grouped so by hand";
-    }
-    fibre.fibre_id = static_cast<int>(fibres.size()) + 1;
-    fibres.push_back(std::move(fibre));
+    DrawnLine line{.fibre = drawn_fibre(set, roi, field), .stated = stated_type(roi, where), .where = where};
+    set_profile(line.fibre, roi, actin, field.pixel_um, p);
+    line.fibre.confidence = 1;  // a person says that it is one
+    line.fibre.fibre_id = static_cast<int>(lines.size()) + 1;
+    lines.push_back(std::move(line));
   }
-  return fibres;
+  return lines;
+}
+
+std::vector<Vec2> held_ends_um(const DrawnLine& line) {
+  const Polyline& points = line.fibre.points_um;
+  const int n = line.stated ? n_held_ends(*line.stated) : 2;
+  if (n == 0) return {};
+  if (n == 1) return {points.front()};
+  return {points.front(), points.back()};
+}
+
+namespace {
+
+/// Ends that may be tied. Of a dorsal fibre one: that which reaches an adhesion, as the program's own fibres are given
+/// back in either direction; its start where that does not tell.
+EndsToTie ends_of(const DrawnLine& line, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
+                  double reach_um) {
+  if (!line.stated || n_held_ends(*line.stated) == 2) return {};
+  if (n_held_ends(*line.stated) == 0) return {.start = false, .end = false};
+  Fibre tried = line.fibre;
+  tie_ends(tried, adhesions, outline_um, reach_um);
+  const bool is_end = tried.end_adhesion_id && !tried.start_adhesion_id;
+  return {.start = !is_end, .end = is_end};
+}
+
+bool is_on_cut(Vec2 point_um, const Cuts& cuts) {
+  constexpr double kOnIt_um = 1e-6;  // led there
+  return std::ranges::any_of(
+      cuts, [&](const auto& cut) { return distance_to_segment_um(point_um, cut.first, cut.second) < kOnIt_um; });
+}
+
+/// The end of a fibre where an anchor can be: in the cell, or on its edge where it was drawn a little outside.
+Vec2 place_of_anchor(Vec2 end_um, const CellOutline& cell, const std::string& where) {
+  if (cell.outer_um.empty()) return end_um;
+  constexpr double kFarthest_um = 3;  // as of adhesions: further out it is another cell's, or the outline is wrong
+  const auto is_in_ring = [&](const Polygon& ring) { return contains(ring, end_um); };
+  const auto hole = std::ranges::find_if(cell.holes_um, is_in_ring);
+  if (is_in_ring(cell.outer_um) && hole == cell.holes_um.end()) return end_um;
+  const Polygon& ring = hole == cell.holes_um.end() ? cell.outer_um : *hole;
+  const Vec2 nearest = nearest_on_boundary_um(ring, end_um);
+  if (norm(nearest - end_um) > kFarthest_um)
+    throw InputError(where, "ends in the cell, where they can be held",
+                     "one " + brief(norm(nearest - end_um)) + " um outside the outline",
+                     "check the outline in overlay.png, and draw it, too, if it is wrong (outline_roi)");
+  return nearest;
+}
+
+/// Tie a line's free end that must be held, its last point, to an anchor of its own.
+int add_anchor(Polyline& line, std::vector<Adhesion>& all, const CellOutline& cell, double area_um2,
+               const std::string& where) {
+  int largest_id = 0;
+  for (const Adhesion& a : all) largest_id = std::max(largest_id, a.adhesion_id);
+  Adhesion made = anchor(place_of_anchor(line.back(), cell, where), area_um2);
+  made.adhesion_id = largest_id + 1;
+  if (!(made.position_um == line.back())) {
+    line.back() = made.position_um;
+    if (line.size() > 1 && line[line.size() - 2] == line.back()) line.pop_back();
+  }
+  all.push_back(made);
+  return made.adhesion_id;
+}
+
+/// Tie the line, and make the anchors that its type asks for.
+Fibre held(DrawnLine line, std::vector<Adhesion>& all, const CellOutline& cell, const FibreParameters& p,
+           double anchor_area_um2, const Cuts& cuts) {
+  const EndsToTie ends = ends_of(line, all, cell.outer_um, p.fibre_reach_um);
+  Fibre& fibre = line.fibre;
+  tie_ends(fibre, all, cell.outer_um, p.fibre_reach_um, ends);
+  lead_to_cut(fibre, cuts, p.fibre_reach_um);
+  if (fibre.points_um.size() < 2)
+    throw InputError(line.where, "a line from one adhesion to another or beyond", "one within a single adhesion");
+  if (!line.stated) return fibre;
+  const auto hold = [&](bool is_asked, std::optional<int>& adhesion_id) {
+    if (is_asked && !adhesion_id && !is_on_cut(fibre.points_um.back(), cuts))
+      adhesion_id = add_anchor(fibre.points_um, all, cell, anchor_area_um2, line.where);
+  };
+  hold(ends.end, fibre.end_adhesion_id);
+  std::reverse(fibre.points_um.begin(), fibre.points_um.end());
+  hold(ends.start, fibre.start_adhesion_id);
+  std::reverse(fibre.points_um.begin(), fibre.points_um.end());
+  fibre.type = *line.stated;
+  fibre.type_confidence = 1;
+  fibre.type_reason = "named or grouped so by hand";
+  return fibre;
+}
+
+}  // namespace
+
+HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>& adhesions, const CellOutline& cell,
+                       const FibreParameters& p, double anchor_area_um2, const Cuts& cuts) {
+  std::vector<Adhesion> all = adhesions;
+  std::vector<std::optional<Fibre>> fibres(lines.size());
+  // first those whose types ask for anchors, which then hold the others, too
+  for (const bool is_stated : {true, false}) {
+    for (std::size_t i = 0; i < lines.size(); ++i) {
+      if (lines[i].stated.has_value() == is_stated)
+        fibres[i] = held(std::move(lines[i]), all, cell, p, anchor_area_um2, cuts);
+    }
+  }
+  HeldFibres result;
+  for (std::optional<Fibre>& fibre : fibres) result.fibres.push_back(std::move(*fibre));
+  result.anchors.assign(all.begin() + static_cast<std::ptrdiff_t>(adhesions.size()), all.end());
+  return result;
 }
 
 Adhesion ellipse_of_polygon(const Polygon& polygon) {

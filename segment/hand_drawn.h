@@ -1,6 +1,7 @@
 /// Outline, adhesions and fibres that a person has drawn in ImageJ.
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
@@ -19,8 +20,11 @@ struct RoiSet {
 };
 
 /// What is drawn is used instead of the segmentation of that part.
+struct LabelMask;
 struct HandDrawn {
   std::optional<RoiSet> outline, adhesions, fibres;
+  /// Of another program, or drawn with its brush. Where there are selections, too, these count.
+  std::shared_ptr<const LabelMask> outline_mask{}, adhesion_mask{};
 };
 
 /// The field in which they must lie.
@@ -41,14 +45,32 @@ CellOutline hand_drawn_outline(const RoiSet& set, const Field& field);
 std::vector<Adhesion> hand_drawn_adhesions(const RoiSet& set, const std::optional<Channel>& adhesion,
                                            const Field& field);
 
-/// Each line as a fibre, its ends tied to the adhesions they reach. The type is that of its name ("dorsal 3",
-/// "Ventral-12", "arc_1") or of its group (1 dorsal, 2 arc, 3 ventral), with certainty, else that of its ends. Width
-/// and intensity from the image across the line, else its stroke or the typical width.
+/// A line of a set as a fibre, not yet tied to adhesions.
+struct DrawnLine {
+  Fibre fibre;
+  std::optional<FibreType>
+      stated;         ///< its type, by name ("dorsal 3", "Edge-12", "arc_1") or group (kFibreTypes, from 1)
+  std::string where;  ///< names it in errors
+};
+/// Width and intensity from the image across the line, else its stroke or the typical width.
 /// @throws InputError naming the selection that is no line, lies outside, is shorter than a pixel or is named for two
 /// types
-std::vector<Fibre> hand_drawn_fibres(const RoiSet& set, const std::vector<Adhesion>& adhesions,
-                                     const Polygon& outline_um, const std::optional<Channel>& actin, const Field& field,
-                                     const FibreParameters& parameters, const Cuts& cuts = {});
+std::vector<DrawnLine> drawn_lines(const RoiSet& set, const std::optional<Channel>& actin, const Field& field,
+                                   const FibreParameters& parameters);
+
+/// Ends that a line's type says are held: of a type that is not stated both, if they reach an adhesion.
+std::vector<Vec2> held_ends_um(const DrawnLine& line);
+
+struct HeldFibres {
+  std::vector<Fibre> fibres;
+  std::vector<Adhesion> anchors;  ///< ids after the adhesions' largest
+};
+/// Fibres held as their type says: ventral and edge ones at both ends; a dorsal one at the end that reaches an
+/// adhesion, else, or where both do, at its start; an arc nowhere. Where no adhesion is in reach an anchor is made, but
+/// for ends on a cut. Of a line whose type is not stated the ends are tied to what they reach, which makes its type.
+/// @throws InputError naming the line whose end must be held and lies outside the cell, or that lies within an adhesion
+HeldFibres hold_fibres(std::vector<DrawnLine> lines, const std::vector<Adhesion>& adhesions, const CellOutline& cell,
+                       const FibreParameters& parameters, double anchor_area_um2, const Cuts& cuts = {});
 
 /// Area, centroid and the ellipse of equal second moments of a polygon, scaled to its area.
 ///

@@ -93,6 +93,31 @@ class Canvas {
     }
     cv::polylines(picture_, points, is_closed, colour, thickness, cv::LINE_AA, kShift);
   }
+  /// The same in dashes: what nobody has seen, and edge fibres, for eyes that see no colours.
+  void dashed_line(Polyline points_um, bool is_closed, const cv::Scalar& colour, int thickness, double dash_px) {
+    if (is_closed) points_um.push_back(points_um.front());
+    constexpr double kGap = 0.7;  // of a dash: still a line for the eye
+    Polyline dash{points_um.front()};
+    double left_um = dash_px * pixel_um_;
+    bool is_gap = false;
+    const auto end_piece = [&] {
+      if (!is_gap && dash.size() > 1) line(dash, false, colour, thickness);
+      is_gap = !is_gap;
+      left_um = (is_gap ? kGap : 1) * dash_px * pixel_um_;
+      dash = {dash.back()};
+    };
+    for (std::size_t i = 1; i < points_um.size(); ++i) {
+      Vec2 rest = points_um[i] - dash.back();
+      while (norm(rest) > left_um) {
+        dash.push_back(dash.back() + (left_um / norm(rest)) * rest);
+        end_piece();
+        rest = points_um[i] - dash.back();
+      }
+      left_um -= norm(rest);
+      dash.push_back(points_um[i]);
+    }
+    end_piece();
+  }
   /// Keep labels off this place.
   void occupy(const Polyline& points_um) {
     std::vector<cv::Point2f> points;
@@ -139,7 +164,9 @@ void draw_labels(Canvas& canvas, const Cell& cell) {
                  scalar(colour_of(f.type)), kFibreText);
   for (const Adhesion& a : cell.adhesions) canvas.occupy(ellipse_polygon(a, 16));
   std::vector<const Adhesion*> large_first;
-  for (const Adhesion& a : cell.adhesions) large_first.push_back(&a);
+  for (const Adhesion& a : cell.adhesions) {
+    if (a.origin != AdhesionOrigin::candidate) large_first.push_back(&a);  // of a lattice numbers would hide the cell
+  }
   std::stable_sort(large_first.begin(), large_first.end(),
                    [](const Adhesion* a, const Adhesion* b) { return a->area_um2 > b->area_um2; });
   for (const Adhesion* a : large_first)
@@ -159,6 +186,7 @@ struct Entry {
   cv::Scalar colour;
   int bar = 56;     ///< length of the line (px)
   int height = 10;  ///< of the line (px)
+  bool is_dashed = false;
 };
 
 std::vector<Entry> entries_of(const Cell& cell, double pixel_um, int width) {
@@ -166,9 +194,19 @@ std::vector<Entry> entries_of(const Cell& cell, double pixel_um, int width) {
   for (const FibreType type : kFibreTypes) {
     const auto n =
         std::count_if(cell.fibres.begin(), cell.fibres.end(), [&](const Fibre& f) { return f.type == type; });
+    if (type == FibreType::edge && n == 0) continue;
     entries.push_back({std::string(name_of(type)) + " " + std::to_string(n), scalar(colour_of(type))});
+    entries.back().is_dashed = type == FibreType::edge;
   }
-  entries.push_back({"adhesion " + std::to_string(cell.adhesions.size()), scalar(kAdhesionColour)});
+  const auto add_adhesions = [&](const std::string& name, bool is_dashed, const auto& is_one) {
+    const auto n = std::ranges::count_if(cell.adhesions, is_one);
+    if (n == 0 && !(cell.adhesions.empty() && !is_dashed)) return;
+    entries.push_back({name + " " + std::to_string(n), scalar(kAdhesionColour)});
+    entries.back().is_dashed = is_dashed;
+  };
+  add_adhesions("adhesion", false, [](const Adhesion& a) { return !is_assumed(a.origin); });
+  add_adhesions("anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
+  add_adhesions("candidate", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
   entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});
   const double bar_um = round_length(0.2 * width * pixel_um);
   char text[32];
@@ -184,8 +222,11 @@ int text_width(const std::string& text) {
 
 void draw_entry(cv::Mat& footer, const Entry& entry, cv::Point at) {
   const int thickness = thickness_of(kLegendText);
-  cv::rectangle(footer, {at.x, at.y - entry.height / 2}, {at.x + entry.bar, at.y + entry.height / 2}, entry.colour,
-                cv::FILLED);
+  const int n_dashes = entry.is_dashed ? 3 : 1, dash = entry.bar / (2 * n_dashes - 1);
+  for (int i = 0; i < n_dashes; ++i) {
+    const int left = at.x + 2 * i * dash, right = entry.is_dashed ? left + dash : at.x + entry.bar;
+    cv::rectangle(footer, {left, at.y - entry.height / 2}, {right, at.y + entry.height / 2}, entry.colour, cv::FILLED);
+  }
   const cv::Point origin(at.x + entry.bar + 14, at.y + 11);
   cv::putText(footer, entry.text, origin, kFont, kLegendText, kInk, thickness, cv::LINE_AA);
   const auto unit = entry.text.find(" um");
@@ -213,9 +254,21 @@ cv::Mat legend(const std::vector<Entry>& entries, int width) {
 void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   canvas.line(cell.outline_um, true, scalar(kOutlineColour), thickness);
   for (const Polygon& hole : cell.holes_um) canvas.line(hole, true, scalar(kOutlineColour), thickness);
-  for (const Adhesion& a : cell.adhesions)
-    canvas.line(ellipse_polygon(a, 32), true, scalar(kAdhesionColour), thickness);
-  for (const Fibre& f : cell.fibres) canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
+  constexpr double kRingDash_px = 7, kFibreDash_px = 22;
+  for (const Adhesion& a : cell.adhesions) {
+    const Polygon ring = ellipse_polygon(a, 32);
+    if (is_assumed(a.origin))
+      canvas.dashed_line(ring, true, scalar(kAdhesionColour), a.origin == AdhesionOrigin::anchor ? thickness : 1,
+                         kRingDash_px);
+    else
+      canvas.line(ring, true, scalar(kAdhesionColour), thickness);
+  }
+  for (const Fibre& f : cell.fibres) {
+    if (f.type == FibreType::edge)
+      canvas.dashed_line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1, kFibreDash_px);
+    else
+      canvas.line(f.points_um, false, scalar(colour_of(f.type)), thickness + 1);
+  }
 }
 
 Picture picture_of(const cv::Mat& rgb) {

@@ -14,10 +14,13 @@ struct Colour {
 // Those of the report's plots (Okabe & Ito's palette, which colour-blind people can tell apart), lighter for the dark
 // ground.
 inline constexpr Colour kVentralColour{0, 214, 143}, kDorsalColour{86, 180, 255}, kArcColour{255, 183, 40},
-    kAdhesionColour{255, 170, 235}, kOutlineColour{225, 225, 225};
+    kEdgeColour{255, 122, 82}, kAdhesionColour{255, 170, 235}, kOutlineColour{225, 225, 225};
 
 constexpr Colour colour_of(FibreType type) {
-  return type == FibreType::ventral ? kVentralColour : type == FibreType::dorsal ? kDorsalColour : kArcColour;
+  return type == FibreType::ventral  ? kVentralColour
+         : type == FibreType::dorsal ? kDorsalColour
+         : type == FibreType::edge   ? kEdgeColour
+                                     : kArcColour;
 }
 
 }  // namespace mbtfm::segment

@@ -1,6 +1,7 @@
 #include "segment/segment_cell.h"
 
 #include <algorithm>
+#include <functional>
 #include <cmath>
 
 #include "pipeline/contract/csv.h"
@@ -27,6 +28,7 @@ void declare(ParameterList& list, SegmentParameters& p) {
   list.add("contact_sheet", p.contact_sheet,
            "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
   declare(list, p.adhesions);
+  declare(list, p.candidates);
   declare(list, p.fibres);
   declare(list, p.outline);
 }
@@ -98,49 +100,225 @@ void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& trac
   }
 }
 
-}  // namespace
+/// The images of a field, and where its adhesions come from.
+struct Inputs {
+  const std::optional<Channel>&adhesion, &actin;
+  const SegmentParameters& parameters;
+  const HandDrawn& drawn;
+  Field field;
+  AdhesionSource source = AdhesionSource::image;
+};
 
-std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
-                                        const SegmentParameters& p, const HandDrawn& drawn) {
+/// Seen ones: by hand, of a mask, or of the image.
+std::vector<Adhesion> seen_adhesions(const Inputs& in) {
+  if (in.source != AdhesionSource::image) return {};
+  if (in.drawn.adhesions) return hand_drawn_adhesions(*in.drawn.adhesions, in.adhesion, in.field);
+  if (in.drawn.adhesion_mask) return mask_adhesions(*in.drawn.adhesion_mask, in.adhesion, in.field);
+  return adhesions_of(*in.adhesion, in.field.pixel_um, in.parameters);
+}
+
+const std::string& name_of_adhesions(const Inputs& in) {
+  if (in.drawn.adhesions) return in.drawn.adhesions->name;
+  return in.drawn.adhesion_mask ? in.drawn.adhesion_mask->name : in.adhesion->name;
+}
+
+struct Outlines {
+  std::vector<CellOutline> chosen;
+  int n_cells = 1;  ///< in the image
+};
+
+Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
+  const SegmentParameters& p = in.parameters;
+  if (in.drawn.outline) {
+    return {chosen({hand_drawn_outline(*in.drawn.outline, in.field)}, in.actin ? *in.actin : *in.adhesion, p), 1};
+  }
+  if (in.drawn.outline_mask)
+    return {mask_outlines(*in.drawn.outline_mask, p.cell, in.field, p.outline),
+            n_cells_in(*in.drawn.outline_mask, in.field, p.outline)};
+  const Channel& shape = in.actin ? *in.actin : *in.adhesion;
+  std::vector<CellOutline> all = outlines_of(shape, found, in.field.pixel_um, p);
+  const int n_cells = static_cast<int>(all.size());
+  return {chosen(std::move(all), shape, p), n_cells};
+}
+
+/// Fibres before they are tied: traced, or drawn by hand.
+struct Lines {
+  std::vector<TracedFibre> traced;
+  std::vector<DrawnLine> drawn;
+  bool are_drawn = false;
+};
+
+std::vector<Vec2> ends_um(const Lines& lines) {
+  std::vector<Vec2> ends;
+  for (const DrawnLine& line : lines.drawn)
+    for (const Vec2 end : held_ends_um(line)) ends.push_back(end);
+  for (const TracedFibre& t : lines.traced)
+    ends.insert(ends.end(), {t.fibre.points_um.front(), t.fibre.points_um.back()});
+  return ends;
+}
+
+/// Where adhesions may be, in this cell.
+std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, const Lines& lines,
+                                    Placement placement) {
+  const CandidateParameters& p = in.parameters.candidates;
+  std::vector<Adhesion> candidates;
+  if (in.source != AdhesionSource::pattern) candidates = candidates_at(ends_um(lines), p.candidate_spacing_um);
+  if (in.source != AdhesionSource::fibre_ends) {
+    const Cell whole{.adhesions = {}, .fibres = {}, .outline_um = cell.outer_um, .holes_um = cell.holes_um};
+    const std::vector<Adhesion> at_ends = candidates;
+    const auto is_possible = [&](Vec2 point) {
+      if (in.source == AdhesionSource::pattern) return covers(*in.drawn.adhesion_mask, point, in.field);
+      const bool is_taken = std::ranges::any_of(
+          at_ends, [&](const Adhesion& end) { return norm(end.position_um - point) < p.candidate_spacing_um; });
+      return !is_taken && distance_to_edge_um(whole, point) <= p.candidate_band_um;
+    };
+    Vec2 low = cell.outer_um.front(), high = low;
+    for (const Vec2 point : cell.outer_um) {
+      low = {std::min(low.x, point.x), std::min(low.y, point.y)};
+      high = {std::max(high.x, point.x), std::max(high.y, point.y)};
+    }
+    const auto in_cell = [&](Vec2 point) {
+      const auto is_in = [&](const Polygon& ring) { return contains(ring, point); };
+      return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in) && is_possible(point);
+    };
+    for (Adhesion& a : lattice_candidates(low, high, p.candidate_spacing_um, placement, in_cell))
+      candidates.push_back(std::move(a));
+  }
+  return inside(cell, candidates);  // which renews the ids
+}
+
+void require_candidates(const Inputs& in, const Cell& cell) {
+  if (!cell.adhesions.empty()) return;
+  if (in.source == AdhesionSource::pattern)
+    throw InputError(in.drawn.adhesion_mask->name, "a pattern beneath the cell", "none of it inside the outline",
+                     "does the mask lie on these images? Check candidate_spacing_um (" +
+                         in_um(in.parameters.candidates.candidate_spacing_um) + ")");
+  throw InputError(in.actin ? in.actin->name : in.adhesion->name, "places for adhesions in the cell",
+                   in.source == AdhesionSource::fibre_ends ? "no fibre, at whose ends they could be" : "none",
+                   "give an adhesion image or an adhesion mask, or set adhesions = cell");
+}
+
+/// As tied(), but a fibre has the same id wherever the candidates are: that of its place among the traced ones, the
+/// longest first.
+std::vector<Fibre> tied_one_by_one(std::vector<TracedFibre> traced, const Cell& cell, const FibreParameters& p) {
+  std::ranges::stable_sort(traced, std::greater(), [](const TracedFibre& t) { return length_um(t.fibre.points_um); });
+  std::vector<Fibre> fibres;
+  for (std::size_t i = 0; i < traced.size(); ++i) {
+    for (Fibre& fibre : tied({traced[i]}, cell.adhesions, cell.outline_um, p, cuts_of(cell))) {
+      fibre.fibre_id = static_cast<int>(i) + 1;
+      fibres.push_back(std::move(fibre));
+    }
+  }
+  return fibres;
+}
+
+/// The cell's adhesions and its fibres, tied to them.
+void hold(Cell& cell, std::vector<Adhesion> adhesions, Lines lines, const CellOutline& outline, const Inputs& in) {
+  const SegmentParameters& p = in.parameters;
+  cell.adhesions = std::move(adhesions);
+  if (lines.are_drawn) {
+    HeldFibres held = hold_fibres(std::move(lines.drawn), cell.adhesions, outline, p.fibres,
+                                  p.candidates.anchor_area_um2, cuts_of(cell));
+    cell.fibres = std::move(held.fibres);
+    cell.adhesions.insert(cell.adhesions.end(), held.anchors.begin(), held.anchors.end());
+  } else if (in.source == AdhesionSource::image) {
+    cell.fibres = tied(std::move(lines.traced), cell.adhesions, cell.outline_um, p.fibres, cuts_of(cell));
+  } else {
+    cell.fibres = tied_one_by_one(lines.traced, cell, p.fibres);
+    for (Fibre& fibre : cell.fibres) {
+      if (in.source == AdhesionSource::pattern) break;
+      fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+      fibre.type_reason += "; candidates were put at its ends";
+    }
+  }
+  for (Adhesion& a : cell.adhesions) a.edge_distance_um = distance_to_edge_um(cell, a.position_um);
+}
+
+/// Inputs that others took the place of.
+std::vector<std::string> unused_in(const Inputs& in) {
+  const HandDrawn& d = in.drawn;
+  std::vector<std::string> unused;
+  const auto add = [&](const std::string& name, const std::string& why) {
+    unused.push_back(name + " is not used: " + why + ".");
+  };
+  if (d.outline && d.outline_mask) add(d.outline_mask->name, "the outline of " + d.outline->name + " counts");
+  const bool is_seen = in.source == AdhesionSource::image;
+  const std::string as_told = "adhesions = " + std::string(name_of(in.source));
+  if (is_seen && d.adhesions && d.adhesion_mask)
+    add(d.adhesion_mask->name, "the adhesions of " + d.adhesions->name + " count");
+  if (!is_seen && d.adhesions) add(d.adhesions->name, as_told);
+  if (!is_seen && in.source != AdhesionSource::pattern && d.adhesion_mask) add(d.adhesion_mask->name, as_told);
+  return unused;
+}
+
+Inputs inputs_of(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                 const SegmentParameters& p, const HandDrawn& drawn) {
   if (!adhesion && !actin) throw UsageError("an adhesion image or an actin image is needed, best both");
   if (drawn.fibres && p.cell == 0)
     throw UsageError("fibres drawn by hand belong to one cell: choose it (cell), not all of them (cell = 0)");
   const Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
   require_equal_sizes(first, second);
   const double pixel_um = common_pixel_size_um(first, second, p.pixel_size_um);
-  const Field field{first.image.width, first.image.height, pixel_um};
-  const auto found = drawn.adhesions ? hand_drawn_adhesions(*drawn.adhesions, adhesion, field)
-                     : adhesion      ? adhesions_of(*adhesion, pixel_um, p)
-                                     : std::vector<Adhesion>{};
-  const Channel& shape = actin ? *actin : *adhesion;
-  const auto outlines =
-      drawn.outline ? std::vector{hand_drawn_outline(*drawn.outline, field)} : outlines_of(shape, found, pixel_um, p);
-  if (actin && drawn.outline && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
-  std::vector<Segmentation> result;
-  for (const CellOutline& outline : chosen(outlines, shape, p)) {
-    Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um, outline.is_cut},
-                   .pixel_size_um = pixel_um,
-                   .n_cells = static_cast<int>(outlines.size()),
-                   .area_um2 = outline.area_um2,
-                   .is_cut_by_border = outline.is_cut_by_border()};
-    if (!s.is_cut_by_border) s.cell.is_cut.clear();
-    std::vector<TracedFibre> traced;
-    if (actin && !drawn.fibres) traced = trace_fibres(actin->image, s.cell.outline_um, pixel_um, p.fibres);
-    CellOutline around = outline;
-    if (adhesion && !drawn.outline) align(s, around, traced, found, p);
-    s.cell.adhesions = inside(around, found);
-    s.n_adhesions_outside = static_cast<int>(found.size() - s.cell.adhesions.size());
-    if (!found.empty() && s.cell.adhesions.empty() && p.cell != 0)
-      throw InputError(drawn.adhesions ? drawn.adhesions->name : adhesion->name, "adhesions inside the cell's outline",
+  Inputs in{adhesion, actin, p, drawn, {first.image.width, first.image.height, pixel_um}};
+  in.source =
+      source_of(p.candidates, adhesion || drawn.adhesions || drawn.adhesion_mask, drawn.adhesion_mask != nullptr);
+  for (const auto& mask : {drawn.outline_mask, drawn.adhesion_mask})
+    if (mask) require_size(*mask, in.field);
+  return in;
+}
+
+Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std::vector<Adhesion>& found,
+                         int n_cells) {
+  const SegmentParameters& p = in.parameters;
+  Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um, outline.is_cut},
+                 .pixel_size_um = in.field.pixel_um,
+                 .n_cells = n_cells,
+                 .area_um2 = outline.area_um2,
+                 .is_cut_by_border = outline.is_cut_by_border(),
+                 .source = in.source};
+  if (!s.is_cut_by_border) s.cell.is_cut.clear();
+  const bool is_given = in.drawn.outline || in.drawn.outline_mask;
+  Lines lines{.traced = {}, .drawn = {}, .are_drawn = in.drawn.fibres.has_value()};
+  if (in.drawn.fibres)
+    lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
+  else if (in.actin)
+    lines.traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
+  CellOutline around = outline;
+  if (in.source == AdhesionSource::image) {
+    if (in.adhesion && !is_given) align(s, around, lines.traced, found, p);
+    std::vector<Adhesion> own = inside(around, found);
+    s.n_adhesions_outside = static_cast<int>(found.size() - own.size());
+    if (!found.empty() && own.empty() && p.cell != 0)
+      throw InputError(name_of_adhesions(in), "adhesions inside the cell's outline",
                        std::to_string(found.size()) + " outside and none inside",
                        "do both channels show the same cell at the same place?");
-    if (drawn.fibres)
-      s.cell.fibres = hand_drawn_fibres(*drawn.fibres, s.cell.adhesions, s.cell.outline_um, actin, field, p.fibres,
-                                        cuts_of(s.cell));
-    else if (actin)
-      s.cell.fibres = tied(std::move(traced), s.cell.adhesions, s.cell.outline_um, p.fibres, cuts_of(s.cell));
-    result.push_back(std::move(s));
+    hold(s.cell, std::move(own), std::move(lines), around, in);
+  } else {
+    if (in.source != AdhesionSource::fibre_ends) {
+      s.second = s.cell;
+      hold(*s.second, candidates_in(in, around, lines, Placement::second), lines, around, in);
+    }
+    std::vector<Adhesion> candidates = candidates_in(in, around, lines, Placement::first);
+    hold(s.cell, std::move(candidates), std::move(lines), around, in);
+    require_candidates(in, s.cell);
   }
+  s.n_anchors = static_cast<int>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::anchor, &Adhesion::origin));
+  s.unused = unused_in(in);
+  return s;
+}
+
+}  // namespace
+
+std::vector<Segmentation> segment_cells(const std::optional<Channel>& adhesion, const std::optional<Channel>& actin,
+                                        const SegmentParameters& p, const HandDrawn& drawn) {
+  const Inputs in = inputs_of(adhesion, actin, p, drawn);
+  const std::vector<Adhesion> found = seen_adhesions(in);
+  const Outlines outlines = outlines_in(in, found);
+  const bool is_given = drawn.outline || drawn.outline_mask;
+  if (actin && is_given && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
+  std::vector<Segmentation> result;
+  for (const CellOutline& outline : outlines.chosen)
+    result.push_back(segment_one(in, outline, found, outlines.n_cells));
   return result;
 }
 

@@ -7,10 +7,12 @@
 
 #include "pipeline/contract/types.h"
 #include "segment/adhesions.h"
+#include "segment/candidates.h"
 #include "segment/channel_alignment.h"
 #include "segment/channels.h"
 #include "segment/fibres.h"
 #include "segment/hand_drawn.h"
+#include "segment/mask.h"
 #include "segment/outline.h"
 
 namespace mbtfm::segment {
@@ -23,6 +25,7 @@ struct SegmentParameters {
   std::string align_channels = "auto";  ///< actin on adhesions
   std::string contact_sheet;            ///< none: it takes a segmentation for each of its pictures
   AdhesionParameters adhesions;
+  CandidateParameters candidates;
   FibreParameters fibres;
   OutlineParameters outline;
 };
@@ -38,13 +41,19 @@ struct Segmentation {
   int n_adhesions_outside = 0;                  ///< found beyond the cell and left out
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
   bool is_aligned = false;                      ///< fibres and outline were moved by it
+  AdhesionSource source = AdhesionSource::image;
+  int n_anchors = 0;  ///< that drawn fibres asked for
+  /// The cell with the candidates at other places, the same fibres tied to them; none where there is nothing to place.
+  std::optional<Cell> second{};
+  std::vector<std::string> unused{};  ///< inputs that others took the place of, a sentence each
 };
 
-/// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions.
-/// Without an adhesion channel there are no adhesions and every fibre is an arc; without actin no fibres. What is drawn
-/// by hand is used instead of each.
+/// Adhesions from the adhesion channel, fibres from actin, the outline from actin or, without it, from adhesions. What
+/// is drawn by hand is used instead of each, or else a mask. Where nothing shows adhesions, or the parameters say so,
+/// there are candidates for them instead (candidates.h). Without actin there are no fibres.
 /// @returns the cell that the parameters name, or all of them, the largest first
-/// @throws UsageError without any channel, or where all cells are asked for and fibres are drawn by hand
+/// @throws UsageError without any channel, where all cells are asked for and fibres are drawn by hand, or where the
+/// source of the adhesions is not there
 /// @throws InputError where sizes or calibrations contradict each other or none tells the pixel size; where a channel
 /// is constant or saturated; where no cell, fewer cells than asked for, or in a given adhesion channel no adhesion is
 /// found

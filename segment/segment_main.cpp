@@ -29,6 +29,40 @@ std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument
   return set;
 }
 
+std::shared_ptr<const LabelMask> mask(StageContext& context, const std::string& argument, int binning) {
+  if (!context.has_input(argument)) return nullptr;
+  LabelMask mask = read_mask(context.input(argument));
+  mask.binning = binning;
+  return std::make_shared<const LabelMask>(std::move(mask));
+}
+
+/// What was assumed of the adhesions, in words; empty where they were seen.
+std::string assumption_of(const Segmentation& s, bool is_by_itself) {
+  const auto n = std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin);
+  const std::string why = is_by_itself ? "No adhesion image: forces" : "Forces";
+  const std::string placed = why + " are placed on " + std::to_string(n) + " candidates for adhesions, ";
+  switch (s.source) {
+    case AdhesionSource::image:
+      return "";
+    case AdhesionSource::pattern:
+      return placed + "all over the adhesive pattern under the cell.";
+    case AdhesionSource::fibre_ends:
+      return placed +
+             "at the ends of the fibres. Which ends are held in truth, and so the types of the fibres, is not "
+             "known. How much this choice matters is not in the error bars.";
+    case AdhesionSource::cell:
+      return placed +
+             "at the ends of the fibres and along the rim of the cell. Which ends are held in truth, and so the "
+             "types of the fibres, is not known.";
+  }
+  throw InternalError("unknown source of adhesions");
+}
+
+Severity severity_of(AdhesionSource source) {
+  // the pattern is known, and its candidates' places are in the error budget
+  return source == AdhesionSource::pattern ? Severity::note : Severity::caution;
+}
+
 /// Length over width, mean weighed by area; 0 of none.
 double aspect_ratio(const std::vector<Adhesion>& adhesions) {
   double sum = 0, area_um2 = 0;
@@ -39,7 +73,7 @@ double aspect_ratio(const std::vector<Adhesion>& adhesions) {
   return area_um2 > 0 ? sum / area_um2 : 0;
 }
 
-StageReport report_of(const Segmentation& s) {
+StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
   StageReport report;
   const auto n_of = [&](FibreType type) {
     std::int64_t n = 0;
@@ -47,16 +81,25 @@ StageReport report_of(const Segmentation& s) {
     return n;
   };
   double area_um2 = 0, length = 0;
-  for (const Adhesion& a : s.cell.adhesions) area_um2 += a.area_um2;
+  std::int64_t n_seen = 0;
+  for (const Adhesion& a : s.cell.adhesions) {
+    if (is_assumed(a.origin)) continue;
+    area_um2 += a.area_um2;
+    ++n_seen;
+  }
   for (const Fibre& f : s.cell.fibres) length += length_um(f.points_um);
   const auto n_adhesions = static_cast<std::int64_t>(s.cell.adhesions.size());
   report.figures = {{"pixel_size_um", s.pixel_size_um},
                     {"n_adhesions", n_adhesions},
                     {"n_adhesions_outside", static_cast<std::int64_t>(s.n_adhesions_outside)},
-                    {"mean_adhesion_area_um2", n_adhesions > 0 ? area_um2 / static_cast<double>(n_adhesions) : 0.0},
+                    {"mean_adhesion_area_um2", n_seen > 0 ? area_um2 / static_cast<double>(n_seen) : 0.0},
+                    {"n_anchors", static_cast<std::int64_t>(s.n_anchors)},
+                    {"n_candidates", n_adhesions - n_seen - s.n_anchors},
+                    {"adhesions_from", std::string(name_of(s.source))},
                     {"n_ventral", n_of(FibreType::ventral)},
                     {"n_dorsal", n_of(FibreType::dorsal)},
                     {"n_arc", n_of(FibreType::arc)},
+                    {"n_edge", n_of(FibreType::edge)},
                     {"fibre_length_um", length},
                     {"cell_area_um2", s.area_um2},
                     {"n_holes", static_cast<std::int64_t>(s.cell.holes_um.size())},
@@ -72,9 +115,14 @@ StageReport report_of(const Segmentation& s) {
                            {"actin_growth", a.growth},
                            {"is_actin_aligned", s.is_aligned}});
   }
-  report.summary = std::to_string(n_adhesions) + " adhesions, " + std::to_string(s.cell.fibres.size()) + " fibres (" +
-                   std::to_string(n_of(FibreType::ventral)) + " ventral, " + std::to_string(n_of(FibreType::dorsal)) +
-                   " dorsal, " + std::to_string(n_of(FibreType::arc)) + " arcs)";
+  const std::int64_t n_candidates = n_adhesions - n_seen - s.n_anchors;
+  report.summary = (n_seen > 0 || n_adhesions == 0 ? std::to_string(n_seen) + " adhesions, " : "") +
+                   (n_candidates > 0 ? std::to_string(n_candidates) + " candidates for adhesions, " : "") +
+                   (s.n_anchors > 0 ? std::to_string(s.n_anchors) + " anchors, " : "") +
+                   std::to_string(s.cell.fibres.size()) + " fibres (" + std::to_string(n_of(FibreType::ventral)) +
+                   " ventral, " + std::to_string(n_of(FibreType::dorsal)) + " dorsal, " +
+                   std::to_string(n_of(FibreType::arc)) + " arcs" +
+                   (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
   for (std::optional<Finding> found :
        {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
                 "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +
@@ -86,9 +134,18 @@ StageReport report_of(const Segmentation& s) {
                             : std::string(),
                 s.is_aligned ? Severity::note : Severity::caution),
         noticed(FindingKind::adhesions_left_out, s.n_adhesions_outside,
-                std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out.")}) {
+                std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out."),
+        noticed(FindingKind::adhesions_assumed,
+                static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
+                assumption_of(s, is_assumed_by_itself), severity_of(s.source)),
+        noticed(FindingKind::fibre_ends_anchored, s.n_anchors,
+                (s.n_anchors == 1 ? "One end of the drawn fibres reaches no adhesion. It is held by an anchor."
+                                  : std::to_string(s.n_anchors) +
+                                        " ends of the drawn fibres reach no adhesion. They are held by anchors."))}) {
     if (found) report.findings.push_back(std::move(*found));
   }
+  for (const std::string& sentence : s.unused)
+    report.findings.push_back(*noticed(FindingKind::input_not_used, 1, sentence));
   if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
   if (s.n_cells > 1) report.summary += "; one of " + std::to_string(s.n_cells) + " cells in the image";
   return report;
@@ -127,6 +184,10 @@ void write_cell(StageContext& context, const std::string& folder, const Segmenta
   CsvText place({"x_um", "y_um", "width_um", "height_um"});
   place.add(ground.low_um.x).add(ground.low_um.y).add(ground.size_um.x).add(ground.size_um.y).end_row();
   write_text(out("images.csv"), place.str());
+  if (s.second) {
+    write_adhesions(out("adhesions_2.csv"), s.second->adhesions);
+    write_fibres(out("fibres_2.csv"), out("fibre_points_2.csv"), s.second->fibres);
+  }
   write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um / binning));  // they lie on the image as it is
 }
 
@@ -138,13 +199,17 @@ void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
     report.figures.emplace_back(part + "_drawn_by_hand", is_drawn);
     if (is_drawn) report.summary += "; " + part + " drawn by hand";
   }
+  report.figures.emplace_back("outline_from_mask", drawn.outline_mask && !drawn.outline);
+  report.figures.emplace_back("adhesions_from_mask", drawn.adhesion_mask && !drawn.adhesions);
 }
 
 /// @throws InputError where no cell looks like that
 void expect_plausible(StageContext& context, const Segmentation& s) {
   context.expect_plausible("cell_area_um2", s.area_um2);
   std::vector<double> areas_um2;
-  for (const Adhesion& a : s.cell.adhesions) areas_um2.push_back(a.area_um2);
+  for (const Adhesion& a : s.cell.adhesions) {
+    if (!is_assumed(a.origin)) areas_um2.push_back(a.area_um2);
+  }
   if (areas_um2.empty()) return;
   const auto middle = areas_um2.begin() + static_cast<std::ptrdiff_t>(areas_um2.size() / 2);
   std::nth_element(areas_um2.begin(), middle, areas_um2.end());
@@ -165,7 +230,8 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
     context.notice(noticed_saturation(*image));
   }
   const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
-                        roi_set(context, "fibre-rois", binning)};
+                        roi_set(context, "fibre-rois", binning), mask(context, "outline-mask", binning),
+                        mask(context, "adhesion-mask", binning)};
   const std::vector<Segmentation> cells = segment_cells(adhesion, actin, parameters, drawn);
   for (const Segmentation& s : cells) expect_plausible(context, s);
   for (std::size_t i = 0; i < cells.size(); ++i) {
@@ -174,8 +240,9 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
                draw_ground(adhesion, actin, cells[i]), binning);
   }
   if (!parameters.contact_sheet.empty())
-    write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters));
-  StageReport report = parameters.cell == 0 ? report_of(cells) : report_of(cells.front());
+    write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters, drawn));
+  StageReport report =
+      parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), parameters.candidates.adhesions == "auto");
   add_drawn_by_hand(report, drawn);
   return report;
 }
@@ -190,13 +257,17 @@ int main(int argc, char** argv) {
       {.name = "segment",
        .purpose = "find adhesions, stress fibres and the outline of a cell in its microscope images",
        .files = {{"adhesion-image", FileArgument::Kind::optional_input,
-                  "adhesion channel (TIFF, PNG or JPEG); without it every fibre counts as an arc"},
+                  "adhesion channel (TIFF, PNG or JPEG); without it forces are placed on candidates: see --adhesions"},
                  {"actin-image", FileArgument::Kind::optional_input,
                   "actin channel (TIFF, PNG or JPEG); without it no fibres, and the outline from the adhesion channel"},
                  {"outline-roi", FileArgument::Kind::optional_input,
                   "ImageJ selection used as the cell's outline (.roi)"},
                  {"adhesion-rois", FileArgument::Kind::optional_input, "ImageJ areas used as adhesions (.roi or .zip)"},
                  {"fibre-rois", FileArgument::Kind::optional_input, "ImageJ lines used as fibres (.roi or .zip)"},
+                 {"outline-mask", FileArgument::Kind::optional_input,
+                  "mask or label image of the cell, used as its outline (TIFF or PNG)"},
+                 {"adhesion-mask", FileArgument::Kind::optional_input,
+                  "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)"},
                  {"out", FileArgument::Kind::output_folder,
                   "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
                   "images.jpg, images.csv, RoiSet.zip"}}},

@@ -50,6 +50,12 @@ std::vector<Adhesion> read_adhesions(const Path& file) {
                       .angle_rad = table.number(row, "angle_deg") * kDegree_rad,
                       .eccentricity = table.number(row, "eccentricity", share_of_one()),
                       .mean_intensity = table.number(row, "mean_intensity")};
+    if (table.has("origin")) {
+      const auto origin = adhesion_origin_of(table.text(row, "origin"));
+      if (!origin) table.fail(row, "origin", "image, drawn, anchor or candidate");
+      adhesions[row].origin = *origin;
+    }
+    if (table.has("edge_distance_um")) adhesions[row].edge_distance_um = table.optional_number(row, "edge_distance_um");
   }
   check_read(file, adhesions);
   return adhesions;
@@ -58,11 +64,11 @@ std::vector<Adhesion> read_adhesions(const Path& file) {
 void write_adhesions(const Path& file, const std::vector<Adhesion>& adhesions) {
   check(adhesions);
   CsvText csv({"adhesion_id", "x_um", "y_um", "area_um2", "major_axis_um", "minor_axis_um", "angle_deg", "eccentricity",
-               "mean_intensity"});
+               "mean_intensity", "origin", "edge_distance_um"});
   for (const Adhesion& a : adhesions) {
     csv.add(a.adhesion_id).add(a.position_um.x).add(a.position_um.y).add(a.area_um2);
     csv.add(a.major_axis_um).add(a.minor_axis_um).add(a.angle_rad / kDegree_rad).add(a.eccentricity);
-    csv.add(a.mean_intensity).end_row();
+    csv.add(a.mean_intensity).add(name_of(a.origin)).add(a.edge_distance_um).end_row();
   }
   write_text(file, csv.str());
 }
@@ -76,7 +82,7 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
   std::map<int, int> index_of;
   for (int row = 0; row < table.n_rows(); ++row) {
     const auto type = fibre_type_of(table.text(row, "type"));
-    if (!type) table.fail(row, "type", "dorsal, arc or ventral");
+    if (!type) table.fail(row, "type", "dorsal, arc, ventral or edge");
     fibres[row] = {.fibre_id = table.integer(row, "fibre_id", 1),
                    .type = *type,
                    .width_um = table.number(row, "width_um", Range::positive()),
@@ -289,7 +295,7 @@ void write_adhesion_forces(const Path& file, const std::vector<AdhesionForce>& f
     MBTFM_ASSERT(adhesion_of.contains(f.adhesion_id));
     const Adhesion& a = *adhesion_of[f.adhesion_id];
     csv.add(f.adhesion_id).add(a.position_um.x).add(a.position_um.y).add(a.area_um2);
-    csv.add(f.force_nN.x).add(f.force_nN.y).add(norm(f.force_nN)).add(norm(f.force_nN) / a.area_um2);
+    csv.add(f.force_nN.x).add(f.force_nN.y).add(norm(f.force_nN)).add(norm(f.force_nN) / area_stood_for_um2(a));
     csv.add(f.sigma_nN).add(text_of(f.connected)).add(f.moment_nN_um);
     for (const PointArray& column : more) csv.add(column.scalars[row]);
     csv.end_row();

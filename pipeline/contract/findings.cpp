@@ -35,6 +35,21 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "27 elsewhere",
        "Nothing where the fibres were moved. If it recurs, measure the shift between the filters with beads that shine "
        "in both."},
+      {adhesions_assumed, "adhesions-assumed", "segment", caution, "candidates for adhesions that nobody saw", 0,
+       "forces act where adhesions are; candidates stand where they may be",
+       "Give an adhesion image (images.adhesion; paxillin.tif if nothing is said), a mask of the adhesions "
+       "(images.adhesion_mask) or draw them by hand (images.adhesion_rois). On an adhesive pattern set "
+       "segment.adhesions = pattern, with the pattern as "
+       "images.adhesion_mask. Read sums of forces over neighbours, not single ones."},
+      {fibre_ends_anchored, "fibre-ends-anchored", "segment", note,
+       "ends of drawn fibres that reach no adhesion and are held by an anchor", 0,
+       "ventral and edge fibres are held at both ends, dorsal ones at one: the drawing says that something holds them",
+       "Check these ends in 1_segment/overlay.png (dashed circles). A fibre that is held nowhere is an arc: name it "
+       "so. "
+       "An adhesion that was missed: lower segment.adhesion_seed_noise, or draw it, too."},
+      {input_not_used, "input-not-used", "segment", note, "inputs that another one took the place of", 0,
+       "a selection drawn by hand counts more than a mask, and what [segment] says counts more than both",
+       "Remove the one that must not count."},
       {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by three standard errors",
        0.98, "chance moves 1 bead in 90 by that much",
        "Check that the two bead images belong to this cell, and that the cell was removed between them."},

@@ -25,6 +25,9 @@ enum class FindingKind {
   adhesions_left_out,
   actin_shift,
   adhesions_long,
+  adhesions_assumed,
+  fibre_ends_anchored,
+  input_not_used,
   // track
   nothing_moves,
   moves_outward,

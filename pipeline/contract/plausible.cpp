@@ -252,7 +252,7 @@ double traction_of_half_the_force_kPa(const std::vector<AdhesionForce>& forces,
   double total_nN = 0;
   for (std::size_t a = 0; a < forces.size(); ++a) {
     const double least_nN = std::max(0.0, norm(forces[a].force_nN) - 2 * forces[a].sigma_nN.value_or(0));
-    loads.emplace_back(least_nN / adhesions[a].area_um2, least_nN);
+    loads.emplace_back(least_nN / area_stood_for_um2(adhesions[a]), least_nN);
     total_nN += least_nN;
   }
   std::ranges::sort(loads, std::greater());

@@ -17,8 +17,39 @@ std::string_view name_of(FibreType type) {
       return "arc";
     case FibreType::ventral:
       return "ventral";
+    case FibreType::edge:
+      return "edge";
   }
   throw InternalError("unknown fibre type");
+}
+
+int n_held_ends(FibreType type) { return type == FibreType::arc ? 0 : type == FibreType::dorsal ? 1 : 2; }
+
+std::string_view name_of(AdhesionOrigin origin) {
+  switch (origin) {
+    case AdhesionOrigin::image:
+      return "image";
+    case AdhesionOrigin::drawn:
+      return "drawn";
+    case AdhesionOrigin::anchor:
+      return "anchor";
+    case AdhesionOrigin::candidate:
+      return "candidate";
+  }
+  throw InternalError("unknown origin of an adhesion");
+}
+
+std::optional<AdhesionOrigin> adhesion_origin_of(std::string_view name) {
+  for (const AdhesionOrigin origin : kAdhesionOrigins) {
+    if (name_of(origin) == name) return origin;
+  }
+  return std::nullopt;
+}
+
+double area_stood_for_um2(const Adhesion& adhesion) {
+  // a disc that touches its six neighbours covers pi / sqrt(12) of its cell
+  constexpr double kCellOverDisc = 1.1026577908435840990;
+  return adhesion.origin == AdhesionOrigin::candidate ? kCellOverDisc * adhesion.area_um2 : adhesion.area_um2;
 }
 
 std::optional<FibreType> fibre_type_of(std::string_view name) {
@@ -108,6 +139,12 @@ double distance_to_cut_um(const Cell& cell, Vec2 point) {
   return least;
 }
 
+double distance_to_edge_um(const Cell& cell, Vec2 point) {
+  double least = distance_to_boundary_um(cell.outline_um, point);
+  for (const Polygon& hole : cell.holes_um) least = std::min(least, distance_to_boundary_um(hole, point));
+  return least;
+}
+
 bool is_held(const Network& network, std::size_t vertex) {
   return network.adhesion_id[vertex] != 0 || (!network.held_by_cut.empty() && network.held_by_cut[vertex]);
 }
@@ -147,6 +184,8 @@ void check(const std::vector<Adhesion>& adhesions) {
     require(a.minor_axis_um <= a.major_axis_um * (1 + 1e-9), "'minor_axis_um' of " + element,
             "at most major_axis_um = " + shown(a.major_axis_um), shown(a.minor_axis_um));
     require(std::isfinite(a.angle_rad), "'angle_deg' of " + element, "a finite number", shown(a.angle_rad));
+    require(!a.edge_distance_um || (std::isfinite(*a.edge_distance_um) && *a.edge_distance_um >= 0),
+            "'edge_distance_um' of " + element, "a number >= 0", shown(a.edge_distance_um.value_or(0)));
   }
 }
 

@@ -30,6 +30,18 @@ inline bool is_finite(Vec2 a) { return std::isfinite(a.x) && std::isfinite(a.y);
 using Polygon = std::vector<Vec2>;
 using Polyline = std::vector<Vec2>;
 
+/// Where an adhesion comes from: found in an image or a mask of one; drawn by hand; put where a fibre drawn by hand
+/// must be held and no adhesion is; or put where one may be, because nothing shows the adhesions.
+enum class AdhesionOrigin { image, drawn, anchor, candidate };
+inline constexpr AdhesionOrigin kAdhesionOrigins[] = {AdhesionOrigin::image, AdhesionOrigin::drawn,
+                                                      AdhesionOrigin::anchor, AdhesionOrigin::candidate};
+std::string_view name_of(AdhesionOrigin origin);
+std::optional<AdhesionOrigin> adhesion_origin_of(std::string_view name);
+/// Nobody has seen it: it is an anchor or a candidate.
+inline bool is_assumed(AdhesionOrigin origin) {
+  return origin == AdhesionOrigin::anchor || origin == AdhesionOrigin::candidate;
+}
+
 /// A segmented focal adhesion: the ellipse of equal second moments, scaled to the area of the segmented component.
 struct Adhesion {
   int adhesion_id = 0;  ///< stable label, >= 1
@@ -40,13 +52,21 @@ struct Adhesion {
   double angle_rad = 0;  ///< of the major axis, from +x towards +y
   double eccentricity = 0;
   double mean_intensity = 0;
+  AdhesionOrigin origin = AdhesionOrigin::image;
+  std::optional<double> edge_distance_um{};  ///< from the centre to the outline, holes included; none: not stated
 };
+/// A candidate of a hexagonal lattice stands for its cell, which is larger than the disc drawn into it; any other
+/// adhesion for its own area.
+double area_stood_for_um2(const Adhesion& adhesion);
 
 /// Hotulainen & Lappalainen (2006): dorsal fibres end on an adhesion with one end, arcs with none, ventral with both.
-enum class FibreType { dorsal, arc, ventral };
-inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral};
+/// An edge fibre is held at both ends, too, and runs along a free piece of the outline.
+enum class FibreType { dorsal, arc, ventral, edge };
+inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge};
 std::string_view name_of(FibreType type);
 std::optional<FibreType> fibre_type_of(std::string_view name);
+/// How many of its ends the type says are held.
+int n_held_ends(FibreType type);
 
 struct Fibre {
   int fibre_id = 0;  ///< stable label, >= 1
@@ -75,6 +95,8 @@ struct Cell {
 using Cuts = std::vector<std::pair<Vec2, Vec2>>;
 Cuts cuts_of(const Cell& cell);
 double distance_to_cut_um(const Cell& cell, Vec2 point);
+/// To the nearest ring of the outline, of a hole as of the cell.
+double distance_to_edge_um(const Cell& cell, Vec2 point);
 
 /// Displacement (stressed minus relaxed position) of one bead.
 struct Bead {

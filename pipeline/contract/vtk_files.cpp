@@ -207,12 +207,14 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
   check(cell);
   Shapes shapes;
   const auto fibre = int_array("fibre_id");
-  const auto type = int_array("fibre_type");  // 1 dorsal, 2 arc, 3 ventral; 0: no fibre
+  const auto type = int_array("fibre_type");  // 1 dorsal, 2 arc, 3 ventral, 4 edge; 0: no fibre
   const auto adhesion = int_array("adhesion_id");
-  const auto label = [&](int fibre_id, int fibre_type, int adhesion_id) {
+  const auto origin = int_array("adhesion_origin");  // 1 image, 2 drawn, 3 anchor, 4 candidate; 0: no adhesion
+  const auto label = [&](int fibre_id, int fibre_type, int adhesion_id, int adhesion_origin = 0) {
     fibre->InsertNextValue(fibre_id);
     type->InsertNextValue(fibre_type);
     adhesion->InsertNextValue(adhesion_id);
+    origin->InsertNextValue(adhesion_origin);
   };
   std::vector<Polygon> rings = cell.holes_um;
   rings.insert(rings.begin(), cell.outline_um);
@@ -227,10 +229,11 @@ void write_cell_vtp(const Path& file, const Cell& cell) {
   }
   for (const Adhesion& a : cell.adhesions) {
     shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
-    label(0, 0, a.adhesion_id);
+    label(0, 0, a.adhesion_id, 1 + static_cast<int>(a.origin));
   }
   const auto poly = shapes.data();
-  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get()}) poly->GetCellData()->AddArray(array);
+  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get(), origin.Get()})
+    poly->GetCellData()->AddArray(array);
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 

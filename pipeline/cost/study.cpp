@@ -162,8 +162,9 @@ class Scratch {
       command.push_back("--" + flag);
       command.push_back(value);
     };
-    for (const runner::ImageInput& image : images_of(stage, images_))
-      add(image.flag, resolve_image(cell_, images_, image.key).string());
+    for (const runner::ImageInput& image : images_of(stage, images_)) {
+      if (const auto file = resolve_image(cell_, images_, image)) add(image.flag, file->string());
+    }
     for (const runner::ImageInput& image : stage.optional_images) {
       if (const auto file = resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
     }

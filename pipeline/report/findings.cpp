@@ -36,18 +36,47 @@ std::string of_cut(const FitSummary& fit) {
       readable(cut->y_nN), readable(cut->y_sigma_nN));
 }
 
+/// Those that were seen, and those that were put where nobody saw one.
+std::string adhesions_in_words(const Cell& cell) {
+  std::size_t n_anchors = 0, n_candidates = 0;
+  for (const Adhesion& a : cell.adhesions) {
+    n_anchors += a.origin == AdhesionOrigin::anchor;
+    n_candidates += a.origin == AdhesionOrigin::candidate;
+  }
+  const std::size_t n_seen = cell.adhesions.size() - n_anchors - n_candidates;
+  std::string text;
+  const auto add = [&](std::size_t n, const char* one, const char* many) {
+    if (n > 0) text += (text.empty() ? "" : ", ") + counted(n, one, many);
+  };
+  add(n_seen, "adhesion", "adhesions");
+  add(n_anchors, "anchor of a drawn fibre", "anchors of drawn fibres");
+  add(n_candidates, "candidate for an adhesion", "candidates for adhesions");
+  return text.empty() ? "0 adhesions" : text;
+}
+
+std::string of_candidates(const Cell& cell) {
+  const auto is_one = [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; };
+  if (std::ranges::none_of(cell.adhesions, is_one)) return {};
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return is_assumed(a.origin); })
+             ? " No adhesion was seen: forces are placed where adhesions may be, on the candidates."
+             : " Forces act on the candidates, too, where nobody saw an adhesion.";
+}
+
 std::string what(const CellResults& results) {
-  int n_by_type[3] = {};
+  int n_by_type[std::size(kFibreTypes)] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
+  const int n_edge = n_by_type[static_cast<int>(FibreType::edge)];
   return fmt::format(
-             "{} ({} dorsal, {}, {} ventral) and {}. The cell pulls with {} nN in total, summed over its adhesions: {} "
+             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} nN in total, summed over its adhesions: "
+             "{} "
              "nN by "
              "the fibres, {} nN by the actin network.",
              counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
-             counted(results.cell.adhesions.size(), "adhesion", "adhesions"), readable(results.fit.total_force_nN),
-             readable(results.fit.fibre_force_nN), readable(results.fit.network_force_nN)) +
-         of_cut(results.fit);
+             n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
+             readable(results.fit.total_force_nN), readable(results.fit.fibre_force_nN),
+             readable(results.fit.network_force_nN)) +
+         of_candidates(results.cell) + of_cut(results.fit);
 }
 
 std::string truth(const CellResults& results) {

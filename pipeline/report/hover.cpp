@@ -29,7 +29,9 @@ std::string hover_of(const Fibre& fibre, const CellResults& results) {
 }
 
 std::string hover_of(const Adhesion& adhesion, const CellResults& results) {
-  std::string text = fmt::format("adhesion {}", adhesion.adhesion_id);
+  std::string text =
+      fmt::format("{} {}", is_assumed(adhesion.origin) ? name_of(adhesion.origin) : "adhesion", adhesion.adhesion_id);
+  if (is_assumed(adhesion.origin)) text += " (assumed, not seen)";
   const auto force = std::find_if(results.forces.begin(), results.forces.end(),
                                   [&](const AdhesionForce& f) { return f.adhesion_id == adhesion.adhesion_id; });
   if (force == results.forces.end()) {
@@ -40,9 +42,10 @@ std::string hover_of(const Adhesion& adhesion, const CellResults& results) {
     const std::optional<int> decimals = has_error ? std::optional(decimals_for(*force->sigma_nN)) : std::nullopt;
     text += "\nforce " + rounded(force_nN, decimals);
     if (has_error) text += " ± " + rounded(*force->sigma_nN, decimals);
-    text += " nN\ntraction " + readable(force_nN / adhesion.area_um2) + " kPa";
+    text += " nN\ntraction " + readable(force_nN / area_stood_for_um2(adhesion)) + " kPa";
   }
-  text += "\narea " + readable(adhesion.area_um2) + " µm²";
+  text += (adhesion.origin == AdhesionOrigin::candidate ? "\nlattice cell " : "\narea ") +
+          readable(area_stood_for_um2(adhesion)) + " µm²";
   std::string fibres;
   for (const Fibre& fibre : results.cell.fibres) {
     if (fibre.start_adhesion_id == adhesion.adhesion_id || fibre.end_adhesion_id == adhesion.adhesion_id)

@@ -130,6 +130,18 @@ void draw_web(Chart& map, const CellResults& results, const Pieces& web, Hover h
 constexpr const char* kHalo = "stroke:#fff;stroke-width:7;stroke-linecap:round";
 constexpr const char* kThick = "stroke-width:3;stroke-linecap:round;stroke:";
 
+bool has_edge_fibres(const Cell& cell) {
+  return std::ranges::any_of(cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; });
+}
+
+bool has_origin(const Cell& cell, AdhesionOrigin origin) {
+  return std::ranges::any_of(cell.adhesions, [&](const Adhesion& a) { return a.origin == origin; });
+}
+
+bool are_all_candidates(const Cell& cell) {
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+}
+
 Figure original_network(const CellResults& results) {
   Chart map = new_map(results, "Where the fibres are");
   const ColourScale scale = tension_scale(results, NetworkForm::original);
@@ -145,9 +157,10 @@ Figure original_network(const CellResults& results) {
   draw_fibre_ids(map, results);
   return {map,
           fmt::format("Stress fibres with their numbers, coloured by their fitted tension, in the network of the first "
-                      "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: adhesions, which "
+                      "mesh before it contracts: {} vertices, {} links (grey: actin network). Blue: {}, which "
                       "hold the vertices inside them.",
-                      results.network.vertices_um.size(), results.network.links.size()) +
+                      results.network.vertices_um.size(), results.network.links.size(),
+                      has_origin(results.cell, AdhesionOrigin::candidate) ? "candidates for adhesions" : "adhesions") +
               caption_of_cut(results.cell),
           legend(colour_bar(scale))};
 }
@@ -172,6 +185,19 @@ Figure contracted_network(const CellResults& results) {
           legend(colour_bar(scale))};
 }
 
+/// Adhesions that were seen, and the dashed ones that nobody saw.
+std::string adhesion_keys(const Cell& cell) {
+  const auto ring = [](const std::string& name) {
+    return "<span><span class=\"type\" style=\"border:2px dashed #ff9be6\"></span>" + name + "</span>";
+  };
+  std::string keys;
+  if (has_origin(cell, AdhesionOrigin::image) || has_origin(cell, AdhesionOrigin::drawn) || cell.adhesions.empty())
+    keys += "<span><span class=\"type\" style=\"background:#ff9be6\"></span>adhesion</span>";
+  if (has_origin(cell, AdhesionOrigin::anchor)) keys += ring("anchor of a drawn fibre, not seen");
+  if (has_origin(cell, AdhesionOrigin::candidate)) keys += ring("candidate, not seen");
+  return keys;
+}
+
 }  // namespace
 
 Figure segmentation_map(const CellResults& results) {
@@ -184,16 +210,23 @@ Figure segmentation_map(const CellResults& results) {
   }
   draw_outline(map, results.cell, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
   // nearly invisible fill: the mouse finds the whole ellipse
-  draw_adhesions(map, results, "fill:#ff9be6;fill-opacity:0.12;stroke:#ff9be6;stroke-width:1.1", Hover::whole);
+  for (const Adhesion& adhesion : results.cell.adhesions) {
+    map.polygon(ellipse_corners(adhesion, kEllipseCorners),
+                std::string("fill:#ff9be6;fill-opacity:0.12;stroke:#ff9be6;stroke-width:1.1") +
+                    (is_assumed(adhesion.origin) ? ";stroke-dasharray:3 3" : ""),
+                hover_of(adhesion, results));
+  }
   std::string types;
-  for (const FibreType type : {FibreType::dorsal, FibreType::arc, FibreType::ventral}) {
-    types += fmt::format("<span><span class=\"type\" style=\"background:{}\"></span>{}</span>",
-                         is_dark ? bright_colour_of(type) : colour_of(type), full_name_of(type));
+  for (const FibreType type : kFibreTypes) {
+    if (type == FibreType::edge && !has_edge_fibres(results.cell)) continue;
+    types +=
+        "<span>" + swatch_of(type, is_dark ? bright_colour_of(type) : colour_of(type)) + full_name_of(type) + "</span>";
   }
   for (const Fibre& fibre : results.cell.fibres) {
     map.curve(fibre.points_um,
-              std::string("stroke-width:2.6;stroke-linecap:round;stroke:") +
-                  (is_dark ? bright_colour_of(fibre.type) : colour_of(fibre.type)),
+              std::string("stroke-width:2.6;stroke:") +
+                  (is_dark ? bright_colour_of(fibre.type) : colour_of(fibre.type)) +
+                  (fibre.type == FibreType::edge ? dashes_of(fibre.type) : ";stroke-linecap:round"),
               hover_of(fibre, results));
   }
   draw_fibre_ids(map, results);
@@ -221,7 +254,7 @@ Figure segmentation_map(const CellResults& results) {
                      "Full size: 1_segment/overlay.png."
                    : "Adhesions, fibres and outline.") +
               caption_of_cut(results.cell),
-          legend(types + "<span><span class=\"type\" style=\"background:#ff9be6\"></span>adhesion</span>" + missing)};
+          legend(types + adhesion_keys(results.cell) + missing)};
 }
 
 Figure adhesion_map(const CellResults& results) {
@@ -230,7 +263,7 @@ Figure adhesion_map(const CellResults& results) {
   std::vector<double> tractions;
   std::vector<Vec2> forces;
   for (const AdhesionForce& force : results.forces) {
-    tractions.push_back(norm(force.force_nN) / by_id.at(force.adhesion_id)->area_um2);
+    tractions.push_back(norm(force.force_nN) / area_stood_for_um2(*by_id.at(force.adhesion_id)));
     forces.push_back(force.force_nN);
   }
   const ColourScale colours{.low = 0, .high = round_end(percentile(tractions, 0.98)), .label = "traction (kPa)"};
@@ -244,10 +277,18 @@ Figure adhesion_map(const CellResults& results) {
     map.arrow(by_id.at(force.adhesion_id)->position_um, scale.px_per_unit * force.force_nN,
               "stroke-width:1.4;stroke:#111");
   }
+  const std::string of_candidates =
+      has_origin(results.cell, AdhesionOrigin::candidate)
+          ? " Candidates are no adhesions that were seen: read their colours as a traction density (force over the "
+            "area of a lattice cell)."
+          : "";
   return {map,
-          "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force of the cell on the "
-          "substrate. Dashed: the cell’s outline. The few highest tractions share the colour at the bar’s end." +
-              caption_of_cut(results.cell),
+          std::string(are_all_candidates(results.cell)
+                          ? "Each candidate is coloured by the traction where it stands; the arrow is the force"
+                          : "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force") +
+              " of the cell on the substrate. Dashed: the cell’s outline. The few highest tractions share the colour "
+              "at the bar’s end." +
+              of_candidates + caption_of_cut(results.cell),
           legend(arrow_legend(scale, "nN") + colour_bar(colours))};
 }
 

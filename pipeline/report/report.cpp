@@ -71,6 +71,10 @@ std::string adhesion_section(const CellResults& results) {
              {"y (µm)", true},
              {"fibre ends on it"}},
             {}};
+  const bool has_assumed = std::ranges::any_of(by_id, [](const auto& a) { return is_assumed(a.second->origin); });
+  const bool are_candidates =
+      std::ranges::any_of(by_id, [](const auto& a) { return a.second->origin == AdhesionOrigin::candidate; });
+  if (has_assumed) all.columns.push_back({"seen"});
   for (const AdhesionForce& force : forces) {
     const Adhesion& adhesion = *by_id.at(force.adhesion_id);
     const double magnitude = norm(force.force_nN);
@@ -78,9 +82,11 @@ std::string adhesion_section(const CellResults& results) {
     const std::optional<int> decimals = has_error ? std::optional(decimals_for(*force.sigma_nN)) : std::nullopt;
     all.rows.push_back({std::to_string(force.adhesion_id), rounded(magnitude, decimals),
                         rounded(force.sigma_nN, decimals), rounded(force.force_nN.x, decimals),
-                        rounded(force.force_nN.y, decimals), rounded(magnitude / adhesion.area_um2, 2),
-                        rounded(adhesion.area_um2, 2), fmt::format("{:.1f}", adhesion.position_um.x),
+                        rounded(force.force_nN.y, decimals), rounded(magnitude / area_stood_for_um2(adhesion), 2),
+                        rounded(area_stood_for_um2(adhesion), 2), fmt::format("{:.1f}", adhesion.position_um.x),
                         fmt::format("{:.1f}", adhesion.position_um.y), force.connected ? "yes" : "no"});
+    if (has_assumed)
+      all.rows.back().push_back(is_assumed(adhesion.origin) ? "no: " + std::string(name_of(adhesion.origin)) : "yes");
   }
   constexpr std::size_t kTop = 12;  // fits a screen
   Table top{all.columns, {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
@@ -90,6 +96,12 @@ std::string adhesion_section(const CellResults& results) {
       "torques {}{}.</p>\n",
       top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque),
       balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
+  if (are_candidates)
+    html +=
+        "<p class=\"sub\">Candidates are places where an adhesion may be. Nobody saw one there: read their tractions "
+        "as "
+        "a traction density (force over the area of a lattice cell), and sums over neighbours rather than single "
+        "forces.</p>\n";
   html += html_of(top, file_of(results, "4_fit/adhesion_forces.csv"));
   if (all.rows.size() > kTop) html += folded(fmt::format("All {} adhesions", all.rows.size()), html_of(all));
   return section("Forces of the adhesions", html);

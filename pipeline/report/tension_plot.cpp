@@ -45,6 +45,8 @@ const char* colour_of(FibreType type) {
       return "#B87A00";
     case FibreType::ventral:
       return "#00805C";
+    case FibreType::edge:
+      return "#B5482A";
   }
   return "#555";
 }
@@ -57,6 +59,8 @@ const char* full_name_of(FibreType type) {
       return "transverse arc";
     case FibreType::ventral:
       return "ventral";
+    case FibreType::edge:
+      return "edge";
   }
   return "";
 }
@@ -69,8 +73,20 @@ const char* bright_colour_of(FibreType type) {
       return "#ffb728";
     case FibreType::ventral:
       return "#00d68f";
+    case FibreType::edge:
+      return "#ff7a52";
   }
   return "#ddd";
+}
+
+const char* dashes_of(FibreType type) { return type == FibreType::edge ? ";stroke-dasharray:9 4 2 4" : ""; }
+
+std::string swatch_of(FibreType type, const std::string& colour) {
+  // edge fibres are dashed: eyes that see no colours tell them, too
+  return fmt::format("<span class=\"type\" style=\"background:{}\"></span>",
+                     type == FibreType::edge
+                         ? fmt::format("linear-gradient(90deg,{0} 40%,transparent 40% 60%,{0} 60%)", colour)
+                         : colour);
 }
 
 std::vector<FibreRow> fibre_rows(const CellResults& results) {

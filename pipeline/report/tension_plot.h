@@ -17,7 +17,11 @@ std::string tension_plot_legend(const CellResults& results);
 const char* colour_of(FibreType type);
 /// The same, lighter for the dark ground of an image.
 const char* bright_colour_of(FibreType type);
-/// "dorsal", "transverse arc", "ventral"
+/// Dashes of its line in maps, as CSS: edge fibres are told by them from the others without colours.
+const char* dashes_of(FibreType type);
+/// Its mark in legends and tables, as HTML.
+std::string swatch_of(FibreType type, const std::string& colour);
+/// "dorsal", "transverse arc", "ventral", "edge"
 const char* full_name_of(FibreType type);
 
 /// A fibre with what is known of its tension.

@@ -12,8 +12,7 @@ namespace mbtfm::report {
 namespace {
 
 std::string type_cell(FibreType type) {
-  return fmt::format("<span class=\"keep\"><span class=\"type\" style=\"background:{}\"></span>{}</span>",
-                     colour_of(type), full_name_of(type));
+  return "<span class=\"keep\">" + swatch_of(type, colour_of(type)) + full_name_of(type) + "</span>";
 }
 
 /// Half of the 95 % interval. Its upper half: the lower one may be cut at zero.

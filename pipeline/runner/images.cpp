@@ -13,13 +13,22 @@ namespace fs = std::filesystem;
 
 void declare(ParameterList& list, ImageNames& names) {
   list.table("images");
-  list.add("adhesion", names.adhesion, "image of the adhesions: a file name or glob in the cell folder");
+  list.add(
+      "adhesion", names.adhesion,
+      "image of the adhesions: a file name or glob in the cell folder; without a file of the default name, forces are "
+      "placed on candidates (segment.adhesions)");
   list.add("actin", names.actin, "image of the actin");
   list.add("beads_stressed", names.beads_stressed, "image of the beads while the cell pulls");
   list.add("beads_relaxed", names.beads_relaxed, "image of the beads after the cell was removed");
   list.add("outline_roi", names.outline_roi, "ImageJ area used as the cell's outline, where the file is there");
   list.add("adhesion_rois", names.adhesion_rois, "ImageJ areas used as adhesions, where the file is there");
   list.add("fibre_rois", names.fibre_rois, "ImageJ lines used as fibres, where the file is there");
+  list.add("outline_mask", names.outline_mask,
+           "mask or label image of the cell (TIFF or PNG), used as its outline, where the file is there");
+  list.add(
+      "adhesion_mask", names.adhesion_mask,
+      "mask or label image used as adhesions, where the file is there; with segment.adhesions = pattern the adhesive "
+      "pattern");
   list.add("displacement", names.displacement,
            "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]");
 }
@@ -32,6 +41,8 @@ const std::string& name_of_image(const ImageNames& names, const std::string& key
   if (key == "displacement") return names.displacement;
   if (key == "outline_roi") return names.outline_roi;
   if (key == "adhesion_rois") return names.adhesion_rois;
+  if (key == "outline_mask") return names.outline_mask;
+  if (key == "adhesion_mask") return names.adhesion_mask;
   MBTFM_ASSERT(key == "fibre_rois");
   return names.fibre_rois;
 }
@@ -83,10 +94,19 @@ fs::path resolve_image(const fs::path& folder, const ImageNames& names, const st
                    "make '" + key + "' in [images] of cell.toml fit one of them only");
 }
 
+std::optional<fs::path> resolve_image(const fs::path& folder, const ImageNames& names, const ImageInput& image) {
+  if (image.need == ImageInput::Need::where_there) return resolve_optional_image(folder, names, image.key);
+  return resolve_image(folder, names, image.key);
+}
+
 std::optional<fs::path> resolve_optional_image(const fs::path& folder, const ImageNames& names,
                                                const std::string& key) {
-  const bool is_default = name_of_image(names, key) == name_of_image(ImageNames{}, key);
-  if (is_default && match_image(folder, name_of_image(names, key)).files.empty()) return std::nullopt;
+  const std::string& name = name_of_image(names, key);
+  const bool is_default = name == name_of_image(ImageNames{}, key);
+  // a link that leads nowhere is there, and somebody wants it
+  std::error_code error;
+  const bool is_there = fs::exists(fs::symlink_status(file_shown_as(folder, name), error));
+  if (is_default && !is_there && match_image(folder, name).files.empty()) return std::nullopt;
   return resolve_image(folder, names, key);
 }
 

@@ -22,6 +22,9 @@ struct ImageNames {
   std::string outline_roi = "outline.roi|outline.zip";
   std::string adhesion_rois = "adhesions.zip|adhesions.roi";
   std::string fibre_rois = "fibres.zip|fibres.roi";
+  // masks and label images of other programs, likewise
+  std::string outline_mask = "outline_mask.tif|outline_mask.png";
+  std::string adhesion_mask = "adhesion_mask.tif|adhesion_mask.png";
 };
 void declare(ParameterList& list, ImageNames& names);
 
@@ -42,6 +45,10 @@ ImageMatch match_image(const std::filesystem::path& folder, const std::string& n
 /// The one file that is meant. @throws InputError where there is none, or several: lists them
 std::filesystem::path resolve_image(const std::filesystem::path& folder, const ImageNames& names,
                                     const std::string& key);
+
+/// The file of a stage's image; none where it need not be there and is not.
+std::optional<std::filesystem::path> resolve_image(const std::filesystem::path& folder, const ImageNames& names,
+                                                   const ImageInput& image);
 
 /// The same of a file that need not be there where its name is left at the default.
 std::optional<std::filesystem::path> resolve_optional_image(const std::filesystem::path& folder,

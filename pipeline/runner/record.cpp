@@ -49,12 +49,17 @@ std::vector<Difference> differences(const Hashes& before, const Hashes& now) {
   return result;
 }
 
+bool is_of_frames(const std::string& file) {
+  const auto is_of_whole = [&](const Stage& stage) {
+    return std::ranges::find(stage.reads_where_there, file) != stage.reads_where_there.end();
+  };
+  return std::ranges::none_of(stages(), is_of_whole) &&
+         std::ranges::any_of(stages(), [&](const Stage& stage) { return is_of_series(stage, file); });
+}
+
 /// Nothing differs but, maybe, files that an earlier stage wrote of single frames.
 bool are_of_series(const std::vector<Difference>& differences) {
-  return std::all_of(differences.begin(), differences.end(), [](const Difference& difference) {
-    return std::any_of(stages().begin(), stages().end(),
-                       [&](const Stage& stage) { return is_of_series(stage, difference.name); });
-  });
+  return std::ranges::all_of(differences, [](const Difference& difference) { return is_of_frames(difference.name); });
 }
 
 /// Those of a time series that the tracker wrote, one for each frame that it did not refuse.
@@ -195,6 +200,8 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   std::vector<std::string> names = files_of(images_of(stage, images), cell, images);
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
+  std::ranges::copy_if(stage.reads_where_there, std::back_inserter(names),
+                       [&](const std::string& file) { return is_own_file(cell / file); });
   for (const PathArgument& argument : stage.arguments) {
     if (argument.where.empty() || !is_own_file(cell / argument.where)) continue;
     names.push_back(argument.where);

@@ -32,8 +32,9 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     command.push_back("--" + flag);
     command.push_back(value);
   };
-  for (const ImageInput& image : images_of(stage, images))
-    add(image.flag, resolve_image(cell, images, image.key).string());
+  for (const ImageInput& image : images_of(stage, images)) {
+    if (const auto file = resolve_image(cell, images, image)) add(image.flag, file->string());
+  }
   for (const ImageInput& image : stage.optional_images) {
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
   }
@@ -181,7 +182,7 @@ void CellRun::check_before_start(CellOutcome& now) const {
     if (state != StageState::must_run && !(follows && state == StageState::up_to_date)) continue;
     changed.push_back(stage.folder);
     note_failure(now.stages[i], [&] {
-      for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image.key);
+      for (const ImageInput& image : images_of(stage, images_)) resolve_image(cell_, images_, image);
       for (const ImageInput& image : stage.optional_images) resolve_optional_image(cell_, images_, image.key);
       if (!options_.is_checked) check_parameters(stage, cell_ / "cell.toml", options_);
     });

@@ -8,8 +8,10 @@ namespace mbtfm::runner {
 
 /// An input image: a key of [images] in cell.toml, given to the stage as --flag.
 struct ImageInput {
+  enum class Need { always, where_there };
   std::string flag;
   std::string key;
+  Need need = Need::always;  ///< where_there: a file of the default name may lack
 };
 
 /// A file or folder of the cell folder, given to the stage as --flag.
@@ -26,9 +28,10 @@ struct Stage {
   std::vector<ImageInput> optional_images;  ///< used where they are there
   std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
   PathArgument output;
-  std::vector<std::string> reads;    ///< files behind `arguments`, relative to the cell folder
-  std::vector<std::string> writes;   ///< files without which the stage is not done
-  std::vector<std::string> series;   ///< globs: files that it writes of a time series only
+  std::vector<std::string> reads;              ///< files behind `arguments`, relative to the cell folder
+  std::vector<std::string> reads_where_there;  ///< further ones, which the stage before writes in some cases only
+  std::vector<std::string> writes;             ///< files without which the stage is not done
+  std::vector<std::string> series;             ///< globs: files that it writes in some cases only, as of a time series
   std::vector<std::string> tables;   ///< of cell.toml that its result depends on; empty: above the first table
   std::vector<std::string> effects;  ///< keys of [effects] that it depends on
 };

@@ -122,6 +122,7 @@ std::vector<Direction> directions_of(const Cell& cell, const Displacements& disp
   std::map<int, std::optional<Near>> near;
   std::vector<Direction> list;
   for (const Adhesion& a : cell.adhesions) {
+    if (is_assumed(a.origin)) continue;  // a disc that was put there has no direction, and beads near it no meaning
     near[a.adhesion_id] = beads.around(a);
     const auto& n = near[a.adhesion_id];
     if (!n) continue;
@@ -131,6 +132,7 @@ std::vector<Direction> directions_of(const Cell& cell, const Displacements& disp
   }
   for (const FibreEnd& end : held_ends(cell)) {
     const Adhesion& a = *adhesion.at(end.adhesion_id);
+    if (is_assumed(a.origin)) continue;
     const double between = angle_deg({std::cos(a.angle_rad), std::sin(a.angle_rad)}, end.inwards);
     list.push_back({Relation::adhesion_fibre, end.adhesion_id, end.fibre_id, std::min(between, 180 - between)});
     if (const auto& n = near.at(end.adhesion_id)) {

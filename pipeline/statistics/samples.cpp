@@ -46,9 +46,12 @@ Sample with_typical_errors(Sample sample) {
 template <class Visit>
 void for_each_adhesion(const Study& study, Visit&& visit) {
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    std::map<int, double> area;
-    for (const Adhesion& a : study.cells[i].cell.adhesions) area[a.adhesion_id] = a.area_um2;
+    std::map<int, double> area;  // of those that were seen: an anchor's or a candidate's size is nobody's measurement
+    for (const Adhesion& a : study.cells[i].cell.adhesions) {
+      if (!is_assumed(a.origin)) area[a.adhesion_id] = a.area_um2;
+    }
     for (const AdhesionForce& f : study.cells[i].forces) {
+      if (!area.contains(f.adhesion_id)) continue;
       visit(study.cells[i], static_cast<int>(i), f, area.at(f.adhesion_id));
     }
   }
@@ -68,11 +71,13 @@ std::vector<Observation> Sample::of_group(int condition, int kind) const {
 
 Sample sample_tensions(const Study& study) {
   std::vector<std::string> kinds;
-  for (const FibreType type : kFibreTypes) kinds.emplace_back(name_of(type));
+  for (const FibreType type : kFibreTypes) {
+    if (counted_type(study, type) == type) kinds.emplace_back(name_of(type));
+  }
   Sample sample = empty_sample(study, "tension_nN", "tension", "nN", "fibres", kinds);
   for (const MeasuredFibre& f : measured_fibres(study)) {
-    add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()), static_cast<int>(f.fibre->type),
-        f.tension->tension_nN, standard_error_nN(*f.tension));
+    add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()),
+        static_cast<int>(counted_type(study, f.fibre->type)), f.tension->tension_nN, standard_error_nN(*f.tension));
   }
   return with_typical_errors(std::move(sample));
 }
@@ -117,11 +122,12 @@ std::vector<Sample> sample_cells(const Study& study) {
 }
 
 CellFigures figures_of(const StudyCell& cell) {
-  CellFigures f{.n_adhesions = static_cast<double>(cell.cell.adhesions.size()),
+  CellFigures f{.n_adhesions = static_cast<double>(std::ranges::count_if(
+                    cell.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); })),
                 .n_fibres = static_cast<double>(cell.cell.fibres.size()),
                 .adhesion_area_um2 = 0,
                 .cell_area_um2 = std::abs(signed_area_um2(cell.cell.outline_um))};
-  for (const Adhesion& a : cell.cell.adhesions) f.adhesion_area_um2 += a.area_um2;
+  for (const Adhesion& a : cell.cell.adhesions) f.adhesion_area_um2 += is_assumed(a.origin) ? 0 : a.area_um2;
   for (const Polygon& hole : cell.cell.holes_um) f.cell_area_um2 -= std::abs(signed_area_um2(hole));
   return f;
 }

@@ -93,6 +93,9 @@ void declare(ParameterList& list, StudyParameters& parameters) {
   list.add("bootstrap_draws", parameters.bootstrap_draws, Range::between(100, 1000000),
            "draws of cells behind the intervals of means and medians");
   list.add("bootstrap_seed", parameters.bootstrap_seed, "of these draws");
+  list.add("fibre_types", parameters.fibre_types, Range::between(3, 4),
+           "types of fibres that are told apart; 3: dorsal, arc and ventral, edge fibres count as ventral; 4: edge "
+           "fibres are a type of their own");
 }
 
 std::vector<double> thresholds_nN(const StudyParameters& parameters) {
@@ -140,6 +143,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
   });
   Study study;
+  study.n_fibre_types = parameters.fibre_types;
   std::vector<std::string> condition_of_cell;
   for (std::size_t i = 0; i < folders.size(); ++i) {
     if (!reasons[i].empty()) {
@@ -154,6 +158,10 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   if (study.cells.empty()) no_cell_left(folder, study.left_out);
   number_conditions(study, condition_of_cell);
   return study;
+}
+
+FibreType counted_type(const Study& study, FibreType type) {
+  return study.n_fibre_types < 4 && type == FibreType::edge ? FibreType::ventral : type;
 }
 
 std::vector<MeasuredFibre> measured_fibres(const Study& study) {

@@ -19,6 +19,7 @@ struct StudyParameters {
   double near_adhesion_um = 1.5;    ///< beads lie some 1 um apart: about seven of them around an adhesion
   int bootstrap_draws = 2000;       ///< ends of the intervals then repeat to some 5 % of their half width
   std::uint64_t bootstrap_seed = 1;
+  int fibre_types = 3;  ///< an edge fibre is held at both ends as a ventral one is, and few cells have enough of them
 };
 void declare(ParameterList& list, StudyParameters& parameters);
 /// The tensions above which shares are given, each once.
@@ -45,7 +46,10 @@ struct Study {
   std::vector<std::string> conditions;  ///< in the order of the alphabet; one without a name where none were asked for
   std::vector<StudyCell> cells;         ///< those that enter
   std::vector<LeftOutCell> left_out;
+  int n_fibre_types = 3;  ///< 4: edge fibres are a type of their own; 3: they count as ventral
 };
+/// The type as which a fibre counts.
+FibreType counted_type(const Study& study, FibreType type);
 
 /// Files that must be there of each finished cell, and those that are read where they are, relative to its folder.
 const std::vector<std::string>& files_of_a_cell();

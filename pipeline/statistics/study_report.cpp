@@ -165,7 +165,8 @@ std::string overview(const Study& study, const Analysis& analysis) {
   std::size_t n_fibres = 0, n_adhesions = 0;
   for (const StudyCell& c : study.cells) {
     n_fibres += c.cell.fibres.size();
-    n_adhesions += c.cell.adhesions.size();
+    n_adhesions += static_cast<std::size_t>(
+        std::ranges::count_if(c.cell.adhesions, [](const Adhesion& a) { return !is_assumed(a.origin); }));
   }
   std::string html = fmt::format(
       "<p>{} cells{} with {} adhesions and {} stress fibres; the tensions of {} of them could be identified and enter "
@@ -183,6 +184,20 @@ constexpr const char* kHowToRead =
     "random effects of the cell and of each kind in it, known error of each value, Satterthwaite’s degrees of "
     "freedom). "
     "Holm’s correction is over the pairs that one question compares.</p>\n";
+
+/// Which type edge fibres count as; empty without any.
+std::string on_edge_fibres(const Study& study) {
+  std::size_t n = 0;
+  for (const StudyCell& cell : study.cells)
+    n += static_cast<std::size_t>(
+        std::ranges::count_if(cell.cell.fibres, [](const Fibre& f) { return f.type == FibreType::edge; }));
+  if (n == 0) return "";
+  return fmt::format("<p class=\"sub\">{} edge {} a free piece of the outline and {} held at both ends. {}</p>\n", n,
+                     n == 1 ? "fibre runs along" : "fibres run along", n == 1 ? "is" : "are",
+                     study.n_fibre_types < 4
+                         ? "Here they count as ventral fibres; stats.fibre_types = 4 shows them as a type of their own."
+                         : "Here they are a type of their own.");
+}
 
 }  // namespace
 
@@ -209,7 +224,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   body += report::section("What the program noticed",
                           findings_text(study, with_file(findings_table(study), "findings.csv")));
   body += report::section("Figures", pictures);
-  body += report::section("Tension by fibre type", with_file(types_table(study, analysis), "types.csv"));
+  body += report::section("Tension by fibre type",
+                          on_edge_fibres(study) + with_file(types_table(study, analysis), "types.csv"));
   std::string tests;
   for (const Measure* m : analysis.measures()) {
     if (!m->comparisons.empty())

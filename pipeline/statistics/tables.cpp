@@ -36,7 +36,8 @@ std::string cells_csv(const Study& study) {
                                            "noise_um",
                                            "n_meshes",
                                            "converged",
-                                           "findings"};
+                                           "findings",
+                                           "n_edge"};
   CsvText csv(header);
   for (const StudyCell& c : study.cells) {
     std::map<FibreType, int> n_of;
@@ -47,8 +48,8 @@ std::string cells_csv(const Study& study) {
       if (t.fibre_id == 0) network_tension = t.tension_nN;
     }
     csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(1).add("");
-    csv.add(static_cast<int>(c.cell.adhesions.size())).add(static_cast<int>(c.cell.fibres.size()));
-    for (const FibreType type : kFibreTypes) csv.add(n_of[type]);
+    csv.add(static_cast<int>(figures.n_adhesions)).add(static_cast<int>(c.cell.fibres.size()));
+    for (const FibreType type : {FibreType::dorsal, FibreType::arc, FibreType::ventral}) csv.add(n_of[type]);
     csv.add(figures.cell_area_um2).add(figures.adhesion_area_um2);
     const auto where_known = [&](double value) { return is_network_known(c) ? std::optional(value) : std::nullopt; };
     csv.add(c.fit.total_force_nN).add(where_known(c.fit.network_force_nN)).add(where_known(c.fit.fibre_force_nN));
@@ -57,6 +58,7 @@ std::string cells_csv(const Study& study) {
         .add(c.fit.relative_l2)
         .add(c.fit.expected_relative_l2);
     csv.add(c.fit.noise_um).add(c.fit.n_meshes).add(c.fit.converged ? 1 : 0).add(open_ids(c.findings));
+    csv.add(n_of[FibreType::edge]);
     csv.end_row();
   }
   for (const LeftOutCell& c : study.left_out) {
@@ -69,7 +71,7 @@ std::string cells_csv(const Study& study) {
 
 std::string adhesions_csv(const Study& study) {
   CsvText csv({"cell", "condition", "adhesion_id", "x_um", "y_um", "area_um2", "eccentricity", "fx_nN", "fy_nN",
-               "force_nN", "traction_kPa", "sigma_nN", "connected"});
+               "force_nN", "traction_kPa", "sigma_nN", "connected", "origin"});
   for (const StudyCell& c : study.cells) {
     std::map<int, const Adhesion*> by_id;
     for (const Adhesion& adhesion : c.cell.adhesions) by_id[adhesion.adhesion_id] = &adhesion;
@@ -78,7 +80,8 @@ std::string adhesions_csv(const Study& study) {
       csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(a.adhesion_id);
       csv.add(a.position_um.x).add(a.position_um.y).add(a.area_um2).add(a.eccentricity);
       csv.add(force.force_nN.x).add(force.force_nN.y).add(norm(force.force_nN));
-      csv.add(norm(force.force_nN) / a.area_um2).add(force.sigma_nN).add(force.connected ? 1 : 0);
+      csv.add(norm(force.force_nN) / area_stood_for_um2(a)).add(force.sigma_nN).add(force.connected ? 1 : 0);
+      csv.add(name_of(a.origin));
       csv.end_row();
     }
   }

@@ -60,8 +60,8 @@ class Errors : public ::testing::Test {
 };
 
 TEST_F(Errors, a_missing_image_is_named) {
-  fs::remove(cell_ / "paxillin.tif");
-  expect_error(kInput, {"paxillin.tif"}, "1_segment");
+  fs::remove(cell_ / "actin.tif");
+  expect_error(kInput, {"actin.tif"}, "1_segment");
 }
 
 TEST_F(Errors, an_empty_folder_is_told_what_it_lacks) {

@@ -60,7 +60,7 @@ Extent extent_of(const std::string& file, const char* array) {
 
 void expect_the_arrays_of_the_page_on_formats() {
   const std::map<std::string, std::set<std::string>> expected = {
-      {"1_segment/cell.vtp", {"adhesion_id", "fibre_id", "fibre_type"}},
+      {"1_segment/cell.vtp", {"adhesion_id", "adhesion_origin", "fibre_id", "fibre_type"}},
       {"2_track/displacement.vtp", {"displacement_um", "sigma_um", "is_good"}},
       {"3_network/network.vtu", {"fibre_id", "rest_length_um", "share", "adhesion_id"}},
       {"4_fit/contracted.vtu", {"fibre_id", "force_nN", "contraction_um", "adhesion_id"}},
@@ -81,8 +81,8 @@ void expect_the_arrays_of_the_page_on_formats() {
 
 void expect_the_unit_in_the_name_of_every_quantity() {
   // numbers without a unit
-  const std::set<std::string> pure = {"adhesion_id", "fibre_id", "fibre_type",       "is_good",
-                                      "share",       "state",    "informs_fibre_id", "weight"};
+  const std::set<std::string> pure = {"adhesion_id", "adhesion_origin", "fibre_id",         "fibre_type", "is_good",
+                                      "share",       "state",           "informs_fibre_id", "weight"};
   for (const auto& entry : fs::recursive_directory_iterator(cell())) {
     if (entry.path().extension() != ".vtp" && entry.path().extension() != ".vtu") continue;
     const auto data = opened(entry.path());

@@ -1,4 +1,5 @@
 #include "mbtfm/error_budget.h"
+#include "mbtfm/second_placement.h"
 
 #include <gtest/gtest.h>
 
@@ -273,6 +274,33 @@ TEST(ErrorBudget, of_a_tension_at_zero_is_what_its_interval_says) {
   const ErrorParts parts = f.budget(kExact).tensions[1].parts_nN;
   EXPECT_GT(parts.beads, 0);
   EXPECT_NEAR(std::hypot(parts.beads, parts.model), f.fit.tensions_nN[1].sides_95->above / kNormal95, 1e-9);
+}
+
+EnsembleFit answer_of(std::vector<int> ids, const std::vector<double>& tensions_nN, double total_nN) {
+  EnsembleFit fit;
+  fit.fibre_ids = std::move(ids);
+  for (const double t : tensions_nN) fit.tensions_nN.push_back({.value = t});
+  fit.total_force_nN.value = total_nN;
+  return fit;
+}
+
+TEST(ErrorBudget, two_placements_of_the_candidates_tell_the_error_of_placing_them) {
+  // Of answers with the variance v, half the squared difference of two has the mean v.
+  const PlacementSpread spread =
+      spread_between(answer_of({0, 1, 2, 4}, {0.1, 5, 3, 2}, 100), answer_of({0, 1, 4}, {0.1, 8, 2}, 110));
+  EXPECT_NEAR(spread.tensions_nN.at(1), 3 / std::sqrt(2.0), 1e-12);
+  EXPECT_NEAR(spread.tensions_nN.at(0), 0, 1e-12);
+  EXPECT_NEAR(spread.tensions_nN.at(4), 0, 1e-12);
+  EXPECT_FALSE(spread.tensions_nN.contains(2));  // too short where the other candidates hold it
+  EXPECT_NEAR(spread.total_force_nN, 10 / std::sqrt(2.0), 1e-12);
+  ErrorBudget budget;
+  for (const int id : {0, 1, 2, 4})
+    budget.tensions.push_back({.fibre_id = id, .tension_nN = 1, .parts_nN = {.segmentation = 0.5}});
+  budget.total_force_parts_nN.segmentation = 1;
+  const ErrorBudget whole = with_spread(budget, spread);
+  EXPECT_NEAR(whole.tensions[1].parts_nN.segmentation, std::hypot(0.5, 3 / std::sqrt(2.0)), 1e-12);
+  EXPECT_EQ(whole.tensions[2].parts_nN.segmentation, 0.5);
+  EXPECT_NEAR(whole.total_force_parts_nN.segmentation, std::hypot(1, 10 / std::sqrt(2.0)), 1e-12);
 }
 
 }  // namespace

@@ -190,5 +190,44 @@ TEST(Files, writers_check_what_they_write) {
   EXPECT_THROW(write_network(folder / "n.vtu", torn), InvalidData);
 }
 
+TEST(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
+  const test::TemporaryFolder folder;
+  std::vector<Adhesion> adhesions;
+  for (const AdhesionOrigin origin : kAdhesionOrigins) {
+    adhesions.push_back({.adhesion_id = static_cast<int>(adhesions.size()) + 1,
+                         .position_um = {1, 2},
+                         .area_um2 = 1,
+                         .major_axis_um = 1.2,
+                         .minor_axis_um = 1.1,
+                         .origin = origin});
+  }
+  adhesions[1].edge_distance_um = 0.25;
+  write_adhesions(folder / "adhesions.csv", adhesions);
+  const auto read = read_adhesions(folder / "adhesions.csv");
+  ASSERT_EQ(read.size(), adhesions.size());
+  for (std::size_t i = 0; i < read.size(); ++i) EXPECT_EQ(read[i].origin, adhesions[i].origin);
+  EXPECT_FALSE(read[0].edge_distance_um);
+  EXPECT_EQ(read[1].edge_distance_um, 0.25);
+}
+
+TEST(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
+  const test::TemporaryFolder folder;
+  const std::string columns =
+      "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity";
+  write_text(folder / "adhesions.csv", columns + "\n1,1,2,1,1.2,1.1,0,0.4,100\n");
+  const auto read = read_adhesions(folder / "adhesions.csv");
+  EXPECT_EQ(read.at(0).origin, AdhesionOrigin::image);
+  EXPECT_FALSE(read[0].edge_distance_um);
+  write_text(folder / "adhesions.csv", columns + ",origin\n1,1,2,1,1.2,1.1,0,0.4,100,seen\n");
+  EXPECT_THROW(read_adhesions(folder / "adhesions.csv"), InputError);
+}
+
+TEST(Files, a_candidate_stands_for_the_cell_of_its_lattice) {
+  const Adhesion disc{
+      .position_um = {}, .area_um2 = 3.14159265, .origin = AdhesionOrigin::candidate};  // of 2 um, on a lattice of 2 um
+  EXPECT_NEAR(area_stood_for_um2(disc), std::sqrt(3.0) / 2 * 4, 1e-6);
+  EXPECT_EQ(area_stood_for_um2({.position_um = {}, .area_um2 = 1.5}), 1.5);
+}
+
 }  // namespace
 }  // namespace mbtfm

@@ -40,6 +40,11 @@ Roi oval(Vec2 corner_px, Vec2 size_px) {
 
 RoiSet set_of(std::vector<Roi> rois) { return {"rois.zip", std::move(rois)}; }
 
+constexpr double kAnchor_um2 = 1;
+HeldFibres held(const RoiSet& set, const std::vector<Adhesion>& adhesions, const CellOutline& cell = {}) {
+  return hold_fibres(drawn_lines(set, std::nullopt, kField, {}), adhesions, cell, {}, kAnchor_um2);
+}
+
 TEST(HandDrawn, a_polygon_has_the_ellipse_of_its_second_moments) {
   // a rectangle of sides a, b has the moments a²/12, b²/12: axes' ratio a/b, turned with it
   for (const double angle : {0.0, 0.3, 1.2, -0.9}) {
@@ -101,9 +106,7 @@ TEST(HandDrawn, pixels_within_an_area_are_those_whose_centres_are) {
 TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_ends) {
   const std::vector<Adhesion> adhesions = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
   const std::vector<Vec2> tied = {{50, 50}, {150, 50}}, loose = {{80, 200}, {180, 200}};
-  const auto type_of = [&](const Roi& roi) {
-    return hand_drawn_fibres(set_of({roi}), adhesions, {}, std::nullopt, kField, {}).front().type;
-  };
+  const auto type_of = [&](const Roi& roi) { return held(set_of({roi}), adhesions).fibres.front().type; };
   EXPECT_EQ(type_of(line(tied)), FibreType::ventral);
   EXPECT_EQ(type_of(line(loose)), FibreType::arc);
   EXPECT_EQ(type_of(line(tied, "dorsal 3")), FibreType::dorsal);
@@ -112,27 +115,97 @@ TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_
   EXPECT_EQ(type_of(line(tied, "0012-0034", 1)), FibreType::dorsal);
   EXPECT_EQ(type_of(line(tied, "0012-0034", 2)), FibreType::arc);
   EXPECT_EQ(type_of(line(loose, "0012-0034", 3)), FibreType::ventral);
+  EXPECT_EQ(type_of(line(loose, "edge 4")), FibreType::edge);
+  EXPECT_EQ(type_of(line(tied, "0012-0034", 4)), FibreType::edge);
   EXPECT_EQ(type_of(line(tied, "dorsal", 3)), FibreType::dorsal);
   EXPECT_EQ(type_of(line(tied, "archive 4", 9)), FibreType::ventral);  // neither says a type
 }
 
-TEST(HandDrawn, a_named_fibre_is_still_tied_to_the_adhesions_it_reaches) {
+TEST(HandDrawn, a_named_fibre_is_held_by_what_it_reaches_and_by_anchors_where_it_reaches_nothing) {
   const std::vector<Adhesion> adhesions = {test::ellipse(7, {5, 5}, 1, 0.5, 0)};
-  const Fibre f =
-      hand_drawn_fibres(set_of({line({{50, 50}, {150, 50}}, "ventral 1")}), adhesions, {}, std::nullopt, kField, {})
-          .front();
-  EXPECT_EQ(f.start_adhesion_id, 7);
-  EXPECT_FALSE(f.end_adhesion_id);
-  EXPECT_EQ(f.type, FibreType::ventral);
-  EXPECT_EQ(f.confidence, 1);
-  EXPECT_NEAR(norm(f.points_um.back() - Vec2{15.05, 5.05}), 0, 1e-12);  // from the pixel's centre
+  for (const char* name : {"ventral 1", "edge 1"}) {
+    const HeldFibres result = held(set_of({line({{50, 50}, {150, 50}}, name)}), adhesions);
+    const Fibre& f = result.fibres.front();
+    EXPECT_EQ(f.start_adhesion_id, 7);
+    EXPECT_EQ(f.end_adhesion_id, 8);
+    EXPECT_EQ(f.confidence, 1);
+    EXPECT_EQ(f.type_confidence, 1);
+    EXPECT_NEAR(norm(f.points_um.back() - Vec2{15.05, 5.05}), 0, 1e-12);  // from the pixel's centre
+    ASSERT_EQ(result.anchors.size(), 1u);
+    EXPECT_EQ(result.anchors[0].adhesion_id, 8);
+    EXPECT_EQ(result.anchors[0].origin, AdhesionOrigin::anchor);
+    EXPECT_EQ(result.anchors[0].position_um, f.points_um.back());
+    EXPECT_NEAR(result.anchors[0].area_um2, kAnchor_um2, 1e-12);
+    EXPECT_NEAR(std::numbers::pi / 4 * result.anchors[0].major_axis_um * result.anchors[0].minor_axis_um, kAnchor_um2,
+                1e-12);
+  }
+}
+
+TEST(HandDrawn, a_fibre_is_held_at_as_many_ends_as_its_type_says_with_or_without_adhesions) {
+  const std::vector<Adhesion> at_both = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
+  for (const FibreType type : kFibreTypes) {
+    for (const auto& adhesions : {std::vector<Adhesion>{}, at_both}) {
+      const HeldFibres result =
+          held(set_of({line({{50, 50}, {150, 50}}, std::string(name_of(type)) + " 1")}), adhesions);
+      const Fibre& f = result.fibres.front();
+      EXPECT_EQ(f.type, type);
+      EXPECT_EQ(f.start_adhesion_id.has_value(), n_held_ends(type) >= 1) << name_of(type);
+      EXPECT_EQ(f.end_adhesion_id.has_value(), n_held_ends(type) == 2) << name_of(type);
+      EXPECT_EQ(static_cast<int>(result.anchors.size()), adhesions.empty() ? n_held_ends(type) : 0);
+      EXPECT_NEAR(length_um(f.points_um), 10, 0.2) << name_of(type);  // free ends stay where they are drawn
+    }
+  }
+}
+
+TEST(HandDrawn, a_dorsal_fibre_is_held_at_its_last_point_where_that_alone_reaches_an_adhesion) {
+  const std::vector<Adhesion> adhesions = {test::ellipse(7, {15, 5}, 1, 0.5, 0)};
+  const HeldFibres result = held(set_of({line({{50, 50}, {150, 50}}, "dorsal 1")}), adhesions);
+  EXPECT_FALSE(result.fibres[0].start_adhesion_id);
+  EXPECT_EQ(result.fibres[0].end_adhesion_id, 7);
+  EXPECT_TRUE(result.anchors.empty());
+}
+
+TEST(HandDrawn, fibres_that_meet_share_an_anchor) {
+  const HeldFibres result = held(set_of({line({{60, 200}, {52, 52}}, "a"), line({{50, 50}, {150, 50}}, "edge 1"),
+                                         line({{150, 52}, {150, 200}}, "ventral 2")}),
+                                 {});
+  EXPECT_EQ(result.anchors.size(), 3u);
+  EXPECT_EQ(result.fibres[1].end_adhesion_id, result.fibres[2].start_adhesion_id);
+  EXPECT_EQ(result.fibres[0].end_adhesion_id,
+            result.fibres[1].start_adhesion_id);  // of no stated type: what it reaches
+  EXPECT_EQ(result.fibres[0].type, FibreType::dorsal);
+}
+
+TEST(HandDrawn, an_end_a_little_outside_the_cell_is_held_on_its_edge_and_one_far_outside_is_refused) {
+  const CellOutline cell{.outer_um = {{4, 4}, {20, 4}, {20, 20}, {4, 20}}, .holes_um = {}};
+  const auto near = held(set_of({line({{100, 100}, {209.5, 99.5}}, "ventral 1")}), {}, cell);
+  EXPECT_NEAR(norm(near.anchors[0].position_um - Vec2{20, 10}), 0, 1e-9);
+  EXPECT_EQ(near.fibres[0].points_um.back(), near.anchors[0].position_um);
+  EXPECT_THROW(held(set_of({line({{100, 100}, {250, 100}}, "ventral 1")}), {}, cell), InputError);
+}
+
+TEST(HandDrawn, a_line_that_passes_an_adhesion_between_two_points_does_not_turn_back_to_it) {
+  const std::vector<Adhesion> adhesions = {test::ellipse(1, {14, 5.3}, 2, 2, 0)};
+  const HeldFibres result = held(set_of({line({{50, 50}, {150, 50}}, "dorsal 1")}), adhesions);
+  const Polyline& points = result.fibres[0].points_um;
+  EXPECT_EQ(points.back(), adhesions[0].position_um);
+  for (std::size_t i = 1; i < points.size(); ++i) EXPECT_GT(points[i].x, points[i - 1].x);
+}
+
+TEST(HandDrawn, no_anchor_is_made_where_a_fibre_leaves_the_image) {
+  const CellOutline cell{.outer_um = {{0, 4}, {20, 4}, {20, 20}, {0, 20}}, .holes_um = {}};
+  const Cuts cuts = {{{0, 20}, {0, 4}}};
+  const RoiSet set = set_of({line({{100, 100}, {2, 100}}, "ventral 1")});
+  const HeldFibres result = hold_fibres(drawn_lines(set, std::nullopt, kField, {}), {}, cell, {}, kAnchor_um2, cuts);
+  EXPECT_EQ(result.anchors.size(), 1u);
+  EXPECT_FALSE(result.fibres[0].end_adhesion_id);
 }
 
 TEST(HandDrawn, a_fibres_width_is_measured_in_the_image) {
   Image image = test::even_image(256, 256, 100);
   test::draw_line(image, {{5, 12.8}, {20, 12.8}}, 500, 0.8, 0.1);
   const RoiSet set = set_of({line({{60, 127.5}, {190, 127.5}})});
-  const Fibre f = hand_drawn_fibres(set, {}, {}, Channel{"actin.tif", image}, kField, {}).front();
+  const Fibre f = drawn_lines(set, Channel{"actin.tif", image}, kField, {}).front().fibre;
   EXPECT_NEAR(f.width_um, 0.8, 0.1);  // a pixel
   EXPECT_NEAR(f.mean_intensity, 500, 25);
 }
@@ -167,9 +240,7 @@ TEST(HandDrawn, what_cannot_be_used_is_named) {
   const auto adhesion = [](const Roi& roi) {
     return error_of([&] { hand_drawn_adhesions(set_of({roi}), std::nullopt, kField); });
   };
-  const auto fibre = [](const Roi& roi) {
-    return error_of([&] { hand_drawn_fibres(set_of({roi}), {}, {}, std::nullopt, kField, {}); });
-  };
+  const auto fibre = [](const Roi& roi) { return error_of([&] { held(set_of({roi}), {}); }); };
   const Roi square = area({{10, 10}, {20, 10}, {20, 20}, {10, 20}}, "a 1");
   EXPECT_EQ(adhesion(square), "no error");
   EXPECT_EQ(adhesion(line({{10, 10}, {20, 20}}, "a 1")), "rois.zip: 'a 1': a segmented line");
@@ -215,6 +286,7 @@ TEST(HandDrawn, what_the_program_found_given_back_by_hand_gives_the_same_cell) {
   for (std::size_t i = 0; i < found.cell.adhesions.size(); ++i) {
     const Adhesion &a = again.cell.adhesions[i], &b = found.cell.adhesions[i];
     EXPECT_NEAR(norm(a.position_um - b.position_um), 0, kFloat_um);
+    EXPECT_EQ(a.origin, AdhesionOrigin::drawn);
     EXPECT_NEAR(a.area_um2, b.area_um2, 1e-4 * b.area_um2);
     EXPECT_NEAR(a.minor_axis_um, b.minor_axis_um, 1e-4);
     EXPECT_NEAR(std::sin(a.angle_rad - b.angle_rad), 0, 1e-4);

@@ -497,6 +497,31 @@ TEST_F(Runner, hand_drawn_rois_that_are_asked_for_by_name_must_be_there) {
   EXPECT_THROW(resolve_optional_image(cell_, names, "fibre_rois"), InputError);  // which of them?
 }
 
+TEST_F(Runner, a_cell_without_an_adhesion_image_is_run_and_one_that_names_its_image_must_have_it) {
+  fs::remove(cell_ / "paxillin.tif");
+  EXPECT_EQ(started(), "fit network segment track");
+  EXPECT_EQ(read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
+  write_text(cell_ / "adhesion_mask.png", "mask");
+  write_text(cell_ / "outline_mask.tif", "mask");
+  EXPECT_EQ(started(), "segment");
+  for (const char* flag : {"--adhesion-mask", "--outline-mask"})
+    EXPECT_NE(read_text(cell_ / "1_segment/record.json").find(flag), std::string::npos) << flag;
+  write_text(cell_ / "paxillin.tif", "it was elsewhere");
+  EXPECT_EQ(started(), "segment");
+  EXPECT_NE(read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
+  write_parameters("[images]\nadhesion = \"vinculin.tif\"\n");
+  EXPECT_THROW(run_cell(cell_, options_), InputError);
+}
+
+TEST_F(Runner, a_second_placement_of_the_adhesions_that_comes_or_goes_is_fitted_again) {
+  started();
+  write_text(cell_ / "1_segment/adhesions_2.csv", "at other places");
+  EXPECT_EQ(started(), "fit");
+  EXPECT_EQ(started(), "");
+  fs::remove(cell_ / "1_segment/adhesions_2.csv");
+  EXPECT_EQ(started(), "fit");
+}
+
 TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   const TemporaryFolder folder;
   fs::create_directories(folder / "bin");

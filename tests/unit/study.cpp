@@ -106,6 +106,44 @@ TEST(Study, tensions_that_cannot_be_identified_do_not_enter) {
                           [](const std::string& w) { return w.find("could not be identified") != w.npos; }));
 }
 
+TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
+  const FakeStudy fake;
+  for (const int n_types : {3, 4}) {
+    Study study = fake.read({.fibre_types = n_types});
+    const std::vector<double> before = values_of(sample_tensions(study).of_group(0, 2));
+    Fibre& ventral = *std::ranges::find(study.cells[0].cell.fibres, FibreType::ventral, &Fibre::type);
+    ventral.type = FibreType::edge;
+    const Sample sample = sample_tensions(study);
+    EXPECT_EQ(sample.n_kinds(), n_types);
+    EXPECT_EQ(sample.values.size(), measured_fibres(study).size());
+    EXPECT_EQ(values_of(sample.of_group(0, 2)).size(), before.size() - (n_types == 4 ? 1 : 0));
+    EXPECT_EQ(n_types == 4 ? sample.of_group(0, 3).size() : 1u, 1u);
+    const auto tables = tables_of(study, analyse(study, {}));
+    const CsvTable cells(tables[0].second, "cells.csv");
+    EXPECT_EQ(cells.integer(0, "n_edge", 0), 1);
+    const StudyParameters parameters{.fibre_types = n_types};
+    const Analysis analysis = analyse(study, parameters);
+    const std::string page = study_html(study, analysis, figures_of(study, analysis, parameters), parameters);
+    EXPECT_NE(page.find("1 edge fibre runs along"), std::string::npos);
+  }
+}
+
+TEST(Study, adhesions_that_nobody_saw_do_not_enter) {
+  const FakeStudy fake;
+  Study study = fake.read();
+  const std::size_t n = sample_adhesion_forces(study).values.size();
+  const double area_um2 = figures_of(study.cells[0]).adhesion_area_um2;
+  Adhesion& a = study.cells[0].cell.adhesions[0];
+  a.origin = AdhesionOrigin::anchor;
+  study.cells[0].cell.adhesions[1].origin = AdhesionOrigin::candidate;
+  EXPECT_EQ(sample_adhesion_forces(study).values.size(), n - 2);
+  EXPECT_EQ(sample_adhesion_areas(study).values.size(), n - 2);
+  EXPECT_LT(figures_of(study.cells[0]).adhesion_area_um2, area_um2);
+  for (StudyCell& c : study.cells)
+    for (Adhesion& all : c.cell.adhesions) all.origin = AdhesionOrigin::candidate;
+  EXPECT_NO_THROW(tables_of(study, analyse(study, {})));
+}
+
 /// A cell whose fibres and network pull the same adhesions: the fit's share of the network may be anything.
 TEST(Study, forces_of_a_network_that_cannot_be_identified_do_not_enter) {
   Study study = test::simulated_study({.n_cells = 4});

@@ -1,0 +1,147 @@
+#include "segment/candidates.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "pipeline/contract/errors.h"
+#include "segment/segment_cell.h"
+#include "tests/support/drawn_image.h"
+
+namespace mbtfm::segment {
+namespace {
+
+double nearest_um(const std::vector<Vec2>& points, Vec2 point) {
+  double least = std::numeric_limits<double>::infinity();
+  for (const Vec2 p : points)
+    if (!(p == point)) least = std::min(least, norm(p - point));
+  return least;
+}
+
+TEST(Candidates, of_a_lattice_touch_and_do_not_overlap) {
+  for (const Placement placement : {Placement::first, Placement::second}) {
+    const auto points = hexagonal_lattice({-100, -70}, {150, 200}, 2, placement);
+    for (const Vec2 p : points) EXPECT_NEAR(nearest_um(points, p), 2, 1e-9);
+    EXPECT_NEAR(static_cast<double>(points.size()) * std::sqrt(3.0) / 2 * 4, 250 * 270, 0.01 * 250 * 270);
+  }
+  const Adhesion one = lattice_candidates({0, 0}, {1, 1}, 2, Placement::first, [](Vec2) { return true; }).at(0);
+  EXPECT_EQ(one.major_axis_um, 2);
+  EXPECT_EQ(one.position_um, (Vec2{0.5, 0.5}));
+  EXPECT_EQ(one.origin, AdhesionOrigin::candidate);
+}
+
+TEST(Candidates, of_the_second_placement_lie_in_the_middle_between_those_of_the_first) {
+  const auto first = hexagonal_lattice({-20, -20}, {20, 20}, 2, Placement::first);
+  for (const Vec2 p : hexagonal_lattice({-15, -15}, {15, 15}, 2, Placement::second))
+    EXPECT_NEAR(nearest_um(first, p), 1, 1e-9);  // half way between two neighbours
+}
+
+TEST(Candidates, at_ends_near_to_each_other_are_one) {
+  const auto found = candidates_at({{0, 0}, {1.9, 0}, {2.1, 0}, {10, 0}}, 2);
+  ASSERT_EQ(found.size(), 3u);
+  EXPECT_EQ(found[2].adhesion_id, 3);
+}
+
+TEST(Candidates, are_taken_where_nothing_shows_the_adhesions_and_as_the_parameters_say) {
+  EXPECT_EQ(source_of({}, true, false), AdhesionSource::image);
+  EXPECT_EQ(source_of({}, false, false), AdhesionSource::cell);
+  EXPECT_EQ(source_of({.adhesions = "fibre-ends"}, true, false), AdhesionSource::fibre_ends);
+  EXPECT_EQ(source_of({.adhesions = "pattern"}, true, true), AdhesionSource::pattern);
+  EXPECT_THROW(source_of({.adhesions = "pattern"}, true, false), UsageError);
+  EXPECT_THROW(source_of({.adhesions = "image"}, false, false), UsageError);
+}
+
+struct Scene {
+  test::DrawnScene drawn = test::drawn_scene(10, 1);
+  Channel adhesion{"paxillin.tif", drawn.adhesion_image}, actin{"actin.tif", drawn.actin_image};
+  SegmentParameters parameters;
+  explicit Scene(const char* adhesions) {
+    parameters.pixel_size_um = test::DrawnScene::kPixel_um;
+    parameters.candidates.adhesions = adhesions;
+  }
+};
+
+bool are_candidates(const Cell& cell) {
+  return std::ranges::all_of(cell.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
+}
+
+void expect_apart(const Cell& cell, double least_um) {
+  for (std::size_t i = 0; i < cell.adhesions.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      EXPECT_GE(norm(cell.adhesions[i].position_um - cell.adhesions[j].position_um), least_um - 1e-9);
+}
+
+/// The same fibres, each with its own id, whatever holds it.
+void expect_same_fibres(const Cell& a, const Cell& b) {
+  for (const Fibre& f : a.fibres) {
+    const auto other = std::ranges::find(b.fibres, f.fibre_id, &Fibre::fibre_id);
+    if (other == b.fibres.end()) continue;
+    EXPECT_EQ(other->mean_intensity, f.mean_intensity);
+    EXPECT_EQ(other->width_um, f.width_um);
+  }
+}
+
+TEST(Candidates, without_an_adhesion_image_stand_at_the_ends_of_the_fibres_and_along_the_rim) {
+  const Scene scene("auto");
+  const Segmentation s = segment_cell(std::nullopt, scene.actin, scene.parameters);
+  EXPECT_EQ(s.source, AdhesionSource::cell);
+  ASSERT_FALSE(s.cell.adhesions.empty());
+  EXPECT_TRUE(are_candidates(s.cell));
+  expect_apart(s.cell, scene.parameters.candidates.candidate_spacing_um);
+  ASSERT_FALSE(s.cell.fibres.empty());
+  for (const Fibre& f : s.cell.fibres) {
+    EXPECT_EQ(f.type, FibreType::ventral) << f.type_reason;
+    EXPECT_LE(f.type_confidence, 0.5);  // nobody saw what holds it
+  }
+  const double band_um = scene.parameters.candidates.candidate_band_um;
+  for (const Adhesion& a : s.cell.adhesions) {
+    const bool is_end = std::ranges::any_of(s.cell.fibres, [&](const Fibre& f) {
+      return f.points_um.front() == a.position_um || f.points_um.back() == a.position_um;
+    });
+    EXPECT_TRUE(is_end || *a.edge_distance_um <= band_um);
+    EXPECT_TRUE(contains(s.cell.outline_um, a.position_um));
+  }
+  ASSERT_TRUE(s.second);
+  expect_same_fibres(s.cell, *s.second);
+}
+
+TEST(Candidates, at_fibre_ends_alone_have_no_other_place) {
+  const Scene scene("fibre-ends");
+  const Segmentation s = segment_cell(scene.adhesion, scene.actin, scene.parameters);
+  EXPECT_TRUE(are_candidates(s.cell));
+  EXPECT_LE(s.cell.adhesions.size(), 2 * s.cell.fibres.size());
+  EXPECT_FALSE(s.second);
+}
+
+TEST(Candidates, of_a_pattern_lie_on_it_and_in_the_cell) {
+  Scene scene("pattern");
+  Image half = test::even_image(256, 256, 0);
+  for (int j = 0; j < 256; ++j)
+    for (int i = 0; i < 128; ++i) half.at(i, j) = 255;
+  HandDrawn drawn;
+  drawn.adhesion_mask = std::make_shared<const LabelMask>(mask_of(half, "pattern.tif"));
+  const Segmentation s = segment_cell(std::nullopt, scene.actin, scene.parameters, drawn);
+  EXPECT_TRUE(are_candidates(s.cell));
+  expect_apart(s.cell, 2);
+  for (const Adhesion& a : s.cell.adhesions) {
+    EXPECT_LT(a.position_um.x, 12.8);
+    EXPECT_TRUE(contains(s.cell.outline_um, a.position_um));
+  }
+  // half of a cell of 10 um radius, by the lattice cell of 3.46 um²
+  EXPECT_NEAR(static_cast<double>(s.cell.adhesions.size()), 0.5 * s.area_um2 / 3.464, 6);
+  ASSERT_TRUE(s.second);
+  EXPECT_NEAR(static_cast<double>(s.second->adhesions.size()), static_cast<double>(s.cell.adhesions.size()), 6);
+  for (const Adhesion& a : s.second->adhesions) EXPECT_LT(a.position_um.x, 12.8);
+}
+
+TEST(Candidates, are_not_asked_for_where_an_image_shows_the_adhesions) {
+  const Scene scene("auto");
+  const Segmentation s = segment_cell(scene.adhesion, scene.actin, scene.parameters);
+  EXPECT_EQ(s.source, AdhesionSource::image);
+  EXPECT_FALSE(s.second);
+  for (const Adhesion& a : s.cell.adhesions) EXPECT_EQ(a.origin, AdhesionOrigin::image);
+}
+
+}  // namespace
+}  // namespace mbtfm::segment
