@@ -7,6 +7,7 @@
 #include "segment/edge_profile.h"
 #include "segment/ellipse.h"
 #include "segment/grid.h"
+#include "segment/haze.h"
 
 namespace mbtfm::segment {
 
@@ -55,6 +56,12 @@ cv::Mat without_debris(const cv::Mat& mask, double smallest) {
   return result;
 }
 
+cv::Mat smoothed(const cv::Mat& mask) {
+  cv::Mat smooth;
+  cv::GaussianBlur(mask, smooth, cv::Size(0, 0), kSigma_px);
+  return smooth > 127;
+}
+
 cv::Mat disc_of(double radius_px) {
   const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
@@ -94,15 +101,14 @@ double median_within(const cv::Mat& values, const cv::Mat& mask) {
 /// One round of comparing points near the edge with both sides. "Inside" is what the cell looks like along its edge:
 /// brighter things, its thick middle, fibres and adhesions, count no more than that.
 cv::Mat moved_edge(const cv::Mat& values, const cv::Mat& mask, double band_px, double smallest) {
-  cv::Mat grown, core, result = mask.clone(), smooth;
+  cv::Mat grown, core, result = mask.clone();
   cv::dilate(mask, grown, disc_of(band_px));
   cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   const cv::Mat clipped = cv::min(values, median_within(values, mask & ~core));
   const cv::Mat middle = (mean_nearby(clipped, mask, band_px) + mean_nearby(clipped, ~mask, band_px)) / 2;
   const cv::Mat brighter = clipped > middle, band = grown & ~core;
   brighter.copyTo(result, band);
-  cv::GaussianBlur(result, smooth, cv::Size(0, 0), kSigma_px);
-  return without_debris(smooth > 127, smallest);
+  return without_debris(smoothed(result), smallest);
 }
 
 void add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double pixel_um, double reach_um) {
@@ -243,7 +249,7 @@ Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameter
 }
 
 /// All cells; holes filled.
-cv::Mat mask_of(const Scene& s, double smallest) {
+cv::Mat mask_of(const Scene& s, double smallest, const OutlineParameters& p) {
   cv::Mat mask = first_mask(s.smooth, s.noise, smallest);
   if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
   // two halves of pure noise differ by 1.6 standard deviations
@@ -255,6 +261,8 @@ cv::Mat mask_of(const Scene& s, double smallest) {
     // less than a pixel in a thousand of the cell: what still changes is noise
     if (cv::countNonZero(before ^ mask) * 1000 < cv::countNonZero(mask)) break;
   }
+  const cv::Mat body = without_haze(s.smooth, mask, s.pixel_um, p.outline_band_um);
+  if (cv::countNonZero(body ^ mask) > 0) mask = without_debris(smoothed(body), smallest);
   return mask;
 }
 
@@ -316,7 +324,7 @@ std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesi
                                     const OutlineParameters& p) {
   const Scene s = scene_of(matrix_of(image), pixel_size_um, p);
   const double smallest = s.px_of(p.outline_smallest_um2);
-  cv::Mat mask = mask_of(s, smallest);
+  cv::Mat mask = mask_of(s, smallest, p);
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
