@@ -33,6 +33,10 @@ std::vector<Patch> patches_of(const cv::Mat& labels, int margin) {
   return patches;
 }
 
+/// The greatest of the noisy heights near a place lies above the adhesion's own: by 1.3 standard deviations for five
+/// independent ones, and by half more as bright pixels have more shot noise than the ground.
+constexpr double kLift = 2;
+
 /// Height above the rim's level, positive inside: the level is a share of the greatest height near, within the region.
 cv::Mat excess_over_rim(const Contrast& c, const cv::Mat& labels, const Patch& patch, double radius_px,
                         const AdhesionParameters& p) {
@@ -41,6 +45,7 @@ cv::Mat excess_over_rim(const Contrast& c, const cv::Mat& labels, const Patch& p
   const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
   const cv::Mat disc = cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
   cv::dilate(own, greatest, disc);
+  if (c.coarseness > 1) greatest -= c.noise(patch.box) * kLift;  // else noise is no tenth of the height
   const cv::Mat faintest = cv::max(c.noise(patch.box) * p.adhesion_rim_noise, c.floor);
   return c.height(patch.box) - cv::max(greatest * p.adhesion_rim_level, faintest);
 }

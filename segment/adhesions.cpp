@@ -13,9 +13,7 @@ namespace mbtfm::segment {
 
 namespace {
 
-constexpr double kUsualBlur_um = 0.15;  ///< 0.21 · 560 nm / NA 1.2 … 0.9, a little out of focus
-constexpr double kWidestBlur_um = 0.2;  ///< a rim that is softer than any optics in focus is the adhesion's own
-constexpr double kUsualDome = 0.2;      ///< adhesions fade towards their rim
+constexpr double kUsualDome = 0.2;  ///< adhesions fade towards their rim
 
 BlurredEllipse in_pixels(const Adhesion& a, double pixel_um, CommonShape shape) {
   const cv::Point2d centre = to_pixels(a.position_um, pixel_um);
@@ -76,9 +74,11 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
 void declare(ParameterList& list, AdhesionParameters& p) {
   list.table("segment");
   list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um(),
-           "radius of the median that is the background of an adhesion (um)");
+           "radius of the median that is the background of an adhesion (um); in a noisy image up to 1.6 times larger, as the "
+           "smoothing widens the adhesions");
   list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
-           "standard deviation of the Gaussian before thresholding (um)");
+           "standard deviation of the Gaussian before thresholding (um); unset: the least from 0.05 to 0.2 um at which "
+           "the faintest adhesion stands out of the noise");
   list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor(),
            "height of an adhesion's brightest pixel over its background (standard deviations of the noise)");
   list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor(),

@@ -14,7 +14,7 @@ namespace mbtfm::segment {
 
 struct AdhesionParameters {
   double adhesion_background_um = 2.0;  ///< larger than half of the widest adhesion, smaller than illumination changes
-  double adhesion_smoothing_um = 0.05;  ///< a third of the microscope's blur, which it widens by 6 %
+  std::optional<double> adhesion_smoothing_um;  ///< unset: as the image's noise asks for
   double adhesion_seed_noise = 5;       ///< five standard deviations: less than one false seed in 10^6 pixels
   double adhesion_rim_noise = 2.5;      ///< the rim may be fainter than the seed, but still out of the noise
   double adhesion_rim_level =

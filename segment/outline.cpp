@@ -7,6 +7,7 @@
 #include "segment/edge_profile.h"
 #include "segment/ellipse.h"
 #include "segment/grid.h"
+#include "segment/haze.h"
 
 namespace mbtfm::segment {
 
@@ -55,6 +56,12 @@ cv::Mat without_debris(const cv::Mat& mask, double smallest) {
   return result;
 }
 
+cv::Mat smoothed(const cv::Mat& mask) {
+  cv::Mat smooth;
+  cv::GaussianBlur(mask, smooth, cv::Size(0, 0), kSigma_px);
+  return smooth > 127;
+}
+
 cv::Mat disc_of(double radius_px) {
   const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
   return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
@@ -94,15 +101,14 @@ double median_within(const cv::Mat& values, const cv::Mat& mask) {
 /// One round of comparing points near the edge with both sides. "Inside" is what the cell looks like along its edge:
 /// brighter things, its thick middle, fibres and adhesions, count no more than that.
 cv::Mat moved_edge(const cv::Mat& values, const cv::Mat& mask, double band_px, double smallest) {
-  cv::Mat grown, core, result = mask.clone(), smooth;
+  cv::Mat grown, core, result = mask.clone();
   cv::dilate(mask, grown, disc_of(band_px));
   cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
   const cv::Mat clipped = cv::min(values, median_within(values, mask & ~core));
   const cv::Mat middle = (mean_nearby(clipped, mask, band_px) + mean_nearby(clipped, ~mask, band_px)) / 2;
   const cv::Mat brighter = clipped > middle, band = grown & ~core;
   brighter.copyTo(result, band);
-  cv::GaussianBlur(result, smooth, cv::Size(0, 0), kSigma_px);
-  return without_debris(smooth > 127, smallest);
+  return without_debris(smoothed(result), smallest);
 }
 
 void add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double pixel_um, double reach_um) {
@@ -243,7 +249,7 @@ Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameter
 }
 
 /// All cells; holes filled.
-cv::Mat mask_of(const Scene& s, double smallest) {
+Body cells_in(const Scene& s, double smallest, const OutlineParameters& p) {
   cv::Mat mask = first_mask(s.smooth, s.noise, smallest);
   if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
   // two halves of pure noise differ by 1.6 standard deviations
@@ -255,16 +261,21 @@ cv::Mat mask_of(const Scene& s, double smallest) {
     // less than a pixel in a thousand of the cell: what still changes is noise
     if (cv::countNonZero(before ^ mask) * 1000 < cv::countNonZero(mask)) break;
   }
-  return mask;
+  Body body = without_haze(s.smooth, mask, s.pixel_um, p.outline_band_um);
+  if (cv::countNonZero(body.mask ^ mask) > 0) mask = without_debris(smoothed(body.mask), smallest);
+  return {mask, body.soft};
 }
 
-/// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel.
-std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Adhesion>& adhesions, Vec2 field_um,
-                          double border_um) {
+/// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel. So do those in
+/// haze, which has no profile of a membrane.
+std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Adhesion>& adhesions, const Scene& s,
+                          const cv::Mat& soft) {
   std::vector<bool> result;
   for (const Vec2 p : ring_um) {
-    const double border = std::min({p.x, p.y, field_um.x - p.x, field_um.y - p.y});
-    result.push_back(border > border_um && std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
+    const double border = std::min({p.x, p.y, s.field_um().x - p.x, s.field_um().y - p.y});
+    const int x = std::clamp(static_cast<int>(p.x / s.pixel_um), 0, soft.cols - 1);
+    const int y = std::clamp(static_cast<int>(p.y / s.pixel_um), 0, soft.rows - 1);
+    result.push_back(border > s.border_um() && !soft.at<uchar>(y, x) && std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
                        return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
                      }));
   }
@@ -273,7 +284,7 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
 
 /// A ring of the mask's grid as the polygon on the image's edge.
 Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const std::vector<Adhesion>& adhesions,
-                   const OutlineParameters& p) {
+                   const cv::Mat& soft, const OutlineParameters& p) {
   const auto points = resampled(ring, p.outline_spacing_um / s.pixel_um);
   Polygon coarse, polygon;
   std::vector<cv::Point2d> full_ring;
@@ -282,7 +293,7 @@ Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const s
     full_ring.push_back(to_pixels(coarse.back(), s.full_pixel_um));
   }
   const Vec2 field_um = s.field_um();
-  const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, field_um, s.border_um()), s.full_pixel_um);
+  const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, s, soft), s.full_pixel_um);
   for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), p.outline_spacing_um / s.full_pixel_um)) {
     const Vec2 at = to_um(point, s.full_pixel_um);
     polygon.push_back({std::clamp(at.x, 0.0, field_um.x), std::clamp(at.y, 0.0, field_um.y)});
@@ -316,7 +327,7 @@ std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesi
                                     const OutlineParameters& p) {
   const Scene s = scene_of(matrix_of(image), pixel_size_um, p);
   const double smallest = s.px_of(p.outline_smallest_um2);
-  cv::Mat mask = mask_of(s, smallest);
+  auto [mask, soft] = cells_in(s, smallest, p);
   if (mask.empty() || cv::countNonZero(mask) == 0) return {};
   const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
   add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
@@ -328,7 +339,7 @@ std::vector<CellOutline> find_cells(const Image& image, const std::vector<Adhesi
     cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
     const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
     for (const auto& ring : rings) {
-      const Polygon polygon = polygon_of(s, ring, adhesions, p);
+      const Polygon polygon = polygon_of(s, ring, adhesions, soft, p);
       if (cell.outer_um.empty()) {
         CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
         cell.outer_um = std::move(cut.points_um);

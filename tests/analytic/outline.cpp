@@ -5,6 +5,7 @@
 #include "segment/ellipse.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
+#include "tests/support/real_adhesions.h"
 
 namespace mbtfm::segment {
 namespace {
@@ -49,6 +50,38 @@ TEST(Outline, lies_in_the_middle_of_a_cortex_that_the_microscope_cannot_resolve)
     EXPECT_NEAR(mean_offset_um(outline, kDisc), 0, 0.1);  // its half-height is 0.2 and 0.3 um further out
     EXPECT_GT(intersection_over_union(outline, ellipse_polygon(kDisc, 200)), 0.98);
   }
+}
+
+TEST(Outline, lies_on_the_edge_of_a_cell_and_not_of_its_haze) {
+  // a tall cell out of focus: a blur of 2 um, and a skirt of a third of the light that reaches three times as far
+  for (const double noise : {2.0, 20.0}) {
+    SCOPED_TRACE(noise);
+    Image image = even_image(600, 600, 100);
+    const Adhesion cell = ellipse(1, {30, 30}, 36, 26, 0.4);
+    draw_ellipse(image, cell, 400, 2, kPixel_um);
+    draw_ellipse(image, cell, 200, 6, kPixel_um);
+    draw_line(image, {{20, 28}, {40, 31}}, 400, 0.6, kPixel_um);
+    add_noise(image, noise, 6);
+    const Polygon outline = find_outline(image, {}, kPixel_um, {});
+    // the step of the mask's grid, and what the median of a curved cell lacks of its plateau
+    EXPECT_NEAR(mean_offset_um(outline, cell), 0, 0.5);
+    EXPECT_GT(intersection_over_union(outline, ellipse_polygon(cell, 200)), 0.93);
+  }
+}
+
+TEST(Outline, keeps_a_dim_lamella_whose_edge_is_sharp) {
+  Image image = even_image(500, 500, 100);
+  const Adhesion lamella = ellipse(1, {25, 25}, 30, 24, 0.4), body = ellipse(2, {25, 25}, 26, 20, 0.4);
+  draw_ellipse(image, lamella, 100, 0.15, kPixel_um);
+  draw_ellipse(image, body, 200, 0.5, kPixel_um);  // three times as bright
+  add_noise(image, 5, 7);
+  const Polygon outline = find_outline(image, {}, kPixel_um, {});
+  EXPECT_GT(intersection_over_union(outline, ellipse_polygon(lamella, 200)), 0.95);  // 0.75 is the body
+}
+
+TEST(Outline, of_a_real_doublet_is_its_authors_outline) {
+  if (!std::filesystem::exists(kDoublet)) GTEST_SKIP() << "the shared data are absent: " << kDoublet;
+  EXPECT_GE(doublet_overlap(), 0.93);
 }
 
 TEST(Outline, contains_every_adhesion_it_owns) {

@@ -1,6 +1,8 @@
-/// A published fibroblast with its labels (Berginski et al. 2011), where the shared data are present.
+/// Real cells whose adhesions or outline others have marked, where the shared data are present: a published fibroblast
+/// with its labels (Berginski et al. 2011), noisy live cells with masks drawn by hand, a doublet with its outline.
 #pragma once
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -8,13 +10,26 @@
 #include <string>
 #include <vector>
 
-#include "segment/ellipse.h"
-#include "segment/image.h"
+#include "segment/segment_cell.h"
+#include "tests/support/segmentation_score.h"
 
 namespace mbtfm::test {
 
-inline const std::filesystem::path kFibroblast =
-    std::filesystem::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data/fa/faas_fibro100_wt02";
+inline const std::filesystem::path kSharedData =
+    std::filesystem::path(MBTFM_SOURCE_DIR).parent_path() / "shared/data";
+
+inline const std::filesystem::path kFibroblast = kSharedData / "fa/faas_fibro100_wt02";
+/// The authors' images of this series have about 0.215 um a pixel; it makes this cell 35 x 90 um.
+constexpr double kFibroblastPixel_um = 0.215;
+
+/// Two each of six live cells, turned and with added speckle.
+inline const std::filesystem::path kHandMasks = kSharedData / "fa/hand_masks";
+constexpr double kHandMasksPixel_um = 0.1527;
+constexpr int kHandMasked[] = {0, 2, 60, 62, 4, 10, 64, 70, 6, 8, 66, 68};
+
+/// Two MDCK cells on a pattern, in the haze of their own height.
+inline const std::filesystem::path kDoublet = kSharedData / "real/doublet_on_h";
+constexpr double kDoubletPixel_um = 0.108;
 
 /// Rows of a table of numbers without a header.
 inline std::vector<std::vector<double>> numbers_of(const std::filesystem::path& file) {
@@ -37,6 +52,56 @@ inline Labels labels_of(const segment::Image& image) {
     for (int column = 0; column < image.width; ++column)
       if (const int label = static_cast<int>(image.at(column, row))) labels[label].push_back({column, row, 1, 0});
   return labels;
+}
+
+/// The connected pixels of a mask (4 neighbours), by label.
+inline Labels components_of(const segment::Image& mask) {
+  Labels labels;
+  std::vector<bool> is_done(mask.pixels.size(), false);
+  const auto take = [&](std::vector<segment::CoveredPixel>& part, int column, int row) {
+    if (column < 0 || row < 0 || column >= mask.width || row >= mask.height || mask.at(column, row) == 0) return;
+    if (const std::size_t i = static_cast<std::size_t>(row) * mask.width + column; !is_done[i]) {
+      is_done[i] = true;
+      part.push_back({column, row, 1, 0});
+    }
+  };
+  for (int row = 0; row < mask.height; ++row)
+    for (int column = 0; column < mask.width; ++column) {
+      std::vector<segment::CoveredPixel> part;
+      take(part, column, row);
+      for (std::size_t k = 0; k < part.size(); ++k)
+        for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
+          take(part, part[k].column + dx, part[k].row + dy);
+      if (!part.empty()) labels[static_cast<int>(labels.size()) + 1] = std::move(part);
+    }
+  return labels;
+}
+
+/// What is found in an image, by its pixels and by the ellipses that stand for them.
+struct FoundLabels {
+  Labels pixels, ellipses;
+};
+
+inline FoundLabels found_labels(const std::vector<segment::AdhesionRegion>& regions, const segment::Image& image,
+                                double pixel_um) {
+  FoundLabels found;
+  for (const segment::AdhesionRegion& region : regions) {
+    const Adhesion& a = region.adhesion;
+    for (const segment::CoveredPixel& p : region.pixels)
+      if (p.share >= 0.5) found.pixels[a.adhesion_id].push_back(p);
+    const auto range = [&](double centre_um, int n) {
+      return std::pair(std::max(0, static_cast<int>((centre_um - a.major_axis_um) / pixel_um)),
+                       std::min(n, static_cast<int>((centre_um + a.major_axis_um) / pixel_um) + 2));
+    };
+    const auto [top, bottom] = range(a.position_um.y, image.height);
+    const auto [left, right] = range(a.position_um.x, image.width);
+    for (int row = top; row < bottom; ++row)
+      for (int column = left; column < right; ++column)
+        if (const Vec2 at{(column + 0.5) * pixel_um, (row + 0.5) * pixel_um};
+            norm(at - a.position_um) <= a.major_axis_um && segment::distance_to_ellipse_um(a, at) < 0)
+          found.ellipses[a.adhesion_id].push_back({column, row, 1, 0});
+  }
+  return found;
 }
 
 struct Overlap {
@@ -71,6 +136,44 @@ inline Overlap overlap_of(const Labels& truth, const Labels& found) {
   }
   o.f1 = 2.0 * n_hits / (o.n_true + o.n_found);
   return o;
+}
+
+/// By pixels and by ellipses.
+struct Overlaps {
+  Overlap pixels, ellipses;
+};
+
+inline Overlaps overlaps_of(const Labels& truth, const segment::Image& image, double pixel_um) {
+  const FoundLabels found = found_labels(segment::find_adhesion_regions(image, pixel_um, {}), image, pixel_um);
+  return {overlap_of(truth, found.pixels), overlap_of(truth, found.ellipses)};
+}
+
+inline Overlaps hand_mask_overlaps(int image) {
+  const std::string name = std::to_string(image) + ".tif";
+  return overlaps_of(components_of(segment::read_image(kHandMasks / "masks" / name)),
+                     segment::read_image(kHandMasks / "images" / name), kHandMasksPixel_um);
+}
+
+inline Overlaps fibroblast_overlaps() {
+  return overlaps_of(labels_of(segment::read_image(kFibroblast / "adhesions.png")),
+                     segment::read_image(kFibroblast / "focal_image.png"), kFibroblastPixel_um);
+}
+
+/// Intersection over union of a mask's pixels and an outline.
+inline double mask_overlap(const segment::Image& mask, const Polygon& outline_um, double pixel_um) {
+  int n_both = 0, n_either = 0;
+  for (int row = 0; row < mask.height; ++row)
+    for (int column = 0; column < mask.width; ++column) {
+      const bool is_in = contains(outline_um, {(column + 0.5) * pixel_um, (row + 0.5) * pixel_um});
+      n_both += is_in && mask.at(column, row) > 0;
+      n_either += is_in || mask.at(column, row) > 0;
+    }
+  return 1.0 * n_both / std::max(1, n_either);
+}
+
+inline double doublet_overlap() {
+  const Polygon outline = segment::find_outline(segment::read_image(kDoublet / "actin.tif"), {}, kDoubletPixel_um, {});
+  return mask_overlap(segment::read_image(kDoublet / "mask.tif"), outline, kDoubletPixel_um);
 }
 
 }  // namespace mbtfm::test
