@@ -78,16 +78,15 @@ Vec2 direction_of_end(const Polyline& last) {
 
 /// Least effort from the course of the line around its end to the adhesion: some way back along the line, as far
 /// straight ahead.
-double effort_to(const Adhesion& adhesion, const Polyline& last) {
+double effort_to(const Adhesion& adhesion, const Polyline& last, double ahead_cost) {
   constexpr double kAside = 2;    // a fibre goes on ahead, it does not turn aside
   constexpr double kBack = 0.3;   // a line may run on a little over the adhesion that holds it
-  constexpr double kAhead = 0.7;  // its end fades: it may be longer than it looks
   const Vec2 ahead = direction_of_end(last);
   double least = kInfinite;
   for (std::size_t i = 0; i < last.size(); ++i) {
     const double s = 0.1 * static_cast<double>(i);
     const auto aside = [&](Vec2 p) { return kAside * std::max(0.0, distance_to_ellipse_um(adhesion, p)); };
-    least = std::min({least, aside(last[i]) + kBack * s, aside(last.front() + s * ahead) + kAhead * s});
+    least = std::min({least, aside(last[i]) + kBack * s, aside(last.front() + s * ahead) + ahead_cost * s});
   }
   return least;
 }
@@ -107,13 +106,14 @@ double outwardness(const Polyline& last, const Polygon& outline_um) {
 Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
   constexpr double kDirectionCounts = 0.3;  // of the reach: it decides near the limit and nowhere else
   const bool is_along_edge = runs_along_free_edge(line, outline_um);
-  if (is_long(line) || is_along_edge) reach_um *= 2;
-  const Polyline last = last_part(line, reach_um);
+  // its end fades: it may be longer than it looks, a fibre that must be held at both ends by more
+  const double ahead_cost = is_long(line) || is_along_edge ? 0.23 : 0.7;
+  const Polyline last = last_part(line, reach_um * 0.7 / ahead_cost);
   Hold best;
   double least = kInfinite;
   for (const Adhesion& a : adhesions) {
     if (norm(a.position_um - line.back()) > 3 * reach_um + a.major_axis_um) continue;
-    const double effort = effort_to(a, last);
+    const double effort = effort_to(a, last, ahead_cost);
     // between two that the line touches, the one whose centre it passes nearer
     const double cost = effort + 0.2 * distance_to_line_um({last.back(), last.front()}, a.position_um);
     if (cost < least) {
@@ -219,6 +219,10 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
                : n_tied == 1 ? FibreType::dorsal
                              : FibreType::arc;
   if (fibre.type == FibreType::edge) fibre.type_reason += "; along a free edge";
+  if (n_tied < 2 && is_long(line)) {
+    fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+    fibre.type_reason += "; fibres as long as this are held at both ends as a rule";
+  }
 }
 
 void lead_to_cut(Fibre& fibre, const Cuts& cuts, double reach_um) {
