@@ -58,7 +58,7 @@ Contrast contrast_of(const cv::Mat& image, double pixel_um, const AdhesionParame
   Contrast c = smoothed_contrast(image, pixel_um, smoothing_um, p);
   Bright bright = bright_of(c, p.adhesion_seed_noise);
   const auto is_noisy = [&] { return p.adhesion_seed_noise * bright.noise > p.adhesion_faintest * bright.height; };
-  constexpr double kStep = 1.41421;  // a step halves the white noise's variance
+  constexpr double kStep = 2;  // a step halves white noise
   const Contrast least = c;
   while (!p.adhesion_smoothing_um && smoothing_um < kMostSmoothing_um && (bright.height <= 0 || is_noisy())) {
     smoothing_um = std::min(kStep * smoothing_um, kMostSmoothing_um);

@@ -25,8 +25,8 @@ struct Contrast {
   cv::Mat least_seed;   ///< heights below may be a step of the background, as at the edge of a bright cell
 };
 
-/// The smoothing is the least, from `kLeastSmoothing_um` to `kMostSmoothing_um`, at which the faintest adhesion that the
-/// floor lets through can have a seed:
+/// The smoothing is the least, from `kLeastSmoothing_um` to `kMostSmoothing_um`, at which the faintest adhesion that
+/// the floor lets through can have a seed:
 ///
 ///   adhesion_seed_noise · noise(s) <= adhesion_faintest · typical height(s)
 ///

@@ -74,7 +74,8 @@ std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<Adhesi
 void declare(ParameterList& list, AdhesionParameters& p) {
   list.table("segment");
   list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um(),
-           "radius of the median that is the background of an adhesion (um); in a noisy image up to 1.6 times larger, as the "
+           "radius of the median that is the background of an adhesion (um); in a noisy image up to 1.6 times larger, "
+           "as the "
            "smoothing widens the adhesions");
   list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
            "standard deviation of the Gaussian before thresholding (um); unset: the least from 0.05 to 0.2 um at which "

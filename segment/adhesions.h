@@ -15,8 +15,8 @@ namespace mbtfm::segment {
 struct AdhesionParameters {
   double adhesion_background_um = 2.0;  ///< larger than half of the widest adhesion, smaller than illumination changes
   std::optional<double> adhesion_smoothing_um;  ///< unset: as the image's noise asks for
-  double adhesion_seed_noise = 5;       ///< five standard deviations: less than one false seed in 10^6 pixels
-  double adhesion_rim_noise = 2.5;      ///< the rim may be fainter than the seed, but still out of the noise
+  double adhesion_seed_noise = 5;               ///< five standard deviations: less than one false seed in 10^6 pixels
+  double adhesion_rim_noise = 2.5;              ///< the rim may be fainter than the seed, but still out of the noise
   double adhesion_rim_level =
       0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
   double adhesion_level_radius_um = 0.4;   ///< three deviations of the blur: a bright neighbour further off is none

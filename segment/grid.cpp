@@ -145,6 +145,19 @@ float quantile(const cv::Mat& values, double q) {
   return *place;
 }
 
+double median_within(const cv::Mat& values, const cv::Mat& mask) {
+  std::vector<float> within;
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (mask.at<uchar>(y, x)) within.push_back(values.at<float>(y, x));
+  return within.empty() ? 0 : quantile(cv::Mat(within), 0.5);
+}
+
+cv::Mat disc_of(double radius_px) {
+  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
+  return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
+}
+
 float sample(const cv::Mat& image, cv::Point2d point) {
   const double x = std::clamp(point.x, 0.0, image.cols - 1.0), y = std::clamp(point.y, 0.0, image.rows - 1.0);
   const int i = std::min(static_cast<int>(x), std::max(0, image.cols - 2));

@@ -55,6 +55,12 @@ cv::Mat local_spread(const cv::Mat& residual, double radius_px);
 /// The value below which a fraction `q` of the elements lies.
 float quantile(const cv::Mat& values, double q);
 
+/// Median of the values where the mask is not 0; 0 where it is nowhere.
+double median_within(const cv::Mat& values, const cv::Mat& mask);
+
+/// A disc for dilation and erosion, of a pixel at least.
+cv::Mat disc_of(double radius_px);
+
 /// Bilinear sample; outside the matrix the nearest pixel.
 float sample(const cv::Mat& image, cv::Point2d point);
 

@@ -19,11 +19,6 @@ constexpr double kPlateau_bands = 2;  // inwards: twice the widest blur at which
 constexpr double kHalf = 0.5;
 constexpr double kLong_bands = 3;  // along the edge: a tall cell's haze is all around, a dim place of the lamella short
 
-cv::Mat disc_of(double radius_px) {
-  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
-  return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
-}
-
 cv::Mat distance_from(const cv::Mat& mask) {
   cv::Mat distance;
   cv::distanceTransform(~mask, distance, cv::DIST_L2, 5);
@@ -70,14 +65,6 @@ cv::Mat hazy_parts(const cv::Mat& area, const cv::Mat& mask, const cv::Mat& soft
       if (const auto label = static_cast<std::size_t>(labels.at<int>(y, x)); label > 0 && n_edge[label] >= least)
         result.at<uchar>(y, x) = 2 * n_soft[label] > n_edge[label] ? 255 : 0;
   return result;
-}
-
-double median_within(const cv::Mat& values, const cv::Mat& mask) {
-  std::vector<float> within;
-  for (int y = 0; y < mask.rows; ++y)
-    for (int x = 0; x < mask.cols; ++x)
-      if (mask.at<uchar>(y, x)) within.push_back(values.at<float>(y, x));
-  return within.empty() ? 0 : quantile(cv::Mat(within), 0.5);
 }
 
 }  // namespace

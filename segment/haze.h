@@ -20,7 +20,8 @@ struct Body {
 ///
 /// - B: the mean of the image well beyond the mask's reach, as it is near this place.
 /// - I: the image opened by a disc wider than fibres and filopodia, which are neither rim nor plateau.
-/// - P: the greatest I within two bands in the mask, but no more than the mask's median: the edge of a cell's thick middle
+/// - P: the greatest I within two bands in the mask, but no more than the mask's median: the edge of a cell's thick
+/// middle
 ///   is not the edge of the cell.
 ///
 /// It begins only where the mask ends in haze: along three bands of its edge or more, most of it soft. Soft is an

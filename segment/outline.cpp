@@ -62,11 +62,6 @@ cv::Mat smoothed(const cv::Mat& mask) {
   return smooth > 127;
 }
 
-cv::Mat disc_of(double radius_px) {
-  const int r = std::max(1, static_cast<int>(std::lround(radius_px)));
-  return cv::getStructuringElement(cv::MORPH_ELLIPSE, cv::Size(2 * r + 1, 2 * r + 1));
-}
-
 /// Otsu's threshold of log(1 + brightness): cells are bright by a factor, not by an amount.
 cv::Mat first_mask(const cv::Mat& image, double noise, double smallest) {
   const double dark = quantile(image, 0.01), bright = quantile(image, 0.99);
@@ -87,15 +82,6 @@ cv::Mat mean_nearby(const cv::Mat& values, const cv::Mat& mask, double sigma_px)
   cv::multiply(values, weight, weighted);
   // 1e-6: far from the mask both are nothing, and the quotient must stay finite
   return wide_gaussian(weighted, sigma_px) / (wide_gaussian(weight, sigma_px) + 1e-6);
-}
-
-/// Median of the values where the mask is not 0.
-double median_within(const cv::Mat& values, const cv::Mat& mask) {
-  std::vector<float> within;
-  for (int y = 0; y < mask.rows; ++y)
-    for (int x = 0; x < mask.cols; ++x)
-      if (mask.at<uchar>(y, x)) within.push_back(values.at<float>(y, x));
-  return within.empty() ? 0 : quantile(cv::Mat(within), 0.5);
 }
 
 /// One round of comparing points near the edge with both sides. "Inside" is what the cell looks like along its edge:
@@ -275,7 +261,8 @@ std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Ad
     const double border = std::min({p.x, p.y, s.field_um().x - p.x, s.field_um().y - p.y});
     const int x = std::clamp(static_cast<int>(p.x / s.pixel_um), 0, soft.cols - 1);
     const int y = std::clamp(static_cast<int>(p.y / s.pixel_um), 0, soft.rows - 1);
-    result.push_back(border > s.border_um() && !soft.at<uchar>(y, x) && std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
+    result.push_back(border > s.border_um() && !soft.at<uchar>(y, x) &&
+                     std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
                        return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
                      }));
   }

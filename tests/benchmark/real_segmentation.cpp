@@ -46,7 +46,8 @@ void draw(const std::filesystem::path& file, const segment::Image& image, const 
   cv::drawContours(picture, rings, -1, cv::Scalar(0, 200, 0));
   for (const Polygon& polygon : found) {
     std::vector<cv::Point> points;
-    for (const Vec2 p : polygon) points.emplace_back(cvRound(kScale * p.x / pixel_um), cvRound(kScale * p.y / pixel_um));
+    for (const Vec2 p : polygon)
+      points.emplace_back(cvRound(kScale * p.x / pixel_um), cvRound(kScale * p.y / pixel_um));
     cv::polylines(picture, points, true, cv::Scalar(255, 60, 60));
   }
   segment::write_png(file, {picture.cols, picture.rows, {picture.data, picture.data + 3 * picture.total()}});
@@ -82,8 +83,8 @@ int main(int argc, char** argv) {
     std::printf("the shared data are absent: %s\n", kSharedData.c_str());
     return 0;
   }
-  std::printf("%-12s %16s %16s %15s\n%-12s %9s %6s %9s %6s %8s %6s\n", "adhesions", "by pixels", "by ellipses", "number",
-              "", "Dice", "F1", "Dice", "F1", "theirs", "found");
+  std::printf("%-12s %16s %16s %15s\n%-12s %9s %6s %9s %6s %8s %6s\n", "adhesions", "by pixels", "by ellipses",
+              "number", "", "Dice", "F1", "Dice", "F1", "theirs", "found");
   std::vector<Overlaps> all;
   for (const int i : kHandMasked) {
     all.push_back(hand_mask_overlaps(i));
