@@ -56,7 +56,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
     fuzz::answer([&] { hand_drawn_outline(set, field); });
     std::vector<Adhesion> adhesions;
     fuzz::answer([&] { adhesions = hand_drawn_adhesions(set, {}, field); });
-    fuzz::answer([&] { hand_drawn_fibres(set, adhesions, {{0, 0}, {50, 0}, {50, 40}}, {}, field, {}); });
+    const CellOutline cell{.outer_um = {{0, 0}, {50, 0}, {50, 40}}};
+    fuzz::answer([&] { hold_fibres(drawn_lines(set, {}, field, {}), adhesions, cell, {}, 1); });
     for (const Roi& roi : set.rois) {
       if (is_area(roi.shape)) area_px(roi);
       if (is_line(roi.shape)) line_px(roi);
