@@ -191,7 +191,8 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::
     const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
     Z.middleCols<2>(2 * static_cast<Eigen::Index>(i)) *= side_um;
   }
-  const bool has_affine = data.motions.cols() > 0;
+  const Eigen::Index n_affine = data.motions.cols();
+  const bool has_affine = n_affine > 0;
   allow_motions(data, with_even_traction(data.motions, places, compliance_um_per_nN));
   const Spectrum spectrum = spectrum_of(data, Z);
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
@@ -211,6 +212,13 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::
   Eigen::MatrixXd motions(Z.rows(), n_free + found.n_motions);
   if (n_free > 0) motions.leftCols(n_free) = data.motions;
   motions.rightCols(found.n_motions) = std::sqrt(kappa) * Z * eigen.eigenvectors().rightCols(found.n_motions);
+  // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
+  // motion twice, whose square no rounding leaves definite.
+  const Eigen::MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * even;
+  motions.rightCols(found.n_motions) -= even * (even.transpose() * weighted)
+                                                   .completeOrthogonalDecomposition()
+                                                   .solve(weighted.transpose() * motions.rightCols(found.n_motions));
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
   precision.head(n_free).setZero();
   if (has_affine) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
