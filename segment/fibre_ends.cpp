@@ -15,8 +15,8 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
-/// Dorsal fibres and arcs are short. A fibre that spans the cell is held at both ends, though the last micrometres of it
-/// may be hidden: experts drew 22 of 23 such lines of a real cell as held at both.
+/// Dorsal fibres and arcs are short. A fibre that spans the cell is held at both ends, though the last micrometres of
+/// it may be hidden: experts drew 22 of 23 such lines of a real cell as held at both.
 bool is_long(const Polyline& line) {
   constexpr double kLong_um = 16;
   return length_um(line) > kLong_um;
@@ -79,8 +79,8 @@ Vec2 direction_of_end(const Polyline& last) {
 /// Least effort from the course of the line around its end to the adhesion: some way back along the line, as far
 /// straight ahead.
 double effort_to(const Adhesion& adhesion, const Polyline& last, double ahead_cost) {
-  constexpr double kAside = 2;    // a fibre goes on ahead, it does not turn aside
-  constexpr double kBack = 0.3;   // a line may run on a little over the adhesion that holds it
+  constexpr double kAside = 2;   // a fibre goes on ahead, it does not turn aside
+  constexpr double kBack = 0.3;  // a line may run on a little over the adhesion that holds it
   const Vec2 ahead = direction_of_end(last);
   double least = kInfinite;
   for (std::size_t i = 0; i < last.size(); ++i) {
@@ -173,7 +173,8 @@ Polyline to_adhesion(const WayOn& way, const std::vector<Adhesion>& adhesions) {
   for (std::size_t i = 0; i < way.points_um.size(); ++i) {
     n_seen += way.over_noise[i] > kFaint;
     if (static_cast<double>(n_seen) < kShare * static_cast<double>(i + 1)) continue;
-    if (std::ranges::any_of(adhesions, [&](const Adhesion& a) { return distance_to_ellipse_um(a, way.points_um[i]) <= 0; }))
+    if (std::ranges::any_of(adhesions,
+                            [&](const Adhesion& a) { return distance_to_ellipse_um(a, way.points_um[i]) <= 0; }))
       return {way.points_um.begin(), way.points_um.begin() + static_cast<std::ptrdiff_t>(i) + 1};
   }
   return {};
@@ -219,7 +220,7 @@ void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygo
                : n_tied == 1 ? FibreType::dorsal
                              : FibreType::arc;
   if (fibre.type == FibreType::edge) fibre.type_reason += "; along a free edge";
-  if (n_tied < 2 && is_long(line)) {
+  if (n_tied < 2 && is_long(line) && !adhesions.empty()) {
     fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
     fibre.type_reason += "; fibres as long as this are held at both ends as a rule";
   }

@@ -160,8 +160,8 @@ struct Judge {
     return way;
   }
 
-  /// Of lines of texture, the share that a fibre lies beside by chance: of those below the limit in 9 simulated cells of
-  /// 20 fibres .12, in 9 of 40 fibres .22.
+  /// Of lines of texture, the share that a fibre lies beside by chance: of those below the limit in 9 simulated cells
+  /// of 20 fibres .12, in 9 of 40 fibres .22.
   static constexpr double kFalseBeside = 0.15;
 };
 
@@ -205,8 +205,8 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   }
   constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
   const bool is_known = heights.size() >= kEnough;
-  const double bright = is_known ? judge.p.fibre_edge_height * quantile_of(heights, 0.9)
-                                 : std::numeric_limits<double>::infinity();
+  const double bright =
+      is_known ? judge.p.fibre_edge_height * quantile_of(heights, 0.9) : std::numeric_limits<double>::infinity();
   const double faint = is_known ? judge.p.fibre_faintest * quantile_of(heights, 0.5) : 0;
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < traces.size(); ++i) {
@@ -256,7 +256,7 @@ void declare(ParameterList& list, FibreParameters& p) {
 }
 
 std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
-                                const FibreParameters& p) {
+                                      const FibreParameters& p) {
   const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
   const RidgeScales scales = scales_of(p, field.pixel_um);
   const TraceRule rule = rule_of(p, field.pixel_um);
@@ -278,8 +278,8 @@ std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline
   return fibres;
 }
 
-std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
-                        const FibreParameters& p, const Cuts& cuts) {
+std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
+                        const Polygon& outline_um, const FibreParameters& p, const Cuts& cuts) {
   std::vector<Fibre> fibres;
   for (TracedFibre& t : traced) {
     lead_on(t, adhesions, outline_um, p.fibre_reach_um);

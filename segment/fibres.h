@@ -26,7 +26,7 @@ struct FibreParameters {
   double fibre_edge_height = 0.8;       ///< … unless it is as bright as the cell's bright fibres
   double fibre_lamellipodium_um = 3;    ///< its width: this near to the edge a line that winds is a ruffle
   double fibre_reach_um = 1.0;          ///< an end this near to an adhesion's rim is held by it
-  double fibre_faint_um = 4;        ///< longest faint end of the fibres that experts drew on a real cell
+  double fibre_faint_um = 4;            ///< longest faint end of the fibres that experts drew on a real cell
   double fibre_simplify_um = 0.05;      ///< points are left out where the line moves less: half a pixel
 };
 
@@ -37,11 +37,11 @@ void declare(ParameterList& list, FibreParameters& parameters);
 /// @param pixel_size_um  > 0
 /// @throws InvalidData where a pixel is not finite
 std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
-                                const FibreParameters& parameters);
+                                      const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
 /// out. @param cuts  of the outline: see lead_to_cut()
-std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um,
-                        const FibreParameters& parameters, const Cuts& cuts = {});
+std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
+                        const Polygon& outline_um, const FibreParameters& parameters, const Cuts& cuts = {});
 
 /// Both: oriented ridge filters at two widths, lines traced along the ridges through crossings and gaps,
 /// collinear pieces joined. A line is a fibre where its mean height over the texture around it is so significant that

@@ -191,8 +191,8 @@ void collect(const cv::Mat& magnitude, const cv::Mat& is_free, cv::Point2d centr
 /// The spread around one place of the coarse grid; 0 where nothing free is around.
 float spread_at(const Picked& picked, cv::Point2d centre, double radius, std::vector<float>& values,
                 std::vector<float>& spreads) {
-  constexpr std::size_t kEnough = 40;  // the tenth largest of them is known to a tenth
-  constexpr double kFarthest = 4;      // radii
+  constexpr std::size_t kEnough = 40;                 // the tenth largest of them is known to a tenth
+  constexpr double kFarthest = 4;                     // radii
   constexpr double kTail = 0.9, kNormalTail = 1.645;  // 9 of 10 normal variates are smaller, in deviations
   double reach = radius;
   collect(picked.magnitude.front(), picked.is_free, centre, reach, values);

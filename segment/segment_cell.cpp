@@ -1,8 +1,8 @@
 #include "segment/segment_cell.h"
 
 #include <algorithm>
-#include <functional>
 #include <cmath>
+#include <functional>
 
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
@@ -81,8 +81,8 @@ std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const Channel& c
 }
 
 /// Move what the actin image shows to where the adhesion image has it.
-void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& traced, const std::vector<Adhesion>& adhesions,
-           const SegmentParameters& p) {
+void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& traced,
+           const std::vector<Adhesion>& adhesions, const SegmentParameters& p) {
   std::vector<Fibre> fibres;
   for (const TracedFibre& t : traced) fibres.push_back(t.fibre);
   s.alignment = align_channels(fibres, adhesions);

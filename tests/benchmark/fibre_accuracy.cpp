@@ -52,8 +52,8 @@ std::vector<Vec2> skeleton_of(segment::Image map, float threshold) {
       for (int y = 0; y < map.height; ++y)
         for (int x = 0; x < map.width; ++x) {
           if (!on(x, y)) continue;
-          const bool p[8] = {on(x, y - 1),     on(x + 1, y - 1), on(x + 1, y), on(x + 1, y + 1),
-                             on(x, y + 1),     on(x - 1, y + 1), on(x - 1, y), on(x - 1, y - 1)};
+          const bool p[8] = {on(x, y - 1), on(x + 1, y - 1), on(x + 1, y), on(x + 1, y + 1),
+                             on(x, y + 1), on(x - 1, y + 1), on(x - 1, y), on(x - 1, y - 1)};
           int n = 0, n_changes = 0;
           for (int i = 0; i < 8; ++i) {
             n += p[i];

@@ -1,5 +1,6 @@
-/// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells are segmented,
-/// at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the adhesions.
+/// segmentation_accuracy [scenario] [first seed] [last seed] [true-adhesions] [name=value …]: how well simulated cells
+/// are segmented, at three image qualities; mean over the seeds. `true-adhesions` judges the fibres apart from the
+/// adhesions.
 #include <cstdio>
 #include <cstdlib>
 
