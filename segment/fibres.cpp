@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "segment/bright_actin.h"
 #include "segment/fibre_line.h"
 #include "segment/fibre_profile.h"
 #include "segment/fibre_significance.h"
@@ -220,6 +221,26 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   return significant(std::move(candidates), judge.p);
 }
 
+/// Actin as bright as these fibres, away from them and from the folds at the cell's edge.
+std::vector<Polyline> unexplained(const std::vector<Candidate>& fibres, const Judge& judge) {
+  const Field& field = judge.field;
+  std::vector<std::vector<cv::Point2d>> points;
+  for (const Candidate& c : fibres) {
+    points.emplace_back();
+    for (const Vec2 u : c.points_um) points.back().push_back(to_pixels(u - field.origin_um, field.pixel_um));
+  }
+  cv::Mat depth;
+  cv::distanceTransform(field.is_inside, depth, cv::DIST_L2, 5);
+  std::vector<Polyline> lines_um;
+  for (const auto& crest : bright_crests_beside(judge.ridges, depth > judge.p.fibre_lamellipodium_um / field.pixel_um,
+                                                points, 1.33 * judge.p.fibre_width_um / field.pixel_um,
+                                                judge.p.fibre_shortest_um / field.pixel_um)) {
+    lines_um.emplace_back();
+    for (const cv::Point2d& p : crest) lines_um.back().push_back(field.in_um(p));
+  }
+  return lines_um;
+}
+
 }  // namespace
 
 void declare(ParameterList& list, FibreParameters& p) {
@@ -255,8 +276,8 @@ void declare(ParameterList& list, FibreParameters& p) {
            "points are left out where the line moves less (um)");
 }
 
-std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
-                                      const FibreParameters& p) {
+TracedLines trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
+                         const FibreParameters& p) {
   const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
   const RidgeScales scales = scales_of(p, field.pixel_um);
   const TraceRule rule = rule_of(p, field.pixel_um);
@@ -266,16 +287,17 @@ std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline
   set_noise(ridges, is_free, scales.noise_radius_px);
   const auto traces = trace_lines(ridges, field.is_inside, rule);
   const Judge judge{field, ridges, rule, outline_um, area_um2(is_free, field.pixel_um), p};
-  std::vector<TracedFibre> fibres;
-  for (Candidate& c : judged(traces, judge)) {
+  std::vector<Candidate> fibres = judged(traces, judge);
+  TracedLines lines{{}, unexplained(fibres, judge)};
+  for (Candidate& c : fibres) {
     Fibre fibre;
     fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
     fibre.width_um = c.profile.width_px * field.pixel_um;
     fibre.mean_intensity = c.profile.height;
     fibre.confidence = chance_of_fibre(c.expected_false);
-    fibres.push_back({std::move(fibre), std::move(c.before), std::move(c.after)});
+    lines.fibres.push_back({std::move(fibre), std::move(c.before), std::move(c.after)});
   }
-  return fibres;
+  return lines;
 }
 
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
@@ -296,7 +318,7 @@ std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhes
 
 std::vector<Fibre> find_fibres(const Image& image, const Polygon& outline_um, const std::vector<Adhesion>& adhesions,
                                double pixel_size_um, const FibreParameters& p, const Cuts& cuts) {
-  return tied(trace_fibres(image, outline_um, pixel_size_um, p), adhesions, outline_um, p, cuts);
+  return tied(trace_fibres(image, outline_um, pixel_size_um, p).fibres, adhesions, outline_um, p, cuts);
 }
 
 }  // namespace mbtfm::segment

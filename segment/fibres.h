@@ -32,12 +32,19 @@ struct FibreParameters {
 
 void declare(ParameterList& list, FibreParameters& parameters);
 
+struct TracedLines {
+  std::vector<TracedFibre> fibres;
+  /// By line the points, in no order, of actin as bright as the fibres that is in none of them; away from the cell's
+  /// edge
+  std::vector<Polyline> unexplained_um;
+};
+
 /// Lines of an actin image that are stress fibres, not yet tied to adhesions.
 /// @param outline_um  lines whose middle lies outside are no fibres; empty: anywhere
 /// @param pixel_size_um  > 0
 /// @throws InvalidData where a pixel is not finite
-std::vector<TracedFibre> trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
-                                      const FibreParameters& parameters);
+TracedLines trace_fibres(const Image& image, const Polygon& outline_um, double pixel_size_um,
+                         const FibreParameters& parameters);
 /// Tie their ends, which gives the types; label them from 1, the longest first. Those that end up too short are left
 /// out. @param cuts  of the outline: see lead_to_cut()
 std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,

@@ -95,6 +95,7 @@ void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& trac
   for (Polygon& hole : outline.holes_um) move(hole);
   s.cell.outline_um = outline.outer_um;
   s.cell.holes_um = outline.holes_um;
+  for (Polyline& crest : s.unexplained_um) move(crest);
   for (TracedFibre& t : traced) {
     for (Polyline* points : {&t.fibre.points_um, &t.before.points_um, &t.after.points_um}) move(*points);
   }
@@ -281,8 +282,11 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
   Lines lines{.traced = {}, .drawn = {}, .are_drawn = in.drawn.fibres.has_value()};
   if (in.drawn.fibres)
     lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
-  else if (in.actin)
-    lines.traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
+  else if (in.actin) {
+    TracedLines traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
+    lines.traced = std::move(traced.fibres);
+    s.unexplained_um = std::move(traced.unexplained_um);
+  }
   CellOutline around = outline;
   if (in.source == AdhesionSource::image) {
     if (in.adhesion && !is_given) align(s, around, lines.traced, found, p);

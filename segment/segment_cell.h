@@ -40,6 +40,7 @@ struct Segmentation {
   bool is_cut_by_border = false;                ///< the image ends before the cell does
   int n_adhesions_outside = 0;                  ///< found beyond the cell and left out
   std::optional<ChannelAlignment> alignment{};  ///< of the actin image on the adhesion image, where fibre ends tell it
+  std::vector<Polyline> unexplained_um{};       ///< actin as bright as the fibres that is in none of them
   bool is_aligned = false;                      ///< fibres and outline were moved by it
   AdhesionSource source = AdhesionSource::image;
   int n_anchors = 0;  ///< that drawn fibres asked for

@@ -63,6 +63,20 @@ Severity severity_of(AdhesionSource source) {
   return source == AdhesionSource::pattern ? Severity::note : Severity::caution;
 }
 
+/// Length of bright actin in no fibre: the diagonals of the crests' boxes, as they hardly bend.
+double unexplained_um(const Segmentation& s) {
+  double sum = 0;
+  for (const Polyline& crest : s.unexplained_um) {
+    Vec2 low = crest.front(), high = low;
+    for (const Vec2 p : crest) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+    }
+    sum += norm(high - low);
+  }
+  return sum;
+}
+
 /// Length over width, mean weighed by area; 0 of none.
 double aspect_ratio(const std::vector<Adhesion>& adhesions) {
   double sum = 0, area_um2 = 0;
@@ -127,6 +141,8 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
        {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
                 "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +
                     " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
+        noticed(FindingKind::bright_actin, unexplained_um(s),
+                brief(unexplained_um(s)) + " um of actin as bright as the cell's fibres are in none of them."),
         noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
                 s.alignment ? "Fibres end beside their adhesions: the adhesion image shows them shifted by " +
                                   sentence_of(*s.alignment) + "." +

@@ -29,6 +29,13 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        4,
        "adhesion images of five kinds of cell and microscope have 1.7 to 3.1, actin bundles taken for adhesions 6 to 8",
        "Look at the adhesion image: it shows actin where its signal bleeds through or the two channels are exchanged."},
+      {bright_actin, "bright-actin", "segment", caution, "length of bright actin that is in no fibre (um)", 0,
+       "lines as bright as the cell's middle fibre, 3 um and longer, 3 um and more from the edge: none in six "
+       "simulated "
+       "cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um where one fibre is taken "
+       "out",
+       "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
+       "1_segment/RoiSet.zip)."},
       {actin_shift, "actin-shift", "segment", note, "1 where the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
        "above "

@@ -25,6 +25,7 @@ enum class FindingKind {
   adhesions_left_out,
   actin_shift,
   adhesions_long,
+  bright_actin,
   adhesions_assumed,
   fibre_ends_anchored,
   input_not_used,
