@@ -50,20 +50,6 @@ TEST(Fibres, are_followed_through_a_crossing_and_typed_by_their_adhesions) {
   }
 }
 
-TEST(Fibres, that_nobody_can_follow_are_told_if_they_are_as_bright) {
-  std::vector<Polyline> lines;
-  for (const double y : {4.0, 7.0, 10.0, 13.0, 16.0}) lines.push_back({{4, y}, {21, y}});
-  EXPECT_TRUE(trace_fibres(drawn(lines), {}, 0.1, {}).unexplained_um.empty());
-  Polyline ring;  // bends more than a bundle under tension
-  for (int i = 0; i <= 40; ++i) ring.push_back({12.8 + 1.6 * std::cos(0.157 * i), 21 + 1.6 * std::sin(0.157 * i)});
-  lines.push_back(ring);
-  const TracedLines traced = trace_fibres(drawn(lines), {}, 0.1, {});
-  EXPECT_EQ(traced.fibres.size(), 5u);
-  ASSERT_FALSE(traced.unexplained_um.empty());
-  for (const Polyline& crest : traced.unexplained_um)
-    for (const Vec2 p : crest) EXPECT_NEAR(norm(p - Vec2{12.8, 21}), 1.6, 0.5);
-}
-
 TEST(Fibres, half_to_twice_as_wide_as_typical_are_found_with_their_width) {
   for (const double width_um : {0.3, 0.6, 1.2}) {
     SCOPED_TRACE(width_um);

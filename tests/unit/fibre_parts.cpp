@@ -4,6 +4,7 @@
 #include <cmath>
 #include <random>
 
+#include "segment/bright_actin.h"
 #include "segment/fibre_ends.h"
 #include "segment/fibre_significance.h"
 #include "segment/ridge.h"
@@ -68,6 +69,34 @@ TEST(FibreParts, a_way_that_reaches_no_adhesion_changes_nothing) {
   const Polyline before = t.fibre.points_um;
   lead_on(t, {adhesion_at({24, 2})}, {}, 1);
   EXPECT_EQ(t.fibre.points_um, before);
+}
+
+TEST(FibreParts, a_bright_line_that_is_in_no_fibre_is_told_and_a_faint_one_is_not) {
+  constexpr int kSide = 256;
+  cv::Mat image(kSide, kSide, CV_32F, cv::Scalar(100));
+  std::vector<std::vector<cv::Point2d>> fibres;
+  const auto draw = [&](int y, double height) {
+    for (int x = 30; x < 220; ++x)
+      for (int dy = -6; dy <= 6; ++dy)
+        image.at<float>(y + dy, x) += static_cast<float>(height * std::exp(-dy * dy / 8.0));
+  };
+  for (const int y : {30, 60, 90, 120, 150}) {
+    draw(y, 100);
+    fibres.emplace_back();
+    for (int x = 30; x < 220; ++x) fibres.back().emplace_back(x, y);
+  }
+  const cv::Mat is_inside(kSide, kSide, CV_8U, cv::Scalar(255));
+  const RidgeScales scales{.width_sigma_px = {2}, .length_sigma_px = 4, .noise_radius_px = 40};
+  const auto beside = [&] {
+    return bright_crests_beside(find_ridges(image, is_inside, scales), is_inside, fibres, 8, 20);
+  };
+  draw(210, 60);
+  EXPECT_TRUE(beside().empty());
+  draw(180, 130);
+  const auto crests = beside();
+  ASSERT_EQ(crests.size(), 1u);
+  EXPECT_NEAR(static_cast<double>(crests[0].size()), 190, 20);
+  for (const cv::Point2d& p : crests[0]) EXPECT_NEAR(p.y, 180, 1);
 }
 
 /// Normal variates have the deviation that was put in, from few free places as from many; a fibre's own responses do
