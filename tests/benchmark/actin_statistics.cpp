@@ -20,21 +20,17 @@ namespace {
 using namespace mbtfm;
 using namespace mbtfm::segment;
 
-/// An ellipse with its axes along the image's, in pixels.
-struct Nucleus {
-  Vec2 centre_px, radii_px;
-  /// 1 on its rim.
-  double distance(Vec2 p) const {
-    return std::hypot((p.x - centre_px.x) / radii_px.x, (p.y - centre_px.y) / radii_px.y);
-  }
-};
-
 struct Picture {
   std::string group, name;
   Image image;
   double pixel_um = 0.1;
-  std::optional<Nucleus> nucleus{};  ///< of real cells where an eye sees it
+  std::optional<samples::Nucleus> nucleus{};  ///< of real cells where an eye sees it
 };
+
+/// An ellipse with its axes along the image's.
+samples::Nucleus ellipse(Vec2 centre_px, Vec2 radii_px, double pixel_um) {
+  return {pixel_um * centre_px, {1, 0}, pixel_um * radii_px.x, pixel_um * radii_px.y};
+}
 
 constexpr double kFwhm = 2.3548;
 
@@ -213,13 +209,13 @@ void add_texture(const Scene& s, Statistics& result) {
   result["19 lines of significance > 7 beside the fibres, by 1000 um2"] = 1000 * n_lines / s.area_um2;
 }
 
-void add_nucleus(const Scene& s, const std::optional<Nucleus>& nucleus, Statistics& result) {
+void add_nucleus(const Scene& s, const std::optional<samples::Nucleus>& nucleus, Statistics& result) {
   if (!nucleus) return;
   std::vector<double> over, beside;
   for (int y = 0; y < s.image.rows; ++y)
     for (int x = 0; x < s.image.cols; ++x) {
       if (s.is_inside.at<unsigned char>(y, x) == 0 || s.is_fibre.at<unsigned char>(y, x) != 0) continue;
-      const double d = nucleus->distance({x + 0.5, y + 0.5});
+      const double d = nucleus->distance(to_um({1.0 * x, 1.0 * y}, s.pixel_um));
       if (d < 0.9) over.push_back(s.image.at<float>(y, x) - s.dark);
       if (d > 1.3 && d < 1.8) beside.push_back(s.image.at<float>(y, x) - s.dark);
     }
@@ -241,10 +237,10 @@ std::vector<Picture> real_pictures() {
   if (!std::filesystem::exists(data / "real")) return {};
   std::vector<Picture> pictures = {{"drawn", "drawn",
                                     read_image(data / "real/cell_with_drawn_fibres/actin.tif"), 0.1,
-                                    Nucleus{{690, 645}, {95, 75}}}};
-  const std::map<std::string, std::optional<Nucleus>> singles = {
-      {"0000", {}}, {"0002", Nucleus{{279, 192}, {60, 48}}}, {"0004", Nucleus{{221, 262}, {42, 55}}},
-      {"0006", Nucleus{{267, 200}, {45, 55}}}, {"0008", {}}};
+                                    ellipse({690, 645}, {95, 75}, 0.1)}};
+  const std::map<std::string, std::optional<samples::Nucleus>> singles = {
+      {"0000", {}}, {"0002", ellipse({279, 192}, {60, 48}, 0.16)}, {"0004", ellipse({221, 262}, {42, 55}, 0.16)},
+      {"0006", ellipse({267, 200}, {45, 55}, 0.16)}, {"0008", {}}};
   for (const auto& [name, nucleus] : singles)
     pictures.push_back({"single", name, read_image(data / "actin/single_cells" / (name + ".jpg")), 0.16, nucleus});
   const auto pattern = data / "actin/micropattern_chirality";
@@ -259,7 +255,7 @@ std::vector<Picture> simulated_pictures(const std::string& scenario) {
   for (std::uint64_t seed = 201; seed <= 204; ++seed) {
     const test::SimulatedCell cell = test::simulated_cell(scenario, "ordinary", seed);
     const double pixel_um = *cell.actin.image.pixel_size_um;
-    pictures.push_back({scenario, scenario + " " + std::to_string(seed), cell.actin.image, pixel_um});
+    pictures.push_back({scenario, scenario + " " + std::to_string(seed), cell.actin.image, pixel_um, cell.nucleus});
   }
   return pictures;
 }
