@@ -41,8 +41,8 @@ Image tail_of(const Image& focused, const MicroscopeParameters& m, int threads) 
     const Image wide = blurred(binned(focused, std::min(factor, m.image_size_px)), sigma_um, threads);
     for (int row = 0; row < tail.height; ++row) {
       for (int column = 0; column < tail.width; ++column) {
-        tail.at(column, row) += static_cast<float>(weight * between_pixels(wide, (column + 0.5) / factor - 0.5,
-                                                                           (row + 0.5) / factor - 0.5));
+        tail.at(column, row) += static_cast<float>(
+            weight * between_pixels(wide, (column + 0.5) / factor - 0.5, (row + 0.5) / factor - 0.5));
       }
     }
   }

@@ -37,14 +37,14 @@ struct CellParameters {
   int n_ventral = 7;                   ///< 369 fibres in 21 cells: 18 a cell
   int n_dorsal = 7;
   int n_arc = 6;
-  int n_edge = 0;                      ///< bundles along concave arcs of the outline, between adhesions (dense only)
-  int n_carpets = 3;                   ///< groups of ventral fibres side by side (dense only)
-  double carpet_smallest_um = 0.6;     ///< distance of neighbours at a carpet's narrow end: as near as light resolves …
-  double carpet_largest_um = 2;        ///< … and as far as the next peak lies beside most fibres of real cells
-  double merging_fraction = 0.2;       ///< of a carpet's fibres that end on the same adhesion as their neighbour
-  double fibre_width_um = 0.6;         ///< median
-  double fibre_width_log_sd = 0;       ///< all alike
-  double fibre_spacing_um = 2.0;       ///< least distance of fibres that run alongside; crossing is free
+  int n_edge = 0;                   ///< bundles along concave arcs of the outline, between adhesions (dense only)
+  int n_carpets = 3;                ///< groups of ventral fibres side by side (dense only)
+  double carpet_smallest_um = 0.6;  ///< distance of neighbours at a carpet's narrow end: as near as light resolves …
+  double carpet_largest_um = 2;     ///< … and as far as the next peak lies beside most fibres of real cells
+  double merging_fraction = 0.2;    ///< of a carpet's fibres that end on the same adhesion as their neighbour
+  double fibre_width_um = 0.6;      ///< median
+  double fibre_width_log_sd = 0;    ///< all alike
+  double fibre_spacing_um = 2.0;    ///< least distance of fibres that run alongside; crossing is free
   double free_end_clearance_um = 1.5;  ///< from a fibre's free end to the nearest adhesion: its type stays clear
   int n_pairs = 0;                     ///< ventral fibres that come with a parallel neighbour
   double pair_spacing_um = 1.2;        ///< of the neighbours: two fibre widths
@@ -53,26 +53,26 @@ struct CellParameters {
 
 /// What actin looks like beside the course of its fibres. Brightness is relative to that of an adhesion.
 struct ActinParameters {
-  int n_ruffles = 0;                   ///< folds of the membrane near the edge, bright in actin
-  double ruffle_brightness = 1;        ///< 0.5 to 1.2 of this
-  int n_filopodia = 0;                 ///< spikes beyond the outline
-  double fibre_brightness = 1;         ///< median
-  double fibre_modulation = 0.12;      ///< of the brightness along a fibre, over some micrometres
-  double fibre_fading = 0;             ///< the same over tens of micrometres: bundles gain and lose filaments
-  double cytosol = 0.16;               ///< where the cell is thickest
-  double bulge = 0.65;                 ///< part of the thickness that the lamella lacks
-  double lamella = 0;                  ///< least part of it: the lamella's own thickness
-  double clouds = 0;                   ///< uneven cytosol over four micrometres, relative standard deviation
-  double grain = 0;                    ///< the same over the resolution of light: dots and pits
-  double nuclear_shadow = 0;           ///< loss of cytosol over the nucleus, which lifts the cell out of focus
-  double nuclear_dimming = 0;          ///< loss of the fibres' brightness there
-  double nucleus_radius_um = 8;        ///< of its shadow, mean
-  double filaments_per_um2 = 0.8;      ///< thin ones, of the cortical mesh
-  double shortest_filament_um = 2;     ///< shorter ones make grains
-  double longest_filament_um = 6;      ///< of thin filaments
-  double filament_brightness = 0.14;   ///< of the brightest
-  double filament_bend = 0;            ///< sag over length, standard deviation: straight
-  double edge_brightness = 0.18;       ///< of the cortex along the outline
+  int n_ruffles = 0;                  ///< folds of the membrane near the edge, bright in actin
+  double ruffle_brightness = 1;       ///< 0.5 to 1.2 of this
+  int n_filopodia = 0;                ///< spikes beyond the outline
+  double fibre_brightness = 1;        ///< median
+  double fibre_modulation = 0.12;     ///< of the brightness along a fibre, over some micrometres
+  double fibre_fading = 0;            ///< the same over tens of micrometres: bundles gain and lose filaments
+  double cytosol = 0.16;              ///< where the cell is thickest
+  double bulge = 0.65;                ///< part of the thickness that the lamella lacks
+  double lamella = 0;                 ///< least part of it: the lamella's own thickness
+  double clouds = 0;                  ///< uneven cytosol over four micrometres, relative standard deviation
+  double grain = 0;                   ///< the same over the resolution of light: dots and pits
+  double nuclear_shadow = 0;          ///< loss of cytosol over the nucleus, which lifts the cell out of focus
+  double nuclear_dimming = 0;         ///< loss of the fibres' brightness there
+  double nucleus_radius_um = 8;       ///< of its shadow, mean
+  double filaments_per_um2 = 0.8;     ///< thin ones, of the cortical mesh
+  double shortest_filament_um = 2;    ///< shorter ones make grains
+  double longest_filament_um = 6;     ///< of thin filaments
+  double filament_brightness = 0.14;  ///< of the brightest
+  double filament_bend = 0;           ///< sag over length, standard deviation: straight
+  double edge_brightness = 0.18;      ///< of the cortex along the outline
 };
 
 /// Tensions by fibre type: log-normal, after the histograms of thesis fig. 3.14.

@@ -40,8 +40,7 @@ bool lie_too_near(const Polyline& a, const Polyline& b, double least_um, const s
     const bool is_merging = std::ranges::any_of(shared_um, [&](Vec2 p) { return norm(a[i] - p) < kMerge_um + 1; });
     if (is_merging) continue;
     for (std::size_t j = 0; j < b.size(); ++j) {
-      if (norm(a[i] - b[j]) < least_um &&
-          std::abs(cross(tangent(a, i), tangent(b, j))) < std::sin(kAlongside_rad))
+      if (norm(a[i] - b[j]) < least_um && std::abs(cross(tangent(a, i), tangent(b, j))) < std::sin(kAlongside_rad))
         return true;
     }
   }
@@ -220,7 +219,8 @@ std::optional<Plan> plan_dorsal(const Sketch& sketch, std::optional<int> shared_
   if (length > 0.75 * norm(inward)) return std::nullopt;
   Plan plan;
   plan.type = FibreType::dorsal;
-  plan.points_um = parabola(start, start + length * direction(angle), 0.03 * random.normal() * length, kFibreSpacing_um);
+  plan.points_um =
+      parabola(start, start + length * direction(angle), 0.03 * random.normal() * length, kFibreSpacing_um);
   if (shared_id) {
     const Fibre& last = sketch.fibres.back();
     const double turn = cross(tangent(last.points_um, 0), tangent(plan.points_um, 0));
@@ -280,9 +280,7 @@ struct Builder {
     }
     return false;
   }
-  int n_of(FibreType type) const {
-    return static_cast<int>(std::ranges::count(sketch.fibres, type, &Fibre::type));
-  }
+  int n_of(FibreType type) const { return static_cast<int>(std::ranges::count(sketch.fibres, type, &Fibre::type)); }
 
   void add_edges() {
     for (const FreeEdge& edge : sketch.free_edges) {
@@ -300,8 +298,7 @@ struct Builder {
       const int side = i % 2 == 0 ? 1 : -1;
       const double ratio = p.carpet_largest_um / p.carpet_smallest_um;
       offset += side * p.carpet_smallest_um * std::pow(ratio, random.uniform());
-      if (!add(FibreType::ventral, kTries,
-               [&](double t) { return plan_ventral(sketch, carpet, offset, t, random); }))
+      if (!add(FibreType::ventral, kTries, [&](double t) { return plan_ventral(sketch, carpet, offset, t, random); }))
         ++misses, ++n_fibres;
     }
   }

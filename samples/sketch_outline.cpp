@@ -87,9 +87,8 @@ void roughen(Sketch& sketch, Random& random) {
   const std::vector<double> lobes = noise_of(2.5), tents = noise_of(0.7);
   Polygon moved = sketch.outline_um;
   for (int i = 0; i < n; ++i) {
-    const bool is_free = std::ranges::any_of(sketch.free_edges, [&](const FreeEdge& e) {
-      return (i - e.first + n) % n <= (e.last - e.first + n) % n;
-    });
+    const bool is_free = std::ranges::any_of(
+        sketch.free_edges, [&](const FreeEdge& e) { return (i - e.first + n) % n <= (e.last - e.first + n) % n; });
     if (is_free) continue;
     const double shift = sketch.parameters.edge_roughness_um * (0.8 * lobes[i] + 0.6 * tents[i]);
     moved[i] += std::clamp(shift, -3 * sketch.parameters.edge_roughness_um, 3 * sketch.parameters.edge_roughness_um) *
@@ -118,8 +117,8 @@ void draw_outline(Sketch& sketch, Random& random) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     sketch.corner_points.push_back(nearest_point(sketch.outline_um, corners[i]));
     if (is_free[i])
-      sketch.free_edges.push_back({sketch.corner_points.back(),
-                                   nearest_point(sketch.outline_um, corners[(i + 1) % corners.size()])});
+      sketch.free_edges.push_back(
+          {sketch.corner_points.back(), nearest_point(sketch.outline_um, corners[(i + 1) % corners.size()])});
   }
   if (p.edge_roughness_um > 0) roughen(sketch, random);
 }

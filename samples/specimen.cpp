@@ -40,7 +40,8 @@ Image thickness_of(const Cell& cell, double bulge_share, double least, const Mic
   for (int row = 0; row < thickness.height; ++row) {
     for (int column = 0; column < thickness.width; ++column) {
       const Vec2 at{(column + 0.5) * m.pixel_size_um, (row + 0.5) * m.pixel_size_um};
-      const double bulge = 1 - bulge_share + bulge_share * std::exp(-0.5 * std::pow(norm(at - nucleus) / kNucleusRadius_um, 2));
+      const double bulge =
+          1 - bulge_share + bulge_share * std::exp(-0.5 * std::pow(norm(at - nucleus) / kNucleusRadius_um, 2));
       const double lamella = least + (1 - least) * std::pow(wide.at(column, row), 2);
       const double cloud = std::max(0.2, 1 + 0.12 * clouds.at(column, row));
       thickness.at(column, row) *= static_cast<float>(bulge * lamella * cloud);
@@ -147,9 +148,8 @@ void add_thin_filaments(Image& image, const Cell& cell, const ActinParameters& p
     const Vec2 end = start + length * direction(angle);
     const double brightness = kDimmestFilament + p.filament_brightness * std::pow(random.uniform(), 3);
     if (!contains(cell.outline_um, end)) continue;
-    const Polyline line = p.filament_bend > 0
-                              ? parabola(start, end, p.filament_bend * length * bends.normal(), 0.25)
-                              : Polyline{start, end};
+    const Polyline line = p.filament_bend > 0 ? parabola(start, end, p.filament_bend * length * bends.normal(), 0.25)
+                                              : Polyline{start, end};
     add_line(image, line, kThinFilament_um, [&](double) { return brightness; });
   }
 }

@@ -97,12 +97,14 @@ std::vector<double> mean_across(const Scene& s, const std::vector<cv::Point2d>& 
   const double l = std::max(1e-9, std::hypot(d.x, d.y));
   for (int i = -half; i <= half; ++i)
     for (const cv::Point2d& p : points)
-      mean[i + half] += sample(s.image, p + (0.5 * i / l) * cv::Point2d(-d.y, d.x)) / static_cast<double>(points.size());
+      mean[i + half] +=
+          sample(s.image, p + (0.5 * i / l) * cv::Point2d(-d.y, d.x)) / static_cast<double>(points.size());
   return mean;
 }
 
 /// From the middle to the nearest peak to one side that stands out by a share of the ground; none within the profile.
-std::optional<double> to_next_peak_um(const std::vector<double>& profile, int direction, double least, double pixel_um) {
+std::optional<double> to_next_peak_um(const std::vector<double>& profile, int direction, double least,
+                                      double pixel_um) {
   const int n = static_cast<int>(profile.size()), middle = n / 2, clear = static_cast<int>(0.6 / pixel_um);
   double valley = profile[middle], peak = -1e300;
   int at = 0;
@@ -235,17 +237,20 @@ Statistics statistics_of(const Picture& picture) {
 std::vector<Picture> real_pictures() {
   const std::filesystem::path data = std::filesystem::path(MBTFM_SOURCE_DIR) / ".." / "shared" / "data";
   if (!std::filesystem::exists(data / "real")) return {};
-  std::vector<Picture> pictures = {{"drawn", "drawn",
-                                    read_image(data / "real/cell_with_drawn_fibres/actin.tif"), 0.1,
+  std::vector<Picture> pictures = {{"drawn", "drawn", read_image(data / "real/cell_with_drawn_fibres/actin.tif"), 0.1,
                                     ellipse({690, 645}, {95, 75}, 0.1)}};
-  const std::map<std::string, std::optional<samples::Nucleus>> singles = {
-      {"0000", {}}, {"0002", ellipse({279, 192}, {60, 48}, 0.16)}, {"0004", ellipse({221, 262}, {42, 55}, 0.16)},
-      {"0006", ellipse({267, 200}, {45, 55}, 0.16)}, {"0008", {}}};
+  const std::map<std::string, std::optional<samples::Nucleus>> singles = {{"0000", {}},
+                                                                          {"0002", ellipse({279, 192}, {60, 48}, 0.16)},
+                                                                          {"0004", ellipse({221, 262}, {42, 55}, 0.16)},
+                                                                          {"0006", ellipse({267, 200}, {45, 55}, 0.16)},
+                                                                          {"0008", {}}};
   for (const auto& [name, nucleus] : singles)
     pictures.push_back({"single", name, read_image(data / "actin/single_cells" / (name + ".jpg")), 0.16, nucleus});
   const auto pattern = data / "actin/micropattern_chirality";
-  for (const auto& [file, page] : {std::pair("Control/0001_control.tif", 1), {"Control/0001_20Feb20_siNT.tif", 0},
-                                   {"Control/0003_20Feb20_siNT.tif", 0}, {"Control/0005_20Feb20_siNT.tif", 0}})
+  for (const auto& [file, page] : {std::pair("Control/0001_control.tif", 1),
+                                   {"Control/0001_20Feb20_siNT.tif", 0},
+                                   {"Control/0003_20Feb20_siNT.tif", 0},
+                                   {"Control/0005_20Feb20_siNT.tif", 0}})
     pictures.push_back({"pattern", file, read_image(pattern / file, page), 0.16});
   return pictures;
 }

@@ -16,7 +16,7 @@ struct FibreLosses {
     std::map<std::string, int> taken_for;
   };
   std::map<std::string, OfType> of_type;
-  std::map<std::string, double> length_um, lost_um;       ///< by circumstance, the first that holds
+  std::map<std::string, double> length_um, lost_um;        ///< by circumstance, the first that holds
   std::map<std::string, std::pair<int, double>> untraced;  ///< number and length, by what was found instead
   int n_cells = 0;
 };
@@ -81,7 +81,7 @@ inline void add_losses(FibreLosses& losses, const SimulatedCell& cell, const Cel
       continue;
     }
     const double share = covered_share(std::vector{t}, found.fibres, kTolerance_um);
-    auto& [n, length] = losses.untraced[runs_on            ? "a line that runs on over another fibre"
+    auto& [n, length] = losses.untraced[runs_on          ? "a line that runs on over another fibre"
                                         : share >= kMost ? "several pieces that cover it"
                                         : share >= 0.3   ? "a part of it"
                                                          : "nothing (less than 30 % of it)"];
