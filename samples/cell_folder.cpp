@@ -72,7 +72,7 @@ void write_images(const Experiment& e, const ScenarioParameters& p, const FileNa
   }
   const BeadImages beads = bead_spots(relaxed, stressed, p.lost_bead_fraction, m, p.seed);
   write("paxillin.tif", photons_of(paxillin_specimen(e.cell, m, p.seed, threads), m, threads), 0);
-  write("actin.tif", photons_of(actin_specimen(e.cell, p.cell.n_ruffles, m, p.seed, threads), m, threads), 1);
+  write("actin.tif", photons_of(actin_specimen(e.cell, p.actin, m, p.seed, threads), m, threads), 1);
   write("beads_relaxed.tif", photons_of(beads.relaxed, m, threads), 2);
   write("beads_stressed.tif", photons_of(beads.stressed, m, threads), 3);
   write_beads(file("truth/beads.csv"), relaxed, stressed);

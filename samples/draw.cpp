@@ -48,6 +48,16 @@ std::vector<double> draw_spread(Sketch& sketch, const TensionParameters& tension
   return drawn;
 }
 
+std::vector<double> draw_dense(Sketch& sketch, const TensionParameters& tension, std::uint64_t seed) {
+  Random outline(seed, Stream::outline), tensions(seed, Stream::tensions), fibres(seed, Stream::fibres),
+      adhesions(seed, Stream::adhesions);
+  draw_outline(sketch, outline);
+  const auto next = [&](FibreType type) { return draw(tensions, tension_distribution(tension, type)); };
+  std::vector<double> drawn = draw_dense_fibres(sketch, next, fibres);
+  draw_free_adhesions(sketch, adhesions);
+  return drawn;
+}
+
 /// Brightness of adhesions and fibres, width of fibres.
 void draw_brightness(Sketch& sketch, std::uint64_t seed) {
   Random random(seed, Stream::specimen);
@@ -78,6 +88,8 @@ DrawnCell draw_cell(const CellParameters& parameters, const TensionParameters& t
   DrawnCell drawn;
   if (parameters.layout == "spread") {
     drawn.tensions_nN = draw_spread(sketch, tension, seed);
+  } else if (parameters.layout == "dense") {
+    drawn.tensions_nN = draw_dense(sketch, tension, seed);
   } else if (parameters.layout == "ring") {
     draw_ring(sketch);
     drawn.tensions_nN.assign(sketch.fibres.size(), tension.dorsal_median_nN);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "pipeline/contract/parallel.h"
 
@@ -12,6 +13,16 @@ namespace {
 /// Light from the medium and the optics, relative to that of a bright structure.
 constexpr double kStrayLight = 0.02;
 
+/// Linear between pixel centres, which lie at whole numbers; beyond the border its values go on.
+double between_pixels(const Image& image, double x, double y) {
+  const double u = std::clamp(x, 0.0, image.width - 1.0), v = std::clamp(y, 0.0, image.height - 1.0);
+  const int i = std::min(static_cast<int>(u), image.width - 2), j = std::min(static_cast<int>(v), image.height - 2);
+  if (i < 0 || j < 0) return image.at(std::max(i, 0), std::max(j, 0));
+  const double a = u - i, b = v - j;
+  return (1 - b) * ((1 - a) * image.at(i, j) + a * image.at(i + 1, j)) +
+         b * ((1 - a) * image.at(i, j + 1) + a * image.at(i + 1, j + 1));
+}
+
 /// The lamp's profile over the field: brightest off the centre, falling with the square of the distance.
 double illumination(const MicroscopeParameters& m, int column, int row) {
   const double x = (column + 0.5) / m.image_size_px - 0.45;
@@ -19,13 +30,34 @@ double illumination(const MicroscopeParameters& m, int column, int row) {
   return 1 - m.unevenness * 2 * (x * x + y * y);
 }
 
+/// Light that falls with the inverse cube of the distance: Gaussians of doubling width and halving weight, each of
+/// them on pixels of a quarter of its width.
+Image tail_of(const Image& focused, const MicroscopeParameters& m, int threads) {
+  constexpr int kGaussians = 4;
+  Image tail = blank_image(m.image_size_px, m.pixel_size_um);
+  double sigma_um = m.haze_sigma_um, weight = 1 / (2 - std::pow(0.5, kGaussians - 1));
+  for (int i = 0; i < kGaussians; ++i, sigma_um *= 2, weight /= 2) {
+    const int factor = std::clamp(static_cast<int>(sigma_um / m.pixel_size_um / 4), 1, segment::kLargestBinning);
+    const Image wide = blurred(binned(focused, std::min(factor, m.image_size_px)), sigma_um, threads);
+    for (int row = 0; row < tail.height; ++row) {
+      for (int column = 0; column < tail.width; ++column) {
+        tail.at(column, row) += static_cast<float>(
+            weight * between_pixels(wide, (column + 0.5) / factor - 0.5, (row + 0.5) / factor - 0.5));
+      }
+    }
+  }
+  return tail;
+}
+
 /// Haze, stray light and illumination over an image in focus.
 Image through_the_field(const Image& focused, double stray_photons, const MicroscopeParameters& m, int threads) {
   const Image haze = blurred(focused, m.haze_sigma_um, threads);
+  const std::optional<Image> tail = m.haze_tail > 0 ? std::optional(tail_of(focused, m, threads)) : std::nullopt;
   Image result = focused;
   parallel_for(result.height, threads, [&](int row) {
     for (int column = 0; column < result.width; ++column) {
-      const double light = focused.at(column, row) + m.haze * haze.at(column, row) + stray_photons;
+      double light = focused.at(column, row) + m.haze * haze.at(column, row) + stray_photons;
+      if (tail) light += m.haze_tail * tail->at(column, row);
       result.at(column, row) = static_cast<float>(illumination(m, column, row) * light);
     }
   });
@@ -39,11 +71,13 @@ MicroscopeParameters at_quality(MicroscopeParameters m) {
     m.protein_photons *= 3;
     m.bead_photons *= 3;
     m.haze *= 0.5;
+    m.haze_tail *= 0.5;
     m.unevenness *= 0.5;
   } else if (m.image_quality == "poor") {
     m.protein_photons /= 3;
     m.bead_photons /= 3;
     m.haze *= 2;
+    m.haze_tail *= 2;
     m.psf_sigma_um *= 4.0 / 3;
     m.bead_sigma_um *= 4.0 / 3;
   }

@@ -16,8 +16,17 @@ MicroscopeParameters at_quality(MicroscopeParameters microscope);
 
 /// Paxillin and actin: relative density of fluorophore, about 1 in a bright adhesion or fibre.
 Image paxillin_specimen(const Cell& cell, const MicroscopeParameters& microscope, std::uint64_t seed, int threads);
-Image actin_specimen(const Cell& cell, int n_ruffles, const MicroscopeParameters& microscope, std::uint64_t seed,
-                     int threads);
+Image actin_specimen(const Cell& cell, const ActinParameters& actin, const MicroscopeParameters& microscope,
+                     std::uint64_t seed, int threads);
+
+/// The nucleus as it is seen in actin: a darker ellipse near the middle of the cell.
+struct Nucleus {
+  Vec2 centre_um, long_axis;  ///< long_axis: unit vector
+  double half_length_um = 0, half_width_um = 0;
+  /// From the centre, 1 on its rim.
+  double distance(Vec2 point) const;
+};
+Nucleus nucleus_of(const Cell& cell, const ActinParameters& actin, std::uint64_t seed);
 
 /// Photons by pixel of a specimen: PSF, haze, uneven illumination.
 Image photons_of(const Image& specimen, const MicroscopeParameters& microscope, int threads);

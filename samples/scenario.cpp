@@ -11,13 +11,18 @@ namespace fs = std::filesystem;
 namespace {
 
 void declare_cell(ParameterList& list, CellParameters& p) {
-  list.add("layout", p.layout, "spread: a cell at random; ring, line: regular ones", {"spread", "ring", "line"});
+  list.add("layout", p.layout, "spread: a cell at random; dense: with bundles of fibres; ring, line: regular ones",
+           {"spread", "dense", "ring", "line"});
   list.add("diameter_um", p.diameter_um, Range::size_um(), "diameter of the cell (um)");
   list.add("n_corners", p.n_corners, Range::between(3, 50), "adhesion-rich corners of the outline");
   list.add("corner_jitter", p.corner_jitter, Range::between(0, 0.4), "scatter of the corners' radii, relative");
   list.add("edge_concavity", p.edge_concavity, Range::between(0, 0.3),
            "depth of the arc between two corners over their distance");
   list.add("elongation", p.elongation, Range::between(1, 20), "long over short diameter of the cell");
+  list.add("edge_roughness_um", p.edge_roughness_um, Range::zero_or_size_um(),
+           "raggedness of the outline (standard deviation, um)");
+  list.add("free_edge_concavity", p.free_edge_concavity, Range::between(0, 0.3),
+           "depth over length of the arcs that an edge bundle draws in");
   list.add("n_adhesions", p.n_adhesions, Range::between(2, 5000), "adhesions in all");
   list.add("adhesion_area_um2", p.adhesion_area_um2, Range::area_um2(), "mean area of an adhesion (um²)");
   list.add("adhesion_area_log_sd", p.adhesion_area_log_sd, Range::between(0, 5), "spread of the areas' logarithm");
@@ -35,6 +40,13 @@ void declare_cell(ParameterList& list, CellParameters& p) {
   list.add("n_ventral", p.n_ventral, Range::between(0, 1000), "ventral fibres");
   list.add("n_dorsal", p.n_dorsal, Range::between(0, 1000), "dorsal fibres");
   list.add("n_arc", p.n_arc, Range::between(0, 1000), "transverse arcs");
+  list.add("n_edge", p.n_edge, Range::between(0, 20), "bundles along concave arcs of the outline (layout dense)");
+  list.add("n_carpets", p.n_carpets, Range::between(1, 20), "groups of ventral fibres side by side (layout dense)");
+  list.add("carpet_smallest_um", p.carpet_smallest_um, Range::size_um(),
+           "least distance of neighbours in such a group, at its narrow end (um)");
+  list.add("carpet_largest_um", p.carpet_largest_um, Range::size_um(), "largest distance of them there (um)");
+  list.add("merging_fraction", p.merging_fraction, Range::between(0, 1),
+           "share of them that end on their neighbour's adhesion");
   list.add("fibre_width_um", p.fibre_width_um, Range::size_um(), "median width of a fibre (um)");
   list.add("fibre_width_log_sd", p.fibre_width_log_sd, Range::between(0, 0.5), "spread of the widths' logarithm");
   list.add("fibre_spacing_um", p.fibre_spacing_um, Range::size_um(), "least gap of fibres that run alongside (um)");
@@ -44,7 +56,31 @@ void declare_cell(ParameterList& list, CellParameters& p) {
   list.add("pair_spacing_um", p.pair_spacing_um, Range::size_um(), "distance of these neighbours (um)");
   list.add("brightness_log_sd", p.brightness_log_sd, Range::between(0, 0.7),
            "spread of the logarithm of the adhesions' and fibres' brightness");
+}
+
+void declare_actin(ParameterList& list, ActinParameters& p) {
   list.add("n_ruffles", p.n_ruffles, Range::between(0, 1000), "folds of the membrane near the edge, bright in actin");
+  list.add("ruffle_brightness", p.ruffle_brightness, Range::zero_or_factor(), "their brightness over adhesions'");
+  list.add("n_filopodia", p.n_filopodia, Range::between(0, 1000), "spikes of actin beyond the outline");
+  list.add("fibre_brightness", p.fibre_brightness, Range::factor(), "median brightness of fibres over adhesions'");
+  list.add("fibre_modulation", p.fibre_modulation, Range::between(0, 0.5),
+           "variation of a fibre's brightness over some micrometres, relative");
+  list.add("fibre_fading", p.fibre_fading, Range::between(0, 0.5),
+           "variation of it over tens of micrometres, relative");
+  list.add("cytosol", p.cytosol, Range::zero_or_factor(), "brightness of actin that is in no fibre");
+  list.add("bulge", p.bulge, Range::between(0, 1), "share of the cell's thickness around the nucleus only");
+  list.add("lamella", p.lamella, Range::between(0, 1), "least share of the cell's thickness, at its edge");
+  list.add("clouds", p.clouds, Range::between(0, 0.5), "unevenness of that actin over micrometres, relative");
+  list.add("grain", p.grain, Range::between(0, 0.5), "unevenness of it over the resolution of light, relative");
+  list.add("nuclear_shadow", p.nuclear_shadow, Range::between(0, 1), "loss of its brightness over the nucleus");
+  list.add("nuclear_dimming", p.nuclear_dimming, Range::between(0, 1), "loss of fibres' brightness over the nucleus");
+  list.add("nucleus_radius_um", p.nucleus_radius_um, Range::size_um(), "mean radius of that shadow (um)");
+  list.add("filaments_per_um2", p.filaments_per_um2, Range::between(0, 10), "thin filaments of the meshwork, by area");
+  list.add("shortest_filament_um", p.shortest_filament_um, Range::size_um(), "shortest of them (um)");
+  list.add("longest_filament_um", p.longest_filament_um, Range::size_um(), "longest of them (um)");
+  list.add("filament_brightness", p.filament_brightness, Range::zero_or_factor(), "brightness of the brightest of them");
+  list.add("filament_bend", p.filament_bend, Range::between(0, 0.5), "their sag over their length, standard deviation");
+  list.add("edge_brightness", p.edge_brightness, Range::zero_or_factor(), "brightness of the actin along the outline");
 }
 
 void declare_tension(ParameterList& list, TensionParameters& p) {
@@ -66,6 +102,8 @@ void declare_microscope(ParameterList& list, MicroscopeParameters& p) {
   list.add("psf_sigma_um", p.psf_sigma_um, Range::size_um(), "standard deviation of the point-spread function (um)");
   list.add("haze", p.haze, Range::zero_or_factor(), "light from out of focus over light in focus");
   list.add("haze_sigma_um", p.haze_sigma_um, Range::size_um(), "how far that light spreads (um)");
+  list.add("haze_tail", p.haze_tail, Range::zero_or_factor(),
+           "light that falls with the cube of the distance beyond that, over light in focus");
   list.add("unevenness", p.unevenness, Range::between(0, 0.8), "loss of illumination towards the corners, relative");
   list.add("protein_photons", p.protein_photons, Range::between(1e-6, 1e9),
            "photons by pixel of a bright adhesion or fibre");
@@ -128,6 +166,7 @@ void declare(ParameterList& list, ScenarioParameters& p) {
            "shift of the stressed bead image to the right (um)");
   list.add("drift_y_um", p.drift_y_um, Range::between(-1000, 1000), "shift of the stressed bead image down (um)");
   declare_cell(list, p.cell);
+  declare_actin(list, p.actin);
   declare_tension(list, p.tension);
   list.add("simulation_edge_length_um", p.mechanics.simulation_edge_length_um, Range::mesh_um(),
            "mean cable length of the simulation's network (um)");

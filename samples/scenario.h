@@ -14,12 +14,15 @@ namespace mbtfm::samples {
 
 /// What the cell looks like. Defaults: a spread U2OS cell on fibronectin, as in thesis 3.4.
 struct CellParameters {
-  std::string layout = "spread";       ///< spread: drawn at random; ring and line: regular, for known answers
+  /// spread: fibres well apart, at random; dense: in bundles; ring and line: regular, for known answers
+  std::string layout = "spread";
   double diameter_um = 66;             ///< mean, over the corners
   int n_corners = 9;                   ///< adhesion-rich corners with concave arcs between them
   double corner_jitter = 0.1;          ///< of a corner's radius, relative (standard deviation)
   double edge_concavity = 0.08;        ///< depth of the arc between two corners over their distance
   double elongation = 1.15;            ///< long over short diameter
+  double edge_roughness_um = 0;        ///< standard deviation: smooth; real edges are ragged by their filopodia
+  double free_edge_concavity = 0.13;   ///< as edge_concavity, of the arcs with an edge bundle: it draws them in
   int n_adhesions = 170;               ///< thesis 3.4: 3 612 adhesions in 21 cells
   double adhesion_area_um2 = 0.46;     ///< mean (thesis 3.4)
   double adhesion_area_log_sd = 0.6;   ///< of the logarithm: areas spread over a decade
@@ -34,14 +37,42 @@ struct CellParameters {
   int n_ventral = 7;                   ///< 369 fibres in 21 cells: 18 a cell
   int n_dorsal = 7;
   int n_arc = 6;
-  double fibre_width_um = 0.6;         ///< median
-  double fibre_width_log_sd = 0;       ///< all alike
-  double fibre_spacing_um = 2.0;       ///< least distance of fibres that run alongside; crossing is free
+  int n_edge = 0;                   ///< bundles along concave arcs of the outline, between adhesions (dense only)
+  int n_carpets = 3;                ///< groups of ventral fibres side by side (dense only)
+  double carpet_smallest_um = 0.6;  ///< distance of neighbours at a carpet's narrow end: as near as light resolves …
+  double carpet_largest_um = 2;     ///< … and as far as the next peak lies beside most fibres of real cells
+  double merging_fraction = 0.2;    ///< of a carpet's fibres that end on the same adhesion as their neighbour
+  double fibre_width_um = 0.6;      ///< median
+  double fibre_width_log_sd = 0;    ///< all alike
+  double fibre_spacing_um = 2.0;    ///< least distance of fibres that run alongside; crossing is free
   double free_end_clearance_um = 1.5;  ///< from a fibre's free end to the nearest adhesion: its type stays clear
   int n_pairs = 0;                     ///< ventral fibres that come with a parallel neighbour
   double pair_spacing_um = 1.2;        ///< of the neighbours: two fibre widths
   double brightness_log_sd = 0.25;     ///< of adhesions and fibres: they differ by a quarter
-  int n_ruffles = 0;                   ///< folds of the membrane near the edge, bright in actin
+};
+
+/// What actin looks like beside the course of its fibres. Brightness is relative to that of an adhesion.
+struct ActinParameters {
+  int n_ruffles = 0;                  ///< folds of the membrane near the edge, bright in actin
+  double ruffle_brightness = 1;       ///< 0.5 to 1.2 of this
+  int n_filopodia = 0;                ///< spikes beyond the outline
+  double fibre_brightness = 1;        ///< median
+  double fibre_modulation = 0.12;     ///< of the brightness along a fibre, over some micrometres
+  double fibre_fading = 0;            ///< the same over tens of micrometres: bundles gain and lose filaments
+  double cytosol = 0.16;              ///< where the cell is thickest
+  double bulge = 0.65;                ///< part of the thickness that the lamella lacks
+  double lamella = 0;                 ///< least part of it: the lamella's own thickness
+  double clouds = 0;                  ///< uneven cytosol over four micrometres, relative standard deviation
+  double grain = 0;                   ///< the same over the resolution of light: dots and pits
+  double nuclear_shadow = 0;          ///< loss of cytosol over the nucleus, which lifts the cell out of focus
+  double nuclear_dimming = 0;         ///< loss of the fibres' brightness there
+  double nucleus_radius_um = 8;       ///< of its shadow, mean
+  double filaments_per_um2 = 0.8;     ///< thin ones, of the cortical mesh
+  double shortest_filament_um = 2;    ///< shorter ones make grains
+  double longest_filament_um = 6;     ///< of thin filaments
+  double filament_brightness = 0.14;  ///< of the brightest
+  double filament_bend = 0;           ///< sag over length, standard deviation: straight
+  double edge_brightness = 0.18;      ///< of the cortex along the outline
 };
 
 /// Tensions by fibre type: log-normal, after the histograms of thesis fig. 3.14.
@@ -72,6 +103,7 @@ struct MicroscopeParameters {
   double psf_sigma_um = 0.13;    ///< 0.21 · 560 nm / NA 0.9 … 1.2, slightly out of focus
   double haze = 0.35;            ///< light from out of focus, relative to that in focus
   double haze_sigma_um = 3;      ///< how far it spreads
+  double haze_tail = 0;          ///< light that spreads with the inverse cube of the distance, beyond that
   double unevenness = 0.25;      ///< of the illumination, centre to corner
   double protein_photons = 500;  ///< of a bright adhesion or fibre, by pixel
   double bead_photons = 4000;    ///< of a bead in focus, all of its pixels
@@ -94,6 +126,7 @@ struct ScenarioParameters {
   double drift_x_um = 0;              ///< of the stage between the images; none, so that the truth compares directly
   double drift_y_um = 0;
   CellParameters cell;
+  ActinParameters actin;
   TensionParameters tension;
   MechanicsParameters mechanics;
   MicroscopeParameters microscope;

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/polyline.h"
 #include "samples/draw.h"
 #include "samples/geometry.h"
 #include "samples/random.h"
@@ -134,6 +135,95 @@ TEST(DrawnCell, without_room_says_what_to_change) {
   crowded.adhesion_area_um2 = 1;
   EXPECT_THROW(draw_cell(crowded, {}, kField_um, 1), UsageError);
   EXPECT_THROW(draw_cell({}, {}, 40, 1), UsageError) << "a cell of 66 um in a field of 40 um";
+}
+
+/// The scenario `dense`, of one seed after another.
+DrawnCell dense_cell(std::uint64_t seed) {
+  ScenarioParameters p;
+  ParameterList list;
+  declare(list, p);
+  read_toml(list, scenario_file("dense"));
+  return draw_cell(p.cell, p.tension, field_um(p.microscope), seed);
+}
+
+/// Median over a fibre of the distance to the nearest other one that runs alongside; none where there is none.
+std::optional<double> spacing_um(const Fibre& fibre, const std::vector<Fibre>& fibres) {
+  constexpr double kAlongside = 0.2;  // sine of 12 degrees
+  const Polyline points = resampled(fibre.points_um, 0.5);
+  std::vector<double> distances;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    double nearest = 1e300;
+    for (const Fibre& other : fibres) {
+      if (other.fibre_id == fibre.fibre_id) continue;
+      const Polyline others = resampled(other.points_um, 0.25);
+      for (std::size_t k = 0; k < others.size(); ++k)
+        if (std::abs(cross(tangent(points, i), tangent(others, k))) < kAlongside)
+          nearest = std::min(nearest, norm(points[i] - others[k]));
+    }
+    if (nearest < 4) distances.push_back(nearest);
+  }
+  if (distances.size() < points.size() / 2) return std::nullopt;
+  std::ranges::nth_element(distances, distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2));
+  return distances[distances.size() / 2];
+}
+
+TEST(DenseCell, has_room_for_its_fibres_whose_types_agree_with_their_ends) {
+  for (std::uint64_t seed = 1; seed <= 50; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    DrawnCell drawn;
+    ASSERT_NO_THROW(drawn = dense_cell(seed));
+    const Cell& cell = drawn.cell;
+    EXPECT_GE(cell.fibres.size(), 30u);
+    EXPECT_LE(cell.fibres.size(), 50u);
+    ASSERT_EQ(drawn.tensions_nN.size(), cell.fibres.size());
+    for (const Fibre& f : cell.fibres) {
+      const int n_held = f.start_adhesion_id.has_value() + f.end_adhesion_id.has_value();
+      const bool spans = f.type == FibreType::ventral || f.type == FibreType::edge;
+      EXPECT_EQ(n_held, spans ? 2 : f.type == FibreType::dorsal ? 1 : 0) << "fibre " << f.fibre_id;
+      EXPECT_FALSE(n_held == 2 && f.start_adhesion_id == f.end_adhesion_id) << "fibre " << f.fibre_id;
+      for (const bool is_start : {true, false}) {
+        const auto id = is_start ? f.start_adhesion_id : f.end_adhesion_id;
+        const Vec2 end = is_start ? f.points_um.front() : f.points_um.back();
+        if (!id) continue;
+        EXPECT_LT(norm(cell.adhesions[static_cast<std::size_t>(*id) - 1].position_um - end), 1e-9)
+            << "fibre " << f.fibre_id;
+      }
+    }
+  }
+}
+
+TEST(DenseCell, has_fibres_side_by_side_at_the_distances_asked_for) {
+  ScenarioParameters p;
+  std::vector<double> spacings;
+  for (std::uint64_t seed = 1; seed <= 5; ++seed) {
+    const DrawnCell drawn = dense_cell(seed);
+    for (const Fibre& f : drawn.cell.fibres) {
+      if (f.type != FibreType::ventral) continue;
+      const auto spacing = spacing_um(f, drawn.cell.fibres);
+      if (!spacing) continue;
+      // 0.9 of the least distance between the points of the drawing; the finished points lie 2 um apart
+      EXPECT_GE(*spacing, 0.85 * p.cell.carpet_smallest_um) << "seed " << seed << ", fibre " << f.fibre_id;
+      spacings.push_back(*spacing);
+    }
+  }
+  ASSERT_GE(spacings.size(), 60u) << "most of 5 x 24 ventral fibres have a neighbour";
+  std::ranges::sort(spacings);
+  EXPECT_LE(spacings[spacings.size() / 2], p.cell.carpet_largest_um);
+}
+
+TEST(DenseCell, has_edge_bundles_inside_of_concave_arcs) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    SCOPED_TRACE("seed " + std::to_string(seed));
+    const Cell cell = dense_cell(seed).cell;
+    for (const Fibre& f : cell.fibres) {
+      if (f.type != FibreType::edge) continue;
+      for (const Vec2 p : f.points_um) EXPECT_LT(distance_to_boundary_um(cell.outline_um, p), 1.5);
+      const Vec2 middle = f.points_um[f.points_um.size() / 2];
+      const Vec2 chord = 0.5 * (f.points_um.front() + f.points_um.back());
+      const Vec2 outward = nearest_on_boundary_um(cell.outline_um, middle) - middle;
+      EXPECT_LT(dot(middle - chord, outward), 0) << "the edge bulges out at fibre " << f.fibre_id;
+    }
+  }
 }
 
 TEST(DrawnTensions, follow_the_histograms_of_their_types) {

@@ -15,6 +15,7 @@ namespace mbtfm::test {
 struct SimulatedCell {
   Cell truth;
   segment::Channel adhesion, actin;
+  samples::Nucleus nucleus;
 };
 
 /// The images that `mbtfm-simulate --scenario … --image_quality … --seed … --images` writes, without the mechanics.
@@ -28,12 +29,13 @@ inline SimulatedCell simulated_cell(const std::string& scenario, const std::stri
   p.microscope.image_size_px = image_size_px;
   const samples::MicroscopeParameters m = at_quality(p.microscope);
   constexpr int kThreads = 2;
-  SimulatedCell cell{draw_cell(p.cell, p.tension, samples::field_um(m), seed).cell, {}, {}};
+  SimulatedCell cell{draw_cell(p.cell, p.tension, samples::field_um(m), seed).cell, {}, {}, {}};
   const auto image = [&](const samples::Image& specimen, int exposure) {
     return samples::recorded(photons_of(specimen, m, kThreads), m, seed, exposure, kThreads);
   };
   cell.adhesion = {"paxillin.tif", image(paxillin_specimen(cell.truth, m, seed, kThreads), 0)};
-  cell.actin = {"actin.tif", image(actin_specimen(cell.truth, p.cell.n_ruffles, m, seed, kThreads), 1)};
+  cell.actin = {"actin.tif", image(actin_specimen(cell.truth, p.actin, m, seed, kThreads), 1)};
+  cell.nucleus = nucleus_of(cell.truth, p.actin, seed);
   for (segment::Channel* channel : {&cell.adhesion, &cell.actin}) channel->image.pixel_size_um = m.pixel_size_um;
   return cell;
 }
