@@ -158,20 +158,29 @@ std::vector<Vec2> ends_um(const Lines& lines) {
   return ends;
 }
 
-/// Where adhesions may be, in this cell.
+/// Of the fibres' ends those where an adhesion may be.
+std::vector<Vec2> possible_ends_um(const Inputs& in, const Lines& lines) {
+  std::vector<Vec2> ends = ends_um(lines);
+  if (in.source == AdhesionSource::pattern)
+    std::erase_if(ends, [&](Vec2 end) { return !covers(*in.drawn.adhesion_mask, end, in.field); });
+  return ends;
+}
+
+/// Where adhesions may be, in this cell. A fibre that ends on a pattern is held where it ends, not at the next point of
+/// a lattice, which may be a micrometre further in or out.
 std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, const Lines& lines,
                                     Placement placement) {
   const CandidateParameters& p = in.parameters.candidates;
-  std::vector<Adhesion> candidates;
-  if (in.source != AdhesionSource::pattern) candidates = candidates_at(ends_um(lines), p.candidate_spacing_um);
+  std::vector<Adhesion> candidates = candidates_at(possible_ends_um(in, lines), p.candidate_spacing_um);
   if (in.source != AdhesionSource::fibre_ends) {
     const Cell whole{.adhesions = {}, .fibres = {}, .outline_um = cell.outer_um, .holes_um = cell.holes_um};
     const std::vector<Adhesion> at_ends = candidates;
     const auto is_possible = [&](Vec2 point) {
-      if (in.source == AdhesionSource::pattern) return covers(*in.drawn.adhesion_mask, point, in.field);
       const bool is_taken = std::ranges::any_of(
           at_ends, [&](const Adhesion& end) { return norm(end.position_um - point) < p.candidate_spacing_um; });
-      return !is_taken && distance_to_edge_um(whole, point) <= p.candidate_band_um;
+      if (is_taken) return false;
+      if (in.source == AdhesionSource::pattern) return covers(*in.drawn.adhesion_mask, point, in.field);
+      return distance_to_edge_um(whole, point) <= p.candidate_band_um;
     };
     Vec2 low = cell.outer_um.front(), high = low;
     for (const Vec2 point : cell.outer_um) {
