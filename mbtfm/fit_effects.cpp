@@ -157,8 +157,8 @@ void declare(ParameterList& list, FitStageParameters& p) {
   list.add("explain", p.explain, "estimate how far each effect that is off would change the tensions");
   declare(list, p.effects,
           {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
-           "common_motion", "channel_shift", "beyond_cut", "cable_elasticity", "robust_loss", "time_coupling",
-           "effect_tolerance"});
+           "common_motion", "beads_under_load", "channel_shift", "beyond_cut", "cable_elasticity", "robust_loss",
+           "time_coupling", "effect_tolerance"});
 }
 
 }  // namespace mbtfm::inverse

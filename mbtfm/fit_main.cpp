@@ -17,6 +17,7 @@
 #include "mbtfm/second_placement.h"
 #include "mbtfm/series.h"
 #include "mbtfm/solved_misfit.h"
+#include "mbtfm/under_load.h"
 #include "network/effects.h"
 #include "network/mesh.h"
 #include "pipeline/contract/csv.h"
@@ -203,6 +204,26 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
   return cross_validate(problem, data, fit.meshes.front().fit.trial, types, tensions, p.cross_validation, 1, threads);
 }
 
+/// Takes beads and data to the state that explains them better. Of a series every frame has a state of its own.
+Effect take_state_of(FitInputs& inputs, LinearData& data,
+                     const std::function<LinearData(const DisplacementField&)>& data_of, bool is_series,
+                     const EffectSwitches& effects) {
+  if (is_series && effects.beads_under_load == "on")
+    throw UsageError("beads_under_load = on takes no time series: all frames share the beads' places at rest");
+  if (is_series)
+    return decided(kBeadsUnderLoad, effects.beads_under_load, false,
+                   "all frames of a series share the beads' places at rest");
+  double area_um2 = 0;
+  for (const Adhesion& a : inputs.cell.adhesions) area_um2 += a.area_um2;
+  const double size_um =
+      std::sqrt(area_um2 / static_cast<double>(std::max<std::size_t>(1, inputs.cell.adhesions.size())));
+  BeadsOfState state =
+      take_state(inputs.beads, std::move(data), data_of, size_um, effects.effect_tolerance, effects.beads_under_load);
+  inputs.beads = std::move(state.beads);
+  data = std::move(state.data);
+  return state.effect;
+}
+
 /// Registers the files that it reads.
 std::optional<Cell> second_placement_of(StageContext& context, const Cell& cell) {
   std::optional<Cell> second = second_placement(context.inputs_.at("cell"), cell);
@@ -274,6 +295,14 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
              context.threads, moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
   std::optional<ForcesBeyond> beyond;
   if (allows_forces_beyond(p.effects, cell)) beyond = allow_forces_beyond(data, cell, p.gel);
+  const auto data_of = [&](const DisplacementField& beads) {
+    LinearData there = reduce(beads, response_on(beads), beads_in_region(beads, inputs.cell, p.fit), context.threads,
+                              moves ? affine_motions(beads) : Eigen::MatrixXd());
+    if (beyond) allow_forces_beyond(there, inputs.cell, p.gel);
+    return there;
+  };
+  const DisplacementField at_rest = inputs.beads;
+  const Effect under_load = take_state_of(inputs, data, data_of, !series.empty(), p.effects);
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -295,12 +324,6 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   Effect elasticity =
       network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
-  const auto data_of = [&](const DisplacementField& beads) {
-    LinearData there = reduce(beads, response_on(beads), beads_in_region(beads, inputs.cell, p.fit), context.threads,
-                              moves ? affine_motions(beads) : Eigen::MatrixXd());
-    if (beyond) allow_forces_beyond(there, inputs.cell, p.gel);
-    return there;
-  };
   context.progress(0.35, "placing the cell on the beads");
   const DisplacementField measured = inputs.beads;
   const bool can_be_shifted = p.effects.channel_shift != "auto" || !has_candidates(cell);
@@ -335,7 +358,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const auto fitted_field = [&](const Eigen::VectorXd& forces_nN) {
-    return in_bead_frame(field_of(forces_nN, inputs, data), measured, place.placement);
+    return in_bead_frame(field_of(forces_nN, inputs, data), at_rest, place.placement);
   };
   const DisplacementField fitted = fitted_field(fit.forces_nN);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
@@ -384,7 +407,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
   write_displacement(context.output("out", "displacement_without_fibres.csv"), fitted_field(models.front().forces_nN));
-  write_displacement_vtp(context.output("out", "displacement.vtp"), measured, fitted,
+  write_displacement_vtp(context.output("out", "displacement.vtp"), at_rest, fitted,
                          {most_informed_array(influence), weight_array(data)});
   std::function<void(LinearData&)> allow;
   if (beyond) allow = [&](LinearData& of_frame) { allow_forces_beyond(of_frame, cell, p.gel); };
@@ -405,9 +428,10 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                      .findings = {}};
   report.effects = substrate->effects();
   report.effects.insert(report.effects.begin(), fibres);
-  report.effects.insert(report.effects.end(), {common_motion_effect(p.effects.common_motion, motion), place.effect,
-                                               beyond_cut_effect(p.effects.beyond_cut, cell, beyond), elasticity,
-                                               robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
+  report.effects.insert(report.effects.end(),
+                        {common_motion_effect(p.effects.common_motion, motion), under_load, place.effect,
+                         beyond_cut_effect(p.effects.beyond_cut, cell, beyond), elasticity,
+                         robust_loss_effect(p.effects.robust_loss, fit.loss), coupling});
   if (p.explain) {
     context.progress(0.97, "explaining what is off");
     const std::vector<Change> changes =

@@ -27,6 +27,9 @@ const std::vector<Key>& switches() {
        "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
       {"common_motion", &S::common_motion,
        "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
+      {"beads_under_load", &S::beads_under_load,
+       "beads are taken where they lie while the cell pulls, as its images show the cell; auto: where the beads say "
+       "so"},
       {"channel_shift", &S::channel_shift,
        "shift and turn of the cell against the beads, found with the tensions; auto: on, where beads tell it"},
       {"beyond_cut", &S::beyond_cut,

@@ -22,6 +22,7 @@ struct EffectSwitches {
   std::string vertical_displacement = "auto";
   std::string drift_affine = "auto";
   std::string common_motion = "auto";
+  std::string beads_under_load = "auto";
   std::string channel_shift = "auto";
   std::string beyond_cut = "auto";
   std::string cable_elasticity = "auto";

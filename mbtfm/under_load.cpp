@@ -1,0 +1,57 @@
+#include "mbtfm/under_load.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
+
+namespace mbtfm::inverse {
+
+namespace {
+
+/// What independent forces leave of the beads. Of exact data that is rounding, and says nothing.
+double left_by_forces(const ReducedData& reduced) {
+  constexpr double kRounding = 1e-10;  // of the squares; those of G'G are rounded to its condition
+  return std::max(reduced.floor_squared, kRounding * (reduced.floor_squared + reduced.target.squaredNorm()));
+}
+
+double largest_displacement_um(const DisplacementField& beads) {
+  double largest = 0;
+  for (const Bead& b : beads) largest = std::max(largest, norm(b.displacement_um));
+  return largest;
+}
+
+}  // namespace
+
+DisplacementField under_load(DisplacementField beads) {
+  for (Bead& b : beads) b.position_um += b.displacement_um;
+  return beads;
+}
+
+BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
+                        const std::function<LinearData(const DisplacementField&)>& data_of, double size_um,
+                        double tolerance, const std::string& setting) {
+  constexpr double kVeryStrong = 10;
+  const Stopwatch watch;
+  BeadsOfState result{.beads = at_rest, .data = std::move(data), .effect = {}};
+  const double largest = largest_displacement_um(at_rest);
+  if (setting == "off" || (setting == "auto" && !(largest > tolerance * size_um))) {
+    result.effect = decided(kBeadsUnderLoad, setting, largest / size_um, tolerance,
+                            "over the size of an adhesion the largest displacement is");
+    return result;
+  }
+  DisplacementField moved = under_load(at_rest);
+  LinearData loaded = data_of(moved);
+  const double evidence = static_cast<double>(result.data.n_used) *
+                          std::log(left_by_forces(result.data.reduced) / left_by_forces(loaded.reduced));
+  result.effect = decided(kBeadsUnderLoad, setting, evidence, kVeryStrong,
+                          "twice the logarithm of the odds, by what independent forces of the adhesions leave, is");
+  result.effect.seconds = watch.seconds();
+  if (!result.effect.is_on) return result;
+  result.beads = std::move(moved);
+  result.data = std::move(loaded);
+  return result;
+}
+
+}  // namespace mbtfm::inverse

@@ -1,0 +1,105 @@
+#include "mbtfm/under_load.h"
+
+#include <gtest/gtest.h>
+
+#include "mbtfm/common_motion.h"
+#include "mbtfm/fit_results.h"
+#include "pipeline/contract/effects.h"
+#include "tests/support/tension_scene.h"
+
+namespace mbtfm::inverse {
+namespace {
+
+using test::TensionScene;
+
+constexpr Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+constexpr double kSize_um = 1;    // of the adhesions
+constexpr double kNoise = 0.002;  // of the largest displacement, which a lone bead on an adhesion has
+
+/// Adhesions are seen under load, and the beads are put back by what they move. The scene's beads are those under load.
+struct PullingCell {
+  Cell cell;
+  TensionScene scene;
+  DisplacementField at_rest;
+
+  LinearData data_of(const DisplacementField& beads) const {
+    const auto gel = substrate::make_greens(kGel, {.model = "layer"}, 1);
+    return reduce(beads, substrate::dense_response(gel->compliance_um_per_nN(points_of(beads), ellipses_of(cell))), {},
+                  1, affine_motions(beads));
+  }
+  BeadsOfState state(const DisplacementField& beads, const std::string& setting = "auto") const {
+    return take_state(
+        beads, data_of(beads), [&](const DisplacementField& there) { return data_of(there); }, kSize_um, 0.01, setting);
+  }
+  /// Fitted on the network that made the forces.
+  EnsembleFit fit(LinearData data) const {
+    std::vector<network::CableNetwork> networks;
+    networks.emplace_back(scene.cables.network(), scene.cables.parameters());
+    return fit_ensemble(networks, data, scene.adhesion_ids, {}, 1, {});
+  }
+};
+
+/// @param share  of tensions that move the gel by more than an adhesion's radius
+PullingCell pulling_cell(double share, double noise, unsigned seed) {
+  Cell cell = test::round_cell(12, 9);
+  test::add_ventral(cell, 1, 5);
+  test::add_ventral(cell, 2, 7);
+  PullingCell result{.cell = cell,
+                     .scene = test::scene_of(cell, share * Eigen::Vector3d(0.2, 16, 8), 900, noise, seed),
+                     .at_rest = {}};
+  result.at_rest = result.scene.beads;
+  for (std::size_t i = 0; i < result.at_rest.size(); ++i) {
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    const Eigen::VectorXd& u = result.scene.displacement_um;
+    result.at_rest[i].position_um += Vec2{-u[row], -u[row + 1]};
+  }
+  return result;
+}
+
+double error_of(const PullingCell& cell, const EnsembleFit& fit) {
+  return (values_of(fit) - cell.scene.tensions_nN).norm() / std::sqrt(fit.covariance_nN2.trace());
+}
+
+TEST(UnderLoad, beads_go_to_where_the_cell_pulls_them) {
+  const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}, .flag = {}}};
+  EXPECT_EQ(under_load(beads)[0].position_um.x, 3 + 0.1);
+  EXPECT_EQ(under_load(beads)[0].position_um.y, 4 - 0.2);
+  EXPECT_EQ(under_load(beads)[0].displacement_um.y, -0.2);
+}
+
+TEST(UnderLoad, tensions_of_a_cell_seen_under_load_are_right_by_the_beads_there) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    const PullingCell cell = pulling_cell(1, kNoise, seed);
+    ASSERT_GT(cell.scene.largest_um, 0.4) << "an adhesion's radius";
+    const BeadsOfState state = cell.state(cell.at_rest);
+    EXPECT_TRUE(state.effect.is_on) << line_of(state.effect);
+    // three tensions: chance exceeds three standard errors of their sum of squares once in hundreds
+    EXPECT_LT(error_of(cell, cell.fit(state.data)), 3);
+    EXPECT_GT(error_of(cell, cell.fit(cell.data_of(cell.at_rest))), 3);
+    EXPECT_FALSE(cell.state(cell.at_rest, "off").effect.is_on);
+  }
+}
+
+TEST(UnderLoad, beads_that_are_given_under_load_stay_there) {
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    SCOPED_TRACE(seed);
+    const PullingCell cell = pulling_cell(1, kNoise, seed);
+    const BeadsOfState state = cell.state(cell.scene.beads);
+    EXPECT_FALSE(state.effect.is_on) << line_of(state.effect);
+    EXPECT_EQ(state.beads[7].position_um.x, cell.scene.beads[7].position_um.x);
+  }
+}
+
+TEST(UnderLoad, beads_that_hardly_move_are_not_asked) {
+  const PullingCell cell = pulling_cell(0.001, 0.02, 1);
+  ASSERT_LT(cell.scene.largest_um, 0.01 * kSize_um);
+  const auto fail = [](const DisplacementField&) -> LinearData { throw std::logic_error("asked"); };
+  const LinearData data = cell.data_of(cell.at_rest);
+  EXPECT_FALSE(take_state(cell.at_rest, data, fail, kSize_um, 0.01, "auto").effect.is_on);
+  EXPECT_FALSE(take_state(cell.at_rest, data, fail, kSize_um, 0.01, "off").effect.is_on);
+  EXPECT_TRUE(cell.state(cell.at_rest, "on").effect.is_on);
+}
+
+}  // namespace
+}  // namespace mbtfm::inverse
