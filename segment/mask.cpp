@@ -176,6 +176,16 @@ std::vector<int> cells_in(const LabelMask& parts, const Field& field, const Outl
   return labels;
 }
 
+void require_size_of_adhesion(const LabelMask& mask, const Adhesion& a) {
+  constexpr double kLargest_um2 = 100;  // a small cell; the largest adhesions have 10
+  if (a.area_um2 <= kLargest_um2) return;
+  throw InputError(
+      mask.name + ": part at (" + brief(a.position_um.x) + ", " + brief(a.position_um.y) + ") um",
+      "an adhesion, of at most " + shortest(kLargest_um2) + " um²", brief(a.area_um2) + " um²",
+      "a mask of the adhesive pattern goes with segment.adhesions = pattern, one of the cell is an outline_mask; of "
+      "adhesions, check pixel_size_um and that they do not touch each other");
+}
+
 std::string listed(std::vector<int> labels) {
   constexpr std::size_t kMost = 12;
   std::sort(labels.begin(), labels.end());
@@ -231,6 +241,51 @@ void require_upright(const LabelMask& mask, const std::string& what) {
     if (mask.at(i, j) == 0) return;
   throw InputError(mask.name, what + " on a background of 0", "values above 0 in all four corners of the image",
                    "the mask seems inverted: in ImageJ, Edit > Invert; the background must look black");
+}
+
+void require_upright_pattern(const LabelMask& mask) {
+  const int right = mask.width - 1, bottom = mask.height - 1;
+  for (int i = 0; i <= right; ++i)
+    if (mask.at(i, 0) == 0 || mask.at(i, bottom) == 0) return;
+  for (int j = 0; j <= bottom; ++j)
+    if (mask.at(0, j) == 0 || mask.at(right, j) == 0) return;
+  throw InputError(mask.name, "a pattern on a background of 0", "values above 0 all along the border of the image",
+                   "the mask seems inverted: in ImageJ, Edit > Invert; the background must look black. Where all of "
+                   "the gel is adhesive, set segment.adhesions = cell");
+}
+
+std::optional<double> share_beneath(const LabelMask& pattern, const CellOutline& cell, const Field& field) {
+  constexpr double kStep_um = 0.25;  // of the points that are looked at: a pattern's bars are some um wide
+  const LabelMask parts = with_parts_labelled(pattern);
+  const double pixel_um = pixel_of(parts, field);
+  const int step = std::max(1, static_cast<int>(kStep_um / pixel_um));
+  struct Part {
+    double area_um2 = 0, beneath_um2 = 0;
+    bool is_cut = false;
+  };
+  std::map<int, Part> by_label;
+  const auto is_in_cell = [&](Vec2 point) {
+    const auto is_in = [&](const Polygon& ring) { return contains(ring, point); };
+    return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in);
+  };
+  for (int j = 0; j < parts.height; j += step)
+    for (int i = 0; i < parts.width; i += step) {
+      const int label = parts.at(i, j);
+      if (label == 0) continue;
+      const double area_um2 = std::pow(step * pixel_um, 2);
+      Part& part = by_label[label];
+      part.area_um2 += area_um2;
+      if (is_in_cell({(i + 0.5) * pixel_um, (j + 0.5) * pixel_um})) part.beneath_um2 += area_um2;
+      part.is_cut = part.is_cut || i < step || j < step || i + step >= parts.width || j + step >= parts.height;
+    }
+  double area_um2 = 0, beneath_um2 = 0;
+  for (const auto& [label, part] : by_label) {
+    if (part.beneath_um2 == 0 || part.is_cut || part.area_um2 > 2 * cell.area_um2) continue;
+    area_um2 += part.area_um2;
+    beneath_um2 += part.beneath_um2;
+  }
+  if (area_um2 == 0) return std::nullopt;
+  return beneath_um2 / area_um2;
 }
 
 LabelMask with_parts_labelled(LabelMask mask) {
@@ -316,6 +371,7 @@ std::vector<Adhesion> mask_adhesions(const LabelMask& mask, const std::optional<
       pixel.intensity = is_seen ? adhesion->image.at(i, j) : 0;
     }
     Adhesion a = measure_ellipse(pixels, pixel_of(mask, field));
+    require_size_of_adhesion(mask, a);
     a.adhesion_id = static_cast<int>(adhesions.size()) + 1;
     if (adhesion) a.mean_intensity -= level_around(parts, a, adhesion->image, field.pixel_um).value_or(0);
     adhesions.push_back(a);

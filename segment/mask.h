@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,12 +36,20 @@ void require_size(const LabelMask& mask, const Field& field);
 /// @throws InputError where all four corners belong to it: the mask is inverted
 void require_upright(const LabelMask& mask, const std::string& what);
 
+/// A pattern may reach the corners, as lines do. @throws InputError where none of the background reaches the image's
+/// border: the mask is inverted
+void require_upright_pattern(const LabelMask& mask);
+
 /// The parts of a binary mask whose pixels hang together by their sides, as labels in the order of their first pixel;
 /// a label image as it is.
 LabelMask with_parts_labelled(LabelMask mask);
 
 /// Does the mask have a label there?
 bool covers(const LabelMask& mask, Vec2 point_um, const Field& field);
+
+/// Share of a pattern that lies beneath the cell, of the parts that it touches. Parts that the image cuts or that are
+/// larger than two cells are made for more than this cell. None without others.
+std::optional<double> share_beneath(const LabelMask& pattern, const CellOutline& cell, const Field& field);
 
 /// Rings around a label's pixels, in pixels: through the middles of the pixels' sides, so that a ring around n pixels
 /// has an area of n - 1/2, whatever its direction. Outer rings turn from +x towards +y, holes back.
@@ -56,6 +65,7 @@ int n_cells_in(const LabelMask& mask, const Field& field, const OutlineParameter
 
 /// Each label, or part of a binary mask, as the ellipse of its pixels' second moments; `mean_intensity` as of adhesions
 /// drawn by hand. Ids from 1, in the order of the labels, or of the parts' first pixels.
+/// @throws InputError where a part is as large as a cell: it shows the cell, or the pattern beneath it
 std::vector<Adhesion> mask_adhesions(const LabelMask& mask, const std::optional<Channel>& adhesion, const Field& field);
 
 }  // namespace mbtfm::segment

@@ -268,12 +268,14 @@ Inputs inputs_of(const std::optional<Channel>& adhesion, const std::optional<Cha
     throw UsageError("fibres drawn by hand belong to one cell: choose it (cell), not all of them (cell = 0)");
   const Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
   require_equal_sizes(first, second);
+  if (adhesion && actin) require_different_pictures(*adhesion, *actin);
   const double pixel_um = common_pixel_size_um(first, second, p.pixel_size_um);
   Inputs in{adhesion, actin, p, drawn, {first.image.width, first.image.height, pixel_um}};
   in.source =
       source_of(p.candidates, adhesion || drawn.adhesions || drawn.adhesion_mask, drawn.adhesion_mask != nullptr);
   for (const auto& mask : {drawn.outline_mask, drawn.adhesion_mask})
     if (mask) require_size(*mask, in.field);
+  if (in.source == AdhesionSource::pattern) require_upright_pattern(*drawn.adhesion_mask);
   return in;
 }
 
@@ -314,6 +316,8 @@ Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std
     std::vector<Adhesion> candidates = candidates_in(in, around, lines, Placement::first);
     hold(s.cell, std::move(candidates), std::move(lines), around, in);
     require_candidates(in, s.cell);
+    if (in.source == AdhesionSource::pattern)
+      s.pattern_beneath = share_beneath(*in.drawn.adhesion_mask, around, in.field);
   }
   s.n_anchors = static_cast<int>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::anchor, &Adhesion::origin));
   s.unused = unused_in(in);

@@ -43,7 +43,8 @@ struct Segmentation {
   std::vector<Polyline> unexplained_um{};       ///< actin as bright as the fibres that is in none of them
   bool is_aligned = false;                      ///< fibres and outline were moved by it
   AdhesionSource source = AdhesionSource::image;
-  int n_anchors = 0;  ///< that drawn fibres asked for
+  std::optional<double> pattern_beneath{};  ///< share of the pattern that lies beneath the cell: see share_beneath()
+  int n_anchors = 0;                        ///< that drawn fibres asked for
   /// The cell with the candidates at other places, the same fibres tied to them; none where there is nothing to place.
   std::optional<Cell> second{};
   std::vector<std::string> unused{};  ///< inputs that others took the place of, a sentence each

@@ -36,6 +36,19 @@ std::shared_ptr<const LabelMask> mask(StageContext& context, const std::string& 
   return std::make_shared<const LabelMask>(std::move(mask));
 }
 
+/// A cell takes the place and the shape of the pattern that it sits on: less than half of it beneath the cell is
+/// another place.
+bool is_pattern_beside(const Segmentation& s) {
+  constexpr double kHalf = 0.5;
+  return s.pattern_beneath && *s.pattern_beneath < kHalf;
+}
+
+std::string doubt_about_pattern(const Segmentation& s) {
+  if (!is_pattern_beside(s)) return "";
+  return " Only " + brief(100 * *s.pattern_beneath) +
+         " % of the pattern that the cell touches lies beneath it: does the mask lie on these images?";
+}
+
 /// What was assumed of the adhesions, in words; empty where they were seen.
 std::string assumption_of(const Segmentation& s, bool is_by_itself) {
   const auto n = std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin);
@@ -45,7 +58,7 @@ std::string assumption_of(const Segmentation& s, bool is_by_itself) {
     case AdhesionSource::image:
       return "";
     case AdhesionSource::pattern:
-      return placed + "all over the adhesive pattern under the cell.";
+      return placed + "all over the adhesive pattern under the cell." + doubt_about_pattern(s);
     case AdhesionSource::fibre_ends:
       return placed +
              "at the ends of the fibres. Which ends are held in truth, and so the types of the fibres, is not "
@@ -58,9 +71,9 @@ std::string assumption_of(const Segmentation& s, bool is_by_itself) {
   throw InternalError("unknown source of adhesions");
 }
 
-Severity severity_of(AdhesionSource source) {
+Severity severity_of(const Segmentation& s) {
   // the pattern is known, and its candidates' places are in the error budget
-  return source == AdhesionSource::pattern ? Severity::note : Severity::caution;
+  return s.source == AdhesionSource::pattern && !is_pattern_beside(s) ? Severity::note : Severity::caution;
 }
 
 /// Length of bright actin in no fibre: the diagonals of the crests' boxes, as they hardly bend.
@@ -153,7 +166,7 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                 std::to_string(s.n_adhesions_outside) + " adhesions outside the cell were left out."),
         noticed(FindingKind::adhesions_assumed,
                 static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
-                assumption_of(s, is_assumed_by_itself), severity_of(s.source)),
+                assumption_of(s, is_assumed_by_itself), severity_of(s)),
         noticed(FindingKind::fibre_ends_anchored, s.n_anchors,
                 (s.n_anchors == 1 ? "One end of the drawn fibres reaches no adhesion. It is held by an anchor."
                                   : std::to_string(s.n_anchors) +

@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "pipeline/contract/errors.h"
+#include "segment/mask.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
@@ -133,6 +134,52 @@ TEST(Candidates, of_a_pattern_lie_on_it_and_in_the_cell) {
   ASSERT_TRUE(s.second);
   EXPECT_NEAR(static_cast<double>(s.second->adhesions.size()), static_cast<double>(s.cell.adhesions.size()), 6);
   for (const Adhesion& a : s.second->adhesions) EXPECT_LT(a.position_um.x, 12.8);
+}
+
+TEST(Candidates, of_a_pattern_stand_where_fibres_end_on_it) {
+  Scene scene("pattern");
+  HandDrawn drawn;
+  Image disc = test::even_image(256, 256, 255);
+  for (int j = 0; j < 256; ++j) disc.at(0, j) = 0;
+  drawn.adhesion_mask = std::make_shared<const LabelMask>(mask_of(disc, "pattern.tif"));
+  const Segmentation without = segment_cell(std::nullopt, scene.actin, scene.parameters, drawn);
+  scene.parameters.candidates.adhesions = "cell";
+  const Segmentation at_ends = segment_cell(std::nullopt, scene.actin, scene.parameters);
+  ASSERT_FALSE(without.cell.fibres.empty());
+  ASSERT_TRUE(without.second);
+  for (const Cell* cell : {&without.cell, &*without.second}) {
+    ASSERT_EQ(cell->fibres.size(), at_ends.cell.fibres.size());
+    for (std::size_t i = 0; i < cell->fibres.size(); ++i) {  // the same ends, wherever the lattice lies
+      EXPECT_EQ(cell->fibres[i].points_um.front(), at_ends.cell.fibres[i].points_um.front());
+      EXPECT_EQ(cell->fibres[i].points_um.back(), at_ends.cell.fibres[i].points_um.back());
+    }
+    expect_apart(*cell, 2);
+  }
+}
+
+TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
+  const Scene scene("pattern");
+  const auto beneath = [&](Vec2 shift_um) {
+    Image image = test::even_image(256, 256, 0);
+    for (int j = 0; j < 256; ++j)
+      for (int i = 0; i < 256; ++i)
+        if (norm(0.1 * Vec2{i + 0.5, j + 0.5} - Vec2{12.8, 12.8} - shift_um) < 6) image.at(i, j) = 255;
+    HandDrawn drawn;
+    drawn.adhesion_mask = std::make_shared<const LabelMask>(mask_of(image, "pattern.tif"));
+    return segment_cell(std::nullopt, scene.actin, scene.parameters, drawn).pattern_beneath;
+  };
+  EXPECT_GT(beneath({0, 0}).value_or(0), 0.95);
+  EXPECT_LT(beneath({4.5, 4.5}).value_or(1), beneath({0, 0}).value_or(0) - 0.05);
+}
+
+TEST(Candidates, of_the_same_picture_twice_are_refused) {
+  const Scene scene("auto");
+  try {
+    segment_cell(scene.actin, scene.actin, scene.parameters);
+    FAIL() << "taken";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string(error.what()).find("the same, pixel by pixel"), std::string::npos) << error.what();
+  }
 }
 
 TEST(Candidates, are_not_asked_for_where_an_image_shows_the_adhesions) {

@@ -45,6 +45,15 @@ std::string error_of(const auto& body) {
   return "no error";
 }
 
+std::string hint_of(const auto& body) {
+  try {
+    body();
+  } catch (const InputError& error) {
+    return error.hint;
+  }
+  return "no error";
+}
+
 TEST(Mask, an_outline_goes_round_its_pixels_without_bias) {
   for (const double radius_px : {60.0, 83.7, 110.2}) {
     Image image = empty();
@@ -163,7 +172,7 @@ TEST(Mask, an_adhesions_intensity_is_its_height_above_its_surroundings) {
 
 TEST(Mask, binning_the_images_leaves_the_mask_as_fine_as_it_is) {
   Image image = empty();
-  paint_disc(image, 1, {101, 97}, 60);
+  paint_disc(image, 1, {101, 97}, 50);
   LabelMask m = mask(image);
   const auto fine = mask_outlines(m, 1, kField, {}).front();
   m.binning = 2;
@@ -187,6 +196,46 @@ TEST(Mask, what_is_no_mask_is_told) {
   paint_disc(inverted, 0, {128, 128}, 80);
   EXPECT_EQ(error_of([&] { mask_outlines(mask(inverted), 1, kField, {}); }),
             "mask.tif: a cell on a background of 0; values above 0 in all four corners of the image");
+}
+
+TEST(Mask, of_a_cell_or_a_pattern_is_not_taken_for_adhesions) {
+  Image image = empty();
+  paint_disc(image, 255, {40, 40}, 5);
+  paint_disc(image, 255, {150, 150}, 60);
+  const auto measure = [&] { mask_adhesions(mask(image), std::nullopt, kField); };
+  EXPECT_EQ(error_of(measure), "mask.tif: part at (15, 15) um: an adhesion, of at most 100 um²; 113 um²");
+  for (const char* part : {"segment.adhesions = pattern", "outline_mask"})
+    EXPECT_NE(hint_of(measure).find(part), std::string::npos) << hint_of(measure);
+}
+
+TEST(Mask, of_a_pattern_may_reach_the_corners_but_not_go_all_round) {
+  Image lines = empty();
+  paint(lines, 255, [](double x, double) { return x < 50 || x > 200; });
+  EXPECT_NO_THROW(require_upright_pattern(mask(lines)));
+  Image inverted = test::even_image(kSide, kSide, 255);
+  paint_disc(inverted, 0, {128, 128}, 60);
+  const auto look = [&] { require_upright_pattern(mask(inverted)); };
+  EXPECT_EQ(error_of(look),
+            "mask.tif: a pattern on a background of 0; values above 0 all along the border of the image");
+  EXPECT_NE(hint_of(look).find("inverted"), std::string::npos) << hint_of(look);
+}
+
+TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_touches) {
+  Image image = empty();
+  paint(image, 255, [](double x, double y) { return x > 60 && x < 160 && y > 60 && y < 160; });  // the cell's pattern
+  paint_disc(image, 255, {210, 210}, 20);                                                        // another cell's
+  const LabelMask pattern = mask(image);
+  const auto share = [&](double x_um) {
+    const CellOutline cell{.outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .area_um2 = 144};
+    return share_beneath(pattern, cell, kField);
+  };
+  // by columns of points 0.2 um apart, over 10 um
+  EXPECT_NEAR(share(5).value(), 1, 0.02);
+  EXPECT_NEAR(share(13).value(), 0.3, 0.02);
+  EXPECT_FALSE(share(-20));
+  Image whole = test::even_image(kSide, kSide, 255);  // cut by the image
+  const CellOutline cell{.outer_um = {{5, 5}, {17, 5}, {17, 17}, {5, 17}}, .area_um2 = 144};
+  EXPECT_FALSE(share_beneath(mask(whole), cell, kField));
 }
 
 TEST(Mask, a_mask_of_another_size_is_refused_with_both_sizes) {
