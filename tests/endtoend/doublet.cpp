@@ -2,6 +2,7 @@
 /// all over the pattern, beside what optical flow and Fourier tractions give of the same images.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <fstream>
 #include <iostream>
 #include <map>
@@ -73,7 +74,8 @@ struct Answer {
   test::Outcome outcome;
 };
 
-/// Half the work of the forces along the displacement beneath them: of the beads within a candidate's disc.
+/// Half the work of the forces along the displacement beneath them: of the beads about a candidate, under load as it
+/// is.
 double strain_energy_pJ(const Cell& cell, const std::vector<AdhesionForce>& forces, const DisplacementField& field) {
   std::map<int, Vec2> place;
   for (const Adhesion& a : cell.adhesions) place[a.adhesion_id] = a.position_um;
@@ -83,7 +85,7 @@ double strain_energy_pJ(const Cell& cell, const std::vector<AdhesionForce>& forc
     double weights = 0;
     for (const Bead& b : field) {
       if (!b.flag.empty()) continue;
-      const Vec2 d = b.position_um - place[f.adhesion_id];
+      const Vec2 d = b.position_um + b.displacement_um - place[f.adhesion_id];
       const double weight = std::exp(-dot(d, d) / 2);  // over a micrometre
       sum += weight * b.displacement_um;
       weights += weight;
@@ -151,23 +153,43 @@ void print(const char* title, const Answer& a) {
 /// Published of the same images, by optical flow and half-space Fourier tractions.
 constexpr Vec2 kQuadrants_nN[2][2] = {{{88, 154}, {-68, 85}}, {{67, -153}, {-65, -98}}};
 
-/// Sums of tractions over a quadrant vary by a tenth or so with the regularisation, and beads between the bars are
-/// worth as much on either side: 30 nN, or a fifth of the largest.
-void expect_quadrants(const Answer& a, double tolerance_nN) {
+/// Sums of tractions over a quadrant vary by a tenth or two with the regularisation.
+void expect_quadrants(const Answer& a) {
   for (int row = 0; row < 2; ++row)
     for (int column = 0; column < 2; ++column)
-      EXPECT_LT(norm(a.quadrant_nN[row][column] - kQuadrants_nN[row][column]), tolerance_nN)
+      EXPECT_LT(norm(a.quadrant_nN[row][column] - kQuadrants_nN[row][column]), 0.2 * norm(kQuadrants_nN[row][column]))
           << (row == 0 ? "top " : "bottom ") << (column == 0 ? "left" : "right");
+}
+
+/// The tension along a bar of the H, which the longest fibre there has.
+double straight_nN(const Answer& a, bool is_left) {
+  const Fibre* longest = nullptr;
+  for (const Fibre& f : a.cell.fibres) {
+    const bool is_there = std::ranges::all_of(f.points_um, [&](Vec2 p) { return is_left ? p.x < 42 : p.x > 65; });
+    if (is_there && (longest == nullptr || length_um(f.points_um) > length_um(longest->points_um))) longest = &f;
+  }
+  return longest == nullptr ? 0 : a.tensions.at(longest->fibre_id).tension_nN;
 }
 
 TEST(Doublet, forces_on_a_pattern_are_those_of_fourier_tractions) {
   if (!fs::exists(kData)) GTEST_SKIP() << "no ../shared/data here";
   const Answer a = run(Fibres::traced, Outline::mask);
   print("traced fibres", a);
-  expect_quadrants(a, 45);
   const Answer found = run(Fibres::traced, Outline::found);
   print("traced fibres, outline found", found);
-  expect_quadrants(found, 60);
+  for (const Answer* answer : {&a, &found}) {
+    expect_quadrants(*answer);
+    // From the corner forces, and published for 35 doublets; strain energy by the regularisation.
+    EXPECT_GT(straight_nN(*answer, true), 88);
+    EXPECT_LT(straight_nN(*answer, true), 125);
+    EXPECT_GT(straight_nN(*answer, false), 15);
+    EXPECT_LT(straight_nN(*answer, false), 50);
+    EXPECT_GT(answer->fit.network_surface_tension_nN_per_um, 0.7);
+    EXPECT_LT(answer->fit.network_surface_tension_nN_per_um, 1.3);
+    EXPECT_GT(answer->strain_energy_pJ, 0.19);
+    EXPECT_LT(answer->strain_energy_pJ, 0.4);
+    EXPECT_LT(answer->fit.relative_l2, 0.5) << "0.54 with the beads at rest and the fibres' ends on the lattice";
+  }
   for (const double thickness_um : {30.0, 100.0})
     print("other thickness", run(Fibres::drawn, Outline::mask, thickness_um));
 }
@@ -176,11 +198,11 @@ TEST(Doublet, tensions_of_drawn_fibres_are_those_of_the_corner_forces) {
   if (!fs::exists(kData)) GTEST_SKIP() << "no ../shared/data here";
   const Answer a = run(Fibres::drawn, Outline::mask);
   print("drawn fibres", a);
-  expect_quadrants(a, 45);
+  expect_quadrants(a);
   // Independent: sum of tractions 500 to 920 nN, strain energy 0.19 to 0.37 pJ by the regularisation.
   EXPECT_GT(a.fit.total_force_nN, 500);
   EXPECT_LT(a.fit.total_force_nN, 920);
-  EXPECT_GT(a.strain_energy_pJ, 0.15);
+  EXPECT_GT(a.strain_energy_pJ, 0.19);
   EXPECT_LT(a.strain_energy_pJ, 0.4);
   std::map<std::string, const Tension*> by_name;
   for (const Fibre& f : a.cell.fibres) {
@@ -189,12 +211,14 @@ TEST(Doublet, tensions_of_drawn_fibres_are_those_of_the_corner_forces) {
     EXPECT_EQ(f.start_adhesion_id.has_value() && f.end_adhesion_id.has_value(), true) << "held as drawn";
   }
   ASSERT_EQ(by_name.size(), 4u);
-  // From the corner forces: the left straight fibre 88 to 116 nN, the right one 17 to 37; the intervals meet these.
+  // From the corner forces: the left straight fibre 88 to 116 nN, the right one 17 to 37, which the right corners' sums
+  // by regularised tractions give; by forces of the beads alone these are half as large again (docs/accuracy.md). The
+  // intervals meet what lies between.
   const Tension &left = *by_name.at("ventral left"), &right = *by_name.at("ventral right");
   EXPECT_GT(left.high_nN.value_or(0), 88);
   EXPECT_LT(left.low_nN.value_or(0), 116);
   EXPECT_GT(right.high_nN.value_or(0), 17);
-  EXPECT_LT(right.low_nN.value_or(1000), 37);
+  EXPECT_LT(right.low_nN.value_or(1000), 50);
   EXPECT_GT(left.tension_nN, right.tension_nN);
   // Published for 35 doublets: 0.9 to 1.1 nN/um; what the arcs lack the network carries.
   EXPECT_GT(a.fit.network_surface_tension_nN_per_um, 0.7);
