@@ -15,6 +15,9 @@ namespace {
 
 constexpr double kInfinite = std::numeric_limits<double>::infinity();
 
+/// Share of its length along which a fibre follows the cell's edge.
+constexpr double kMostOfIt = 0.6;
+
 /// Dorsal fibres and arcs are short. A fibre that spans the cell is held at both ends, though the last micrometres of
 /// it may be hidden: experts drew 22 of 23 such lines of a real cell as held at both.
 bool is_long(const Polyline& line) {
@@ -37,22 +40,41 @@ Polyline last_part(const Polyline& line, double length_um) {
   return points;
 }
 
+struct AlongEdge {
+  double share = 0;       ///< of the line's length that runs along the outline
+  double nearest_um = 0;  ///< of the line to the outline
+};
+
+/// A part runs along the outline if it is within 30° of it and no further away than `within_um`.
+AlongEdge along_edge(const Polyline& points, const Polygon& outline_um, double within_um) {
+  constexpr double kParallel = 0.866;  // cosine of 30°
+  AlongEdge result{.share = 0, .nearest_um = kInfinite};
+  std::size_t n_along = 0;
+  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
+    const Vec2 d = points[i + 1] - points[i], away = points[i] - nearest_on_boundary_um(outline_um, points[i]);
+    n_along += norm(away) < within_um && std::abs(cross(d, away)) >= kParallel * norm(d) * norm(away);
+    result.nearest_um = std::min(result.nearest_um, norm(away));
+  }
+  result.share = static_cast<double>(n_along) / static_cast<double>(points.size() - 1);
+  return result;
+}
+
+/// Of the middle of the line from its chord, towards the nearest edge; < 0 where it is bent inwards.
+double bulge_um(const Polyline& points, const Polygon& outline_um) {
+  const Vec2 middle = points[points.size() / 2], chord = 0.5 * (points.front() + points.back());
+  const Vec2 nearest = nearest_on_boundary_um(outline_um, middle);
+  const Vec2 outward = contains(outline_um, middle) ? nearest - middle : middle - nearest;
+  return norm(outward) > 0 ? dot(middle - chord, outward) / norm(outward) : 0;
+}
+
 /// Does it run along the outline, for most of its length, where that is straight or bent inwards? A bundle along a free
 /// edge spans between adhesions at its ends and draws the edge in (Bischofs et al., Biophys J 95:3488, 2008).
 bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um) {
   if (outline_um.empty() || line.size() < 2) return false;
-  constexpr double kBeside_um = 1.5, kParallel = 0.866, kMost = 0.6, kStraight = 0.02;  // cosine of 30°
+  constexpr double kBeside_um = 1.5, kStraight = 0.02;
   const Polyline points = last_part(line, length_um(line));
-  std::size_t n_along = 0;
-  for (std::size_t i = 0; i + 1 < points.size(); ++i) {
-    const Vec2 d = points[i + 1] - points[i], away = points[i] - nearest_on_boundary_um(outline_um, points[i]);
-    n_along += norm(away) < kBeside_um && std::abs(cross(d, away)) >= kParallel * norm(d) * norm(away);
-  }
-  if (static_cast<double>(n_along) < kMost * static_cast<double>(points.size() - 1)) return false;
-  const Vec2 middle = points[points.size() / 2], chord = 0.5 * (points.front() + points.back());
-  const Vec2 nearest = nearest_on_boundary_um(outline_um, middle);
-  const Vec2 inward = contains(outline_um, middle) ? middle - nearest : nearest - middle;
-  return dot(middle - chord, inward) >= -kStraight * length_um(line) * norm(inward);
+  if (along_edge(points, outline_um, kBeside_um).share < kMostOfIt) return false;
+  return bulge_um(points, outline_um) <= kStraight * length_um(line);
 }
 
 /// The adhesion that an end reaches best.
@@ -191,6 +213,22 @@ void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const 
     const Polyline on = to_adhesion(*way, adhesions);
     line.insert(line.end(), on.begin(), on.end());
   }
+}
+
+EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, double band_um, double lamellipodium_um) {
+  constexpr double kCourse_um = 2;  // of the line's end tells where it points
+  if (is_long(line) || line.size() < 2) return {};
+  const Polyline points = last_part(line, length_um(line));
+  if (points.size() < 2) return {};
+  const AlongEdge along = along_edge(points, outline_um, kInfinite);
+  if (along.share >= kMostOfIt && along.nearest_um > lamellipodium_um && bulge_um(points, outline_um) > 0)
+    return {.start = false, .end = false};
+  const auto is_held = [&](const Polyline& from_start) {
+    const Polyline last = last_part(from_start, kCourse_um);
+    const Vec2 to_edge = nearest_on_boundary_um(outline_um, last.front()) - last.front();
+    return norm(to_edge) <= band_um || dot(to_edge, direction_of_end(last)) >= 0;
+  };
+  return {.start = is_held({line.rbegin(), line.rend()}), .end = is_held(line)};
 }
 
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,

@@ -27,6 +27,14 @@ struct EndsToTie {
   bool start = true, end = true;
 };
 
+/// Where nobody sees adhesions: which ends something holds, by the shape of the fibre in the cell (Hotulainen &
+/// Lappalainen 2006; theory.md, section 6). An arc runs along the cell's edge behind the lamellipodium and bulges
+/// towards it: held nowhere. A dorsal fibre rises from its adhesion towards the cell's middle: an end away from the
+/// edge that points away from it is free. Fibres that span the cell are held at both ends.
+/// @param outline_um  not empty
+/// @param band_um  from the edge inwards, where the adhesions are
+EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, double band_um, double lamellipodium_um);
+
 /// Tie each end to the adhesion it reaches: on the line's own course, at most `reach_um` ahead of the end or half of it
 /// aside; the nearest. A tied end is led to the adhesion's centre. Both ends never share an adhesion; the nearer one
 /// has it.

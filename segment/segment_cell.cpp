@@ -7,6 +7,7 @@
 #include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
 #include "segment/emptiness.h"
+#include "segment/fibre_ends.h"
 
 namespace mbtfm::segment {
 
@@ -149,18 +150,23 @@ struct Lines {
   bool are_drawn = false;
 };
 
-std::vector<Vec2> ends_um(const Lines& lines) {
-  std::vector<Vec2> ends;
-  for (const DrawnLine& line : lines.drawn)
-    for (const Vec2 end : held_ends_um(line)) ends.push_back(end);
-  for (const TracedFibre& t : lines.traced)
-    ends.insert(ends.end(), {t.fibre.points_um.front(), t.fibre.points_um.back()});
-  return ends;
+/// The ends of a traced fibre that adhesions may hold. On a pattern any.
+EndsToTie ends_to_hold(const Inputs& in, const CellOutline& cell, const TracedFibre& traced) {
+  if (in.source == AdhesionSource::pattern) return {};
+  return ends_held_by_shape(traced.fibre.points_um, cell.outer_um, in.parameters.candidates.candidate_band_um,
+                            in.parameters.fibres.fibre_lamellipodium_um);
 }
 
 /// Of the fibres' ends those where an adhesion may be.
-std::vector<Vec2> possible_ends_um(const Inputs& in, const Lines& lines) {
-  std::vector<Vec2> ends = ends_um(lines);
+std::vector<Vec2> possible_ends_um(const Inputs& in, const CellOutline& cell, const Lines& lines) {
+  std::vector<Vec2> ends;
+  for (const DrawnLine& line : lines.drawn)
+    for (const Vec2 end : held_ends_um(line)) ends.push_back(end);
+  for (const TracedFibre& t : lines.traced) {
+    const EndsToTie held = ends_to_hold(in, cell, t);
+    if (held.start) ends.push_back(t.fibre.points_um.front());
+    if (held.end) ends.push_back(t.fibre.points_um.back());
+  }
   if (in.source == AdhesionSource::pattern)
     std::erase_if(ends, [&](Vec2 end) { return !covers(*in.drawn.adhesion_mask, end, in.field); });
   return ends;
@@ -171,7 +177,7 @@ std::vector<Vec2> possible_ends_um(const Inputs& in, const Lines& lines) {
 std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, const Lines& lines,
                                     Placement placement) {
   const CandidateParameters& p = in.parameters.candidates;
-  std::vector<Adhesion> candidates = candidates_at(possible_ends_um(in, lines), p.candidate_spacing_um);
+  std::vector<Adhesion> candidates = candidates_at(possible_ends_um(in, cell, lines), p.candidate_spacing_um);
   if (in.source != AdhesionSource::fibre_ends) {
     const Cell whole{.adhesions = {}, .fibres = {}, .outline_um = cell.outer_um, .holes_um = cell.holes_um};
     const std::vector<Adhesion> at_ends = candidates;
@@ -208,16 +214,28 @@ void require_candidates(const Inputs& in, const Cell& cell) {
                    "give an adhesion image or an adhesion mask, or set adhesions = cell");
 }
 
-/// As tied(), but a fibre has the same id wherever the candidates are: that of its place among the traced ones, the
-/// longest first.
-std::vector<Fibre> tied_one_by_one(std::vector<TracedFibre> traced, const Cell& cell, const FibreParameters& p) {
+/// As tied() for each, but a fibre has the same id wherever the candidates are: that of its place among the traced
+/// ones, the longest first.
+std::vector<Fibre> tied_one_by_one(std::vector<TracedFibre> traced, const Cell& cell, const CellOutline& outline,
+                                   const Inputs& in) {
+  const FibreParameters& p = in.parameters.fibres;
   std::ranges::stable_sort(traced, std::greater(), [](const TracedFibre& t) { return length_um(t.fibre.points_um); });
   std::vector<Fibre> fibres;
   for (std::size_t i = 0; i < traced.size(); ++i) {
-    for (Fibre& fibre : tied({traced[i]}, cell.adhesions, cell.outline_um, p, cuts_of(cell))) {
-      fibre.fibre_id = static_cast<int>(i) + 1;
-      fibres.push_back(std::move(fibre));
+    const EndsToTie held = ends_to_hold(in, outline, traced[i]);
+    Fibre& fibre = traced[i].fibre;
+    lead_on(traced[i], cell.adhesions, cell.outline_um, p.fibre_reach_um);
+    tie_ends(fibre, cell.adhesions, cell.outline_um, p.fibre_reach_um, held);
+    lead_to_cut(fibre, cuts_of(cell), p.fibre_reach_um);
+    if (length_um(fibre.points_um) < p.fibre_shortest_um) continue;
+    if (in.source != AdhesionSource::pattern) {
+      fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+      fibre.type_reason += held.start && held.end   ? "; candidates were put at its ends"
+                           : held.start || held.end ? "; an end inside the cell, pointing away from the edge, is free"
+                                                    : "; along the edge and bulging towards it: held nowhere";
     }
+    fibre.fibre_id = static_cast<int>(i) + 1;
+    fibres.push_back(std::move(fibre));
   }
   return fibres;
 }
@@ -234,12 +252,7 @@ void hold(Cell& cell, std::vector<Adhesion> adhesions, Lines lines, const CellOu
   } else if (in.source == AdhesionSource::image) {
     cell.fibres = tied(std::move(lines.traced), cell.adhesions, cell.outline_um, p.fibres, cuts_of(cell));
   } else {
-    cell.fibres = tied_one_by_one(lines.traced, cell, p.fibres);
-    for (Fibre& fibre : cell.fibres) {
-      if (in.source == AdhesionSource::pattern) break;
-      fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
-      fibre.type_reason += "; candidates were put at its ends";
-    }
+    cell.fibres = tied_one_by_one(std::move(lines.traced), cell, outline, in);
   }
   for (Adhesion& a : cell.adhesions) a.edge_distance_um = distance_to_edge_um(cell, a.position_um);
 }

@@ -3,9 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "pipeline/contract/errors.h"
+#include "segment/fibre_ends.h"
 #include "segment/mask.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_image.h"
@@ -42,6 +45,39 @@ TEST(Candidates, at_ends_near_to_each_other_are_one) {
   const auto found = candidates_at({{0, 0}, {1.9, 0}, {2.1, 0}, {10, 0}}, 2);
   ASSERT_EQ(found.size(), 3u);
   EXPECT_EQ(found[2].adhesion_id, 3);
+}
+
+/// A round cell of 20 um radius about the origin.
+Polygon round_outline() {
+  Polygon outline;
+  for (int i = 0; i < 120; ++i)
+    outline.push_back(20 * Vec2{std::cos(i * std::numbers::pi / 60), std::sin(i * std::numbers::pi / 60)});
+  return outline;
+}
+/// Part of a circle about (x, 0), from angle to angle.
+Polyline bow(double x_um, double radius_um, double from_rad, double to_rad) {
+  Polyline line;
+  for (int i = 0; i <= 20; ++i) {
+    const double angle = from_rad + i / 20.0 * (to_rad - from_rad);
+    line.push_back({x_um + radius_um * std::cos(angle), radius_um * std::sin(angle)});
+  }
+  return line;
+}
+
+TEST(Candidates, hold_no_arc_one_end_of_a_dorsal_fibre_and_both_of_a_ventral_one) {
+  const Polygon outline = round_outline();
+  const auto held = [&](const Polyline& line) {
+    const EndsToTie ends = ends_held_by_shape(line, outline, 6, 3);
+    return std::pair{ends.start, ends.end};
+  };
+  const std::pair neither{false, false}, both{true, true};
+  EXPECT_EQ(held(bow(0, 14, -0.4, 0.4)), neither) << "an arc: along the edge, 6 um behind it";
+  EXPECT_EQ(held(bow(0, 18.5, -0.3, 0.3)), both) << "along the edge and in the lamellipodium: a bundle of the edge";
+  EXPECT_EQ(held(bow(33, 20, std::numbers::pi - 0.25, std::numbers::pi + 0.25)), both) << "bent inwards";
+  EXPECT_EQ(held({{18.5, 0}, {14, 0.3}, {8, 0.5}}), (std::pair{true, false})) << "rises from the edge to the middle";
+  EXPECT_EQ(held({{8, 0.5}, {14, 0.3}, {18.5, 0}}), (std::pair{false, true}));
+  EXPECT_EQ(held({{18.5, 0}, {17, 3}, {15, 7}}), both) << "a short chord";
+  EXPECT_EQ(held({{-18, 2}, {0, 3}, {10, 2}}), both) << "spans the cell: held at both ends as a rule";
 }
 
 TEST(Candidates, are_taken_where_nothing_shows_the_adhesions_and_as_the_parameters_say) {
@@ -92,13 +128,14 @@ TEST(Candidates, without_an_adhesion_image_stand_at_the_ends_of_the_fibres_and_a
   expect_apart(s.cell, scene.parameters.candidates.candidate_spacing_um);
   ASSERT_FALSE(s.cell.fibres.empty());
   for (const Fibre& f : s.cell.fibres) {
-    EXPECT_EQ(f.type, FibreType::ventral) << f.type_reason;
+    // two chords, and one that rises from the edge towards the middle
+    EXPECT_EQ(f.type, length_um(f.points_um) > 10 ? FibreType::ventral : FibreType::dorsal) << f.type_reason;
     EXPECT_LE(f.type_confidence, 0.5);  // nobody saw what holds it
   }
   const double band_um = scene.parameters.candidates.candidate_band_um;
   for (const Adhesion& a : s.cell.adhesions) {
     const bool is_end = std::ranges::any_of(s.cell.fibres, [&](const Fibre& f) {
-      return f.points_um.front() == a.position_um || f.points_um.back() == a.position_um;
+      return f.start_adhesion_id == a.adhesion_id || f.end_adhesion_id == a.adhesion_id;
     });
     EXPECT_TRUE(is_end || *a.edge_distance_um <= band_um);
     EXPECT_TRUE(contains(s.cell.outline_um, a.position_um));
