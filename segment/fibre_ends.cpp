@@ -217,18 +217,27 @@ void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const 
 
 EndsToTie ends_held_by_shape(const Polyline& line, const Polygon& outline_um, double band_um, double lamellipodium_um) {
   constexpr double kCourse_um = 2;  // of the line's end tells where it points
+  constexpr double kInward = 0.5;   // cosine of 60°: pieces of other fibres point anywhere
+  struct End {
+    double to_edge_um = 0, outward = 0;  ///< cosine to the direction of the nearest edge
+  };
   if (is_long(line) || line.size() < 2) return {};
   const Polyline points = last_part(line, length_um(line));
   if (points.size() < 2) return {};
   const AlongEdge along = along_edge(points, outline_um, kInfinite);
   if (along.share >= kMostOfIt && along.nearest_um > lamellipodium_um && bulge_um(points, outline_um) > 0)
     return {.start = false, .end = false};
-  const auto is_held = [&](const Polyline& from_start) {
-    const Polyline last = last_part(from_start, kCourse_um);
+  const auto pointing = [&](const Polyline& towards_end) {
+    const Polyline last = last_part(towards_end, kCourse_um);
     const Vec2 to_edge = nearest_on_boundary_um(outline_um, last.front()) - last.front();
-    return norm(to_edge) <= band_um || dot(to_edge, direction_of_end(last)) >= 0;
+    const double distance = norm(to_edge);
+    return End{distance, distance > 0 ? dot(to_edge, direction_of_end(last)) / distance : 1};
   };
-  return {.start = is_held({line.rbegin(), line.rend()}), .end = is_held(line)};
+  const End end = pointing(line), start = pointing({line.rbegin(), line.rend()});
+  const auto rises = [&](const End& outer, const End& inner) {
+    return outer.to_edge_um <= band_um && outer.outward > 0 && inner.to_edge_um > band_um && inner.outward < -kInward;
+  };
+  return {.start = !rises(end, start), .end = !rises(start, end)};
 }
 
 void tie_ends(Fibre& fibre, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um,

@@ -77,6 +77,7 @@ TEST(Candidates, hold_no_arc_one_end_of_a_dorsal_fibre_and_both_of_a_ventral_one
   EXPECT_EQ(held({{18.5, 0}, {14, 0.3}, {8, 0.5}}), (std::pair{true, false})) << "rises from the edge to the middle";
   EXPECT_EQ(held({{8, 0.5}, {14, 0.3}, {18.5, 0}}), (std::pair{false, true}));
   EXPECT_EQ(held({{18.5, 0}, {17, 3}, {15, 7}}), both) << "a short chord";
+  EXPECT_EQ(held({{12, 0}, {6, 0.5}, {2, 0.5}}), both) << "a piece of a fibre in the middle of the cell";
   EXPECT_EQ(held({{-18, 2}, {0, 3}, {10, 2}}), both) << "spans the cell: held at both ends as a rule";
 }
 
