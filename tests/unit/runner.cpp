@@ -8,11 +8,13 @@
 #include <sstream>
 
 #include "pipeline/contract/csv.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/stages.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::runner {
@@ -166,6 +168,12 @@ TEST_F(Runner, what_is_left_of_a_series_does_not_outlive_it) {
   EXPECT_FALSE(fs::exists(cell_ / "2_track/frames.csv"));
   EXPECT_FALSE(fs::exists(cell_ / "2_track/displacement_0003.csv"));
   EXPECT_EQ(started(), "");
+}
+
+TEST(Stages, every_effect_belongs_to_a_stage_that_runs_again_for_it) {
+  std::vector<std::string> of_stages;
+  for (const Stage& stage : stages()) of_stages.insert(of_stages.end(), stage.effects.begin(), stage.effects.end());
+  for (const std::string& key : effect_keys()) EXPECT_NE(std::ranges::find(of_stages, key), of_stages.end()) << key;
 }
 
 TEST_F(Runner, order_and_comments_of_the_parameter_file_do_not_matter) {
