@@ -219,6 +219,24 @@ std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions
   return raised;
 }
 
+/// Try the other side of slack fibres as long as it pays.
+void look_beyond_slack(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit) {
+  constexpr int kMaxRounds = 3;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
+    if (!raised) break;
+    TensionFit other = fit;
+    const std::optional<Trial> raised_trial =
+        try_evaluate(problem, *raised, other, force_tolerance(fit.trial, problem, fit.trial.objective));
+    if (!raised_trial) break;
+    other.trial = *raised_trial;
+    descend(problem, parameters, other, is_back_at(problem, fit.trial));
+    fit.n_evaluations = other.n_evaluations;
+    if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
+    fit = std::move(other);
+  }
+}
+
 }  // namespace
 
 Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen::VectorXd& g,
@@ -270,25 +288,13 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
   return x.cwiseMax(low);
 }
 
-TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start) {
+TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start,
+                            Search search) {
   TensionFit fit;
   fit.trial = start;
   descend(problem, parameters, fit);
-  // A slack fibre may be a minimum of its own beside that of the taut one: try the other side as long as it pays.
-  constexpr int kMaxRounds = 3;
-  for (int round = 0; round < kMaxRounds; ++round) {
-    const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
-    if (!raised) break;
-    TensionFit other = fit;
-    const std::optional<Trial> raised_trial =
-        try_evaluate(problem, *raised, other, force_tolerance(fit.trial, problem, fit.trial.objective));
-    if (!raised_trial) break;
-    other.trial = *raised_trial;
-    descend(problem, parameters, other, is_back_at(problem, fit.trial));
-    fit.n_evaluations = other.n_evaluations;
-    if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
-    fit = std::move(other);
-  }
+  if (search == Search::nearest) return fit;
+  look_beyond_slack(problem, parameters, fit);
   fit.trial = problem.evaluate(fit.trial.tensions_nN, &fit.trial);  // to the last digit
   return fit;
 }

@@ -169,8 +169,9 @@ PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, co
   LinearData there = data;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const TensionProblem problem(network, there.reduced, adhesion_ids_of(cell), {}, threads);
-    const TensionFit fit =
-        fit_tensions(problem, rough, threads, scaled_to_data(problem, result.start.tensions_nN, &result.start));
+    const TensionFit fit = fit_tensions(
+        problem, rough, threads, pass == 0 ? start : scaled_to_data(problem, result.start.tensions_nN, &result.start),
+        Search::nearest);
     result.start = fit.trial;
     const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
     const Eigen::MatrixXd motions =

@@ -62,6 +62,7 @@ inline constexpr const char* kChannelShift = "channel shift";
 /// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
 /// field is linear in it, or where no place is found within kFarthest.
 /// @param data  of the beads as they are
+/// @param start  a trial with these data
 PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, const std::string& setting, int threads);
