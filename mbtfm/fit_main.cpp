@@ -256,6 +256,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitInputs inputs = read_inputs(context);
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
   const Cell cell = inputs.cell;
+  check_place(inputs.beads, cell);
   std::vector<SeriesFrame> series = read_series_of(context);
   if (!series.empty() && p.fit.substrate == "per-evaluation")
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
