@@ -48,8 +48,9 @@ struct TensionFit {
 
 /// A fibre that comes out slack may be a minimum of its own beside that of the taut one.
 enum class Search {
-  nearest,  ///< the minimum that the start leads to
-  best      ///< the other side of slack fibres is tried, too
+  nearest,  ///< the minimum that the start leads to, as near as counts where data or weights change after it: to a
+            ///< tenth of a standard error along one direction of twenty
+  best      ///< to a thirtieth, and the other side of slack fibres is tried, too
 };
 
 /// @param start  a trial of this problem: see scaled_to_data(), uniform_start()
