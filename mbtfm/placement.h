@@ -44,6 +44,11 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
                                   const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
                                   const Eigen::VectorXd& model_um, Vec2 centre_um, int threads);
 
+/// Let the beads move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
+/// them.
+void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
+                 int threads);
+
 /// A cell where the beads want it.
 struct PlacedCell {
   Placement placement;
