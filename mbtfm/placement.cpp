@@ -157,7 +157,7 @@ PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, co
                       const Trial& start, const std::string& setting, int threads) {
   const Stopwatch watch;
   constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
-  constexpr double kExact = 0.0625;   // semi-minor axes: half of that is as good as none
+  constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
   constexpr int kMostPasses = 12;     // far off it takes four
   const double width_um = mean_semi_minor_um(cell);
   const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
@@ -187,8 +187,7 @@ PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, co
     if (setting == "auto" && !(sigma_um < 0.5 * width_um)) {
       return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));
     }
-    // what the square of a step adds is as a shift by length² / 2 width: below half of the standard error
-    if (length_um * length_um < width_um * std::max(sigma_um, kExact * width_um)) {
+    if (length_um < kLinear * width_um) {
       result.data = std::move(there);
       add_motions(result.data, motions);
       result.effect = decided(kChannelShift, setting, true, "found with the tensions");
