@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <functional>
 
+#include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/errors.h"
 #include "samples/experiment.h"
 #include "samples/render.h"
