@@ -23,17 +23,6 @@ std::string with_error(double value, double sigma, const std::string& unit) {
 
 }  // namespace
 
-Vec2 CommonMotion::at(Vec2 place_um) const {
-  const Vec2 d = place_um - centre_um;
-  return shift_um + Vec2{(growth + shear_1) * d.x + (shear_2 - turn_rad) * d.y,
-                         (shear_2 + turn_rad) * d.x + (growth - shear_1) * d.y};
-}
-
-double CommonMotion::largest_um(double radius_um) const {
-  // of growth, turn and shear the matrix has singular values |growth + i turn| +- |shear|
-  return radius_um * (std::hypot(growth, turn_rad) + std::hypot(shear_1, shear_2));
-}
-
 Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
   std::vector<Vec2> places_um;
   for (const Bead& bead : beads) places_um.push_back(bead.position_um);
@@ -81,12 +70,12 @@ MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
 
 FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um) {
   const Eigen::VectorXd& a = motions.values;
-  return {.motion = {.centre_um = centre_of(beads_um),
-                     .shift_um = {a[0], a[1]},
+  return {.motion = {.shift = {a[0], a[1]},
                      .turn_rad = a[2],
                      .growth = a[3],
-                     .shear_1 = a[4],
-                     .shear_2 = a[5]},
+                     .stretch = a[4],
+                     .skew = a[5],
+                     .centre = centre_of(beads_um)},
           .sigma = motions.sigma.head(6)};
 }
 
@@ -114,24 +103,24 @@ Effect common_motion_effect(const std::string& setting, const std::optional<Foun
 }
 
 Figures figures_of(const FoundMotion& found) {
-  const CommonMotion& m = found.motion;
+  const AffineMotion& m = found.motion;
   constexpr double kDegree = 180 / std::numbers::pi;
-  return {{"common_shift_x_um", m.shift_um.x},
-          {"common_shift_y_um", m.shift_um.y},
+  return {{"common_shift_x_um", m.shift.x},
+          {"common_shift_y_um", m.shift.y},
           {"common_turn_deg", kDegree * m.turn_rad},
           {"common_turn_sigma_deg", kDegree * found.sigma[2]},
           {"common_growth", m.growth},
           {"common_growth_sigma", found.sigma[3]},
-          {"common_shear", std::hypot(m.shear_1, m.shear_2)},
+          {"common_shear", m.shear()},
           {"common_shear_sigma", std::max(found.sigma[4], found.sigma[5])}};
 }
 
 std::string sentence_of(const FoundMotion& found) {
-  const CommonMotion& m = found.motion;
+  const AffineMotion& m = found.motion;
   constexpr double kDegree = 180 / std::numbers::pi;
   return "growth " + with_error(100 * m.growth, 100 * found.sigma[3], "%") + ", turn " +
          with_error(kDegree * m.turn_rad, kDegree * found.sigma[2], "degrees") + ", shear " +
-         with_error(100 * std::hypot(m.shear_1, m.shear_2), 100 * std::max(found.sigma[4], found.sigma[5]), "%");
+         with_error(100 * m.shear(), 100 * std::max(found.sigma[4], found.sigma[5]), "%");
 }
 
 }  // namespace mbtfm::inverse

@@ -10,22 +10,10 @@
 
 #include "mbtfm/ensemble.h"
 #include "mbtfm/linear_data.h"
+#include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/effects.h"
 
 namespace mbtfm::inverse {
-
-/// u = shift + (growth 1 + turn [0 −1; 1 0] + shear_1 [1 0; 0 −1] + shear_2 [0 1; 1 0]) (x − centre)
-struct CommonMotion {
-  Vec2 centre_um;
-  Vec2 shift_um;
-  double turn_rad = 0;  ///< from +x towards +y
-  double growth = 0;    ///< relative
-  double shear_1 = 0;   ///< growth along x less growth along y, half of it
-  double shear_2 = 0;   ///< the same along the diagonals
-  Vec2 at(Vec2 place_um) const;
-  /// The largest displacement within this distance from the centre, less the shift.
-  double largest_um(double radius_um) const;
-};
 
 /// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
 /// (relative).
@@ -45,7 +33,7 @@ inline constexpr double kUsualGrowth = 0.003;
 
 /// A common motion with the standard errors of its numbers, in the order of affine_motions().
 struct FoundMotion {
-  CommonMotion motion;
+  AffineMotion motion;  ///< um
   Eigen::VectorXd sigma;
 };
 /// @param motions  the first six those of affine_motions()

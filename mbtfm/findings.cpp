@@ -234,12 +234,12 @@ Noticed cell_cut(const FitOutcome& o) {
 
 Noticed common_motion(const FitOutcome& o) {
   if (!o.motion) return {};
-  const CommonMotion& m = o.motion->motion;
+  const AffineMotion& m = o.motion->motion;
   double largest = 0;  // in standard errors
-  const double values[] = {m.turn_rad, m.growth, m.shear_1, m.shear_2};
+  const double values[] = {m.turn_rad, m.growth, m.stretch, m.skew};
   for (int i = 0; i < 4; ++i) largest = std::max(largest, std::abs(values[i]) / o.motion->sigma[i + 2]);
   constexpr double kLarge = 0.01;  // of all lengths: no refocus and no warming does that
-  const bool is_large = std::max({std::abs(m.growth), std::abs(m.shear_1), std::abs(m.shear_2)}) > kLarge;
+  const bool is_large = std::max({std::abs(m.growth), std::abs(m.stretch), std::abs(m.skew)}) > kLarge;
   return noticed(FindingKind::common_motion, largest,
                  "All beads share a motion beside the cell's pull: " + sentence_of(*o.motion) + ". It was taken off." +
                      (is_large ? " It is too large for a change of focus or of temperature: were both pictures taken "

@@ -246,8 +246,8 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
 /// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
 std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::SharedResponse& response,
                        const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
-                       const FitParameters& p, bool moves, const std::function<void(LinearData&)>& allow,
-                       bool is_coupled, StageContext& context) {
+                       const FitParameters& p, bool moves, const AllowMore& allow, bool is_coupled,
+                       StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
       frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, moves,
       is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
@@ -277,6 +277,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   FitInputs inputs = read_inputs(context);
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
   const Cell cell = inputs.cell;
+  check_place(inputs.beads, cell);
   std::vector<SeriesFrame> series = read_series_of(context);
   if (!series.empty() && p.fit.substrate == "per-evaluation")
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
@@ -409,8 +410,12 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_displacement(context.output("out", "displacement_without_fibres.csv"), fitted_field(models.front().forces_nN));
   write_displacement_vtp(context.output("out", "displacement.vtp"), at_rest, fitted,
                          {most_informed_array(influence), weight_array(data)});
-  std::function<void(LinearData&)> allow;
-  if (beyond) allow = [&](LinearData& of_frame) { allow_forces_beyond(of_frame, cell, p.gel); };
+  const auto allow = [&](LinearData& of_frame, const Eigen::VectorXd& forces_nN) {
+    if (beyond) allow_forces_beyond(of_frame, cell, p.gel);
+    // the same place for all, but each frame has the error of it
+    if (place.effect.is_on)
+      allow_place(of_frame, inputs.cell, p.gel, forces_nN, place.placement.centre_um, context.threads);
+  };
   const std::string of_series = series.empty() ? ""
                                                : fit_frames(series, responses.of_series, inputs.cell, networks, fit,
                                                             p.fit, moves, allow, coupling.is_on, context);

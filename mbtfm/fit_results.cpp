@@ -2,10 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
+#include <string>
 
 #include "mbtfm/findings.h"
 #include "mbtfm/noise.h"
+#include "pipeline/contract/csv.h"
+#include "pipeline/contract/errors.h"
 
 namespace mbtfm::inverse {
 
@@ -21,7 +25,30 @@ double surface_tension_nN_per_um(const Network& network, const Polygon& outline_
   return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
 }
 
+/// Along one axis.
+struct Reach {
+  double low_um = std::numeric_limits<double>::infinity(), high_um = -low_um;
+  void add(double at_um) { low_um = std::min(low_um, at_um), high_um = std::max(high_um, at_um); }
+  std::string in_words() const { return brief(low_um) + " to " + brief(high_um) + " um"; }
+};
+
+void check_along(const char* axis, const Reach& beads, const Reach& cell) {
+  if (beads.low_um <= cell.high_um && cell.low_um <= beads.high_um) return;
+  throw InvalidData("the displacement", std::string("beads about the cell, whose ") + axis + " is " + cell.in_words(),
+                    std::string("beads whose ") + axis + " is " + beads.in_words() +
+                        ": has this coordinate another sign, unit or origin?");
+}
+
 }  // namespace
+
+void check_place(const DisplacementField& beads, const Cell& cell) {
+  if (beads.empty() || cell.adhesions.empty()) return;
+  Reach beads_x, beads_y, cell_x, cell_y;
+  for (const Bead& bead : beads) beads_x.add(bead.position_um.x), beads_y.add(bead.position_um.y);
+  for (const Adhesion& a : cell.adhesions) cell_x.add(a.position_um.x), cell_y.add(a.position_um.y);
+  check_along("x", beads_x, cell_x);
+  check_along("y", beads_y, cell_y);
+}
 
 std::vector<int> adhesion_ids_of(const Cell& cell) {
   std::vector<int> ids;

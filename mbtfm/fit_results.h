@@ -16,6 +16,10 @@ struct FitInputs {
   int n_flagged = 0;
 };
 
+/// @throws InvalidData where all beads lie to one side of all adhesions: a coordinate has the wrong sign, unit or
+/// origin
+void check_place(const DisplacementField& beads, const Cell& cell);
+
 std::vector<int> adhesion_ids_of(const Cell& cell);
 std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
 std::vector<Vec2> points_of(const DisplacementField& beads);

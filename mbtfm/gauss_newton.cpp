@@ -31,8 +31,8 @@ constexpr double kLetGo = 0.01;
 constexpr double kSlack = 0.05;
 
 // Of the variance of one component, in 2 Phi, by tension: a thirtieth of a standard error along one direction of
-// twenty.
-constexpr double kNegligible = 5e-5;
+// twenty; a tenth.
+constexpr double kNegligible = 5e-5, kNegligibleAtFirst = 5e-4;
 // Steps that together must lower Phi by more than that.
 constexpr std::size_t kLastSteps = 3;
 // Of the data, left unexplained: less than any experiment leaves.
@@ -41,9 +41,9 @@ constexpr double kExplained = 1e-3;
 constexpr double kFirstRefusal = 0.3;
 
 /// What no bead could tell, in Phi; nor exact beads, as forces are known to some 1e-10.
-double negligible(const TensionProblem& problem, double objective) {
+double negligible(const TensionProblem& problem, double objective, Search search = Search::best) {
   constexpr double kRounding = 1e-20;
-  const double part = kNegligible * problem.n_tensions();
+  const double part = (search == Search::best ? kNegligible : kNegligibleAtFirst) * problem.n_tensions();
   const ReducedData& data = problem.data();
   const double whole = objective + 0.5 * data.floor_squared;
   return std::max(part * whole / static_cast<double>(std::max<Eigen::Index>(1, data.n_components)),
@@ -136,7 +136,7 @@ double gained_of_late(const TensionFit& fit) {
 using Enough = std::function<bool(const Trial&)>;
 
 /// Levenberg–Marquardt from fit.trial, the Hessian bent.
-void descend(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit,
+void descend(const TensionProblem& problem, const FitParameters& parameters, Search search, TensionFit& fit,
              const Enough& is_enough = {}) {
   fit.report = {};
   double damping = 1e-3;  // relative to the diagonal; small, as forces are nearly linear in the tensions
@@ -166,7 +166,7 @@ void descend(const TensionProblem& problem, const FitParameters& parameters, Ten
     if (fit.report.last_change < parameters.tolerance && damping <= 1e-2)
       return has_ended("the tensions change by less than the tolerance");
     // Forces have kinks where a cable passes its rest length, and at a kink steps grow short but not zero.
-    const double told = negligible(problem, fit.trial.objective);
+    const double told = negligible(problem, fit.trial.objective, search);
     if ((predicted < told && damping <= 1e-2) || (gain > 0 && gained_of_late(fit) < told))
       return has_ended("the last steps lower the misfit by less than any bead could tell");
     if (gain > 0) {
@@ -217,6 +217,24 @@ std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions
     if (is_slack(tensions_nN, i)) raised[i] = taut[taut.size() / 2];
   }
   return raised;
+}
+
+/// Try the other side of slack fibres as long as it pays.
+void look_beyond_slack(const TensionProblem& problem, const FitParameters& parameters, TensionFit& fit) {
+  constexpr int kMaxRounds = 3;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
+    if (!raised) break;
+    TensionFit other = fit;
+    const std::optional<Trial> raised_trial =
+        try_evaluate(problem, *raised, other, force_tolerance(fit.trial, problem, fit.trial.objective));
+    if (!raised_trial) break;
+    other.trial = *raised_trial;
+    descend(problem, parameters, Search::best, other, is_back_at(problem, fit.trial));
+    fit.n_evaluations = other.n_evaluations;
+    if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
+    fit = std::move(other);
+  }
 }
 
 }  // namespace
@@ -270,25 +288,13 @@ Eigen::VectorXd bounded_quadratic_minimum(const Eigen::MatrixXd& H, const Eigen:
   return x.cwiseMax(low);
 }
 
-TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start) {
+TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start,
+                            Search search) {
   TensionFit fit;
   fit.trial = start;
-  descend(problem, parameters, fit);
-  // A slack fibre may be a minimum of its own beside that of the taut one: try the other side as long as it pays.
-  constexpr int kMaxRounds = 3;
-  for (int round = 0; round < kMaxRounds; ++round) {
-    const std::optional<Eigen::VectorXd> raised = slack_ones_raised(fit.trial.tensions_nN);
-    if (!raised) break;
-    TensionFit other = fit;
-    const std::optional<Trial> raised_trial =
-        try_evaluate(problem, *raised, other, force_tolerance(fit.trial, problem, fit.trial.objective));
-    if (!raised_trial) break;
-    other.trial = *raised_trial;
-    descend(problem, parameters, other, is_back_at(problem, fit.trial));
-    fit.n_evaluations = other.n_evaluations;
-    if (other.trial.objective >= fit.trial.objective - negligible(problem, fit.trial.objective)) break;
-    fit = std::move(other);
-  }
+  descend(problem, parameters, search, fit);
+  if (search == Search::nearest) return fit;
+  look_beyond_slack(problem, parameters, fit);
   fit.trial = problem.evaluate(fit.trial.tensions_nN, &fit.trial);  // to the last digit
   return fit;
 }

@@ -26,8 +26,9 @@ ModelScore score(const std::string& name, int n_parameters, double misfit, doubl
           .forces_nN = {}};
 }
 
-/// The one tension of all cables that fits best: Gauss–Newton in one variable.
-Trial best_uniform(const TensionProblem& problem) {
+/// Forces of the one tension of all cables that fits best: Gauss–Newton in one variable. Zero where the beads want the
+/// cables to push: less tension is better then down to none, as forces are proportional to a small one.
+Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
   const Eigen::VectorXd ones = Eigen::VectorXd::Ones(problem.n_tensions());
   Trial trial = scaled_to_data(problem, ones);
   constexpr int kMaxSteps = 20;  // forces are all but proportional to the tension: three do
@@ -35,13 +36,15 @@ Trial best_uniform(const TensionProblem& problem) {
     const double tension = trial.tensions_nN[0];
     const Eigen::VectorXd slope = problem.jacobian(trial) * ones;
     const double step = -slope.dot(trial.residual) / std::max(slope.squaredNorm(), 1e-300);
+    const bool is_pushed = tension + step <= 0 && 0.5 * problem.data().target.squaredNorm() <= trial.objective;
+    if (is_pushed) return Eigen::VectorXd::Zero(trial.forces_nN.size());
     const double next = std::max(0.1 * tension, tension + step);
     Trial moved = problem.evaluate(next * ones, &trial);
     if (moved.objective >= trial.objective) break;
     trial = std::move(moved);
     if (std::abs(next - tension) < 1e-6 * tension) break;
   }
-  return trial;
+  return trial.forces_nN;
 }
 
 }  // namespace
@@ -114,7 +117,7 @@ std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData&
   const auto misfit = [&](const Eigen::VectorXd& forces) {
     return (*reduced.compliance * forces - reduced.target).squaredNorm() + reduced.floor_squared;
   };
-  const Eigen::VectorXd uniform = best_uniform(TensionProblem(first_network, reduced, adhesion_ids)).forces_nN;
+  const Eigen::VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
   std::vector<ModelScore> models = {
       score("no-fibres", 1, misfit(uniform), variance, data),
       score("full", static_cast<int>(fit.fibre_ids.size()), misfit(fit.forces_nN), variance, data),

@@ -146,6 +146,12 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& el
   return motions;
 }
 
+void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
+                 int threads) {
+  add_motions(data, placement_motions(gel, ellipses_of(cell), forces_nN, data.position_um,
+                                      data.response->displace(forces_nN), centre_um, threads));
+}
+
 PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, const std::string& setting, int threads) {
@@ -169,8 +175,9 @@ PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, co
   LinearData there = data;
   for (int pass = 0; pass < kMostPasses; ++pass) {
     const TensionProblem problem(network, there.reduced, adhesion_ids_of(cell), {}, threads);
-    const TensionFit fit =
-        fit_tensions(problem, rough, threads, scaled_to_data(problem, result.start.tensions_nN, &result.start));
+    const TensionFit fit = fit_tensions(
+        problem, rough, threads, pass == 0 ? start : scaled_to_data(problem, result.start.tensions_nN, &result.start),
+        Search::nearest);
     result.start = fit.trial;
     const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
     const Eigen::MatrixXd motions =

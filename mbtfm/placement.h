@@ -44,6 +44,11 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
                                   const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
                                   const Eigen::VectorXd& model_um, Vec2 centre_um, int threads);
 
+/// Let the beads move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
+/// them.
+void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
+                 int threads);
+
 /// A cell where the beads want it.
 struct PlacedCell {
   Placement placement;
@@ -62,6 +67,7 @@ inline constexpr const char* kChannelShift = "channel shift";
 /// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
 /// field is linear in it, or where no place is found within kFarthest.
 /// @param data  of the beads as they are
+/// @param start  a trial with these data
 PlacedCell place_cell(const Cell& cell, const network::CableNetwork& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, const std::string& setting, int threads);

@@ -131,15 +131,23 @@ TensionFit fit_with_loss(LinearData& data, const network::CableNetwork& network,
     const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
     reweight(data, linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads));
     const TensionProblem reweighted(network, data.reduced, adhesion_ids, {}, threads);
-    const int n_evaluations = fit.n_evaluations;
-    fit = fit_tensions(reweighted, parameters, threads, scaled_to_data(reweighted, before, &last));
-    fit.n_evaluations += n_evaluations;
-    // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
-    const Eigen::VectorXd change = fit.trial.tensions_nN - before;
-    const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
-    const Eigen::VectorXd changed = less_motion(data, data.response->displace(derivatives * change));
-    const double moved = data.weight_per_um.cwiseProduct(changed).norm();
-    if (moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff()) break;
+    const auto fit_again = [&](const Trial& start, Search search) {
+      const int n_evaluations = fit.n_evaluations;
+      fit = fit_tensions(reweighted, parameters, threads, start, search);
+      fit.n_evaluations += n_evaluations;
+    };
+    const auto is_settled = [&] {
+      // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
+      const Eigen::VectorXd change = fit.trial.tensions_nN - before;
+      const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
+      const Eigen::VectorXd changed = less_motion(data, data.response->displace(derivatives * change));
+      const double moved = data.weight_per_um.cwiseProduct(changed).norm();
+      return moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff();
+    };
+    fit_again(scaled_to_data(reweighted, before, &last), Search::nearest);
+    if (!is_settled()) continue;
+    fit_again(fit.trial, Search::best);  // only now: weights that still change do not change which side is best
+    if (is_settled()) break;
   }
   return fit;
 }

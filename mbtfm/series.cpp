@@ -214,14 +214,16 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, int threads, const Progress& progress, Trial start,
-                                 const std::vector<FrameFit>& kept, const std::function<void(LinearData&)>& allow) {
+                                 const std::vector<FrameFit>& kept, const AllowMore& allow) {
   std::vector<FrameFit> fits;
   const auto fitted = [&](const SeriesFrame& frame) {
     FrameData good = good_beads_of(frame, response, is_used);
     LinearData data = reduce(good.beads, std::move(good.response), good.is_used, threads,
                              moves ? affine_motions(good.beads) : Eigen::MatrixXd());
-    if (allow) allow(data);
-    return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &start), data);
+    const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, threads);
+    const Trial begin = problem.evaluate(start.tensions_nN, &start);
+    if (allow) allow(data, begin.forces_nN);
+    return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &begin), data);
   };
   for (const SeriesFrame& frame : frames) {
     if (progress) {

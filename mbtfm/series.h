@@ -52,20 +52,22 @@ struct FrameFit {
 /// The fits that write_tracks and write_frames put into a folder; none where not both files are there.
 std::vector<FrameFit> read_fits(const Path& folder);
 
+/// Lets a frame's beads do more beside forces and common motion. @param forces_nN  of the network, with which the
+/// frame's fit starts
+using AllowMore = std::function<void(LinearData&, const Eigen::VectorXd& forces_nN)>;
+
 /// @param response  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway
 /// @param moves  a common motion of the beads is found with the tensions
 /// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
 /// @param start  of the first frame, on the first network
 /// @param kept  fits of the same networks, compliance and parameters: taken for frames whose file is still the same
-/// @param allow  lets a frame's beads do more beside forces and common motion; none: they do not
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                                  const std::vector<network::CableNetwork>& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, int threads, const Progress& progress, Trial start,
-                                 const std::vector<FrameFit>& kept = {},
-                                 const std::function<void(LinearData&)>& allow = {});
+                                 const std::vector<FrameFit>& kept = {}, const AllowMore& allow = {});
 
 /// By frame and fibre. @param interval_s  between frames, if known
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

@@ -36,9 +36,9 @@ void declare(ParameterList& list, FitParameters& p) {
            "none");
 }
 
-TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                        const Trial& start) {
-  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start);
+TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start,
+                        Search search) {
+  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start, search);
   std::vector<int> all(problem.n_tensions());
   std::iota(all.begin(), all.end(), 0);
   if (parameters.method == "plain-cg") {

@@ -46,14 +46,22 @@ struct TensionFit {
   std::vector<Milestone> history;
 };
 
+/// A fibre that comes out slack may be a minimum of its own beside that of the taut one.
+enum class Search {
+  nearest,  ///< the minimum that the start leads to, as near as counts where data or weights change after it: to a
+            ///< tenth of a standard error along one direction of twenty
+  best      ///< to a thirtieth, and the other side of slack fibres is tried, too
+};
+
 /// @param start  a trial of this problem: see scaled_to_data(), uniform_start()
 /// @throws UsageError for a method it does not know
-TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads,
-                        const Trial& start);
+TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start,
+                        Search search = Search::best);
 
 /// Levenberg–Marquardt with the exact Jacobian, and what else the Hessian has learnt from the steps before; each step
 /// solves the bounded quadratic problem.
-TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start);
+TensionFit fit_gauss_newton(const TensionProblem& problem, const FitParameters& parameters, const Trial& start,
+                            Search search = Search::best);
 
 /// Non-linear conjugate gradients (Polak–Ribière), projected on t >= 0. `blocks` are taken in turn: so many steps on
 /// those tensions, the others held.

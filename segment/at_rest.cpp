@@ -67,7 +67,7 @@ RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Ve
 }
 
 /// Weighted least squares over the squares; the linear part is held to what pictures do.
-GlobalMotion fitted(const RestingField& field, const std::vector<double>& weights, Vec2 centre, double scale,
+AffineMotion fitted(const RestingField& field, const std::vector<double>& weights, Vec2 centre, double scale,
                     double width) {
   cv::Matx<double, 6, 6> normal;
   cv::Vec<double, 6> right;
@@ -86,10 +86,10 @@ GlobalMotion fitted(const RestingField& field, const std::vector<double>& weight
   return {{p[0], p[1]}, p[2] / scale, p[3] / scale, p[4] / scale, p[5] / scale, centre};
 }
 
-double misfit(const FieldCell& cell, const GlobalMotion& motion) { return norm(cell.u - motion.at(cell.place)); }
+double misfit(const FieldCell& cell, const AffineMotion& motion) { return norm(cell.u - motion.at(cell.place)); }
 
 struct Followed {
-  GlobalMotion motion;
+  AffineMotion motion;
   double score = -1;
 };
 
@@ -100,7 +100,7 @@ struct Search {
   double scale;                  ///< half the picture
   std::vector<double> width_of;  ///< by square: what a square at rest may be off by
 
-  double weight(std::size_t k, const GlobalMotion& motion, double widened) const {
+  double weight(std::size_t k, const AffineMotion& motion, double widened) const {
     if (field.cells[k].n_beads == 0) return 0;
     const double r = misfit(field.cells[k], motion) / (widened * width_of[k]), s = 1 / (1 + r * r);
     return s * s;
@@ -131,7 +131,7 @@ struct Search {
   }
 };
 
-GlobalMotion mode_of(const Search& search) {
+AffineMotion mode_of(const Search& search) {
   const int nx = search.field.nx, ny = search.field.ny;
   struct Place {
     double left, top, right, bottom;  ///< distances from the sides, as shares of the picture
@@ -232,18 +232,12 @@ std::vector<char> opposite(std::vector<char> is) {
   return is;
 }
 
-double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, const GlobalMotion& motion) {
-  std::vector<double> lengths;
-  for (std::size_t k = 0; k < positions.size(); ++k) lengths.push_back(norm(u[k] - motion.at(positions[k])));
-  return quantile(std::move(lengths), 0.99);
-}
-
 /// Mean of a square and the eight around it, beside a motion; nothing where there are no beads.
 struct Around {
   Vec2 u;
   int n_beads = 0;
 };
-Around around(const RestingField& field, const GlobalMotion& motion, int i, int j) {
+Around around(const RestingField& field, const AffineMotion& motion, int i, int j) {
   Around result;
   for (int b = std::max(0, j - 1); b <= std::min(field.ny - 1, j + 1); ++b) {
     for (int a = std::max(0, i - 1); a <= std::min(field.nx - 1, i + 1); ++a) {
@@ -315,6 +309,14 @@ void divide(RestingField& field, double tail) {
 
 }  // namespace
 
+double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
+                     const AffineMotion& motion) {
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < positions.size(); ++k)
+    lengths.push_back(norm(displacements[k] - motion.at(positions[k])));
+  return quantile(std::move(lengths), 0.99);
+}
+
 RestingField resting_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
                            double width, double height) {
   RestingField field = in_squares(positions, displacements, corner, width, height);
@@ -323,7 +325,7 @@ RestingField resting_field(const std::vector<Vec2>& positions, const std::vector
   Search search{field, field.motion.centre, 0.5 * std::min(width, height), std::vector<double>(field.cells.size(), 1)};
   std::vector<double> all;
   for (const FieldCell& cell : field.cells) all.push_back(cell.n_beads);
-  GlobalMotion motion = fitted(field, all, search.centre, search.scale, 1e-9);
+  AffineMotion motion = fitted(field, all, search.centre, search.scale, 1e-9);
   for (int round = 0; round < 2; ++round) {  // the second with the largest displacement about what rests
     field.largest = largest_about(positions, displacements, motion);
     for (std::size_t k = 0; k < field.cells.size(); ++k) {

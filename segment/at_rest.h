@@ -3,24 +3,10 @@
 
 #include <vector>
 
+#include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/types.h"
 
 namespace mbtfm::segment {
-
-/// A small affine motion of the whole about the image's centre.
-struct GlobalMotion {
-  Vec2 shift;
-  double turn_rad = 0;  ///< from +x towards +y
-  double growth = 0;    ///< relative
-  double stretch = 0;   ///< shear: longer by so much along x, shorter along y
-  double skew = 0;      ///< shear: the same along the diagonal x = y and across it
-  Vec2 centre;
-  Vec2 at(Vec2 place) const {
-    const Vec2 d = place - centre;
-    return {shift.x + (growth + stretch) * d.x + (skew - turn_rad) * d.y,
-            shift.y + (skew + turn_rad) * d.x + (growth - stretch) * d.y};
-  }
-};
 
 /// The beads of a square of the picture taken together.
 struct FieldCell {
@@ -30,12 +16,16 @@ struct FieldCell {
   bool rests = false;  ///< it belongs to the rest of the picture that moves as one body
 };
 
+/// The largest displacement beside a motion; a hundredth of the beads may move further, as outliers do.
+double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
+                     const AffineMotion& motion);
+
 /// The picture in squares, row by row.
 struct RestingField {
   int nx = 0, ny = 0;
   double side = 1;  ///< of a square
   std::vector<FieldCell> cells;
-  GlobalMotion motion;                ///< roughly, of what rests
+  AffineMotion motion;                ///< roughly, of what rests
   double bead_noise = 0;              ///< standard deviation of a bead's component about its square
   double share_at_rest = 0;           ///< of the squares with beads
   double share_of_border_moving = 0;  ///< of the squares along the border, those that do not rest

@@ -14,13 +14,8 @@ namespace {
 /// Of the chi² distribution with four degrees of freedom: what one in 370 exceeds.
 constexpr double kChiSquared = 16.25;
 
-double shear_of(const GlobalMotion& m) { return std::hypot(m.stretch, m.skew); }
-
-/// How far a motion's linear part moves what is `arm` from the centre, at most.
-double reach_of(const GlobalMotion& m, double arm) { return arm * (std::hypot(m.growth, m.turn_rad) + shear_of(m)); }
-
 CommonMotion as_found(const RestingField& rest, const FarField& shifted, const FarField& affine, bool is_taken) {
-  const GlobalMotion& m = affine.drift;
+  const AffineMotion& m = affine.drift;
   const FarField& taken = is_taken ? affine : shifted;
   return {.drift_um = taken.drift.shift,
           .drift_sigma_um = taken.errors.shift,
@@ -28,7 +23,7 @@ CommonMotion as_found(const RestingField& rest, const FarField& shifted, const F
           .turn_sigma_rad = affine.errors.turn_rad,
           .growth = m.growth,
           .growth_sigma = affine.errors.growth,
-          .shear = shear_of(m),
+          .shear = m.shear(),
           .shear_angle_rad = 0.5 * std::atan2(m.skew, m.stretch),
           .shear_sigma = affine.errors.shear,
           .has_far_field = affine.is_at_rest,
@@ -38,15 +33,8 @@ CommonMotion as_found(const RestingField& rest, const FarField& shifted, const F
           .pull_of_border = rest.pull_of_border};
 }
 
-/// About the drift; a hundredth of the beads may move further, as outliers do.
-double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, const GlobalMotion& drift) {
-  std::vector<double> lengths;
-  for (std::size_t k = 0; k < positions.size(); ++k) lengths.push_back(norm(u[k] - drift.at(positions[k])));
-  return quantile(std::move(lengths), 0.99);
-}
-
 /// Median misfit of what is at rest, or, where nothing is, of all.
-double misfit_of(const RestingField& rest, bool is_at_rest, const GlobalMotion& motion) {
+double misfit_of(const RestingField& rest, bool is_at_rest, const AffineMotion& motion) {
   std::vector<double> misfits;
   for (const FieldCell& cell : rest.cells) {
     if (cell.n_beads == 0 || (is_at_rest && !cell.rests)) continue;
@@ -71,7 +59,7 @@ MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<V
       whole_motion(positions, displacements, corner, width, height, {Drift::translation, Drift::affine});
   const FarField &shifted = whole.of[0], &affine = whole.of[1];
   MotionTaken result;
-  const double arm = 0.5 * std::min(width, height), reach = reach_of(affine.drift, arm);
+  const double arm = 0.5 * std::min(width, height), reach = affine.drift.largest_within(arm);
   const double unit = std::max(largest_about(positions, displacements, affine.drift), 1e-12);
   const double seen =
       std::max(1e-3, 1 - whole.rest.share_of_border_moving);  // of the border; beyond it others may pull

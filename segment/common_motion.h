@@ -12,7 +12,7 @@ namespace mbtfm::segment {
 inline constexpr const char* kAffineDrift = "affine drift";  ///< the effect's name
 
 struct MotionTaken {
-  GlobalMotion motion;  ///< what is taken off
+  AffineMotion motion;  ///< what is taken off
   CommonMotion common;  ///< what was found, in the unit of the positions for um
   Effect affine;        ///< whether turn, growth and shear are taken off
   double rms = 0, noise = 0;

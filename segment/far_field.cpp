@@ -237,7 +237,7 @@ void reweigh(Design& design, const Solved& s) {
   }
 }
 
-GlobalMotion motion_of(const Solved& s, Vec2 centre, double scale) {
+AffineMotion motion_of(const Solved& s, Vec2 centre, double scale) {
   const auto value = [&](int k) { return k < s.global.rows ? s.global.at<double>(k) / (k < 2 ? 1 : scale) : 0.0; };
   return {{value(0), value(1)}, value(2), value(3), value(4), value(5), centre};
 }

@@ -19,7 +19,7 @@ struct MotionErrors {
 };
 
 struct FarField {
-  GlobalMotion drift;
+  AffineMotion drift;
   MotionErrors errors;
   double linear_chi_squared = 0;  ///< of turn, growth, stretch and skew together, over their covariance: 4 expected
   double rms = 0;                 ///< of a bead's component about drift and the cell's tail

@@ -176,7 +176,7 @@ struct DrawnField {
   std::vector<Vec2> positions, displacements;
 };
 
-DrawnField drawn_field(double side, const std::vector<test::Peak>& peaks, const GlobalMotion& motion, double noise_px,
+DrawnField drawn_field(double side, const std::vector<test::Peak>& peaks, const AffineMotion& motion, double noise_px,
                        std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> place(0, side - 1);
@@ -195,7 +195,7 @@ TEST(FarField, turn_growth_and_shear_beside_a_cell_are_found_within_their_errors
   constexpr double kSide = 600, kNoise = 0.3;
   constexpr int kDraws = 12;
   const auto peaks = test::ring_of_adhesions(kSide, 8);
-  const GlobalMotion truth{.shift = {3, -2},
+  const AffineMotion truth{.shift = {3, -2},
                            .turn_rad = 0.003,
                            .growth = -0.002,
                            .stretch = 0.001,

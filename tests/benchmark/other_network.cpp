@@ -159,22 +159,23 @@ Formulations true_formulations() {
 
 /// Of every adhesion: true force, found force, stated error; and of the cell's total.
 void forces(Cells cells) {
-  std::printf("cell,truth,adhesion_id,connected,true_nN,found_nN,sigma_nN,across_nN,network_nN\n");
+  std::printf("cell,truth,adhesion_id,connected,true_nN,found_nN,sigma_nN,across_nN,network_nN,edge_um\n");
   for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
     for (const auto& [name, truth] : true_formulations()) {
       OtherNetwork o = other_network(c, &truth);
       const EnsembleFit found = fit(span(o.experiment.cell, FitParameters{}.n_meshes), o.noisy, o);
       const Estimate& total = found.total_force_nN;
-      std::printf("%d,%s,0,0,%.5g,%.5g,%.5g,0,0\n", int(c), name, total_nN(o.forces_nN), total.value,
+      std::printf("%d,%s,0,0,%.5g,%.5g,%.5g,0,0,0\n", int(c), name, total_nN(o.forces_nN), total.value,
                   total.standard_error);
       const std::vector<AdhesionForce> by_adhesion = forces_of(found, o.experiment.cell);
       for (std::size_t a = 0; a < by_adhesion.size(); ++a) {
         const AdhesionForce& f = by_adhesion[a];
         const Eigen::Vector2d wanted = o.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a));
         const Eigen::Vector2d got(f.force_nN.x, f.force_nN.y), unit = got.normalized();
-        std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected),
+        std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected),
                     wanted.norm(), got.norm(), f.sigma_nN.value_or(0), unit[0] * wanted[1] - unit[1] * wanted[0],
-                    found.network_forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm());
+                    found.network_forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm(),
+                    distance_to_boundary_um(o.experiment.cell.outline_um, o.experiment.cell.adhesions[a].position_um));
       }
     }
   }

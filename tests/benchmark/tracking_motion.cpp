@@ -5,6 +5,7 @@
 #include <cstdlib>
 #include <functional>
 
+#include "pipeline/contract/affine_motion.h"
 #include "pipeline/contract/errors.h"
 #include "samples/experiment.h"
 #include "samples/render.h"
@@ -84,11 +85,13 @@ int main(int argc, char** argv) {
     const samples::Experiment experiment = samples::simulate(p, threads);
     for (const Asked& asked : motions) {
       const double side_um = field_um(p.microscope);
-      const Motion motion = [&](Vec2 at) {
-        const Vec2 d = at - Vec2{0.5 * side_um, 0.5 * side_um};
-        return asked.shift_um + Vec2{(asked.growth + asked.stretch) * d.x + (asked.skew - asked.turn_rad) * d.y,
-                                     (asked.skew + asked.turn_rad) * d.x + (asked.growth - asked.stretch) * d.y};
-      };
+      const AffineMotion affine{.shift = asked.shift_um,
+                                .turn_rad = asked.turn_rad,
+                                .growth = asked.growth,
+                                .stretch = asked.stretch,
+                                .skew = asked.skew,
+                                .centre = {0.5 * side_um, 0.5 * side_um}};
+      const Motion motion = [&](Vec2 at) { return affine.at(at); };
       const Pair pair = drawn(p, experiment, motion, threads);
       for (const Crop& crop : crops) {
         // where the motion is counts only in the middle: elsewhere one of each

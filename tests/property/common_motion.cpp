@@ -13,14 +13,10 @@ namespace {
 
 using test::TensionScene;
 
-constexpr CommonMotion kMotion{.centre_um = {20, 30},
-                               .shift_um = {0.4, -0.2},
-                               .turn_rad = 0.005,
-                               .growth = -0.003,
-                               .shear_1 = 0.001,
-                               .shear_2 = 0.002};
+constexpr AffineMotion kMotion{
+    .shift = {0.4, -0.2}, .turn_rad = 0.005, .growth = -0.003, .stretch = 0.001, .skew = 0.002, .centre = {20, 30}};
 
-void move(DisplacementField& beads, const CommonMotion& motion) {
+void move(DisplacementField& beads, const AffineMotion& motion) {
   for (Bead& bead : beads) bead.displacement_um += motion.at(bead.position_um);
 }
 
@@ -54,7 +50,7 @@ TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
 
 TEST(CommonMotion, without_allowing_for_it_growth_is_taken_for_force) {
   TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
-  move(scene.beads, {.centre_um = {}, .shift_um = {}, .growth = 0.003});
+  move(scene.beads, {.shift = {}, .growth = 0.003, .centre = {}});
   LinearData blind = reduce(scene.beads, scene.compliance_um_per_nN), seeing = with_motions(scene, scene.beads);
   const double truth = total_nN(scene.forces_nN);
   const EnsembleFit a = fit_of(scene, blind), b = fit_of(scene, seeing);
@@ -72,11 +68,11 @@ TEST(CommonMotion, what_was_planted_is_found_within_its_stated_error) {
     LinearData data = with_motions(scene, scene.beads);
     const EnsembleFit fit = fit_of(scene, data);
     const FoundMotion found = common_motion_among(motions_beside(data, fit), data.position_um);
-    const CommonMotion& m = found.motion;
-    const Vec2 shift = m.shift_um - kMotion.at(m.centre_um);
+    const AffineMotion& m = found.motion;
+    const Vec2 shift = m.shift - kMotion.at(m.centre);
     Eigen::VectorXd error(6);
-    error << shift.x, shift.y, m.turn_rad - kMotion.turn_rad, m.growth - kMotion.growth, m.shear_1 - kMotion.shear_1,
-        m.shear_2 - kMotion.shear_2;
+    error << shift.x, shift.y, m.turn_rad - kMotion.turn_rad, m.growth - kMotion.growth, m.stretch - kMotion.stretch,
+        m.skew - kMotion.skew;
     squares += error.cwiseQuotient(found.sigma).cwiseAbs2() / kDraws;
   }
   // a mean of 60 squared normal numbers has a standard deviation of .18
@@ -156,14 +152,14 @@ TEST(CommonMotion, of_beads_in_one_place_or_none_is_no_obstacle) {
 }
 
 TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {
-  constexpr CommonMotion kStill{
-      .centre_um = {20, 30}, .shift_um = {}, .turn_rad = 0.005, .growth = -0.003, .shear_1 = 0.001, .shear_2 = 0.002};
+  constexpr AffineMotion kStill{
+      .shift = {}, .turn_rad = 0.005, .growth = -0.003, .stretch = 0.001, .skew = 0.002, .centre = {20, 30}};
   double largest = 0;
   for (int i = 0; i < 3600; ++i) {
     const double angle = i * 1.7453292519943296e-3;
-    largest = std::max(largest, norm(kStill.at(kStill.centre_um + 7 * Vec2{std::cos(angle), std::sin(angle)})));
+    largest = std::max(largest, norm(kStill.at(kStill.centre + 7 * Vec2{std::cos(angle), std::sin(angle)})));
   }
-  EXPECT_NEAR(largest, kStill.largest_um(7), 1e-5 * largest);
+  EXPECT_NEAR(largest, kStill.largest_within(7), 1e-5 * largest);
 }
 
 }  // namespace

@@ -31,6 +31,19 @@ TEST(ModelScores, a_parameter_costs_AIC_two_and_BIC_the_logarithm_of_the_number_
   }
 }
 
+TEST(ModelScores, beads_that_are_pushed_are_explained_best_by_no_tension) {
+  test::TensionScene scene = one_fibre(2, 300);
+  scene.displacement_um *= -1;
+  test::measure(scene, 0.02, 5);
+  EnsembleFit nothing;  // of the fit the scores take these alone
+  nothing.fibre_ids = scene.cables.fibre_ids();
+  nothing.forces_nN = Eigen::VectorXd::Zero(scene.forces_nN.size());
+  const std::vector<ModelScore> models = compare_models(nothing, scene.data, scene.cables, scene.adhesion_ids);
+  EXPECT_EQ(models[0].name, "no-fibres");
+  EXPECT_EQ(models[0].forces_nN, nothing.forces_nN);
+  EXPECT_EQ(models[0].relative_l2, 1);
+}
+
 TEST(ModelScores, BIC_prefers_the_network_alone_where_it_is_alone_and_AIC_does_so_less_often) {
   // A fibre that pulls like the network is none. A parameter too many lowers chi² by the square of a normal variable,
   // so AIC takes it where that is above 2, in 16 % of the draws, however many the beads; BIC where it is above

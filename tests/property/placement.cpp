@@ -7,6 +7,7 @@
 
 #include "mbtfm/error_budget.h"
 #include "mbtfm/fit_results.h"
+#include "mbtfm/series.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -178,6 +179,31 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
     EXPECT_NEAR(std::pow(*budget.tensions[static_cast<std::size_t>(i)].parts_nN.place, 2), more, 0.1 * more) << i;
     EXPECT_GT(more, 0);
   }
+}
+
+TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
+  const ShiftedCell shifted = shifted_cell({}, 0, 0.05, 4);
+  std::vector<network::CableNetwork> networks;
+  networks.emplace_back(shifted.scene.cables.network(), shifted.scene.cables.parameters());
+  const LinearData data = shifted.data_of(shifted.scene.beads);
+  const std::pair<EnsembleFit, FoundPlacement> known = shifted.fit("on");
+  const EnsembleFit& single = known.first;
+  const Trial start = next_start(single);
+  const auto frame_fit = [&](const AllowMore& allow) {
+    return fit_series({{.frame = 1, .refused = {}, .beads = shifted.scene.beads}}, networks, data.response, {},
+                      shifted.scene.adhesion_ids, {}, true, false, 1, {}, start, {}, allow)
+        .front();
+  };
+  const FrameFit held = frame_fit({});
+  const FrameFit allowed = frame_fit([&](LinearData& frame, const Eigen::VectorXd& forces_nN) {
+    allow_place(frame, shifted.cell, kGel, forces_nN, known.second.placement.centre_um, 1);
+  });
+  for (std::size_t i = 0; i < single.tensions_nN.size(); ++i) {
+    // the forces whose motions are allowed are those of a rough fit here, of the fit's end there
+    EXPECT_NEAR(allowed.sigmas_nN[i], single.tensions_nN[i].standard_error, 0.02 * allowed.sigmas_nN[i]) << i;
+    EXPECT_GT(allowed.sigmas_nN[i], held.sigmas_nN[i]) << i;
+  }
+  EXPECT_GT(allowed.total_force_nN.standard_error, held.total_force_nN.standard_error);
 }
 
 TEST(Placement, added_motions_reduce_as_if_they_had_been_there_from_the_first) {

@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "mbtfm/fit_results.h"
 #include "mbtfm/model_checks.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
@@ -46,6 +47,23 @@ TEST(TensionFitHard, starts_from_1e_6_to_1e3_nN_end_at_the_same_tensions) {
     }
   }
   test::came_out("within " + test::two_digits(worst) + " standard errors");
+}
+
+TEST(TensionFitHard, beads_all_beside_the_cell_are_refused_with_their_place) {
+  test::hard_case("positions with the wrong sign: no bead is near the cell", "refused, with the places of both");
+  const Cell cell = test::round_cell(8, 6);
+  DisplacementField beads;
+  for (const Adhesion& a : cell.adhesions)
+    beads.push_back({.position_um = a.position_um, .displacement_um = {}, .sigma_um = 0.02, .flag = {}});
+  EXPECT_NO_THROW(check_place(beads, cell));
+  EXPECT_NO_THROW(check_place({beads.front()}, cell));  // a field may show a part of the cell
+  const auto with_sign = [&](double x, double y) {
+    DisplacementField turned = beads;
+    for (Bead& bead : turned) bead.position_um = {x * bead.position_um.x, y * bead.position_um.y};
+    return turned;
+  };
+  EXPECT_THROW(check_place(with_sign(-1, 1), cell), InvalidData);
+  EXPECT_THROW(check_place(with_sign(1, -1), cell), InvalidData);
 }
 
 TEST(TensionFitHard, parallel_fibres_0_2_um_apart_are_named_with_their_sum) {
