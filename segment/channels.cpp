@@ -24,12 +24,6 @@ void require_equal_sizes(const Channel& first, const Channel& second) {
                    "both images must show the same field at the same magnification");
 }
 
-void require_different_pictures(const Channel& adhesion, const Channel& actin) {
-  if (adhesion.image.pixels != actin.image.pixels) return;
-  throw InputError(actin.name, "another picture than the adhesion image " + adhesion.name, "the same, pixel by pixel",
-                   "name the actin image, or of a file with several channels the channel (segment.actin_channel)");
-}
-
 double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um) {
   if (given_um) return *given_um;
   const std::optional<double> a = first.image.pixel_size_um, b = second.image.pixel_size_um;

@@ -22,9 +22,6 @@ std::string in_um(double length_um);
 /// @throws InputError where the two are not of one size
 void require_equal_sizes(const Channel& first, const Channel& second);
 
-/// @throws InputError where both have the same pixels
-void require_different_pictures(const Channel& adhesion, const Channel& actin);
-
 /// The pixel size of two images of one field: the one given, or else the calibration that they have.
 /// @throws InputError where neither tells it, or they contradict each other
 double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um);

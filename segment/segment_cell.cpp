@@ -281,7 +281,6 @@ Inputs inputs_of(const std::optional<Channel>& adhesion, const std::optional<Cha
     throw UsageError("fibres drawn by hand belong to one cell: choose it (cell), not all of them (cell = 0)");
   const Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
   require_equal_sizes(first, second);
-  if (adhesion && actin) require_different_pictures(*adhesion, *actin);
   const double pixel_um = common_pixel_size_um(first, second, p.pixel_size_um);
   Inputs in{adhesion, actin, p, drawn, {first.image.width, first.image.height, pixel_um}};
   in.source =

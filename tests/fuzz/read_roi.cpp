@@ -56,7 +56,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
     fuzz::answer([&] { hand_drawn_outline(set, field); });
     std::vector<Adhesion> adhesions;
     fuzz::answer([&] { adhesions = hand_drawn_adhesions(set, {}, field); });
-    const CellOutline cell{.outer_um = {{0, 0}, {50, 0}, {50, 40}}};
+    const CellOutline cell{.outer_um = {{0, 0}, {50, 0}, {50, 40}}, .holes_um = {}};
     fuzz::answer([&] { hold_fibres(drawn_lines(set, {}, field, {}), adhesions, cell, {}, 1); });
     for (const Roi& roi : set.rois) {
       if (is_area(roi.shape)) area_px(roi);

@@ -210,16 +210,6 @@ TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
   EXPECT_LT(beneath({4.5, 4.5}).value_or(1), beneath({0, 0}).value_or(0) - 0.05);
 }
 
-TEST(Candidates, of_the_same_picture_twice_are_refused) {
-  const Scene scene("auto");
-  try {
-    segment_cell(scene.actin, scene.actin, scene.parameters);
-    FAIL() << "taken";
-  } catch (const InputError& error) {
-    EXPECT_NE(std::string(error.what()).find("the same, pixel by pixel"), std::string::npos) << error.what();
-  }
-}
-
 TEST(Candidates, are_not_asked_for_where_an_image_shows_the_adhesions) {
   const Scene scene("auto");
   const Segmentation s = segment_cell(scene.adhesion, scene.actin, scene.parameters);
