@@ -1,8 +1,6 @@
 #include "segment/bright_actin.h"
 
 #include <algorithm>
-#include <cmath>
-#include <numbers>
 #include <opencv2/imgproc.hpp>
 
 #include "segment/grid.h"
@@ -28,13 +26,6 @@ double usual_height(const Ridges& ridges, const std::vector<std::vector<cv::Poin
   return middle_of(std::move(heights));
 }
 
-bool is_crest(const Ridges& ridges, int x, int y) {
-  const double angle = std::numbers::pi * ridges.direction.at<std::uint8_t>(y, x) / ridges.n_directions();
-  const cv::Point2d across(-std::sin(angle), std::cos(angle)), here(x, y);
-  const double height = ridges.strongest.at<float>(y, x);
-  return ridges.at(here - across, angle) <= height && ridges.at(here + across, angle) < height;
-}
-
 }  // namespace
 
 std::vector<std::vector<cv::Point2d>> bright_crests_beside(const Ridges& ridges, const cv::Mat& is_inside,
@@ -51,7 +42,7 @@ std::vector<std::vector<cv::Point2d>> bright_crests_beside(const Ridges& ridges,
   for (int y = 1; y + 1 < crests.rows; ++y)
     for (int x = 1; x + 1 < crests.cols; ++x)
       if (is_inside.at<std::uint8_t>(y, x) != 0 && is_explained.at<std::uint8_t>(y, x) == 0 &&
-          ridges.strongest.at<float>(y, x) >= level && is_crest(ridges, x, y))
+          ridges.strongest.at<float>(y, x) >= level && ridges.is_crest(x, y))
         crests.at<std::uint8_t>(y, x) = 255;
   cv::dilate(crests, joined, cv::Mat());
   const int n = cv::connectedComponents(joined, labels, 8, CV_32S);

@@ -181,8 +181,6 @@ double round_length(double limit) {
 }
 
 /// A line in a colour and what it stands for. "um" is drawn as µm, which OpenCV's font lacks.
-const cv::Scalar kUnexplainedColour(213, 94, 0);  // vermillion, the one of Okabe & Ito's that is not taken
-
 struct Entry {
   std::string text;
   cv::Scalar colour;
@@ -210,7 +208,7 @@ std::vector<Entry> entries_of(const Segmentation& s, double pixel_um, int width)
   add_adhesions("adhesion", false, [](const Adhesion& a) { return !is_assumed(a.origin); });
   add_adhesions("anchor", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::anchor; });
   add_adhesions("candidate", true, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; });
-  if (!s.unexplained_um.empty()) entries.push_back({"bright actin in no fibre", kUnexplainedColour});
+  if (!s.unexplained_um.empty()) entries.push_back({"bright actin in no fibre", scalar(kUnexplainedColour)});
   entries.push_back({"outline", cv::Scalar(150, 150, 150), 56, 4});
   const double bar_um = round_length(0.2 * width * pixel_um);
   char text[32];
@@ -299,7 +297,7 @@ Picture draw_overlay(const std::optional<Channel>& adhesion, const std::optional
   Canvas canvas(adhesion, actin, view_of(s), s.pixel_size_um, kLongSide);
   draw_marks(canvas, s.cell, 2);
   for (const Polyline& crest : s.unexplained_um)
-    for (const Vec2 p : crest) canvas.line({p, p}, false, kUnexplainedColour, 6);
+    for (const Vec2 p : crest) canvas.line({p, p}, false, scalar(kUnexplainedColour), 6);
   draw_labels(canvas, s.cell);
   cv::Mat whole;
   const int width = canvas.picture().cols;

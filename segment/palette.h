@@ -14,7 +14,8 @@ struct Colour {
 // Those of the report's plots (Okabe & Ito's palette, which colour-blind people can tell apart), lighter for the dark
 // ground.
 inline constexpr Colour kVentralColour{0, 214, 143}, kDorsalColour{86, 180, 255}, kArcColour{255, 183, 40},
-    kEdgeColour{255, 122, 82}, kAdhesionColour{255, 170, 235}, kOutlineColour{225, 225, 225};
+    kEdgeColour{255, 122, 82}, kAdhesionColour{255, 170, 235}, kOutlineColour{225, 225, 225},
+    kUnexplainedColour{213, 94, 0};
 
 constexpr Colour colour_of(FibreType type) {
   return type == FibreType::ventral  ? kVentralColour

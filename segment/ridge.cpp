@@ -119,6 +119,14 @@ double Ridges::at(cv::Point2d point, double angle_rad) const {
          u * sample(response[static_cast<std::size_t>((k + 1) % n)], point);
 }
 
+double Ridges::angle_rad(int x, int y) const { return pi * direction.at<std::uint8_t>(y, x) / n_directions(); }
+
+bool Ridges::is_crest(int x, int y) const {
+  const double angle = angle_rad(x, y), height = strongest.at<float>(y, x);
+  const cv::Point2d across(-std::sin(angle), std::cos(angle)), here(x, y);
+  return at(here - across, angle) <= height && at(here + across, angle) < height;
+}
+
 Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions) {
   const FilterBank bank = bank_of(scales, n_directions);
   const int step = bank.side - 2 * bank.margin;

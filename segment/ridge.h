@@ -17,6 +17,10 @@ struct Ridges {
   int n_directions() const { return static_cast<int>(response.size()); }
   /// Response at a point for lines along `angle_rad`, interpolated in position and direction.
   double at(cv::Point2d point, double angle_rad) const;
+  /// Of the strongest direction at a pixel. @return from +x towards +y, from 0 to below pi
+  double angle_rad(int x, int y) const;
+  /// Is the strongest response here greatest across its own direction? Not for pixels on the border.
+  bool is_crest(int x, int y) const;
 };
 
 struct RidgeScales {

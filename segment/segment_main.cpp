@@ -150,12 +150,13 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                    " ventral, " + std::to_string(n_of(FibreType::dorsal)) + " dorsal, " +
                    std::to_string(n_of(FibreType::arc)) + " arcs" +
                    (n_of(FibreType::edge) > 0 ? ", " + std::to_string(n_of(FibreType::edge)) + " edge)" : ")");
+  const double bright_um = unexplained_um(s);
   for (std::optional<Finding> found :
        {noticed(FindingKind::adhesions_long, aspect_ratio(s.cell.adhesions),
                 "The adhesions are " + brief(aspect_ratio(s.cell.adhesions)) +
                     " times as long as wide, on average over their area. Adhesions are 2 to 3 times."),
-        noticed(FindingKind::bright_actin, unexplained_um(s),
-                brief(unexplained_um(s)) + " um of actin as bright as the cell's fibres are in none of them."),
+        noticed(FindingKind::bright_actin, bright_um,
+                brief(bright_um) + " um of actin, as bright as the cell's fibres, is in no fibre."),
         noticed(FindingKind::actin_shift, s.alignment && s.alignment->is_significant() ? 1 : 0,
                 s.alignment ? "Fibres end beside their adhesions: the adhesion image shows them shifted by " +
                                   sentence_of(*s.alignment) + "." +

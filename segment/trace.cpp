@@ -140,10 +140,7 @@ std::vector<Step> seeds_of(const Ridges& ridges, const cv::Mat& is_inside, const
       const double height = ridges.strongest.at<float>(y, x);
       if (height < rule.start_noise * ridges.noise.at<float>(y, x) || height <= 0) continue;
       if (is_inside.at<std::uint8_t>(y, x) == 0) continue;
-      const double angle = pi * ridges.direction.at<std::uint8_t>(y, x) / ridges.n_directions();
-      const cv::Point2d across = left_of(unit(angle)), p(x, y);
-      if (ridges.at(p - across, angle) <= height && ridges.at(p + across, angle) < height)
-        seeds.push_back({p, angle, height});
+      if (ridges.is_crest(x, y)) seeds.push_back({cv::Point2d(x, y), ridges.angle_rad(x, y), height});
     }
   std::stable_sort(seeds.begin(), seeds.end(), [](const Step& a, const Step& b) { return a.height > b.height; });
   return seeds;
