@@ -8,6 +8,7 @@
 #include "mbtfm/error_budget.h"
 #include "mbtfm/fit_results.h"
 #include "mbtfm/series.h"
+#include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -23,11 +24,7 @@ struct ShiftedCell {
   TensionScene scene;
   Placement truth;
 
-  LinearData data_of(const DisplacementField& beads) const {
-    const auto gel = substrate::make_greens(kGel, {.model = "layer"}, 1);
-    return reduce(beads, substrate::dense_response(gel->compliance_um_per_nN(points_of(beads), ellipses_of(cell))), {},
-                  1, affine_motions(beads));
-  }
+  LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
 
   /// Fitted on the network that made the forces.
   std::pair<EnsembleFit, FoundPlacement> fit(const std::string& setting = "auto") const {

@@ -5,6 +5,7 @@
 #include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
 #include "pipeline/contract/effects.h"
+#include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::inverse {
@@ -22,11 +23,7 @@ struct PullingCell {
   TensionScene scene;
   DisplacementField at_rest;
 
-  LinearData data_of(const DisplacementField& beads) const {
-    const auto gel = substrate::make_greens(kGel, {.model = "layer"}, 1);
-    return reduce(beads, substrate::dense_response(gel->compliance_um_per_nN(points_of(beads), ellipses_of(cell))), {},
-                  1, affine_motions(beads));
-  }
+  LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
   BeadsOfState state(const DisplacementField& beads, const std::string& setting = "auto") const {
     return take_state(
         beads, data_of(beads), [&](const DisplacementField& there) { return data_of(there); }, kSize_um, 0.01, setting);
