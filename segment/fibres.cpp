@@ -12,6 +12,7 @@
 #include "segment/bright_actin.h"
 #include "segment/fibre_line.h"
 #include "segment/fibre_profile.h"
+#include "segment/fibre_scales.h"
 #include "segment/fibre_significance.h"
 #include "segment/grid.h"
 #include "segment/trace.h"
@@ -19,9 +20,6 @@
 namespace mbtfm::segment {
 
 namespace {
-
-/// Full width at half maximum of a Gaussian in standard deviations.
-constexpr double kFwhm = 2.3548;
 
 /// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
 struct Field {
@@ -46,8 +44,7 @@ cv::Rect box_of(const Polygon& outline_um, cv::Size size, double pixel_um, doubl
 
 Field field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
   const cv::Rect box = box_of(outline_um, image.size(), pixel_um, 2 * p.fibre_averaging_um);
-  // a fibre's deviation spans 1.2 pixels: the grid carries all but 1e-3 of its spectrum
-  const int factor = std::max(1, static_cast<int>(p.fibre_width_um / kFwhm / pixel_um / 1.2));
+  const int factor = grid_factor(p, pixel_um);
   Field field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
   field.is_inside = cv::Mat(field.image.size(), CV_8U, cv::Scalar(outline_um.empty() ? 255 : 0));
   if (outline_um.empty()) return field;
@@ -55,29 +52,6 @@ Field field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um,
   for (const Vec2 u : outline_um) corners[0].emplace_back(to_pixels(u - field.origin_um, field.pixel_um));
   cv::fillPoly(field.is_inside, corners, cv::Scalar(255));
   return field;
-}
-
-RidgeScales scales_of(const FibreParameters& p, double pixel_um) {
-  RidgeScales scales;
-  for (const double s : {1 / std::numbers::sqrt2, std::numbers::sqrt2})
-    scales.width_sigma_px.push_back(s * p.fibre_width_um / kFwhm / pixel_um);
-  scales.length_sigma_px = p.fibre_averaging_um / pixel_um;
-  scales.noise_radius_px = std::max(6.0, 8 * p.fibre_width_um / pixel_um);
-  return scales;
-}
-
-TraceRule rule_of(const FibreParameters& p, double pixel_um) {
-  TraceRule rule;
-  rule.start_noise = p.fibre_start_noise;
-  rule.follow_noise = p.fibre_follow_noise;
-  rule.gap_px = p.fibre_gap_um / pixel_um;
-  rule.smallest_radius_px = p.fibre_smallest_radius_um / pixel_um;
-  rule.line_radius_px = 0.6 * p.fibre_width_um / pixel_um;
-  rule.shortest_px = p.fibre_shortest_um / pixel_um;
-  rule.end_window_px = 4 * p.fibre_averaging_um / pixel_um;
-  rule.join_gap_px = 1.5 * p.fibre_gap_um / pixel_um;
-  rule.faint_px = p.fibre_faint_um / pixel_um;
-  return rule;
 }
 
 bool falls_on_both_sides(const Profile& profile, double ratio) {
@@ -100,9 +74,7 @@ struct Candidate {
 
 double significance_of(const std::vector<cv::Point2d>& points, const std::vector<double>& height, const Ridges& ridges,
                        const Field& field, const FibreParameters& p) {
-  // noise through a Gaussian of deviation s correlates over 2 sqrt(pi) s
-  const double independent_px = 2 * std::sqrt(std::numbers::pi) * p.fibre_averaging_um / field.pixel_um;
-  return significance(ridges, points, height, independent_px);
+  return significance(ridges, points, height, independent_px(p, field.pixel_um));
 }
 
 double area_um2(const cv::Mat& mask, double pixel_um) { return cv::countNonZero(mask) * pixel_um * pixel_um; }

@@ -48,9 +48,9 @@ double noise_gain_of(const cv::Mat& filters) {
 }
 
 struct FilterBank {
-  int margin = 0, side = 0;                   ///< of a tile, in pixels; the margin is inside the side
-  std::vector<std::vector<cv::Mat>> filters;  ///< [pair of directions][width]
-  double noise_gain = 0;                      ///< greatest of the widths
+  int margin = 0, side = 0;      ///< of a tile, in pixels; the margin is inside the side
+  std::vector<cv::Mat> filters;  ///< by pair of directions
+  double noise_gain = 0;
 };
 
 cv::Point2d along(int k, int n) { return {std::cos(pi * k / n), std::sin(pi * k / n)}; }
@@ -59,20 +59,18 @@ FilterBank bank_of(const RidgeScales& scales, int n_directions) {
   FilterBank bank;
   const double l = scales.length_sigma_px;
   // beyond 3.5 standard deviations lies 5e-4 of the weight
-  bank.margin = static_cast<int>(std::ceil(3.5 * std::max(l, scales.width_sigma_px.back())));
+  bank.margin = static_cast<int>(std::ceil(3.5 * std::max(l, scales.width_sigma_px)));
   bank.side = 128;  // a transform of this side stays in a processor's cache
   while (bank.side < 6 * bank.margin) bank.side *= 2;
   bank.filters.resize(static_cast<std::size_t>(n_directions / 2));
   cv::parallel_for_(cv::Range(0, n_directions / 2), [&](const cv::Range& pairs) {
     for (int i = pairs.start; i < pairs.end; ++i)
-      for (const double w : scales.width_sigma_px)
-        bank.filters[static_cast<std::size_t>(i)].push_back(
-            pair_of_filters(bank.side, along(2 * i, n_directions), along(2 * i + 1, n_directions), w, l));
+      bank.filters[static_cast<std::size_t>(i)] = pair_of_filters(
+          bank.side, along(2 * i, n_directions), along(2 * i + 1, n_directions), scales.width_sigma_px, l);
   });
   // along the pixels and across their diagonal: the grid cuts the narrow filter's spectrum differently
   for (const std::size_t pair : {std::size_t{0}, bank.filters.size() / 2})
-    for (const cv::Mat& filters : bank.filters[pair])
-      bank.noise_gain = std::max(bank.noise_gain, noise_gain_of(filters));
+    bank.noise_gain = std::max(bank.noise_gain, noise_gain_of(bank.filters[pair]));
   return bank;
 }
 
@@ -84,19 +82,12 @@ void filter_tile(const cv::Mat& padded, const FilterBank& bank, cv::Point at, Ri
   const cv::Size size = ridges.strongest.size();
   const cv::Rect there(at, cv::Size(std::min(step, size.width - at.x), std::min(step, size.height - at.y)));
   const cv::Rect here(cv::Point(bank.margin, bank.margin), there.size());
-  for (std::size_t pair = 0; pair < bank.filters.size(); ++pair)
-    for (std::size_t width = 0; width < bank.filters[pair].size(); ++width) {
-      cv::mulSpectrums(spectrum, bank.filters[pair][width], product, 0);
-      cv::dft(product, both, cv::DFT_INVERSE | cv::DFT_SCALE);
-      cv::split(both(here), parts);
-      for (std::size_t i = 0; i < 2; ++i) {
-        cv::Mat response = ridges.response[2 * pair + i](there);
-        if (width == 0)
-          parts[i].copyTo(response);
-        else
-          cv::max(parts[i], response, response);
-      }
-    }
+  for (std::size_t pair = 0; pair < bank.filters.size(); ++pair) {
+    cv::mulSpectrums(spectrum, bank.filters[pair], product, 0);
+    cv::dft(product, both, cv::DFT_INVERSE | cv::DFT_SCALE);
+    cv::split(both(here), parts);
+    for (std::size_t i = 0; i < 2; ++i) parts[i].copyTo(ridges.response[2 * pair + i](there));
+  }
   cv::Mat strongest = ridges.strongest(there), direction = ridges.direction(there);
   ridges.response[0](there).copyTo(strongest);
   direction.setTo(0);
@@ -218,8 +209,8 @@ float spread_at(const Picked& picked, cv::Point2d centre, double radius, std::ve
 }  // namespace
 
 cv::Mat texture_of(const std::vector<cv::Mat>& responses, const cv::Mat& is_free, double radius_px) {
-  constexpr int kCellsInRadius = 6;  // about 113 values in a disc
-  constexpr int kCellsApart = 2;     // a third of the radius from disc to disc
+  constexpr int kCellsInRadius = 12;  // about 450 values in a disc
+  constexpr int kCellsApart = 4;      // a third of the radius from disc to disc
   const int factor = std::max(1, cvRound(radius_px / kCellsInRadius));
   const Picked picked = pick(responses, is_free, factor);
   cv::Mat fine, spread((picked.is_free.rows + kCellsApart - 1) / kCellsApart,

@@ -24,14 +24,14 @@ struct Ridges {
 };
 
 struct RidgeScales {
-  std::vector<double> width_sigma_px;  ///< of the Gaussian profile of the lines looked for
-  double length_sigma_px = 5;          ///< of the averaging along the line
-  double noise_radius_px = 40;         ///< the noise is taken over a disc of this radius
+  double width_sigma_px = 2;    ///< of the Gaussian profile of the lines looked for
+  double length_sigma_px = 5;   ///< of the averaging along the line
+  double noise_radius_px = 40;  ///< the noise is taken over a disc of this radius
 };
 
 /// Second derivative of a Gaussian across, Gaussian along, normalised so that a straight line of Gaussian profile with
-/// the filter's own width and height 1 gives 1; for each direction the greatest response over the widths. The noise is
-/// as `set_noise` finds it. Filtered by tiles: time grows with the pixels and nothing else.
+/// the filter's own width and height 1 gives 1. The noise is as `set_noise` finds it. Filtered by tiles: time grows with
+/// the pixels and nothing else.
 /// @param is_inside  CV_8U, not 0 where the texture is the cell's; nothing outside of it counts as texture
 Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions = 16);
 

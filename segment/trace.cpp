@@ -82,16 +82,37 @@ bool is_on(const cv::Mat& image, cv::Point2d p) {
   return p.x >= 0 && p.y >= 0 && p.x <= image.cols - 1 && p.y <= image.rows - 1;
 }
 
-/// Steps from `start` (excluded) until the line is lost for longer than the gap, or runs along one already traced.
+/// The direction of the last steps, from before the newest ones: where lines touch, the other one has bent those.
+double course_of(const std::vector<Step>& steps, double window_px) {
+  const std::size_t n = steps.size(), window = static_cast<std::size_t>(window_px), newest = std::min(n / 3, window / 4);
+  const std::size_t last = n - 1 - newest, first = last - std::min(last, window);
+  const cv::Point2d way = steps[last].point - steps[first].point;
+  return length(way) > 0 ? std::atan2(way.y, way.x) : steps.back().angle;
+}
+
+/// Steps from `start` (excluded) until the line is lost for longer than the gap, or runs upon one already traced for
+/// longer than it may; there it goes straight on, for the other's ridge would lead it astray.
 std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const TraceRule& rule, Step start) {
+  constexpr std::size_t kFirst = 3;  // steps before the line has a course of its own
   std::vector<Step> steps;
   std::size_t last_seen = 0, last_free = 0;
   Step now = start;
   double height_so_far = start.height;
   while (std::abs(now.angle - start.angle) < 2 * pi) {  // a ring ends
+    const bool was_free = last_free == steps.size();
     now.point += unit(now.angle);
     if (!is_on(ridges.noise, now.point)) break;
-    now = settle(ridges, rule, now);
+    if (steps.size() >= kFirst && claims.has(now.point, now.angle)) {
+      if (was_free) {
+        now.angle = course_of(steps, rule.end_window_px);
+        now.point = steps.back().point + unit(now.angle);
+        if (!is_on(ridges.noise, now.point)) break;
+      }
+      now.height = ridges.at(now.point, now.angle);
+    } else {
+      now = settle(ridges, rule, now);
+      last_free = steps.size() + 1;
+    }
     steps.push_back(now);
     const double level =
         std::max(rule.follow_noise * sample(ridges.noise, now.point), rule.follow_share * height_so_far);
@@ -99,10 +120,8 @@ std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const Trace
       last_seen = steps.size();
       height_so_far += (now.height - height_so_far) / static_cast<double>(steps.size() + 1);
     }
-    const cv::Point2d way = now.point - steps[steps.size() - std::min<std::size_t>(steps.size(), 4)].point;
-    if (steps.size() < 4 || !claims.has(now.point, std::atan2(way.y, way.x))) last_free = steps.size();
     if (static_cast<double>(steps.size() - last_seen) > rule.gap_px) break;
-    if (static_cast<double>(steps.size() - last_free) > 2 * rule.line_radius_px) break;
+    if (static_cast<double>(steps.size() - last_free) > rule.through_px) break;
   }
   steps.resize(std::min(last_seen, last_free));
   return steps;
@@ -210,7 +229,7 @@ std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, c
     cut_faded_ends(trace, rule);
     if (trace.points.size() >= 3) traces.push_back(std::move(trace));
   }
-  traces = joined(std::move(traces), rule);
+  traces = joined(std::move(traces), ridges, rule);
   std::erase_if(traces, [&](const Trace& t) { return static_cast<double>(t.points.size()) < rule.shortest_px; });
   return traces;
 }

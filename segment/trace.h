@@ -19,6 +19,7 @@ struct TraceRule {
   double follow_noise = 2.5;       ///< and those it may fall to
   double follow_share = 0.4;       ///< or this share of its height so far, where that is more
   double gap_px = 10;              ///< a line may be invisible for this long
+  double through_px = 30;          ///< and run upon another one for this long, straight on
   double smallest_radius_px = 30;  ///< of curvature
   double line_radius_px = 3;       ///< a second line of the same direction within it is the same
   double shortest_px = 15;

@@ -7,6 +7,8 @@
 #include <optional>
 #include <tuple>
 
+#include "segment/grid.h"
+
 namespace mbtfm::segment {
 
 namespace {
@@ -30,17 +32,39 @@ std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, double reach_px)
   return ends;
 }
 
-/// How badly two ends fit to one line; nothing where they do not.
-std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const TraceRule& rule) {
-  constexpr double kStraight = 0.94;  // cosine of 20°
-  if (std::min(a.height, b.height) < rule.follow_share * std::max(a.height, b.height)) return std::nullopt;
+double angle_between(cv::Point2d a, cv::Point2d b) { return std::atan2(std::abs(a.cross(b)), a.dot(b)); }
+
+/// Is the way from end to end brighter than texture?
+bool is_bright_between(cv::Point2d a, cv::Point2d b, const Ridges& ridges, const TraceRule& rule) {
+  const cv::Point2d way = b - a;
+  const double angle = std::atan2(way.y, way.x), n = std::ceil(std::hypot(way.x, way.y));
+  double over_noise = 0;
+  for (double i = 0; i < n; ++i) {
+    const cv::Point2d p = a + ((i + 0.5) / n) * way;
+    over_noise += ridges.at(p, angle) / std::max<double>(sample(ridges.noise, p), 1e-30) / n;
+  }
+  return over_noise >= rule.follow_noise;
+}
+
+/// How badly two ends fit to one line, the sum of the squares of what separates them in its usual size; nothing where
+/// they do not.
+std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridges& ridges, const TraceRule& rule) {
+  constexpr double kTurn = 0.14;       // 8°: by as much a fibre turns from the one to the other
+  constexpr double kHeight = 0.5;      // logarithm
+  constexpr double kWorst = 9;
   const cv::Point2d gap = b.point - a.point;
   const double distance = std::hypot(gap.x, gap.y);
-  const double sideways = std::max(std::abs(gap.cross(a.outward)), std::abs(gap.cross(b.outward)));
-  if (distance > rule.join_gap_px || a.outward.dot(b.outward) > -kStraight) return std::nullopt;
-  if (gap.dot(a.outward) < -rule.line_radius_px) return std::nullopt;
-  if (sideways > rule.line_radius_px / 2 + 0.15 * distance) return std::nullopt;
-  return distance + 4 * sideways;
+  if (distance > rule.join_gap_px || gap.dot(a.outward) < -2 * rule.line_radius_px) return std::nullopt;
+  const double turn = angle_between(a.outward, -b.outward) / kTurn;
+  const cv::Point2d along = a.outward - b.outward;
+  const double sideways = std::abs(gap.cross(along)) / std::max(1e-9, std::hypot(along.x, along.y)) /
+                          (rule.line_radius_px / 2 + 0.1 * distance);
+  const double far = 2 * distance / rule.join_gap_px;
+  const double height = std::log(a.height / b.height) / kHeight;
+  const double sum = turn * turn + sideways * sideways + far * far + height * height;
+  if (!(sum <= kWorst)) return std::nullopt;
+  if (distance > 2 * rule.line_radius_px && !is_bright_between(a.point, b.point, ridges, rule)) return std::nullopt;
+  return sum;
 }
 
 struct Fit {
@@ -52,7 +76,7 @@ struct Fit {
 };
 
 /// All pairs of ends that fit, the best first.
-std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const TraceRule& rule) {
+std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const Ridges& ridges, const TraceRule& rule) {
   const double side = std::max(1.0, rule.join_gap_px);
   const auto cell = [&](double v) { return static_cast<int>(std::floor(v / side)); };
   std::map<std::pair<int, int>, std::vector<End>> grid;
@@ -65,7 +89,7 @@ std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const TraceRule& rul
         if (found == grid.end()) continue;
         for (const End b : found->second)
           if (a < b && b != opposite(a))
-            if (const auto m = mismatch(ends[a], ends[b], rule)) fits.push_back({*m, a, b});
+            if (const auto m = mismatch(ends[a], ends[b], ridges, rule)) fits.push_back({*m, a, b});
       }
   std::sort(fits.begin(), fits.end());
   return fits;
@@ -99,11 +123,69 @@ void append(Trace& to, Trace piece, bool is_reversed) {
   to.height.insert(to.height.end(), piece.height.begin(), piece.height.end());
 }
 
+/// Where the ends of others lie on a piece, from inside it: the points to cut it at.
+std::vector<std::size_t> cuts_of(const std::vector<Trace>& traces, std::size_t piece, const std::vector<EndPoint>& ends,
+                                 const std::vector<End>& near, const TraceRule& rule) {
+  constexpr double kAlong = 0.77;  // cosine of 40°: what meets at more is a crossing
+  const Trace& trace = traces[piece];
+  const auto margin = static_cast<std::size_t>(2 * rule.line_radius_px) + 2;
+  std::vector<std::size_t> cuts;
+  if (trace.points.size() <= 2 * margin) return cuts;
+  for (const End end : near) {
+    if (end / 2 == piece) continue;
+    double least = 2 * rule.line_radius_px;
+    std::size_t at = 0;
+    for (std::size_t i = margin; i + margin < trace.points.size(); ++i) {
+      const cv::Point2d d = trace.points[i] - ends[end].point;
+      if (std::hypot(d.x, d.y) < least) least = std::hypot(d.x, d.y), at = i;
+    }
+    if (at == 0) continue;
+    const cv::Point2d along = trace.points[at + 2] - trace.points[at - 2];
+    if (std::abs(along.dot(ends[end].outward)) < kAlong * std::hypot(along.x, along.y)) continue;
+    cuts.push_back(at);
+  }
+  std::sort(cuts.begin(), cuts.end());
+  return cuts;
+}
+
+std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const TraceRule& rule) {
+  const auto ends = ends_of(traces, rule.end_window_px / 2);
+  const double side = std::max(1.0, 2 * rule.line_radius_px);
+  const auto cell = [&](cv::Point2d p, int dx, int dy) {
+    return std::pair(static_cast<int>(std::floor(p.x / side)) + dx, static_cast<int>(std::floor(p.y / side)) + dy);
+  };
+  std::map<std::pair<int, int>, std::vector<End>> grid;
+  for (End e = 0; e < ends.size(); ++e) grid[cell(ends[e].point, 0, 0)].push_back(e);
+  std::vector<Trace> pieces;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    std::vector<End> near;
+    for (const cv::Point2d& p : traces[i].points)
+      for (int dy = -1; dy <= 1; ++dy)
+        for (int dx = -1; dx <= 1; ++dx)
+          if (const auto found = grid.find(cell(p, dx, dy)); found != grid.end())
+            near.insert(near.end(), found->second.begin(), found->second.end());
+    std::sort(near.begin(), near.end());
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    auto cuts = cuts_of(traces, i, ends, near, rule);
+    cuts.push_back(traces[i].points.size());
+    std::size_t from = 0;
+    for (const std::size_t to : cuts) {
+      if (to - from < 3) continue;
+      const auto first = static_cast<std::ptrdiff_t>(from), last = static_cast<std::ptrdiff_t>(to);
+      pieces.push_back({{traces[i].points.begin() + first, traces[i].points.begin() + last},
+                        {traces[i].height.begin() + first, traces[i].height.begin() + last}});
+      from = to;
+    }
+  }
+  return pieces;
+}
+
 }  // namespace
 
-std::vector<Trace> joined(std::vector<Trace> traces, const TraceRule& rule) {
+std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
+  traces = cut_at_junctions(traces, rule);
   const auto ends = ends_of(traces, rule.end_window_px / 2);
-  const auto link = links_of(fits_of(ends, rule), traces.size());
+  const auto link = links_of(fits_of(ends, ridges, rule), traces.size());
   std::vector<bool> is_used(traces.size());
   std::vector<Trace> result;
   for (End start = 0; start < link.size(); ++start) {

@@ -9,6 +9,7 @@
 #include "pipeline/contract/polyline.h"
 #include "samples/geometry.h"
 #include "segment/fibre_profile.h"
+#include "segment/fibre_scales.h"
 #include "segment/fibre_significance.h"
 #include "segment/grid.h"
 #include "segment/ridge.h"
@@ -171,11 +172,7 @@ void add_haze(const Scene& s, Statistics& result) {
 /// The responses of the fibres' own filters away from fibres, and the lines that they would make there.
 void add_texture(const Scene& s, Statistics& result) {
   const FibreParameters p;
-  RidgeScales scales;
-  for (const double w : {1 / std::numbers::sqrt2, std::numbers::sqrt2})
-    scales.width_sigma_px.push_back(w * p.fibre_width_um / kFwhm / s.pixel_um);
-  scales.length_sigma_px = p.fibre_averaging_um / s.pixel_um;
-  scales.noise_radius_px = std::max(6.0, 8 * p.fibre_width_um / s.pixel_um);
+  const RidgeScales scales = scales_of(p, s.pixel_um);
   Ridges ridges = find_ridges(s.image, s.is_inside, scales);
   cv::Mat deep, is_free;
   cv::erode(s.is_inside, deep, disc_of(2 / s.pixel_um));  // without the cortex of the edge
@@ -192,21 +189,11 @@ void add_texture(const Scene& s, Statistics& result) {
     for (int x = 0; x < excess.cols; ++x)
       if (is_free.at<unsigned char>(y, x) != 0) strengths.push_back(excess.at<float>(y, x));
   result["18 texture's tail: 99 % of the strongest, in deviations"] = quantile(cv::Mat(strengths, true), 0.99F);
-  TraceRule rule;
-  rule.start_noise = p.fibre_start_noise;
-  rule.follow_noise = p.fibre_follow_noise;
-  rule.gap_px = p.fibre_gap_um / s.pixel_um;
-  rule.smallest_radius_px = p.fibre_smallest_radius_um / s.pixel_um;
-  rule.line_radius_px = 0.6 * p.fibre_width_um / s.pixel_um;
-  rule.shortest_px = p.fibre_shortest_um / s.pixel_um;
-  rule.end_window_px = 4 * p.fibre_averaging_um / s.pixel_um;
-  rule.join_gap_px = 1.5 * p.fibre_gap_um / s.pixel_um;
-  const double independent_px = 2 * std::sqrt(std::numbers::pi) * p.fibre_averaging_um / s.pixel_um;
   int n_lines = 0;
-  for (const Trace& t : trace_lines(ridges, deep, rule)) {
+  for (const Trace& t : trace_lines(ridges, deep, rule_of(p, s.pixel_um))) {
     const auto is_off = [&](const cv::Point2d& q) { return is_free.at<unsigned char>(cv::Point(q)) != 0; };
     if (2 * std::ranges::count_if(t.points, is_off) < static_cast<std::ptrdiff_t>(t.points.size())) continue;
-    n_lines += significance(ridges, t.points, t.height, independent_px) > 7;
+    n_lines += significance(ridges, t.points, t.height, independent_px(p, s.pixel_um)) > 7;
   }
   result["19 lines of significance > 7 beside the fibres, by 1000 um2"] = 1000 * n_lines / s.area_um2;
 }
