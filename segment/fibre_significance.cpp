@@ -20,22 +20,38 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
 
 namespace {
 
-constexpr double kScale = 1.26;  ///< the significance by which e times fewer lines of texture are found
+/// Nothing is traced that is less significant.
+constexpr double kLeast = 3;
+/// The tail of the lines of texture falls as exp(−x^1.3): counted in simulated cells of meshwork alone and of dense
+/// fibres (docs/theory.md, (24)).
+constexpr double kShape = 1.3;
 
 }  // namespace
 
-double expected_false_lines(double significance, double free_area_um2) {
-  // The strongest chains of a texture have an exponential tail. Density and scale were counted in 24 simulated cells of
-  // meshwork alone (62 000 um², scenario no-fibres, three image qualities), where it holds from 18 lines a cell to 0.2.
-  constexpr double kDensity_per_um2 = 0.00148, kAt = 10;
-  return kDensity_per_um2 * free_area_um2 * std::exp((kAt - significance) / kScale);
+double TextureLines::expected_false(double significance) const {
+  constexpr double kBarely = 6, kMany = 20;  // a mean height of two deviations over three micrometres is no line
+  const double n_false = n * std::exp(-std::pow(std::max(0.0, significance - kLeast) / scale, kShape));
+  return significance < kBarely ? std::max(n_false, kMany) : n_false;
 }
 
-double chance_of_fibre(double n_false) {
-  // Near the limit a cell has about one fibre in 8 units of significance: counted in 24 crowded simulated cells, where
-  // of the lines with confidence c a share c is true to 0.1.
+double TextureLines::chance_of_fibre(double significance, double factor) const {
+  // Near the limit a cell has about one fibre in 8 units of significance: counted in 24 crowded simulated cells.
   constexpr double kFibres_per_unit = 0.12;
-  return kFibres_per_unit / (kFibres_per_unit + n_false / kScale);
+  const double x = std::max(0.0, significance - kLeast) / scale;
+  const double density = factor * expected_false(significance) * kShape / scale * std::pow(x, kShape - 1);
+  return kFibres_per_unit / (kFibres_per_unit + density);
+}
+
+TextureLines texture_lines(std::vector<double> significances) {
+  constexpr double kHardly = 10;            // texture hardly makes more significant ones
+  constexpr double kPrior = 10, kUsual = 2;  // a few lines do not tell the scale: as many of the usual one are added
+  std::erase_if(significances, [](double s) { return s >= kHardly || s < kLeast; });
+  const auto n = static_cast<double>(significances.size());
+  if (significances.empty()) return {kPrior, kUsual};
+  const auto middle = significances.begin() + static_cast<std::ptrdiff_t>(significances.size() / 2);
+  std::nth_element(significances.begin(), middle, significances.end());
+  const double scale = (*middle - kLeast) / std::pow(std::numbers::ln2, 1 / kShape);  // of a median
+  return {n + kPrior, (n * scale + kPrior * kUsual) / (n + kPrior)};
 }
 
 double share_beside(const Polyline& line_um, const std::vector<Polyline>& fibres_um) {

@@ -14,19 +14,25 @@ namespace mbtfm::segment {
 double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
                     double independent_px);
 
-/// How many lines at least as significant one finds by chance in the texture of a cell: the number of false alarms
-/// (Desolneux, Moisan & Morel, From Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
-/// @param free_area_um2  of the cell, without what its fibres cover
-double expected_false_lines(double significance, double free_area_um2);
+/// The lines that a cell's texture makes: how many, and how significant they are as a rule.
+struct TextureLines {
+  double n = 0;
+  double scale = 0;  ///< of their significance
+
+  /// How many at least as significant one finds by chance: the number of false alarms (Desolneux, Moisan & Morel, From
+  /// Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
+  double expected_false(double significance) const;
+  /// The chance that such a line is a fibre: the density of fibres at that significance over that of all lines, where
+  /// those of texture are rarer by a factor.
+  double chance_of_fibre(double significance, double factor = 1) const;
+};
+/// From the lines of the cell itself, most of which are its texture's.
+TextureLines texture_lines(std::vector<double> significances);
 
 /// Share of a line that has one of these fibres beside it: nearer than 3 um, at less than 15 degrees. Bundles lie in
 /// carpets; a line of texture is beside one by chance.
 /// @param line_um, fibres_um  with points about a pixel apart
 double share_beside(const Polyline& line_um, const std::vector<Polyline>& fibres_um);
-
-/// The chance that such a line is a fibre, where by chance there would be `n_false` at least as significant: the
-/// density of fibres at that significance over that of all lines.
-double chance_of_fibre(double n_false);
 
 /// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond
 /// its net turning, by length.

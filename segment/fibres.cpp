@@ -69,7 +69,9 @@ struct Candidate {
   Polyline points_um;
   WayOn before, after;
   Profile profile;
-  double expected_false = 0;  ///< lines as significant as this one that chance would make
+  double significance = 0;
+  double expected_false = 0;  ///< lines as significant as this one that texture would make
+  bool is_beside = false;     ///< a fibre
 };
 
 double significance_of(const std::vector<cv::Point2d>& points, const std::vector<double>& height, const Ridges& ridges,
@@ -77,17 +79,21 @@ double significance_of(const std::vector<cv::Point2d>& points, const std::vector
   return significance(ridges, points, height, independent_px(p, field.pixel_um));
 }
 
-double area_um2(const cv::Mat& mask, double pixel_um) { return cv::countNonZero(mask) * pixel_um * pixel_um; }
+TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
+                              const FibreParameters& p) {
+  std::vector<double> significances;
+  for (const Trace& t : traces) significances.push_back(significance_of(t.points, t.height, ridges, field, p));
+  return texture_lines(std::move(significances));
+}
 
 /// Where the cell's texture is to be seen: inside of it, and away from lines that cannot be texture.
 cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
                        const FibreParameters& p) {
-  const double inside_um2 = area_um2(field.is_inside, field.pixel_um);
+  const TextureLines texture = texture_lines_of(traces, ridges, field, p);
   cv::Mat is_free = field.is_inside.clone();
   const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
   for (const Trace& t : traces) {
-    const double n_false = expected_false_lines(significance_of(t.points, t.height, ridges, field, p), inside_um2);
-    if (n_false > p.fibre_false_per_cell) continue;
+    if (texture.expected_false(significance_of(t.points, t.height, ridges, field, p)) > p.fibre_false_per_cell) continue;
     for (const cv::Point2d& point : t.points) cv::circle(is_free, cv::Point(point), radius, cv::Scalar(0), cv::FILLED);
   }
   return is_free;
@@ -99,7 +105,7 @@ struct Judge {
   const Ridges& ridges;
   const TraceRule& rule;
   const Polygon& outline_um;
-  double free_area_um2 = 0;
+  TextureLines texture;
   const FibreParameters& p;
 
   /// What is left of a line away from the cell's edge; nothing where that has not the shape of a fibre.
@@ -115,8 +121,8 @@ struct Judge {
     };
     c.points_um = cut(c.points_um);
     points = cut(points);
-    c.expected_false =
-        expected_false_lines(significance_of(points, cut(trace.height), ridges, field, p), free_area_um2);
+    c.significance = significance_of(points, cut(trace.height), ridges, field, p);
+    c.expected_false = texture.expected_false(c.significance);
     if (kFalseBeside * c.expected_false > p.fibre_false_per_cell) return std::nullopt;
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
     if (!falls_on_both_sides(c.profile, p.fibre_side_ratio)) return std::nullopt;
@@ -160,8 +166,7 @@ std::vector<Candidate> significant(std::vector<Candidate> candidates, const Fibr
   take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
   while (take([&](Candidate& c) {
     if (share_beside(c.points_um, fibres_um) < 0.5) return false;
-    c.expected_false *= Judge::kFalseBeside;
-    return true;
+    return c.is_beside = true;
   })) {
   }
   return kept;
@@ -258,7 +263,7 @@ TracedLines trace_fibres(const Image& image, const Polygon& outline_um, double p
   const cv::Mat is_free = free_of_fibres(trace_lines(ridges, field.is_inside, rule), ridges, field, p);
   set_noise(ridges, is_free, scales.noise_radius_px);
   const auto traces = trace_lines(ridges, field.is_inside, rule);
-  const Judge judge{field, ridges, rule, outline_um, area_um2(is_free, field.pixel_um), p};
+  const Judge judge{field, ridges, rule, outline_um, texture_lines_of(traces, ridges, field, p), p};
   std::vector<Candidate> fibres = judged(traces, judge);
   TracedLines lines{{}, unexplained(fibres, judge)};
   for (Candidate& c : fibres) {
@@ -266,7 +271,7 @@ TracedLines trace_fibres(const Image& image, const Polygon& outline_um, double p
     fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
     fibre.width_um = c.profile.width_px * field.pixel_um;
     fibre.mean_intensity = c.profile.height;
-    fibre.confidence = chance_of_fibre(c.expected_false);
+    fibre.confidence = judge.texture.chance_of_fibre(c.significance, c.is_beside ? Judge::kFalseBeside : 1);
     lines.fibres.push_back({std::move(fibre), std::move(c.before), std::move(c.after)});
   }
   return lines;
