@@ -172,7 +172,31 @@ std::vector<Candidate> significant(std::vector<Candidate> candidates, const Fibr
   return kept;
 }
 
-/// All lines that are fibres. Along the edge these are only lines as bright as those in the cell.
+/// Of the ridges along the outline: the height of the cell's cortex, seen from its side. Infinite without an outline.
+double height_of_cortex(const Judge& judge) {
+  const Field& field = judge.field;
+  if (judge.outline_um.empty()) return std::numeric_limits<double>::infinity();
+  std::vector<double> heights;
+  Polygon ring = judge.outline_um;
+  ring.push_back(ring.front());
+  for (std::size_t i = 0; i + 1 < ring.size(); ++i) {
+    const cv::Point2d from = to_pixels(ring[i] - field.origin_um, field.pixel_um),
+                      way = to_pixels(ring[i + 1] - field.origin_um, field.pixel_um) - from;
+    const double length = std::hypot(way.x, way.y), angle = std::atan2(way.y, way.x);
+    const int reach = cvCeil(judge.p.fibre_edge_um / field.pixel_um);
+    for (double s = 0.5; s < length; ++s) {
+      double height = 0;  // inside or outside: the outline lies to either side
+      for (int k = -reach; k <= reach; ++k) {
+        const cv::Point2d p = from + (s / length) * way + (k / length) * cv::Point2d(-way.y, way.x);
+        height = std::max(height, judge.ridges.at(p, angle));
+      }
+      heights.push_back(height);
+    }
+  }
+  return heights.empty() ? std::numeric_limits<double>::infinity() : quantile_of(std::move(heights), 0.5);
+}
+
+/// All lines that are fibres. Along the edge these are only lines that stand out of the cortex.
 std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& judge) {
   std::vector<std::optional<Candidate>> inner;
   std::vector<double> heights;
@@ -181,15 +205,14 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
     if (inner.back() && inner.back()->expected_false <= judge.p.fibre_false_per_cell)
       heights.push_back(inner.back()->profile.height);
   }
-  constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
-  const bool is_known = heights.size() >= kEnough;
-  const double bright =
-      is_known ? judge.p.fibre_edge_height * quantile_of(heights, 0.9) : std::numeric_limits<double>::infinity();
-  const double faint = is_known ? judge.p.fibre_faintest * quantile_of(heights, 0.5) : 0;
+  constexpr std::size_t kEnough = 5;  // fewer do not tell what faint is
+  const double faint = heights.size() >= kEnough ? judge.p.fibre_faintest * quantile_of(heights, 0.5) : 0;
+  const double bright = judge.p.fibre_edge_height * height_of_cortex(judge);
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < traces.size(); ++i) {
-    auto whole = judge.candidate(traces[i], 0);
-    if (whole && whole->profile.height >= bright)
+    std::optional<Candidate> whole;
+    if (quantile_of(traces[i].height, 0.5) >= bright) whole = judge.candidate(traces[i], 0);
+    if (whole)
       candidates.push_back(std::move(*whole));
     else if (inner[i])
       candidates.push_back(std::move(*inner[i]));
@@ -239,7 +262,7 @@ void declare(ParameterList& list, FibreParameters& p) {
   list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
            "a line along the outline this near to it is the cell's edge, not a fibre (um)");
   list.add("fibre_edge_height", p.fibre_edge_height, Range::zero_or_factor(),
-           "unless it reaches this share of the height of bright fibres");
+           "unless it is by this factor as high as the edge is as a rule");
   list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
            "a line that winds this near to the outline is a ruffle, not a fibre (um)");
   list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
