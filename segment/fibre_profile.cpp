@@ -19,21 +19,23 @@ double median_of(std::vector<float>& values) {
 
 struct Column {
   double level;
-  double error;
+  double error;  ///< of its difference from the line's own level: brightness that varies along the line cancels
 };
 
 /// Level of the image at a distance `offset` from the line (positive to the left), over all its points.
 Column column_at(const cv::Mat& image, const std::vector<cv::Point2d>& points, double offset) {
-  std::vector<float> values(points.size());
+  std::vector<float> values(points.size()), differences(points.size());
   for (std::size_t i = 0; i < points.size(); ++i) {
     const std::size_t a = i > 2 ? i - 3 : 0, b = std::min(i + 3, points.size() - 1);
     const cv::Point2d d = points[b] - points[a];
     const double l = std::max(1e-9, std::hypot(d.x, d.y));
     values[i] = sample(image, points[i] + (offset / l) * cv::Point2d(-d.y, d.x));
+    differences[i] = values[i] - sample(image, points[i]);
   }
-  const double level = median_of(values);
-  for (float& v : values) v = static_cast<float>(std::abs(v - level));
-  return {level, 1.4826 * median_of(values) / std::sqrt(static_cast<double>(values.size()))};
+  const auto difference = static_cast<float>(median_of(differences));
+  for (float& d : differences) d = std::abs(d - difference);
+  const double error = 1.4826 * median_of(differences) / std::sqrt(static_cast<double>(values.size()));
+  return {median_of(values), error};
 }
 
 /// Where the profile falls to `level` going out from `middle` in steps of `direction`, in columns from the middle.

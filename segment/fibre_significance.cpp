@@ -43,7 +43,7 @@ double TextureLines::chance_of_fibre(double significance, double factor) const {
 }
 
 TextureLines texture_lines(std::vector<double> significances) {
-  constexpr double kHardly = 10;            // texture hardly makes more significant ones
+  constexpr double kHardly = 10;             // texture hardly makes more significant ones
   constexpr double kPrior = 10, kUsual = 2;  // a few lines do not tell the scale: as many of the usual one are added
   std::erase_if(significances, [](double s) { return s >= kHardly || s < kLeast; });
   const auto n = static_cast<double>(significances.size());

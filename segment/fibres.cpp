@@ -93,7 +93,8 @@ cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, c
   cv::Mat is_free = field.is_inside.clone();
   const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
   for (const Trace& t : traces) {
-    if (texture.expected_false(significance_of(t.points, t.height, ridges, field, p)) > p.fibre_false_per_cell) continue;
+    if (texture.expected_false(significance_of(t.points, t.height, ridges, field, p)) > p.fibre_false_per_cell)
+      continue;
     for (const cv::Point2d& point : t.points) cv::circle(is_free, cv::Point(point), radius, cv::Scalar(0), cv::FILLED);
   }
   return is_free;

@@ -30,8 +30,8 @@ struct RidgeScales {
 };
 
 /// Second derivative of a Gaussian across, Gaussian along, normalised so that a straight line of Gaussian profile with
-/// the filter's own width and height 1 gives 1. The noise is as `set_noise` finds it. Filtered by tiles: time grows with
-/// the pixels and nothing else.
+/// the filter's own width and height 1 gives 1. The noise is as `set_noise` finds it. Filtered by tiles: time grows
+/// with the pixels and nothing else.
 /// @param is_inside  CV_8U, not 0 where the texture is the cell's; nothing outside of it counts as texture
 Ridges find_ridges(const cv::Mat& image, const cv::Mat& is_inside, const RidgeScales& scales, int n_directions = 16);
 

@@ -49,21 +49,21 @@ bool is_bright_between(cv::Point2d a, cv::Point2d b, const Ridges& ridges, const
 /// How badly two ends fit to one line, the sum of the squares of what separates them in its usual size; nothing where
 /// they do not.
 std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridges& ridges, const TraceRule& rule) {
-  constexpr double kTurn = 0.14;       // 8°: by as much a fibre turns from the one to the other
-  constexpr double kHeight = 0.5;      // logarithm
+  constexpr double kTurn = 0.14;   // 8°: by as much a fibre turns from the one to the other
+  constexpr double kHeight = 0.5;  // logarithm
   constexpr double kWorst = 9;
   const cv::Point2d gap = b.point - a.point;
-  const double distance = std::hypot(gap.x, gap.y);
-  if (distance > rule.join_gap_px || gap.dot(a.outward) < -2 * rule.line_radius_px) return std::nullopt;
+  const double distance = std::hypot(gap.x, gap.y), overlap = -gap.dot(a.outward);
+  if (distance > rule.join_gap_px || overlap > rule.overlap_px) return std::nullopt;
   const double turn = angle_between(a.outward, -b.outward) / kTurn;
   const cv::Point2d along = a.outward - b.outward;
   const double sideways = std::abs(gap.cross(along)) / std::max(1e-9, std::hypot(along.x, along.y)) /
-                          (rule.line_radius_px / 2 + 0.1 * distance);
+                          (rule.line_radius_px / 2 + (overlap > 0 ? 0 : 0.1 * distance));
   const double far = 2 * distance / rule.join_gap_px;
   const double height = std::log(a.height / b.height) / kHeight;
   const double sum = turn * turn + sideways * sideways + far * far + height * height;
   if (!(sum <= kWorst)) return std::nullopt;
-  if (distance > 2 * rule.line_radius_px && !is_bright_between(a.point, b.point, ridges, rule)) return std::nullopt;
+  if (overlap < -2 * rule.line_radius_px && !is_bright_between(a.point, b.point, ridges, rule)) return std::nullopt;
   return sum;
 }
 
@@ -75,22 +75,40 @@ struct Fit {
   }
 };
 
-/// All pairs of ends that fit, the best first.
-std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const Ridges& ridges, const TraceRule& rule) {
-  const double side = std::max(1.0, rule.join_gap_px);
-  const auto cell = [&](double v) { return static_cast<int>(std::floor(v / side)); };
-  std::map<std::pair<int, int>, std::vector<End>> grid;
-  for (End e = 0; e < ends.size(); ++e) grid[{cell(ends[e].point.x), cell(ends[e].point.y)}].push_back(e);
-  std::vector<Fit> fits;
-  for (End a = 0; a < ends.size(); ++a)
+/// The ends by squares of the image.
+class EndGrid {
+ public:
+  EndGrid(const std::vector<EndPoint>& ends, double side) : side_(side) {
+    for (End e = 0; e < ends.size(); ++e) grid_[square(ends[e].point, 0, 0)].push_back(e);
+  }
+  /// Those in the square of a point and in its neighbours.
+  void add_near(cv::Point2d point, std::vector<End>& near) const {
     for (int dy = -1; dy <= 1; ++dy)
       for (int dx = -1; dx <= 1; ++dx) {
-        const auto found = grid.find({cell(ends[a].point.x) + dx, cell(ends[a].point.y) + dy});
-        if (found == grid.end()) continue;
-        for (const End b : found->second)
-          if (a < b && b != opposite(a))
-            if (const auto m = mismatch(ends[a], ends[b], ridges, rule)) fits.push_back({*m, a, b});
+        const auto found = grid_.find(square(point, dx, dy));
+        if (found != grid_.end()) near.insert(near.end(), found->second.begin(), found->second.end());
       }
+  }
+
+ private:
+  std::pair<int, int> square(cv::Point2d p, int dx, int dy) const {
+    return {static_cast<int>(std::floor(p.x / side_)) + dx, static_cast<int>(std::floor(p.y / side_)) + dy};
+  }
+  double side_;
+  std::map<std::pair<int, int>, std::vector<End>> grid_;
+};
+
+/// All pairs of ends that fit, the best first.
+std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const Ridges& ridges, const TraceRule& rule) {
+  const EndGrid grid(ends, std::max(1.0, rule.join_gap_px));
+  std::vector<Fit> fits;
+  for (End a = 0; a < ends.size(); ++a) {
+    std::vector<End> near;
+    grid.add_near(ends[a].point, near);
+    for (const End b : near)
+      if (a < b && b != opposite(a))
+        if (const auto m = mismatch(ends[a], ends[b], ridges, rule)) fits.push_back({*m, a, b});
+  }
   std::sort(fits.begin(), fits.end());
   return fits;
 }
@@ -114,19 +132,33 @@ std::vector<std::optional<End>> links_of(const std::vector<Fit>& fits, std::size
   return link;
 }
 
+/// Ends that lie beside each other, of one line traced twice: each gives half of what both have.
+void trim_overlap(Trace& first, Trace& second) {
+  constexpr double kCourse_px = 10;
+  const cv::Point2d beyond = first.points.back() - second.points.front();
+  const double half = beyond.dot(outward(first.points, LineEnd::last, kCourse_px)) / 2;
+  const double most = static_cast<double>(std::min(first.points.size(), second.points.size())) / 2;
+  const auto n = static_cast<std::ptrdiff_t>(std::clamp(half, 0.0, most));
+  first.points.erase(first.points.end() - n, first.points.end());
+  first.height.erase(first.height.end() - n, first.height.end());
+  second.points.erase(second.points.begin(), second.points.begin() + n);
+  second.height.erase(second.height.begin(), second.height.begin() + n);
+}
+
 void append(Trace& to, Trace piece, bool is_reversed) {
   if (is_reversed) {
     std::reverse(piece.points.begin(), piece.points.end());
     std::reverse(piece.height.begin(), piece.height.end());
   }
+  if (!to.points.empty()) trim_overlap(to, piece);
   to.points.insert(to.points.end(), piece.points.begin(), piece.points.end());
   to.height.insert(to.height.end(), piece.height.begin(), piece.height.end());
 }
 
-/// Where the ends of others lie on a piece, from inside it: the points to cut it at.
+/// Where the ends of others lie on a piece: the points to cut it at.
 std::vector<std::size_t> cuts_of(const std::vector<Trace>& traces, std::size_t piece, const std::vector<EndPoint>& ends,
                                  const std::vector<End>& near, const TraceRule& rule) {
-  constexpr double kAlong = 0.77;  // cosine of 40°: what meets at more is a crossing
+  constexpr double kAlong = 0.5;  // cosine of 60°: what ends at a steeper angle is no part of this line
   const Trace& trace = traces[piece];
   const auto margin = static_cast<std::size_t>(2 * rule.line_radius_px) + 2;
   std::vector<std::size_t> cuts;
@@ -148,32 +180,28 @@ std::vector<std::size_t> cuts_of(const std::vector<Trace>& traces, std::size_t p
   return cuts;
 }
 
+Trace part_of(const Trace& trace, std::size_t from, std::size_t to) {
+  const auto first = static_cast<std::ptrdiff_t>(from), last = static_cast<std::ptrdiff_t>(to);
+  return {{trace.points.begin() + first, trace.points.begin() + last},
+          {trace.height.begin() + first, trace.height.begin() + last}};
+}
+
 std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const TraceRule& rule) {
-  const auto ends = ends_of(traces, rule.end_window_px / 2);
-  const double side = std::max(1.0, 2 * rule.line_radius_px);
-  const auto cell = [&](cv::Point2d p, int dx, int dy) {
-    return std::pair(static_cast<int>(std::floor(p.x / side)) + dx, static_cast<int>(std::floor(p.y / side)) + dy);
-  };
-  std::map<std::pair<int, int>, std::vector<End>> grid;
-  for (End e = 0; e < ends.size(); ++e) grid[cell(ends[e].point, 0, 0)].push_back(e);
+  constexpr std::size_t kShortest = 3;  // points
+  const auto ends = ends_of(traces, rule.course_px);
+  const EndGrid grid(ends, std::max(1.0, 2 * rule.line_radius_px));
   std::vector<Trace> pieces;
   for (std::size_t i = 0; i < traces.size(); ++i) {
     std::vector<End> near;
-    for (const cv::Point2d& p : traces[i].points)
-      for (int dy = -1; dy <= 1; ++dy)
-        for (int dx = -1; dx <= 1; ++dx)
-          if (const auto found = grid.find(cell(p, dx, dy)); found != grid.end())
-            near.insert(near.end(), found->second.begin(), found->second.end());
+    for (const cv::Point2d& p : traces[i].points) grid.add_near(p, near);
     std::sort(near.begin(), near.end());
     near.erase(std::unique(near.begin(), near.end()), near.end());
     auto cuts = cuts_of(traces, i, ends, near, rule);
     cuts.push_back(traces[i].points.size());
     std::size_t from = 0;
     for (const std::size_t to : cuts) {
-      if (to - from < 3) continue;
-      const auto first = static_cast<std::ptrdiff_t>(from), last = static_cast<std::ptrdiff_t>(to);
-      pieces.push_back({{traces[i].points.begin() + first, traces[i].points.begin() + last},
-                        {traces[i].height.begin() + first, traces[i].height.begin() + last}});
+      if (to - from < kShortest) continue;
+      pieces.push_back(part_of(traces[i], from, to));
       from = to;
     }
   }
@@ -184,7 +212,7 @@ std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const Trac
 
 std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
   traces = cut_at_junctions(traces, rule);
-  const auto ends = ends_of(traces, rule.end_window_px / 2);
+  const auto ends = ends_of(traces, rule.course_px);
   const auto link = links_of(fits_of(ends, ridges, rule), traces.size());
   std::vector<bool> is_used(traces.size());
   std::vector<Trace> result;
