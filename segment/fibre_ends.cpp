@@ -68,16 +68,6 @@ double bulge_um(const Polyline& points, const Polygon& outline_um) {
   return norm(outward) > 0 ? dot(middle - chord, outward) / norm(outward) : 0;
 }
 
-/// Does it run along the outline, for most of its length, where that is straight or bent inwards? A bundle along a free
-/// edge spans between adhesions at its ends and draws the edge in (Bischofs et al., Biophys J 95:3488, 2008).
-bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um) {
-  if (outline_um.empty() || line.size() < 2) return false;
-  constexpr double kBeside_um = 1.5, kStraight = 0.02;
-  const Polyline points = last_part(line, length_um(line));
-  if (along_edge(points, outline_um, kBeside_um).share < kMostOfIt) return false;
-  return bulge_um(points, outline_um) <= kStraight * length_um(line);
-}
-
 /// The adhesion that an end reaches best.
 struct Hold {
   const Adhesion* adhesion = nullptr;
@@ -204,6 +194,14 @@ Polyline to_adhesion(const WayOn& way, const std::vector<Adhesion>& adhesions) {
 }
 
 }  // namespace
+
+bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um) {
+  if (outline_um.empty() || line.size() < 2) return false;
+  constexpr double kBeside_um = 1.5, kStraight = 0.02;
+  const Polyline points = last_part(line, length_um(line));
+  if (along_edge(points, outline_um, kBeside_um).share < kMostOfIt) return false;
+  return bulge_um(points, outline_um) <= kStraight * length_um(line);
+}
 
 void lead_on(TracedFibre& traced, const std::vector<Adhesion>& adhesions, const Polygon& outline_um, double reach_um) {
   Polyline& line = traced.fibre.points_um;

@@ -27,6 +27,10 @@ struct EndsToTie {
   bool start = true, end = true;
 };
 
+/// Does it run along the outline, for most of its length, where that is straight or bent inwards? A bundle along a free
+/// edge spans between adhesions at its ends and draws the edge in (Bischofs et al., Biophys J 95:3488, 2008).
+bool runs_along_free_edge(const Polyline& line, const Polygon& outline_um);
+
 /// Where nobody sees adhesions: which ends something holds, by the shape of the fibre in the cell (Hotulainen &
 /// Lappalainen 2006; theory.md, section 6). An arc runs along the cell's edge behind the lamellipodium and bulges
 /// towards it: held nowhere. A dorsal fibre rises from an adhesion near the edge straight towards the cell's middle,

@@ -64,6 +64,9 @@ bool is_ruffle(const Polyline& line_um, const Polygon& outline_um, double lamell
   return distance_to_boundary_um(outline_um, line_um[line_um.size() / 2]) < lamellipodium_um;
 }
 
+/// A line of which so much has a fibre beside it lies in its bundle.
+constexpr double kMostBeside = 0.5;
+
 /// A traced line that may be a fibre.
 struct Candidate {
   Polyline points_um;
@@ -79,11 +82,24 @@ double significance_of(const std::vector<cv::Point2d>& points, const std::vector
   return significance(ridges, points, height, independent_px(p, field.pixel_um));
 }
 
+Polyline in_um(const std::vector<cv::Point2d>& points, const Field& field) {
+  Polyline line;
+  for (const cv::Point2d& point : points) line.push_back(field.in_um(point));
+  return line;
+}
+
+/// From the lines that do not lie beside fibres: those are faint fibres as often as texture.
 TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
                               const FibreParameters& p) {
-  std::vector<double> significances;
-  for (const Trace& t : traces) significances.push_back(significance_of(t.points, t.height, ridges, field, p));
-  return texture_lines(std::move(significances));
+  std::vector<double> all, apart;
+  for (const Trace& t : traces) all.push_back(significance_of(t.points, t.height, ridges, field, p));
+  const TextureLines first = texture_lines(all);
+  std::vector<Polyline> fibres_um;
+  for (std::size_t i = 0; i < traces.size(); ++i)
+    if (first.expected_false(all[i]) <= p.fibre_false_per_cell) fibres_um.push_back(in_um(traces[i].points, field));
+  for (std::size_t i = 0; i < traces.size(); ++i)
+    if (share_beside(in_um(traces[i].points, field), fibres_um) < kMostBeside) apart.push_back(all[i]);
+  return texture_lines(std::move(apart));
 }
 
 /// Where the cell's texture is to be seen: inside of it, and away from lines that cannot be texture.
@@ -113,7 +129,7 @@ struct Judge {
   std::optional<Candidate> candidate(const Trace& trace, double edge_um) const {
     auto points = smoothed(trace.points, cvRound(p.fibre_averaging_um / field.pixel_um));
     Candidate c;
-    for (const cv::Point2d& point : points) c.points_um.push_back(field.in_um(point));
+    c.points_um = in_um(points, field);
     const Piece piece = without_edge(c.points_um, outline_um, edge_um);
     if (static_cast<double>(piece.n) * field.pixel_um < p.fibre_shortest_um) return std::nullopt;
     const auto cut = [&](const auto& all) {
@@ -166,7 +182,7 @@ std::vector<Candidate> significant(std::vector<Candidate> candidates, const Fibr
   };
   take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
   while (take([&](Candidate& c) {
-    if (share_beside(c.points_um, fibres_um) < 0.5) return false;
+    if (share_beside(c.points_um, fibres_um) < kMostBeside) return false;
     return c.is_beside = true;
   })) {
   }
@@ -213,7 +229,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
   for (std::size_t i = 0; i < traces.size(); ++i) {
     std::optional<Candidate> whole;
     if (quantile_of(traces[i].height, 0.5) >= bright) whole = judge.candidate(traces[i], 0);
-    if (whole)
+    if (whole && length_um(whole->points_um) >= 2 * judge.p.fibre_shortest_um)  // ruffles, roots of filopodia: shorter
       candidates.push_back(std::move(*whole));
     else if (inner[i])
       candidates.push_back(std::move(*inner[i]));

@@ -84,7 +84,8 @@ bool is_on(const cv::Mat& image, cv::Point2d p) {
 
 /// The direction of the last steps, from before the newest ones: where lines touch, the other one has bent those.
 double course_of(const std::vector<Step>& steps, double window_px) {
-  const std::size_t n = steps.size(), window = static_cast<std::size_t>(window_px), newest = std::min(n / 3, window / 4);
+  const std::size_t n = steps.size(), window = static_cast<std::size_t>(window_px),
+                    newest = std::min(n / 3, window / 4);
   const std::size_t last = n - 1 - newest, first = last - std::min(last, window);
   const cv::Point2d way = steps[last].point - steps[first].point;
   return length(way) > 0 ? std::atan2(way.y, way.x) : steps.back().angle;

@@ -19,15 +19,16 @@ End opposite(End end) { return end ^ 1; }
 
 struct EndPoint {
   cv::Point2d point, outward;
-  double height = 0;  ///< mean of the piece
+  double height = 0;  ///< mean of the last part
 };
 
 std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, double reach_px) {
   std::vector<EndPoint> ends;
   for (const Trace& t : traces) {
-    const double height = std::accumulate(t.height.begin(), t.height.end(), 0.0) / static_cast<double>(t.height.size());
-    ends.push_back({t.points.front(), outward(t.points, LineEnd::first, reach_px), height});
-    ends.push_back({t.points.back(), outward(t.points, LineEnd::last, reach_px), height});
+    const auto n = static_cast<std::ptrdiff_t>(std::min<double>(static_cast<double>(t.height.size()), 4 * reach_px));
+    const auto mean = [n](auto from) { return std::accumulate(from, from + n, 0.0) / static_cast<double>(n); };
+    ends.push_back({t.points.front(), outward(t.points, LineEnd::first, reach_px), mean(t.height.begin())});
+    ends.push_back({t.points.back(), outward(t.points, LineEnd::last, reach_px), mean(t.height.rbegin())});
   }
   return ends;
 }
@@ -55,6 +56,7 @@ std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridge
   const cv::Point2d gap = b.point - a.point;
   const double distance = std::hypot(gap.x, gap.y), overlap = -gap.dot(a.outward);
   if (distance > rule.join_gap_px || overlap > rule.overlap_px) return std::nullopt;
+  if (std::min(a.height, b.height) < rule.follow_share * std::max(a.height, b.height)) return std::nullopt;
   const double turn = angle_between(a.outward, -b.outward) / kTurn;
   const cv::Point2d along = a.outward - b.outward;
   const double sideways = std::abs(gap.cross(along)) / std::max(1e-9, std::hypot(along.x, along.y)) /
