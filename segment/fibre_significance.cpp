@@ -10,10 +10,16 @@ namespace mbtfm::segment {
 
 double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
                     double independent_px) {
+  constexpr double kMost = 2;  // of the middle one: a bright spot on the way makes no line
   if (points.empty()) return 0;
-  double sum = 0;
+  std::vector<double> over_noise;
   for (std::size_t i = 0; i < points.size(); ++i)
-    sum += height[i] / std::max<double>(sample(ridges.noise, points[i]), 1e-30);
+    over_noise.push_back(height[i] / std::max<double>(sample(ridges.noise, points[i]), 1e-30));
+  std::vector<double> sorted = over_noise;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  double sum = 0;
+  for (const double h : over_noise) sum += std::min(h, kMost * *middle);
   const auto n = static_cast<double>(points.size());
   return sum / n * std::sqrt(n / independent_px);
 }
@@ -29,7 +35,7 @@ constexpr double kShape = 1.3;
 }  // namespace
 
 double TextureLines::expected_false(double significance) const {
-  constexpr double kBarely = 6, kMany = 20;  // a mean height of two deviations over three micrometres is no line
+  constexpr double kBarely = 7, kMany = 20;  // noise alone makes such lines, of pieces that happen to lie in a row
   const double n_false = n * std::exp(-std::pow(std::max(0.0, significance - kLeast) / scale, kShape));
   return significance < kBarely ? std::max(n_false, kMany) : n_false;
 }

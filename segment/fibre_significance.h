@@ -10,7 +10,8 @@
 namespace mbtfm::segment {
 
 /// Signal to noise of a whole line: its mean height in standard deviations of the texture around, times the root of the
-/// number of independent pieces in its length. Texture averages out along a line, a bundle persists.
+/// number of independent pieces in its length. Texture averages out along a line, a bundle persists. Spots brighter
+/// than twice the line count as twice the line.
 double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
                     double independent_px);
 

@@ -92,7 +92,7 @@ Polyline in_um(const std::vector<cv::Point2d>& points, const Field& field) {
 TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
                               const FibreParameters& p) {
   std::vector<double> all, apart;
-  for (const Trace& t : traces) all.push_back(significance_of(t.points, t.height, ridges, field, p));
+  for (const Trace& t : traces) all.push_back(significance_of(t.points, t.own_height(), ridges, field, p));
   const TextureLines first = texture_lines(all);
   std::vector<Polyline> fibres_um;
   for (std::size_t i = 0; i < traces.size(); ++i)
@@ -109,7 +109,7 @@ cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, c
   cv::Mat is_free = field.is_inside.clone();
   const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
   for (const Trace& t : traces) {
-    if (texture.expected_false(significance_of(t.points, t.height, ridges, field, p)) > p.fibre_false_per_cell)
+    if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > p.fibre_false_per_cell)
       continue;
     for (const cv::Point2d& point : t.points) cv::circle(is_free, cv::Point(point), radius, cv::Scalar(0), cv::FILLED);
   }
@@ -138,7 +138,7 @@ struct Judge {
     };
     c.points_um = cut(c.points_um);
     points = cut(points);
-    c.significance = significance_of(points, cut(trace.height), ridges, field, p);
+    c.significance = significance_of(points, cut(trace.own_height()), ridges, field, p);
     c.expected_false = texture.expected_false(c.significance);
     if (kFalseBeside * c.expected_false > p.fibre_false_per_cell) return std::nullopt;
     c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);

@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <numbers>
+#include <numeric>
 
 #include "segment/grid.h"
 #include "segment/trace_join.h"
@@ -27,9 +29,16 @@ class Claims {
     if (x < 0 || y < 0 || x >= bits_.cols || y >= bits_.rows) return false;
     return (bits_.at<int>(y, x) >> index(angle_rad)) & 1;
   }
+  /// Lines within two of the filter's directions.
   void add(cv::Point2d point, double angle_rad, double radius_px) {
     int mask = 0;
     for (int k = -2; k <= 2; ++k) mask |= 1 << ((index(angle_rad) + k + n_) % n_);
+    add(point, mask, radius_px);
+  }
+  void add_all_directions(cv::Point2d point, double radius_px) { add(point, (1 << n_) - 1, radius_px); }
+
+ private:
+  void add(cv::Point2d point, int mask, double radius_px) {
     const int r = static_cast<int>(std::ceil(radius_px));
     for (int dy = -r; dy <= r; ++dy)
       for (int dx = -r; dx <= r; ++dx) {
@@ -39,7 +48,6 @@ class Claims {
       }
   }
 
- private:
   int index(double angle_rad) const {
     const int k = static_cast<int>(std::lround(angle_rad / pi * n_)) % n_;
     return k < 0 ? k + n_ : k;
@@ -60,6 +68,7 @@ struct Step {
   cv::Point2d point;
   double angle;
   double height;
+  bool is_shared = false;
 };
 
 /// Best direction within one filter direction of the present one, then the ridge's centre across it.
@@ -110,8 +119,10 @@ std::vector<Step> follow(const Ridges& ridges, const Claims& claims, const Trace
         if (!is_on(ridges.noise, now.point)) break;
       }
       now.height = ridges.at(now.point, now.angle);
+      now.is_shared = true;
     } else {
       now = settle(ridges, rule, now);
+      now.is_shared = false;
       last_free = steps.size() + 1;
     }
     steps.push_back(now);
@@ -137,6 +148,7 @@ Trace trace_from(const Ridges& ridges, const Claims& claims, const TraceRule& ru
   const auto add = [&](const Step& s) {
     trace.points.push_back(s.point);
     trace.height.push_back(s.height);
+    trace.is_shared.push_back(s.is_shared);
   };
   for (auto s = behind.rbegin(); s != behind.rend(); ++s) add(*s);
   add(seed);
@@ -144,12 +156,31 @@ Trace trace_from(const Ridges& ridges, const Claims& claims, const TraceRule& ru
   return trace;
 }
 
+double course_at(const Trace& trace, std::size_t i) {
+  const cv::Point2d d = trace.points[std::min(i + 2, trace.size() - 1)] - trace.points[i > 1 ? i - 2 : 0];
+  return std::atan2(d.y, d.x);
+}
+
 void claim(Claims& claims, const Trace& trace, double radius_px) {
-  for (std::size_t i = 0; i < trace.points.size(); ++i) {
-    const std::size_t a = i > 1 ? i - 2 : 0, b = std::min(i + 2, trace.points.size() - 1);
-    const cv::Point2d d = trace.points[b] - trace.points[a];
-    claims.add(trace.points[i], std::atan2(d.y, d.x), radius_px);
-  }
+  for (std::size_t i = 0; i < trace.size(); ++i) claims.add(trace.points[i], course_at(trace, i), radius_px);
+}
+
+/// Of lines most of which lie on others, of two that are one the higher or longer.
+std::vector<Trace> without_doubles(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
+  constexpr double kMost = 0.5;
+  std::ranges::stable_sort(traces, std::greater(), [](const Trace& t) {
+    const std::vector<double> own = t.own_height();
+    return std::accumulate(own.begin(), own.end(), 0.0);
+  });
+  Claims claims(ridges.noise.size(), ridges.n_directions());
+  std::erase_if(traces, [&](const Trace& t) {
+    std::size_t n = 0;
+    for (std::size_t i = 0; i < t.size(); ++i) n += claims.has(t.points[i], course_at(t, i));
+    if (static_cast<double>(n) > kMost * static_cast<double>(t.size())) return true;
+    claim(claims, t, rule.line_radius_px);
+    return false;
+  });
+  return traces;
 }
 
 /// Local maxima across their own direction that a line may start from, strongest first.
@@ -175,6 +206,7 @@ double height_at(std::vector<double> values, double share) {
 /// How many points to cut from the front: up to where the height first reaches a share of the plateau behind it, and
 /// the share of the whole line's that it may fall to.
 std::size_t faded_points(const std::vector<double>& height, const TraceRule& rule) {
+  if (height.empty()) return 0;
   const std::size_t window = std::min(height.size(), static_cast<std::size_t>(rule.end_window_px));
   const double whole = rule.follow_share * height_at(height, 0.5);
   std::size_t n = 0;
@@ -189,15 +221,39 @@ std::size_t faded_points(const std::vector<double>& height, const TraceRule& rul
 
 void cut_faded_ends(Trace& trace, const TraceRule& rule) {
   for (int side = 0; side < 2; ++side) {
-    const auto n = static_cast<std::ptrdiff_t>(faded_points(trace.height, rule));
-    trace.height.erase(trace.height.begin(), trace.height.begin() + n);
-    trace.points.erase(trace.points.begin(), trace.points.begin() + n);
-    std::reverse(trace.height.begin(), trace.height.end());
-    std::reverse(trace.points.begin(), trace.points.end());
+    trace = trace.part(faded_points(trace.height, rule), trace.size());
+    trace.reverse();
   }
 }
 
 }  // namespace
+
+Trace Trace::part(std::size_t from, std::size_t to) const {
+  const auto cut = [&](const auto& all) {
+    return std::decay_t<decltype(all)>(all.begin() + static_cast<std::ptrdiff_t>(from),
+                                       all.begin() + static_cast<std::ptrdiff_t>(to));
+  };
+  return {cut(points), cut(height), cut(is_shared)};
+}
+
+void Trace::reverse() {
+  std::reverse(points.begin(), points.end());
+  std::reverse(height.begin(), height.end());
+  std::reverse(is_shared.begin(), is_shared.end());
+}
+
+void Trace::append(const Trace& other) {
+  points.insert(points.end(), other.points.begin(), other.points.end());
+  height.insert(height.end(), other.height.begin(), other.height.end());
+  is_shared.insert(is_shared.end(), other.is_shared.begin(), other.is_shared.end());
+}
+
+std::vector<double> Trace::own_height() const {
+  std::vector<double> own = height;
+  for (std::size_t i = 0; i < own.size(); ++i)
+    if (is_shared[i]) own[i] = 0;
+  return own;
+}
 
 cv::Point2d outward(const std::vector<cv::Point2d>& points, LineEnd end, double reach) {
   const std::size_t n = points.size(), back = std::min(n - 1, static_cast<std::size_t>(std::max(1.0, reach)));
@@ -227,10 +283,14 @@ std::vector<Trace> trace_lines(const Ridges& ridges, const cv::Mat& is_inside, c
     if (claims.has(seed.point, seed.angle)) continue;
     Trace trace = trace_from(ridges, claims, rule, seed);
     claim(claims, trace, 1.33 * rule.line_radius_px);
+    // at its end a line answers in every direction
+    for (const cv::Point2d& end : {trace.points.front(), trace.points.back()})
+      claims.add_all_directions(end, 1.33 * rule.line_radius_px);
     cut_faded_ends(trace, rule);
     if (trace.points.size() >= 3) traces.push_back(std::move(trace));
   }
-  traces = joined(std::move(traces), ridges, rule);
+  traces = without_doubles(joined(std::move(traces), ridges, rule), ridges, rule);
+  for (Trace& trace : traces) cut_faded_ends(trace, rule);
   std::erase_if(traces, [&](const Trace& t) { return static_cast<double>(t.points.size()) < rule.shortest_px; });
   return traces;
 }

@@ -8,10 +8,19 @@
 
 namespace mbtfm::segment {
 
-/// One traced line: points a pixel apart, and the ridge's height at each.
+/// One traced line: points a pixel apart.
 struct Trace {
   std::vector<cv::Point2d> points;
-  std::vector<double> height;
+  std::vector<double> height;   ///< of the ridge at each
+  std::vector<bool> is_shared;  ///< the height is that of another line, upon which it runs there
+
+  std::size_t size() const { return points.size(); }
+  /// The points from `from` to before `to`.
+  Trace part(std::size_t from, std::size_t to) const;
+  void reverse();
+  void append(const Trace& other);
+  /// 0 where it is another line's.
+  std::vector<double> own_height() const;
 };
 
 struct TraceRule {

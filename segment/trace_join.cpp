@@ -134,27 +134,20 @@ std::vector<std::optional<End>> links_of(const std::vector<Fit>& fits, std::size
   return link;
 }
 
-/// Ends that lie beside each other, of one line traced twice: each gives half of what both have.
-void trim_overlap(Trace& first, Trace& second) {
-  constexpr double kCourse_px = 10;
-  const cv::Point2d beyond = first.points.back() - second.points.front();
-  const double half = beyond.dot(outward(first.points, LineEnd::last, kCourse_px)) / 2;
-  const double most = static_cast<double>(std::min(first.points.size(), second.points.size())) / 2;
-  const auto n = static_cast<std::ptrdiff_t>(std::clamp(half, 0.0, most));
-  first.points.erase(first.points.end() - n, first.points.end());
-  first.height.erase(first.height.end() - n, first.height.end());
-  second.points.erase(second.points.begin(), second.points.begin() + n);
-  second.height.erase(second.height.begin(), second.height.begin() + n);
-}
-
-void append(Trace& to, Trace piece, bool is_reversed) {
-  if (is_reversed) {
-    std::reverse(piece.points.begin(), piece.points.end());
-    std::reverse(piece.height.begin(), piece.height.end());
+/// Add the next piece of the line. Ends that lie beside each other, of one line traced twice, each give half of what
+/// both have.
+void append(Trace& line, Trace piece) {
+  if (line.size() == 0) {
+    line = std::move(piece);
+    return;
   }
-  if (!to.points.empty()) trim_overlap(to, piece);
-  to.points.insert(to.points.end(), piece.points.begin(), piece.points.end());
-  to.height.insert(to.height.end(), piece.height.begin(), piece.height.end());
+  constexpr double kCourse_px = 10;
+  const cv::Point2d beyond = line.points.back() - piece.points.front();
+  const double half = beyond.dot(outward(line.points, LineEnd::last, kCourse_px)) / 2;
+  const double most = static_cast<double>(std::min(line.size(), piece.size())) / 2;
+  const auto n = static_cast<std::size_t>(std::clamp(half, 0.0, most));
+  line = line.part(0, line.size() - n);
+  line.append(piece.part(n, piece.size()));
 }
 
 /// Where the ends of others lie on a piece: the points to cut it at.
@@ -182,12 +175,6 @@ std::vector<std::size_t> cuts_of(const std::vector<Trace>& traces, std::size_t p
   return cuts;
 }
 
-Trace part_of(const Trace& trace, std::size_t from, std::size_t to) {
-  const auto first = static_cast<std::ptrdiff_t>(from), last = static_cast<std::ptrdiff_t>(to);
-  return {{trace.points.begin() + first, trace.points.begin() + last},
-          {trace.height.begin() + first, trace.height.begin() + last}};
-}
-
 std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const TraceRule& rule) {
   constexpr std::size_t kShortest = 3;  // points
   const auto ends = ends_of(traces, rule.course_px);
@@ -203,7 +190,7 @@ std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const Trac
     std::size_t from = 0;
     for (const std::size_t to : cuts) {
       if (to - from < kShortest) continue;
-      pieces.push_back(part_of(traces[i], from, to));
+      pieces.push_back(traces[i].part(from, to));
       from = to;
     }
   }
@@ -223,7 +210,9 @@ std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const
     Trace line;
     for (std::optional<End> entry = start; entry; entry = link[opposite(*entry)]) {
       is_used[*entry / 2] = true;
-      append(line, std::move(traces[*entry / 2]), *entry % 2 == 1);
+      Trace& piece = traces[*entry / 2];
+      if (*entry % 2 == 1) piece.reverse();
+      append(line, std::move(piece));
     }
     result.push_back(std::move(line));
   }

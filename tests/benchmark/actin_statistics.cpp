@@ -193,7 +193,7 @@ void add_texture(const Scene& s, Statistics& result) {
   for (const Trace& t : trace_lines(ridges, deep, rule_of(p, s.pixel_um))) {
     const auto is_off = [&](const cv::Point2d& q) { return is_free.at<unsigned char>(cv::Point(q)) != 0; };
     if (2 * std::ranges::count_if(t.points, is_off) < static_cast<std::ptrdiff_t>(t.points.size())) continue;
-    n_lines += significance(ridges, t.points, t.height, independent_px(p, s.pixel_um)) > 7;
+    n_lines += significance(ridges, t.points, t.own_height(), independent_px(p, s.pixel_um)) > 7;
   }
   result["19 lines of significance > 7 beside the fibres, by 1000 um2"] = 1000 * n_lines / s.area_um2;
 }

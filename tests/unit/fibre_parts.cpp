@@ -1,6 +1,7 @@
 /// The parts of the fibre finder: what lies beside fibres, what a faint end leads to, what counts as texture.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -28,9 +29,51 @@ TEST(FibreParts, a_line_is_beside_a_fibre_that_is_near_and_parallel) {
   EXPECT_DOUBLE_EQ(share_beside(straight({2, 1}, {12, 1}), {}), 0);
 }
 
+/// Lines whose significances follow the law of texture, S = 3 + s (−ln u)^(1/1.3).
+std::vector<double> lines_of_texture(int n, double scale, unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<double> uniform(1e-12, 1);
+  std::vector<double> significances;
+  for (int i = 0; i < n; ++i) significances.push_back(3 + scale * std::pow(-std::log(uniform(random)), 1 / 1.3));
+  return significances;
+}
+
+/// Of 40 cells of texture, the number of lines above the limit where two are expected has the mean 2 and spread of a
+/// count (and a little of the scale's error); a tenth of the cell's lines being fibres changes little.
+TEST(FibreParts, as_many_lines_of_texture_are_taken_for_fibres_as_expected) {
+  for (const double scale : {1.5, 2.0, 3.0})
+    for (const int n_fibres : {0, 20}) {
+      SCOPED_TRACE(scale);
+      double n_false = 0;
+      constexpr int kCells = 40;
+      for (unsigned seed = 1; seed <= kCells; ++seed) {
+        std::vector<double> lines = lines_of_texture(200, scale, seed);
+        const std::vector<double> texture = lines;
+        lines.insert(lines.end(), static_cast<std::size_t>(n_fibres), 25.0);
+        const TextureLines t = texture_lines(lines);
+        n_false +=
+            static_cast<double>(std::ranges::count_if(texture, [&](double s) { return t.expected_false(s) <= 2; }));
+      }
+      EXPECT_NEAR(n_false / kCells, 2, 1);
+    }
+}
+
 TEST(FibreParts, more_significant_lines_are_made_by_chance_less_often_and_by_more_texture_more_often) {
-  EXPECT_LT(expected_false_lines(12, 2000), expected_false_lines(11, 2000));
-  EXPECT_DOUBLE_EQ(expected_false_lines(11, 2000), 2 * expected_false_lines(11, 1000));
+  const TextureLines fine = texture_lines(lines_of_texture(100, 1.5, 1)),
+                     coarse = texture_lines(lines_of_texture(100, 3, 1)),
+                     many = texture_lines(lines_of_texture(400, 1.5, 1));
+  for (const double s : {7.0, 9.0, 12.0}) {
+    EXPECT_LT(fine.expected_false(s + 1), fine.expected_false(s));
+    EXPECT_GT(coarse.expected_false(s), fine.expected_false(s));
+    EXPECT_GT(many.expected_false(s), fine.expected_false(s));
+    EXPECT_GT(fine.chance_of_fibre(s), coarse.chance_of_fibre(s));
+    EXPECT_GT(coarse.chance_of_fibre(s, 0.1), coarse.chance_of_fibre(s));
+  }
+}
+
+TEST(FibreParts, a_line_of_two_deviations_is_none_in_the_cleanest_cell) {
+  EXPECT_GE(texture_lines({}).expected_false(6.9), 20);
+  EXPECT_LT(texture_lines({}).expected_false(12), 0.1);
 }
 
 Adhesion adhesion_at(Vec2 position) {
@@ -64,6 +107,41 @@ TEST(FibreParts, a_long_fibre_is_led_on_along_its_faint_end_to_the_adhesion_ther
   EXPECT_NEAR(norm(bright.fibre.points_um.back() - adhesions[0].position_um), 0, 1e-9);
 }
 
+Fibre line_held_at_start(Vec2 from, Vec2 to) {
+  Fibre f;
+  f.points_um = straight(from, to);
+  f.start_adhesion_id = 7;
+  f.type = FibreType::dorsal;
+  return f;
+}
+
+TEST(FibreParts, a_fibre_that_spans_the_cell_is_held_at_its_far_end_by_an_anchor) {
+  const Polygon outline = {{-5, -20}, {45, -20}, {45, 20}, {-5, 20}};
+  std::vector<Adhesion> adhesions = {adhesion_at({0, 0})};
+  std::vector<Fibre> fibres = {line_held_at_start({0, 0}, {30, 3}), line_held_at_start({0, 0}, {30, 3.2}),
+                               line_held_at_start({0, 0}, {9, 3})};
+  hold_far_ends(fibres, adhesions, outline, {}, 1);
+  ASSERT_EQ(adhesions.size(), 2u);  // ends that meet share it
+  EXPECT_EQ(adhesions[1].origin, AdhesionOrigin::anchor);
+  EXPECT_EQ(adhesions[1].adhesion_id, 8);
+  for (const std::size_t i : {0u, 1u}) {
+    EXPECT_EQ(fibres[i].type, FibreType::ventral);
+    EXPECT_EQ(fibres[i].end_adhesion_id, 8);
+    EXPECT_EQ(fibres[i].points_um.back(), adhesions[1].position_um);
+  }
+  EXPECT_EQ(fibres[2].type, FibreType::dorsal);  // short ones may be dorsal
+  EXPECT_FALSE(fibres[2].end_adhesion_id);
+}
+
+TEST(FibreParts, a_fibre_that_leaves_the_image_is_held_by_no_anchor_there) {
+  const Polygon outline = {{-5, -20}, {30, -20}, {30, 20}, {-5, 20}};
+  std::vector<Adhesion> adhesions = {adhesion_at({0, 0})};
+  std::vector<Fibre> fibres = {line_held_at_start({0, 0}, {30, 3})};
+  hold_far_ends(fibres, adhesions, outline, {{{30, -20}, {30, 20}}}, 1);
+  EXPECT_EQ(adhesions.size(), 1u);
+  EXPECT_FALSE(fibres[0].end_adhesion_id);
+}
+
 TEST(FibreParts, a_way_that_reaches_no_adhesion_changes_nothing) {
   TracedFibre t = traced(20, 3);
   const Polyline before = t.fibre.points_um;
@@ -86,7 +164,7 @@ TEST(FibreParts, a_bright_line_that_is_in_no_fibre_is_told_and_a_faint_one_is_no
     for (int x = 30; x < 220; ++x) fibres.back().emplace_back(x, y);
   }
   const cv::Mat is_inside(kSide, kSide, CV_8U, cv::Scalar(255));
-  const RidgeScales scales{.width_sigma_px = {2}, .length_sigma_px = 4, .noise_radius_px = 40};
+  const RidgeScales scales{.width_sigma_px = 2, .length_sigma_px = 4, .noise_radius_px = 40};
   const auto beside = [&] {
     return bright_crests_beside(find_ridges(image, is_inside, scales), is_inside, fibres, 8, 20);
   };
