@@ -49,15 +49,15 @@ double TextureLines::chance_of_fibre(double significance, double factor) const {
 }
 
 TextureLines texture_lines(std::vector<double> significances) {
-  constexpr double kHardly = 10;             // texture hardly makes more significant ones
-  constexpr double kPrior = 10, kUsual = 2;  // a few lines do not tell the scale: as many of the usual one are added
-  std::erase_if(significances, [](double s) { return s >= kHardly || s < kLeast; });
+  constexpr double kFewest = 10;
+  constexpr double kPrior = 30, kUsual = 2;  // a few lines do not tell the scale: as many of the usual one are added
+  std::erase_if(significances, [](double s) { return s >= kHardlyTexture || s < kLeast; });
   const auto n = static_cast<double>(significances.size());
-  if (significances.empty()) return {kPrior, kUsual};
+  if (significances.empty()) return {kFewest, kUsual};
   const auto middle = significances.begin() + static_cast<std::ptrdiff_t>(significances.size() / 2);
   std::nth_element(significances.begin(), middle, significances.end());
   const double scale = (*middle - kLeast) / std::pow(std::numbers::ln2, 1 / kShape);  // of a median
-  return {n + kPrior, (n * scale + kPrior * kUsual) / (n + kPrior)};
+  return {n + kFewest, (n * scale + kPrior * kUsual) / (n + kPrior)};
 }
 
 double share_beside(const Polyline& line_um, const std::vector<Polyline>& fibres_um) {

@@ -15,6 +15,9 @@ namespace mbtfm::segment {
 double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
                     double independent_px);
 
+/// Texture hardly makes more significant lines.
+constexpr double kHardlyTexture = 10;
+
 /// The lines that a cell's texture makes: how many, and how significant they are as a rule.
 struct TextureLines {
   double n = 0;

@@ -93,10 +93,9 @@ TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ri
                               const FibreParameters& p) {
   std::vector<double> all, apart;
   for (const Trace& t : traces) all.push_back(significance_of(t.points, t.own_height(), ridges, field, p));
-  const TextureLines first = texture_lines(all);
   std::vector<Polyline> fibres_um;
   for (std::size_t i = 0; i < traces.size(); ++i)
-    if (first.expected_false(all[i]) <= p.fibre_false_per_cell) fibres_um.push_back(in_um(traces[i].points, field));
+    if (all[i] >= kHardlyTexture) fibres_um.push_back(in_um(traces[i].points, field));
   for (std::size_t i = 0; i < traces.size(); ++i)
     if (share_beside(in_um(traces[i].points, field), fibres_um) < kMostBeside) apart.push_back(all[i]);
   return texture_lines(std::move(apart));

@@ -29,10 +29,15 @@ double transfer(double wx, double wy, cv::Point2d e, double w, double l) {
 cv::Mat pair_of_filters(int side, cv::Point2d e1, cv::Point2d e2, double w, double l) {
   cv::Mat filters(side, side, CV_32FC2);
   const auto frequency = [&](int i) { return 2 * pi * (i <= side / 2 ? i : i - side) / side; };
+  // of the kernel sampled at the pixels, whose spectrum repeats: cut off at the grid's highest frequency it would ring
+  const auto sampled = [&](int x, int y, cv::Point2d e) {
+    double sum = 0;
+    for (const int i : {-1, 0, 1})
+      for (const int j : {-1, 0, 1}) sum += transfer(frequency(x) + 2 * pi * i, frequency(y) + 2 * pi * j, e, w, l);
+    return static_cast<float>(sum);
+  };
   for (int y = 0; y < side; ++y)
-    for (int x = 0; x < side; ++x)
-      filters.at<std::complex<float>>(y, x) = {static_cast<float>(transfer(frequency(x), frequency(y), e1, w, l)),
-                                               static_cast<float>(transfer(frequency(x), frequency(y), e2, w, l))};
+    for (int x = 0; x < side; ++x) filters.at<std::complex<float>>(y, x) = {sampled(x, y, e1), sampled(x, y, e2)};
   return filters;
 }
 

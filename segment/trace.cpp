@@ -220,10 +220,9 @@ std::size_t faded_points(const std::vector<double>& height, const TraceRule& rul
 }
 
 void cut_faded_ends(Trace& trace, const TraceRule& rule) {
-  for (int side = 0; side < 2; ++side) {
-    trace = trace.part(faded_points(trace.height, rule), trace.size());
-    trace.reverse();
-  }
+  const std::size_t first = faded_points(trace.height, rule);
+  const std::size_t last = trace.size() - faded_points({trace.height.rbegin(), trace.height.rend()}, rule);
+  trace = first < last ? trace.part(first, last) : Trace{};
 }
 
 }  // namespace

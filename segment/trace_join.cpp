@@ -54,13 +54,12 @@ std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridge
   constexpr double kHeight = 0.5;  // logarithm
   constexpr double kWorst = 9;
   const cv::Point2d gap = b.point - a.point;
-  const double distance = std::hypot(gap.x, gap.y), overlap = -gap.dot(a.outward);
+  const cv::Point2d course = a.outward - b.outward, along = course / std::max(1e-9, std::hypot(course.x, course.y));
+  const double distance = std::hypot(gap.x, gap.y), overlap = -gap.dot(along);
   if (distance > rule.join_gap_px || overlap > rule.overlap_px) return std::nullopt;
   if (std::min(a.height, b.height) < rule.follow_share * std::max(a.height, b.height)) return std::nullopt;
   const double turn = angle_between(a.outward, -b.outward) / kTurn;
-  const cv::Point2d along = a.outward - b.outward;
-  const double sideways = std::abs(gap.cross(along)) / std::max(1e-9, std::hypot(along.x, along.y)) /
-                          (rule.line_radius_px / 2 + (overlap > 0 ? 0 : 0.1 * distance));
+  const double sideways = std::abs(gap.cross(along)) / (rule.line_radius_px / 2 + (overlap > 0 ? 0 : 0.1 * distance));
   const double far = 2 * distance / rule.join_gap_px;
   const double height = std::log(a.height / b.height) / kHeight;
   const double sum = turn * turn + sideways * sideways + far * far + height * height;
