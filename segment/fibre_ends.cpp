@@ -91,16 +91,17 @@ Vec2 direction_of_end(const Polyline& last) {
 
 /// Least effort from the course of the line around its end to the adhesion: some way back along the line, as far
 /// straight ahead.
-double effort_to(const Adhesion& adhesion, const Polyline& last, double ahead_cost) {
+double effort_to(const Adhesion& adhesion, const Polyline& last, double ahead_cost, double farthest_um) {
   constexpr double kAside = 2;   // a fibre goes on ahead, it does not turn aside
   constexpr double kBack = 0.3;  // a line may run on a little over the adhesion that holds it
   const Vec2 ahead = direction_of_end(last);
+  constexpr double kStep_um = 0.1;
+  const auto aside = [&](Vec2 p) { return kAside * std::max(0.0, distance_to_ellipse_um(adhesion, p)); };
   double least = kInfinite;
-  for (std::size_t i = 0; i < last.size(); ++i) {
-    const double s = 0.1 * static_cast<double>(i);
-    const auto aside = [&](Vec2 p) { return kAside * std::max(0.0, distance_to_ellipse_um(adhesion, p)); };
-    least = std::min({least, aside(last[i]) + kBack * s, aside(last.front() + s * ahead) + ahead_cost * s});
-  }
+  for (std::size_t i = 0; i < last.size(); ++i)
+    least = std::min(least, aside(last[i]) + kBack * kStep_um * static_cast<double>(i));
+  for (double s = 0; s <= farthest_um; s += kStep_um)
+    least = std::min(least, aside(last.front() + s * ahead) + ahead_cost * s);
   return least;
 }
 
@@ -126,7 +127,7 @@ Hold hold_of(const Polyline& line, const std::vector<Adhesion>& adhesions, const
   double least = kInfinite;
   for (const Adhesion& a : adhesions) {
     if (norm(a.position_um - line.back()) > 3 * reach_um + a.major_axis_um) continue;
-    const double effort = effort_to(a, last, ahead_cost);
+    const double effort = effort_to(a, last, ahead_cost, (1 + kDirectionCounts) * reach_um / ahead_cost);
     // between two that the line touches, the one whose centre it passes nearer
     const double cost = effort + 0.2 * distance_to_line_um({last.back(), last.front()}, a.position_um);
     if (cost < least) {
