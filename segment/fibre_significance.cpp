@@ -60,24 +60,45 @@ TextureLines texture_lines(std::vector<double> significances) {
   return {n + kFewest, (n * scale + kPrior * kUsual) / (n + kPrior)};
 }
 
-double share_beside(const Polyline& line_um, const std::vector<Polyline>& fibres_um) {
-  constexpr double kBeside_um = 3;      // bundles of one carpet lie nearer
+namespace {
+
+constexpr double kBeside_um = 3;  // bundles of one carpet lie nearer
+constexpr std::size_t kEach = 3;  // point
+
+Vec2 direction_at(const Polyline& line, std::size_t i) {
+  const Vec2 d = line[std::min(i + kEach, line.size() - 1)] - line[i >= kEach ? i - kEach : 0];
+  return (1 / std::max(norm(d), 1e-12)) * d;
+}
+
+std::pair<int, int> square_of(Vec2 p, int dx = 0, int dy = 0) {
+  return {static_cast<int>(std::floor(p.x / kBeside_um)) + dx, static_cast<int>(std::floor(p.y / kBeside_um)) + dy};
+}
+
+}  // namespace
+
+void Bundles::add(const Polyline& line_um) {
+  for (std::size_t i = 0; i < line_um.size(); i += kEach)
+    squares_[square_of(line_um[i])].push_back({line_um[i], direction_at(line_um, i)});
+}
+
+bool Bundles::has_beside(const Place& place) const {
   constexpr double kParallel = 0.9659;  // cosine of 15°
-  std::size_t n = 0, n_beside = 0;
-  const auto direction = [](const Polyline& l, std::size_t i) {
-    const Vec2 d = l[std::min(i + 3, l.size() - 1)] - l[i > 2 ? i - 3 : 0];
-    return (1 / std::max(norm(d), 1e-12)) * d;
-  };
-  const auto is_beside = [&](Vec2 p, Vec2 along, const Polyline& fibre) {
-    for (std::size_t k = 0; k < fibre.size(); k += 3) {
-      if (norm(fibre[k] - p) < kBeside_um && std::abs(dot(direction(fibre, k), along)) > kParallel) return true;
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      const auto found = squares_.find(square_of(place.position_um, dx, dy));
+      if (found == squares_.end()) continue;
+      for (const Place& other : found->second)
+        if (norm(other.position_um - place.position_um) < kBeside_um &&
+            std::abs(dot(other.along, place.along)) > kParallel)
+          return true;
     }
-    return false;
-  };
-  for (std::size_t i = 0; i < line_um.size(); i += 3, ++n) {
-    const Vec2 along = direction(line_um, i);
-    n_beside += std::ranges::any_of(fibres_um, [&](const Polyline& f) { return is_beside(line_um[i], along, f); });
-  }
+  return false;
+}
+
+double Bundles::share_beside(const Polyline& line_um) const {
+  std::size_t n = 0, n_beside = 0;
+  for (std::size_t i = 0; i < line_um.size(); i += kEach, ++n)
+    n_beside += has_beside({line_um[i], direction_at(line_um, i)});
   return static_cast<double>(n_beside) / static_cast<double>(std::max<std::size_t>(1, n));
 }
 

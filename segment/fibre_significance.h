@@ -1,7 +1,9 @@
 /// What tells a bundle from the meshwork of the cortex. Internal to segment/ (OpenCV types).
 #pragma once
 
+#include <map>
 #include <opencv2/core.hpp>
+#include <utility>
 #include <vector>
 
 #include "pipeline/contract/types.h"
@@ -33,10 +35,21 @@ struct TextureLines {
 /// From the lines of the cell itself, most of which are its texture's.
 TextureLines texture_lines(std::vector<double> significances);
 
-/// Share of a line that has one of these fibres beside it: nearer than 3 um, at less than 15 degrees. Bundles lie in
-/// carpets; a line of texture is beside one by chance.
-/// @param line_um, fibres_um  with points about a pixel apart
-double share_beside(const Polyline& line_um, const std::vector<Polyline>& fibres_um);
+/// Lines that others may lie beside. Bundles lie in carpets; a line of texture is beside one by chance.
+class Bundles {
+ public:
+  /// @param line_um  with points about a pixel apart
+  void add(const Polyline& line_um);
+  /// Share of a line that has one of these beside it: nearer than 3 um, at less than 15 degrees.
+  double share_beside(const Polyline& line_um) const;
+
+ private:
+  struct Place {
+    Vec2 position_um, along;
+  };
+  bool has_beside(const Place& place) const;
+  std::map<std::pair<int, int>, std::vector<Place>> squares_;
+};
 
 /// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond
 /// its net turning, by length.

