@@ -37,7 +37,7 @@ void declare(ParameterList& list, CandidateParameters& p) {
   list.add("candidate_band_um", p.candidate_band_um, Range::size_um(),
            "adhesions = cell: candidates lie this near to the cell's edge (um)");
   list.add("anchor_area_um2", p.anchor_area_um2, Range::area_um2(),
-           "area of the anchor that holds the end of a fibre drawn by hand where no adhesion is (um²)");
+           "area of the anchor that holds the end of a fibre where no adhesion is (um²)");
 }
 
 AdhesionSource source_of(const CandidateParameters& p, bool shows_adhesions, bool has_mask) {

@@ -169,9 +169,10 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                 static_cast<double>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::candidate, &Adhesion::origin)),
                 assumption_of(s, is_assumed_by_itself), severity_of(s)),
         noticed(FindingKind::fibre_ends_anchored, s.n_anchors,
-                (s.n_anchors == 1 ? "One end of the drawn fibres reaches no adhesion. It is held by an anchor."
-                                  : std::to_string(s.n_anchors) +
-                                        " ends of the drawn fibres reach no adhesion. They are held by anchors."))}) {
+                (s.n_anchors == 1
+                     ? "One end of a fibre that must be held reaches no adhesion. It is held by an anchor."
+                     : std::to_string(s.n_anchors) +
+                           " ends of fibres that must be held reach no adhesion. They are held by anchors."))}) {
     if (found) report.findings.push_back(std::move(*found));
   }
   for (const std::string& sentence : s.unused)

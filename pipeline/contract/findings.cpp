@@ -49,11 +49,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "segment.adhesions = pattern, with the pattern as "
        "images.adhesion_mask. Read sums of forces over neighbours, not single ones."},
       {fibre_ends_anchored, "fibre-ends-anchored", "segment", note,
-       "ends of drawn fibres that reach no adhesion and are held by an anchor", 0,
-       "ventral and edge fibres are held at both ends, dorsal ones at one: the drawing says that something holds them",
-       "Check these ends in 1_segment/overlay.png (dashed circles). A fibre that is held nowhere is an arc: name it "
-       "so. "
-       "An adhesion that was missed: lower segment.adhesion_seed_noise, or draw it, too."},
+       "ends of fibres that reach no adhesion and are held by an anchor", 0,
+       "ventral and edge fibres are held at both ends, dorsal ones at one; fibres that span the cell are ventral as a "
+       "rule",
+       "Check these ends in 1_segment/overlay.png (dashed circles). An adhesion that was missed: lower "
+       "segment.adhesion_seed_noise, or draw it. A fibre that is not held there: draw it and name it dorsal or arc."},
       {input_not_used, "input-not-used", "segment", note, "inputs that another one took the place of", 0,
        "a selection drawn by hand counts more than a mask, and what [segment] says counts more than both",
        "Remove the one that must not count."},

@@ -49,7 +49,7 @@ std::string adhesions_in_words(const Cell& cell) {
     if (n > 0) text += (text.empty() ? "" : ", ") + counted(n, one, many);
   };
   add(n_seen, "adhesion", "adhesions");
-  add(n_anchors, "anchor of a drawn fibre", "anchors of drawn fibres");
+  add(n_anchors, "anchor at the end of a fibre", "anchors at ends of fibres");
   add(n_candidates, "candidate for an adhesion", "candidates for adhesions");
   return text.empty() ? "0 adhesions" : text;
 }
