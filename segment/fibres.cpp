@@ -212,18 +212,24 @@ double height_of_cortex(const Judge& judge) {
   return heights.empty() ? std::numeric_limits<double>::infinity() : quantile_of(std::move(heights), 0.5);
 }
 
-/// All lines that are fibres. Along the edge these are only lines that stand out of the cortex.
+/// All lines that are fibres. Along the edge these are only lines that stand out of the cortex, or are as high as the
+/// cell's high fibres: where bundles line most of the edge, they are what the cortex seems to be.
 std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& judge) {
   std::vector<std::optional<Candidate>> inner;
-  std::vector<double> heights;
+  std::vector<double> heights, ridge_heights;
   for (const Trace& trace : traces) {
     inner.push_back(judge.candidate(trace, judge.p.fibre_edge_um));
-    if (inner.back() && inner.back()->expected_false <= judge.p.fibre_false_per_cell)
-      heights.push_back(inner.back()->profile.height);
+    if (!inner.back() || inner.back()->expected_false > judge.p.fibre_false_per_cell) continue;
+    heights.push_back(inner.back()->profile.height);
+    ridge_heights.push_back(quantile_of(trace.height, 0.5));
   }
-  constexpr std::size_t kEnough = 5;  // fewer do not tell what faint is
-  const double faint = heights.size() >= kEnough ? judge.p.fibre_faintest * quantile_of(heights, 0.5) : 0;
-  const double bright = judge.p.fibre_edge_height * height_of_cortex(judge);
+  constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
+  constexpr double kHigh = 0.8;       // of the second highest of ten
+  double faint = 0, bright = judge.p.fibre_edge_height * height_of_cortex(judge);
+  if (heights.size() >= kEnough) {
+    faint = judge.p.fibre_faintest * quantile_of(heights, 0.5);
+    bright = std::min(bright, kHigh * quantile_of(ridge_heights, 0.9));
+  }
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < traces.size(); ++i) {
     std::optional<Candidate> whole;
