@@ -207,7 +207,7 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
 /// Takes beads and data to the state that explains them better. Of a series every frame has a state of its own.
 Effect take_state_of(FitInputs& inputs, LinearData& data,
                      const std::function<LinearData(const DisplacementField&)>& data_of, bool is_series,
-                     const EffectSwitches& effects) {
+                     const EffectSwitches& effects, const Gel& gel, int threads) {
   if (is_series && effects.beads_under_load == "on")
     throw UsageError("beads_under_load = on takes no time series: all frames share the beads' places at rest");
   if (is_series)
@@ -217,8 +217,12 @@ Effect take_state_of(FitInputs& inputs, LinearData& data,
   for (const Adhesion& a : inputs.cell.adhesions) area_um2 += a.area_um2;
   const double size_um =
       std::sqrt(area_um2 / static_cast<double>(std::max<std::size_t>(1, inputs.cell.adhesions.size())));
-  BeadsOfState state =
-      take_state(inputs.beads, std::move(data), data_of, size_um, effects.effect_tolerance, effects.beads_under_load);
+  const auto carried = [&](const LinearData& at_rest) {
+    return carried_um(gel, ellipses_of(inputs.cell), free_forces_nN(at_rest.reduced), at_rest.position_um,
+                      at_rest.displacement_um, threads);
+  };
+  BeadsOfState state = take_state(inputs.beads, std::move(data), data_of, size_um, effects.effect_tolerance,
+                                  effects.beads_under_load, carried);
   inputs.beads = std::move(state.beads);
   data = std::move(state.data);
   return state.effect;
@@ -291,19 +295,20 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   };
   Responses responses = responses_of(inputs.beads, series, response_on);
   const bool moves = allows_common_motion(p.effects);
-  LinearData data =
-      reduce(inputs.beads, std::move(responses.of_beads), beads_in_region(inputs.beads, inputs.cell, p.fit),
-             context.threads, moves ? affine_motions(inputs.beads) : Eigen::MatrixXd());
+  const auto reduced = [&](const DisplacementField& beads, substrate::SharedResponse response) {
+    return reduce(beads, std::move(response), beads_in_region(beads, inputs.cell, p.fit), context.threads,
+                  moves ? affine_motions(beads) : Eigen::MatrixXd());
+  };
+  LinearData data = reduced(inputs.beads, std::move(responses.of_beads));
   std::optional<ForcesBeyond> beyond;
   if (allows_forces_beyond(p.effects, cell)) beyond = allow_forces_beyond(data, cell, p.gel);
   const auto data_of = [&](const DisplacementField& beads) {
-    LinearData there = reduce(beads, response_on(beads), beads_in_region(beads, inputs.cell, p.fit), context.threads,
-                              moves ? affine_motions(beads) : Eigen::MatrixXd());
+    LinearData there = reduced(beads, response_on(beads));
     if (beyond) allow_forces_beyond(there, inputs.cell, p.gel);
     return there;
   };
-  const DisplacementField at_rest = inputs.beads;
-  const Effect under_load = take_state_of(inputs, data, data_of, !series.empty(), p.effects);
+  const DisplacementField as_tracked = inputs.beads;
+  const Effect under_load = take_state_of(inputs, data, data_of, !series.empty(), p.effects, p.gel, context.threads);
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
   std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
@@ -326,9 +331,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
       network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
   context.progress(0.35, "placing the cell on the beads");
-  const DisplacementField measured = inputs.beads;
+  const DisplacementField in_state = inputs.beads;
   const bool can_be_shifted = p.effects.channel_shift != "auto" || !has_candidates(cell);
-  PlacedCell place = place_cell(inputs.cell, networks.front(), measured, data, data_of, p.gel, p.fit, start,
+  PlacedCell place = place_cell(inputs.cell, networks.front(), in_state, data, data_of, p.gel, p.fit, start,
                                 can_be_shifted ? p.effects.channel_shift : "off", context.threads);
   if (!can_be_shifted)
     place.effect =
@@ -336,7 +341,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
                 "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
   data = std::move(place.data);
   if (place.effect.is_on) {
-    inputs.beads = in_cell_frame(measured, place.placement);
+    inputs.beads = in_cell_frame(in_state, place.placement);
     for (SeriesFrame& frame : series) frame.beads = in_cell_frame(frame.beads, place.placement);
     if (!series.empty()) responses = responses_of(inputs.beads, series, response_on);
     start = std::move(place.start);
@@ -359,7 +364,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const std::vector<Tension> tensions = tensions_of(fit);
   const std::vector<AdhesionForce> forces = forces_of(fit, inputs.cell);
   const auto fitted_field = [&](const Eigen::VectorXd& forces_nN) {
-    return in_bead_frame(field_of(forces_nN, inputs, data), at_rest, place.placement);
+    return in_bead_frame(field_of(forces_nN, inputs, data), as_tracked, place.placement);
   };
   const DisplacementField fitted = fitted_field(fit.forces_nN);
   FitSummary summary = summary_of(fit, data, inputs, networks, p.fit);
@@ -408,7 +413,7 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
   write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
   write_displacement(context.output("out", "displacement_without_fibres.csv"), fitted_field(models.front().forces_nN));
-  write_displacement_vtp(context.output("out", "displacement.vtp"), at_rest, fitted,
+  write_displacement_vtp(context.output("out", "displacement.vtp"), as_tracked, fitted,
                          {most_informed_array(influence), weight_array(data)});
   const auto allow = [&](LinearData& of_frame, const Eigen::VectorXd& forces_nN) {
     if (beyond) allow_forces_beyond(of_frame, cell, p.gel);

@@ -64,18 +64,28 @@ void take_off(const LinearData& data, const Eigen::VectorXd& weight, const Eigen
   add_upper_gram(pulled.transpose(), gram, data.threads, -1);
 }
 
+struct Explained {
+  Eigen::VectorXd target;    ///< y = C⁻ᵀ Gᵀ W² P u
+  double floor_squared = 0;  ///< uᵀ W² P u − |y|², Λ included
+};
+
+/// @param root  C
+Explained explained(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& root,
+                    const Eigen::VectorXd& u) {
+  const Eigen::VectorXd weighted = weight.cwiseProduct(less_motion(data, u));
+  Eigen::MatrixXd target = data.response->pull_back(weighted);
+  solve_upper_transposed(root, target);
+  return {.target = target, .floor_squared = std::max(0.0, weighted.dot(u) - target.squaredNorm())};
+}
+
 /// From A = Gᵀ W² P G = Cᵀ C and y = C⁻ᵀ Gᵀ W² P u.
 /// @param trace  of A before anything was taken off it
 void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Eigen::MatrixXd A, double trace) {
   auto [root, n_felt] = root_of(std::move(A), trace, data.threads);
-  const Eigen::VectorXd u = less_motion(data, data.displacement_um);
-  const Eigen::VectorXd weighted_u = weight.cwiseProduct(u);
-  Eigen::MatrixXd target = data.response->pull_back(weighted_u);
-  solve_upper_transposed(root, target);
+  auto [target, floor_squared] = explained(data, weight, root, data.displacement_um);
   data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root)),
-                  .target = target,
-                  .floor_squared = std::max(
-                      0.0, weighted_u.dot(data.displacement_um) - target.squaredNorm()),  // uᵀ W² P u, Λ included
+                  .target = std::move(target),
+                  .floor_squared = floor_squared,
                   .n_components = data.n_used,
                   .n_felt = n_felt,
                   .is_upper = true};
@@ -234,6 +244,10 @@ double total_nN(const Eigen::VectorXd& forces_nN) {
   double sum = 0;
   for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
   return sum;
+}
+
+double floor_squared_of(const LinearData& data, const Eigen::VectorXd& displacement_um) {
+  return explained(data, squared_weights(data), *data.reduced.compliance, displacement_um).floor_squared;
 }
 
 double noise_variance(const LinearData& data) {

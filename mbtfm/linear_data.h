@@ -110,6 +110,9 @@ double total_nN(const Eigen::VectorXd& forces_nN);
 /// residual_um, times W
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
+/// What no force explains of these displacements (um, 2·beads) in place of the data's: reduced.floor_squared of them.
+double floor_squared_of(const LinearData& data, const Eigen::VectorXd& displacement_um);
+
 /// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
 /// below the stated errors'.
 double noise_variance(const LinearData& data);

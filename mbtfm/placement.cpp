@@ -45,6 +45,18 @@ Slopes slopes_of_ellipse(const substrate::HalfSpaceEllipse& field, double step_u
   return {difference({step_um, 0}), difference({0, step_um})};
 }
 
+constexpr double kPoint = 4;  // semi-axes: from there on the field is a point force's within (1/4)² / 2
+
+bool is_far(const Ellipse& ellipse, Vec2 offset) {
+  const double reach = kPoint * ellipse.semi_major_um;
+  return dot(offset, offset) > reach * reach;
+}
+
+Vec2 force_on(const Eigen::VectorXd& forces_nN, std::size_t ellipse) {
+  const auto row = 2 * static_cast<Eigen::Index>(ellipse);
+  return {forces_nN[row], forces_nN[row + 1]};
+}
+
 /// Shift x, y and turn with standard errors, of what the fit leaves of the beads, tensions and common motion following.
 struct Step {
   Eigen::Vector3d value, sigma;
@@ -118,7 +130,6 @@ DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementFiel
 Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& ellipses,
                                   const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
                                   const Eigen::VectorXd& model_um, Vec2 centre_um, int threads) {
-  constexpr double kPoint = 4;    // semi-axes: from there on the field is a point force's within (1/4)² / 2
   constexpr double kStep = 0.05;  // of the semi-minor axis, over which differences are taken
   std::vector<substrate::HalfSpaceEllipse> fields;
   for (const Ellipse& e : ellipses) fields.emplace_back(gel, e);
@@ -129,11 +140,9 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& el
     for (std::size_t k = 0; k < ellipses.size(); ++k) {
       const Ellipse& e = ellipses[k];
       const Vec2 offset = at - e.centre_um;
-      const Vec2 F{forces_nN[2 * static_cast<Eigen::Index>(k)], forces_nN[2 * static_cast<Eigen::Index>(k) + 1]};
-      const double reach = kPoint * e.semi_major_um;
-      const Slopes one = dot(offset, offset) > reach * reach
-                             ? slopes_of_point(gel, offset, F)
-                             : slopes_of_ellipse(fields[k], kStep * e.semi_minor_um, at, F);
+      const Vec2 F = force_on(forces_nN, k);
+      const Slopes one = is_far(e, offset) ? slopes_of_point(gel, offset, F)
+                                           : slopes_of_ellipse(fields[k], kStep * e.semi_minor_um, at, F);
       sum.by_x += one.by_x;
       sum.by_y += one.by_y;
     }
@@ -144,6 +153,30 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<Ellipse>& el
     motions.middleRows<2>(row) << -sum.by_x.x, -sum.by_y.x, turned.x, -sum.by_x.y, -sum.by_y.y, turned.y;
   });
   return motions;
+}
+
+Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses, const Eigen::VectorXd& forces_nN,
+                           const std::vector<Vec2>& beads_um, const Eigen::VectorXd& by_um, int threads) {
+  std::vector<substrate::HalfSpaceEllipse> fields;
+  for (const Ellipse& e : ellipses) fields.emplace_back(gel, e);
+  Eigen::VectorXd change(by_um.size());
+  parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
+    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const Vec2 at = beads_um[static_cast<std::size_t>(b)], by{by_um[row], by_um[row + 1]}, middle = at + 0.5 * by;
+    Vec2 sum;
+    for (std::size_t k = 0; k < ellipses.size(); ++k) {
+      const Vec2 offset = middle - ellipses[k].centre_um, F = force_on(forces_nN, k);
+      if (is_far(ellipses[k], offset)) {
+        const Slopes slopes = slopes_of_point(gel, offset, F);
+        sum += by.x * slopes.by_x + by.y * slopes.by_y;
+        continue;
+      }
+      const substrate::Sym2 a = fields[k].compliance_um_per_nN(at), c = fields[k].compliance_um_per_nN(at + by);
+      sum += {(c.xx - a.xx) * F.x + (c.xy - a.xy) * F.y, (c.xy - a.xy) * F.x + (c.yy - a.yy) * F.y};
+    }
+    change.segment<2>(row) << sum.x, sum.y;
+  });
+  return change;
 }
 
 void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,

@@ -44,6 +44,12 @@ Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::E
                                   const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
                                   const Eigen::VectorXd& model_um, Vec2 centre_um, int threads);
 
+/// By how much the displacement by these forces changes where each bead goes `by_um` (2·beads). By the half-space's
+/// field, as above.
+Eigen::VectorXd carried_um(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
+                           const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
+                           const Eigen::VectorXd& by_um, int threads);
+
 /// Let the beads move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
 /// them.
 void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,

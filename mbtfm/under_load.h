@@ -28,15 +28,19 @@ struct BeadsOfState {
   Effect effect;
 };
 
+/// Of data of beads at rest: by how much more the beads would move under load, by the forces that explain them at rest.
+using Carried = std::function<Eigen::VectorXd(const LinearData&)>;
+
 /// auto: under load where the beads say so. No cell model is asked: forces of the adhesions, all independent, leave the
 /// squares S of the beads, and n ln(S_rest/S_load) is twice the logarithm of the odds, as both states have the same
-/// unknowns. Fields of other programs may state the places under load already, and simulated cells are made at rest.
+/// unknowns. Where `carried` tells that the odds are hopeless, the data under load are not asked for. Fields of other
+/// programs may state the places under load already, and simulated cells are made at rest.
 ///
 /// Source: Kass & Raftery, J Am Stat Assoc 90:773, 1995: above 10 the evidence is very strong.
 /// @param data  of the beads at rest
 /// @param size_um  of an adhesion; where no bead moves by `tolerance` of it, both states are the same
 BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
                         const std::function<LinearData(const DisplacementField&)>& data_of, double size_um,
-                        double tolerance, const std::string& setting);
+                        double tolerance, const std::string& setting, const Carried& carried = {});
 
 }  // namespace mbtfm::inverse

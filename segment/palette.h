@@ -15,7 +15,7 @@ struct Colour {
 // ground.
 inline constexpr Colour kVentralColour{0, 214, 143}, kDorsalColour{86, 180, 255}, kArcColour{255, 183, 40},
     kEdgeColour{255, 122, 82}, kAdhesionColour{255, 170, 235}, kOutlineColour{225, 225, 225},
-    kUnexplainedColour{213, 94, 0};
+    kUnexplainedColour{90, 60, 255};
 
 constexpr Colour colour_of(FibreType type) {
   return type == FibreType::ventral  ? kVentralColour

@@ -112,13 +112,23 @@ TEST(RealBeads, weak_beads_on_a_mottled_ground_are_followed_by_windows_as_image_
     ours.push_back(window.displacement_um);
     there.push_back(theirs.at(window.position_um).u);
   }
-  const test::Agreement found = test::agreement(less_median(ours), less_median(there));
-  RecordProperty("median_px", std::to_string(found.median_px));
-  RecordProperty("correlation", std::to_string(found.correlation));
-  // The data set's bars are 0.2 px and 0.85. Reached: 0.21 and 0.91, where a median of these 68 windows is known to
-  // 0.02: both fields have their noise. This limit is one such error beyond what is reached.
-  EXPECT_LE(found.median_px, 0.23);
-  EXPECT_GE(found.correlation, 0.85);
+  const test::Agreement whole = test::agreement(less_median(ours), less_median(there));
+  RecordProperty("median_px", std::to_string(whole.median_px));
+  RecordProperty("correlation", std::to_string(whole.correlation));
+  // Reached: 0.21 and 0.91, where a median of these 68 windows is known to 0.02: both fields have their noise. This
+  // limit is one such error beyond what is reached.
+  EXPECT_LE(whole.median_px, 0.23);
+  EXPECT_GE(whole.correlation, 0.85);
+  // The data set states what another correlation reaches by component, x/y, and its bar for the median, 0.2 px, is such
+  // a number: a vector differs by more than either of its components. (r by component: 0.850 and 0.934.)
+  for (const Vec2 axis : {Vec2{1, 0}, Vec2{0, 1}}) {
+    const auto along = [&](std::vector<Vec2> values) {
+      for (Vec2& value : values) value = {dot(value, axis), 0};
+      return values;
+    };
+    EXPECT_LE(test::agreement(along(less_median(ours)), along(less_median(there))).median_px, 0.2)
+        << (axis.x > 0 ? "x" : "y");
+  }
 }
 
 TEST(RealBeads, a_growth_cone_moves_its_gel_as_published_tracks_say) {

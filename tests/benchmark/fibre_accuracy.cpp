@@ -8,6 +8,7 @@
 #include "segment/image.h"
 #include "segment/segment_cell.h"
 #include "tests/support/drawn_fibres.h"
+#include "tests/support/settings.h"
 
 namespace {
 
@@ -18,8 +19,7 @@ segment::SegmentParameters parameters_of(double pixel_um, const std::vector<std:
   p.pixel_size_um = pixel_um;
   ParameterList list;
   declare(list, p);
-  for (const std::string& s : settings)
-    set_from_text(parameter_named(list, s.substr(0, s.find('='))), s.substr(s.find('=') + 1));
+  test::set_all(list, settings);
   return p;
 }
 

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/fibre_losses.h"
+#include "tests/support/settings.h"
 
 namespace {
 
@@ -50,8 +51,7 @@ int main(int argc, char** argv) {
         segment::SegmentParameters p;
         ParameterList list;
         declare(list, p);
-        for (const std::string& s : settings)
-          set_from_text(parameter_named(list, s.substr(0, s.find('='))), s.substr(s.find('=') + 1));
+        test::set_all(list, settings);
         found = segment_cell(cell.adhesion, cell.actin, p).cell;
         if (has_true_adhesions) {
           found.adhesions = cell.truth.adhesions;

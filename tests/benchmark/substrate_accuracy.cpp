@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/parameters.h"
+#include "tests/support/settings.h"
 #include "tests/support/substrate_scene.h"
 
 namespace {
@@ -53,10 +54,7 @@ int run(const std::vector<std::string>& arguments) {
   ParameterList list;
   declare(list, study);
   study.substrate.model = arguments.at(0);
-  for (std::size_t k = 1; k < arguments.size(); ++k) {
-    const auto split = arguments[k].find('=');
-    set_from_text(parameter_named(list, arguments[k].substr(0, split)), arguments[k].substr(split + 1));
-  }
+  test::set_all(list, {arguments.begin() + 1, arguments.end()});
   const auto points = test::scattered_points(study.beads, 45);
   const auto ellipses = test::scattered_ellipses(study.adhesions, 35);
   const auto model = substrate::make_substrate(study.gel, study.substrate, study.threads);

@@ -92,6 +92,26 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
   }
 }
 
+TEST(Placement, what_carries_a_bead_changes_its_displacement_by_as_much_as_the_field_differs) {
+  const Cell cell = test::round_cell(12, 7);
+  constexpr double kWay_um = 0.4;  // the adhesions' radius a
+  std::vector<Vec2> beads, carried;
+  Eigen::VectorXd by(800), forces(14);
+  for (int i = 0; i < 400; ++i) {
+    const Vec2 way{kWay_um * std::sin(3 * i), kWay_um * std::cos(3 * i)};
+    beads.push_back({13 + 1.7 * (i % 20), 13 + 1.7 * (i / 20)});
+    carried.push_back(beads.back() + way);
+    by.segment<2>(2 * i) << way.x, way.y;
+  }
+  for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
+  const auto gel = substrate::make_greens(kGel, {.model = "half-space"}, 1);
+  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const Eigen::VectorXd wanted =
+      (gel->compliance_um_per_nN(carried, ellipses) - gel->compliance_um_per_nN(beads, ellipses)) * forces;
+  // Exact near an adhesion. From r = 4 a on by the slope halfway, which leaves way² / (4 r²) of 1/r.
+  EXPECT_LE((carried_um(kGel, ellipses, forces, beads, by, 2) - wanted).norm(), 1.0 / 64 * wanted.norm());
+}
+
 TEST(Placement, frames_are_each_others_inverse) {
   const Placement placement{.centre_um = {30, 20}, .shift_um = {0.4, -0.7}, .turn_rad = 0.3};
   const DisplacementField beads = {{.position_um = {3, 4}, .displacement_um = {0.1, -0.2}, .flag = {}}};

@@ -4,6 +4,7 @@
 
 #include "mbtfm/common_motion.h"
 #include "mbtfm/fit_results.h"
+#include "mbtfm/placement.h"
 #include "pipeline/contract/effects.h"
 #include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
@@ -26,7 +27,14 @@ struct PullingCell {
   LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
   BeadsOfState state(const DisplacementField& beads, const std::string& setting = "auto") const {
     return take_state(
-        beads, data_of(beads), [&](const DisplacementField& there) { return data_of(there); }, kSize_um, 0.01, setting);
+        beads, data_of(beads), [&](const DisplacementField& there) { return data_of(there); }, kSize_um, 0.01, setting,
+        carried());
+  }
+  Carried carried() const {
+    return [this](const LinearData& data) {
+      return carried_um(kGel, ellipses_of(cell), free_forces_nN(data.reduced), data.position_um, data.displacement_um,
+                        1);
+    };
   }
   /// Fitted on the network that made the forces.
   EnsembleFit fit(LinearData data) const {
@@ -85,6 +93,12 @@ TEST(UnderLoad, beads_that_are_given_under_load_stay_there) {
     const BeadsOfState state = cell.state(cell.scene.beads);
     EXPECT_FALSE(state.effect.is_on) << line_of(state.effect);
     EXPECT_EQ(state.beads[7].position_um.x, cell.scene.beads[7].position_um.x);
+    // so clearly that the data under load are not asked for; by them it is the same
+    const auto fail = [](const DisplacementField&) -> LinearData { throw std::logic_error("asked"); };
+    const LinearData data = cell.data_of(cell.scene.beads);
+    EXPECT_FALSE(take_state(cell.scene.beads, data, fail, kSize_um, 0.01, "auto", cell.carried()).effect.is_on);
+    const auto data_of = [&](const DisplacementField& there) { return cell.data_of(there); };
+    EXPECT_FALSE(take_state(cell.scene.beads, data, data_of, kSize_um, 0.01, "auto").effect.is_on);
   }
 }
 
