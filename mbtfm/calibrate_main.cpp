@@ -2,15 +2,19 @@
 #include <algorithm>
 #include <cmath>
 
-#include "mbtfm/fttc.h"
+#include "mbtfm/tractions/fttc.h"
 #include "pipeline/charts/chart.h"
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/parallel.h"
-#include "pipeline/contract/stage.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/stage.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 // From hardly smoothed to hardly a traction left: a cell's adhesions are some 0.1 to 10 um apart.
@@ -28,17 +32,17 @@ struct Cells {
 };
 
 /// The folders that hold a displacement and a fit, in alphabetical order.
-Cells read_cells(StageContext& context) {
+Cells read_cells(stage::StageContext& context) {
   const Path folder = context.input("cells", {});
   std::vector<Path> paths;
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    if (is_own_file(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
+    if (files::is_own_file(entry.path() / "4_fit/fit.json")) paths.push_back(entry.path());
   }
   std::sort(paths.begin(), paths.end());
   Cells cells;
   for (const Path& path : paths) {
-    check_cell_folder(path);
-    const FitSummary fit = read_fit_summary(path / "4_fit/fit.json");
+    files::check_cell_folder(path);
+    const FitSummary fit = files::read_fit_summary(path / "4_fit/fit.json");
     if (!fit.converged) {
       ++cells.n_not_converged;
       continue;
@@ -48,12 +52,12 @@ Cells read_cells(StageContext& context) {
                             name + "/4_fit/fit.json"});
     FittedCell cell;
     cell.name = name;
-    ParameterList list;
+    stage::ParameterList list;
     declare(list, cell.inputs.gel);
-    read_toml(list, path / "cell.toml");
-    cell.inputs.beads = read_displacement(path / "2_track/displacement.csv");
+    stage::read_toml(list, path / "cell.toml");
+    cell.inputs.beads = files::read_displacement(path / "2_track/displacement.csv");
     std::erase_if(cell.inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
-    cell.inputs.outline_um = read_outline(path / "1_segment/outline.csv").front();
+    cell.inputs.outline_um = files::read_outline(path / "1_segment/outline.csv").front();
     cell.fitted_force_nN = fit.total_force_nN;
     cells.fitted.push_back(std::move(cell));
   }
@@ -176,24 +180,25 @@ charts::Chart slope_chart(const std::vector<Comparison>& series, std::optional<d
   return chart;
 }
 
-void write_tables(StageContext& context, const std::vector<FittedCell>& cells, const std::vector<Comparison>& series) {
-  CsvText table({"length_um", "slope", "correlation", "n_cells"});
-  CsvText by_cell({"cell", "length_um", "fttc_total_force_nN", "fit_total_force_nN"});
+void write_tables(stage::StageContext& context, const std::vector<FittedCell>& cells,
+                  const std::vector<Comparison>& series) {
+  files::CsvText table({"length_um", "slope", "correlation", "n_cells"});
+  files::CsvText by_cell({"cell", "length_um", "fttc_total_force_nN", "fit_total_force_nN"});
   for (const Comparison& s : series) {
     table.add(s.length_um).add(s.line.slope).add(s.line.correlation).add(static_cast<int>(cells.size())).end_row();
     for (std::size_t c = 0; c < cells.size(); ++c) {
       by_cell.add(cells[c].name).add(s.length_um).add(s.fttc_nN[c]).add(cells[c].fitted_force_nN).end_row();
     }
   }
-  write_text(context.output("out"), table.str());
-  write_text(context.output_beside("out", "_cells.csv"), by_cell.str());
+  files::write_text(context.output("out"), table.str());
+  files::write_text(context.output_beside("out", "_cells.csv"), by_cell.str());
 }
 
-StageReport calibrate(const TractionParameters& p, StageContext& context) {
+StageReport calibrate(const TractionParameters& p, stage::StageContext& context) {
   const auto [cells, n_not_converged] = read_cells(context);
   const std::vector<double> lengths_um = lambdas_between(kLargest_um, kSmallest_um);
   std::vector<std::vector<double>> totals(cells.size());
-  parallel_for(static_cast<int>(cells.size()), context.threads, [&](int c) {
+  numerics::parallel_for(static_cast<int>(cells.size()), context.threads, [&](int c) {
     const auto i = static_cast<std::size_t>(c);
     totals[i] = total_forces_nN(cells[i], lengths_um, p);
   });
@@ -210,9 +215,9 @@ StageReport calibrate(const TractionParameters& p, StageContext& context) {
   std::vector<Comparison> shown;  // more than so far from one, the others would crowd along an axis
   std::copy_if(series.begin(), series.end(), std::back_inserter(shown),
                [](const Comparison& c) { return c.line.slope > 0.25 && c.line.slope < 4; });
-  write_text(context.output_beside("out", ".svg"),
-             charts::svg_file({forces_chart(cells, shown), slope_chart(series, slope_one_um)}, 2,
-                              {std::to_string(cells.size()) + " cells. Dashed: FTTC as the fit."}));
+  files::write_text(context.output_beside("out", ".svg"),
+                    charts::svg_file({forces_chart(cells, shown), slope_chart(series, slope_one_um)}, 2,
+                                     {std::to_string(cells.size()) + " cells. Dashed: FTTC as the fit."}));
   StageReport report{.converged = true,
                      .summary = std::to_string(cells.size()) + " cells",
                      .figures = {},
@@ -232,12 +237,12 @@ StageReport calibrate(const TractionParameters& p, StageContext& context) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions
 
 int main(int argc, char** argv) {
-  using mbtfm::FileArgument;
-  using namespace mbtfm::inverse;
-  return mbtfm::run_stage<TractionParameters>(
+  using mbtfm::stage::FileArgument;
+  using namespace mbtfm::tractions;
+  return mbtfm::stage::run_stage<TractionParameters>(
       {.name = "calibrate",
        .purpose = "compare FTTC's total forces with the fit's over finished cells, for a series of lambdas",
        .files = {{"cells", FileArgument::Kind::input, "folder of cell folders with 4_fit/fit.json"},

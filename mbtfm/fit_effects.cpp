@@ -3,16 +3,17 @@
 #include <algorithm>
 #include <optional>
 
-#include "mbtfm/beyond_cut.h"
-#include "mbtfm/common_motion.h"
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/parallel.h"
+#include "mbtfm/tensions/beyond_cut.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/numerics/parallel.h"
+#include "substrate/choice/factory.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 /// The fit again, with other networks, data or loss. From the same start as a run that has the effect from the first.
-EnsembleFit fit_again(const FittedCell& c, const std::vector<network::CableNetwork>& networks, LinearData data,
+EnsembleFit fit_again(const FittedCell& c, const std::vector<cables::CableNetwork>& networks, LinearData data,
                       const std::string& loss, int threads) {
   FitParameters parameters = c.parameters.fit;
   parameters.loss = loss;
@@ -28,7 +29,7 @@ LinearData unweighted(LinearData data) {
 
 std::optional<Change> change_by_gel(const std::string& name, const FittedCell& c,
                                     const substrate::SubstrateParameters& parameters, int threads) {
-  const auto gel = substrate::make_substrate(c.parameters.gel, parameters, threads);
+  const auto gel = choice::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.data;
   with.response = gel->response(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
   return change_between(name, c.fit,
@@ -86,7 +87,7 @@ std::optional<Change> with_forces_beyond(const Effect& e, const FittedCell& c, i
 std::optional<Change> with_fibres(const Effect& e, const FittedCell& c, int threads) {
   if (c.cell.fibres.empty()) return {};
   const auto networks = of_cables(
-      span_ensemble(network::generate_network(c.cell, c.parameters.network).network, c.cell, c.parameters, threads),
+      span_ensemble(mesh::generate_network(c.cell, c.parameters.network).network, c.cell, c.parameters, threads),
       c.networks.front().parameters());
   return change_between(e.name, c.fit, fit_again(c, networks, c.data, c.parameters.fit.loss, threads));
 }
@@ -113,24 +114,24 @@ std::string in_words(const std::string& name) {
 
 }  // namespace
 
-std::vector<network::CableNetwork> span_ensemble(const Network& first, const Cell& cell, const FitStageParameters& p,
-                                                 int threads) {
+std::vector<cables::CableNetwork> span_ensemble(const Network& first, const Cell& cell, const FitStageParameters& p,
+                                                int threads) {
   std::vector<Network> networks(static_cast<std::size_t>(p.fit.n_meshes));
   networks.front() = first;
-  parallel_for(p.fit.n_meshes - 1, threads, [&](int m) {
-    network::NetworkParameters parameters = p.network;
+  numerics::parallel_for(p.fit.n_meshes - 1, threads, [&](int m) {
+    mesh::NetworkParameters parameters = p.network;
     parameters.seed += static_cast<std::uint64_t>(m) + 1;
-    networks[static_cast<std::size_t>(m) + 1] = network::generate_network(cell, parameters).network;
+    networks[static_cast<std::size_t>(m) + 1] = mesh::generate_network(cell, parameters).network;
   });
-  std::vector<network::CableNetwork> cables;
+  std::vector<cables::CableNetwork> cables;
   for (Network& network : networks) cables.emplace_back(std::move(network), p.cables);
   return cables;
 }
 
-std::vector<network::CableNetwork> of_cables(const std::vector<network::CableNetwork>& networks,
-                                             const network::CableParameters& cables) {
-  std::vector<network::CableNetwork> result;
-  for (const network::CableNetwork& n : networks) result.emplace_back(n.network(), cables);
+std::vector<cables::CableNetwork> of_cables(const std::vector<cables::CableNetwork>& networks,
+                                            const cables::CableParameters& cables) {
+  std::vector<cables::CableNetwork> result;
+  for (const cables::CableNetwork& n : networks) result.emplace_back(n.network(), cables);
   return result;
 }
 
@@ -147,7 +148,7 @@ std::vector<Change> explain(std::vector<Effect>& effects, const FittedCell& cell
   return changes;
 }
 
-void declare(ParameterList& list, FitStageParameters& p) {
+void declare(stage::ParameterList& list, FitStageParameters& p) {
   declare(list, p.gel);
   declare(list, p.network);
   declare(list, p.cables);
@@ -161,4 +162,4 @@ void declare(ParameterList& list, FitStageParameters& p) {
            "time_coupling", "effect_tolerance"});
 }
 
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

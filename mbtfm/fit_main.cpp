@@ -5,39 +5,45 @@
 #include <map>
 #include <numbers>
 
-#include "mbtfm/beyond_cut.h"
-#include "mbtfm/common_motion.h"
-#include "mbtfm/cross_validation.h"
-#include "mbtfm/effects.h"
-#include "mbtfm/error_budget.h"
-#include "mbtfm/findings.h"
 #include "mbtfm/fit_effects.h"
-#include "mbtfm/model_checks.h"
-#include "mbtfm/placement.h"
-#include "mbtfm/second_placement.h"
-#include "mbtfm/series.h"
-#include "mbtfm/solved_misfit.h"
-#include "mbtfm/under_load.h"
-#include "network/effects.h"
-#include "network/mesh.h"
-#include "pipeline/contract/csv.h"
+#include "mbtfm/tensions/beyond_cut.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/cross_validation.h"
+#include "mbtfm/tensions/effects.h"
+#include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/model_checks.h"
+#include "mbtfm/tensions/placement.h"
+#include "mbtfm/tensions/second_placement.h"
+#include "mbtfm/tensions/series.h"
+#include "mbtfm/tensions/solved_misfit.h"
+#include "mbtfm/tensions/under_load.h"
+#include "network/cables/effects.h"
+#include "network/mesh/mesh.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/parallel.h"
-#include "pipeline/contract/stage.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/named_array.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/stage.h"
+#include "substrate/choice/factory.h"
 #include "substrate/compliance.h"
 #include "substrate/gel_vtu.h"
 #include "substrate/stated_error.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
-FitInputs read_inputs(StageContext& context) {
-  FitInputs inputs{.cell = read_cell(context.input("cell", kCellFiles)),
-                   .network = read_network(context.input("network")),
+FitInputs read_inputs(stage::StageContext& context) {
+  FitInputs inputs{.cell = files::read_cell(context.input("cell", files::kCellFiles)),
+                   .network = files::read_network(context.input("network")),
                    .beads = {}};
   const Path field = context.input("displacement");
-  for (Bead& bead : read_displacement(field)) {
+  for (Bead& bead : files::read_displacement(field)) {
     if (bead.flag.empty())
       inputs.beads.push_back(std::move(bead));
     else
@@ -77,16 +83,16 @@ void check_cut(const FitInputs& inputs, const Path& file) {
                    "span it anew: mbtfm-network with the same cell");
 }
 
-network::CableParameters inelastic(network::CableParameters cables) {
+cables::CableParameters inelastic(cables::CableParameters cables) {
   cables.axial_stiffness_nN = 0;
   return cables;
 }
 
 /// The tensions found may stretch cables that those of the start did not. @returns whether elasticity was switched on
-bool was_left_out_wrongly(Effect& elasticity, const network::CableNetwork& network, const Trial& answer,
+bool was_left_out_wrongly(Effect& elasticity, const cables::CableNetwork& network, const Trial& answer,
                           const FitStageParameters& p) {
   if (elasticity.is_on || elasticity.setting != "auto") return false;
-  const double share = network::stretch_share(network.network(), answer.equilibrium, p.cables.axial_stiffness_nN);
+  const double share = cables::stretch_share(network.network(), answer.equilibrium, p.cables.axial_stiffness_nN);
   if (share <= p.effects.effect_tolerance) return false;
   elasticity.is_on = true;
   elasticity.number = share;
@@ -107,9 +113,9 @@ std::string names_of_groups(const EnsembleFit& fit) {
   return text;
 }
 
-ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
-                      const std::vector<network::CableNetwork>& networks, const FitInputs& inputs,
-                      const substrate::Substrate& substrate, const FitStageParameters& p, bool is_placed, int threads) {
+ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data, const std::vector<cables::CableNetwork>& networks,
+                      const FitInputs& inputs, const substrate::Substrate& substrate, const FitStageParameters& p,
+                      bool is_placed, int threads) {
   const Figures figures = substrate.figures();
   const bool lacks_base = std::find(figures.begin(), figures.end(),
                                     Figures::value_type{"substrate_model", std::string("half-space")}) != figures.end();
@@ -128,12 +134,12 @@ ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data,
 
 /// The fit of the cell with its candidates for adhesions at other places; beads, gel and cables as in the first.
 EnsembleFit fit_of(const Cell& second, const DisplacementField& beads, const substrate::Substrate& substrate,
-                   const network::CableParameters& cables, const FitStageParameters& p, int threads) {
+                   const cables::CableParameters& cables, const FitStageParameters& p, int threads) {
   const Eigen::MatrixXd motions = allows_common_motion(p.effects) ? affine_motions(beads) : Eigen::MatrixXd();
   LinearData data = reduce(beads, substrate.response(points_of(beads), ellipses_of(second)),
                            beads_in_region(beads, second, p.fit), threads, motions);
   if (allows_forces_beyond(p.effects, second)) allow_forces_beyond(data, second, p.gel);
-  const Network network = network::generate_network(second, p.network).network;
+  const Network network = mesh::generate_network(second, p.network).network;
   return fit_ensemble(of_cables(span_ensemble(network, second, p, threads), cables), data, adhesion_ids_of(second),
                       p.fit, threads, {});
 }
@@ -153,15 +159,15 @@ Figures figures_of(const EnsembleFit& fit, const std::vector<ModelScore>& models
           {"n_missing_fibres_hinted", std::int64_t(missing.size())}};
 }
 
-PointArray most_informed_array(const Influence& influence) {
+files::PointArray most_informed_array(const Influence& influence) {
   return {.name = "informs_fibre_id",
           .scalars = {influence.most_informed.begin(), influence.most_informed.end()},
           .vectors = {}};
 }
 
 /// What the loss and the region leave of each bead.
-PointArray weight_array(const LinearData& data) {
-  PointArray array{.name = "weight", .scalars = {}, .vectors = {}};
+files::PointArray weight_array(const LinearData& data) {
+  files::PointArray array{.name = "weight", .scalars = {}, .vectors = {}};
   for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
     array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
   }
@@ -169,10 +175,10 @@ PointArray weight_array(const LinearData& data) {
 }
 
 /// The tensions of the frame before, by the network's groups; fibres that are new since then at the others' mean.
-Eigen::VectorXd start_of(StageContext& context, const std::vector<int>& fibre_ids) {
+Eigen::VectorXd start_of(stage::StageContext& context, const std::vector<int>& fibre_ids) {
   std::map<int, double> known;
   double sum = 0;
-  for (const Tension& t : read_tensions(context.input("start"))) {
+  for (const Tension& t : files::read_tensions(context.input("start"))) {
     known[t.fibre_id] = t.tension_nN;
     sum += t.tension_nN;
   }
@@ -187,7 +193,7 @@ Eigen::VectorXd start_of(StageContext& context, const std::vector<int>& fibre_id
 
 /// Draws take the tensions of this cell's own fibres of a type. None where it lacks dorsal or ventral ones.
 std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const LinearData& data,
-                                                   const network::CableNetwork& network, const Cell& cell,
+                                                   const cables::CableNetwork& network, const Cell& cell,
                                                    const FitParameters& p, int threads) {
   TypeTensions tensions;
   std::vector<FibreType> types;
@@ -207,12 +213,12 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
 /// Takes beads and data to the state that explains them better. Of a series every frame has a state of its own.
 Effect take_state_of(FitInputs& inputs, LinearData& data,
                      const std::function<LinearData(const DisplacementField&)>& data_of, bool is_series,
-                     const EffectSwitches& effects, const Gel& gel, int threads) {
+                     const stage::EffectSwitches& effects, const Gel& gel, int threads) {
   if (is_series && effects.beads_under_load == "on")
     throw UsageError("beads_under_load = on takes no time series: all frames share the beads' places at rest");
   if (is_series)
-    return decided(kBeadsUnderLoad, effects.beads_under_load, false,
-                   "all frames of a series share the beads' places at rest");
+    return stage::decided(kBeadsUnderLoad, effects.beads_under_load, false,
+                          "all frames of a series share the beads' places at rest");
   double area_um2 = 0;
   for (const Adhesion& a : inputs.cell.adhesions) area_um2 += a.area_um2;
   const double size_um =
@@ -229,19 +235,19 @@ Effect take_state_of(FitInputs& inputs, LinearData& data,
 }
 
 /// Registers the files that it reads.
-std::optional<Cell> second_placement_of(StageContext& context, const Cell& cell) {
+std::optional<Cell> second_placement_of(stage::StageContext& context, const Cell& cell) {
   std::optional<Cell> second = second_placement(context.inputs_.at("cell"), cell);
   if (second) context.input("cell", kSecondPlacementFiles);
   return second;
 }
 
 /// Registers the files that it reads.
-std::vector<SeriesFrame> read_series_of(StageContext& context) {
+std::vector<SeriesFrame> read_series_of(stage::StageContext& context) {
   if (!context.has_input("frames")) return {};
   std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
   std::vector<std::string> names;
   for (const SeriesFrame& frame : frames) {
-    if (frame.refused.empty()) names.push_back(displacement_of_frame(frame.frame));
+    if (frame.refused.empty()) names.push_back(files::displacement_of_frame(frame.frame));
   }
   context.input("frames", names);
   return frames;
@@ -249,9 +255,9 @@ std::vector<SeriesFrame> read_series_of(StageContext& context) {
 
 /// Fit every frame of a time series, from the fit of the displacement on. @return in a few words, what came of it
 std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::SharedResponse& response,
-                       const Cell& cell, const std::vector<network::CableNetwork>& networks, const EnsembleFit& first,
+                       const Cell& cell, const std::vector<cables::CableNetwork>& networks, const EnsembleFit& first,
                        const FitParameters& p, bool moves, const AllowMore& allow, bool is_coupled,
-                       StageContext& context) {
+                       stage::StageContext& context) {
   const std::vector<FrameFit> fits = fit_series(
       frames, networks, response, beads_in_region(beads_of(frames), cell, p), adhesion_ids_of(cell), p, moves,
       is_coupled, context.threads, [&](double f, std::string_view what) { context.progress(0.6 + 0.35 * f, what); },
@@ -259,22 +265,22 @@ std::string fit_frames(const std::vector<SeriesFrame>& frames, const substrate::
       allow);
   write_tracks(context.output("out", "tracks.csv"), fits, cell.fibres, p.frame_interval_s);
   write_frames(context.output("out", "frames.csv"), fits, p.frame_interval_s);
-  write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
+  files::write_text(context.output("out", "tracks.svg"), series_picture(fits, cell.fibres, p.frame_interval_s));
   const auto n_refused = std::count_if(fits.begin(), fits.end(), [](const FrameFit& f) { return !f.refused.empty(); });
   return "; " + std::to_string(fits.size()) + " frames" +
          (n_refused > 0 ? ", " + std::to_string(n_refused) + " of them without a fit (see frames.csv)" : "");
 }
 
 /// @throws InputError where no cell pulls like that
-void expect_plausible(StageContext& context, const FitSummary& summary, const std::vector<Tension>& tensions,
+void expect_plausible(stage::StageContext& context, const FitSummary& summary, const std::vector<Tension>& tensions,
                       const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions) {
   context.expect_plausible("total_force_nN",
                            std::max(0.0, summary.total_force_nN));  // of noise alone: either side of 0
-  context.expect_plausible("fibre_tension_nN", surest_fibre_tension_nN(tensions));
-  context.expect_plausible("traction_kPa", traction_of_half_the_force_kPa(forces, adhesions));
+  context.expect_plausible("fibre_tension_nN", stage::surest_fibre_tension_nN(tensions));
+  context.expect_plausible("traction_kPa", stage::traction_of_half_the_force_kPa(forces, adhesions));
 }
 
-StageReport fit(const FitStageParameters& given, StageContext& context) {
+StageReport fit(const FitStageParameters& given, stage::StageContext& context) {
   FitStageParameters p = given;
   p.substrate.effects = p.effects;
   context.progress(0, "reading");
@@ -285,10 +291,10 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   std::vector<SeriesFrame> series = read_series_of(context);
   if (!series.empty() && p.fit.substrate == "per-evaluation")
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
-  Effect fibres = network::take_fibres(inputs.cell, p.effects.stress_fibres);
+  Effect fibres = cables::take_fibres(inputs.cell, p.effects.stress_fibres);
   check_fibres(inputs, fibres, context.inputs_.at("network"));
   check_cut(inputs, context.inputs_.at("network"));
-  const auto substrate = substrate::make_substrate(p.gel, p.substrate, context.threads);
+  const auto substrate = choice::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
   const auto response_on = [&](const DisplacementField& b) {
     return substrate->response(points_of(b), ellipses_of(inputs.cell));
@@ -311,24 +317,24 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   const Effect under_load = take_state_of(inputs, data, data_of, !series.empty(), p.effects, p.gel, context.threads);
   p.fit.loss = loss_of_switch(p.effects.robust_loss, p.fit.robust_kind);
   context.progress(0.3, "spanning networks");
-  std::vector<network::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
+  std::vector<cables::CableNetwork> networks = span_ensemble(inputs.network, inputs.cell, p, context.threads);
   const Effect coupling =
       decide_time_coupling(context.has_input("start") || series.size() > 1, p.effects.time_coupling);
   const std::vector<int> adhesion_ids = adhesion_ids_of(inputs.cell);
-  const auto start_on = [&](const network::CableNetwork& network) {
+  const auto start_on = [&](const cables::CableNetwork& network) {
     const TensionProblem problem(network, data.reduced, adhesion_ids);
     return coupling.is_on && context.has_input("start")
                ? scaled_to_data(problem, start_of(context, network.fibre_ids()))
                : uniform_start(problem);
   };
   Trial start = start_on(networks.front());
-  const auto take_cables = [&](const network::CableParameters& cables) {
+  const auto take_cables = [&](const cables::CableParameters& cables) {
     networks = of_cables(networks, cables);
     start = start_on(networks.front());
   };
   const Eigen::VectorXd& start_nN = start.tensions_nN;
   Effect elasticity =
-      network::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
+      cables::decide_elasticity(networks.front(), {start_nN.data(), start_nN.data() + start_nN.size()}, p.effects);
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
   context.progress(0.35, "placing the cell on the beads");
   const DisplacementField in_state = inputs.beads;
@@ -336,9 +342,9 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   PlacedCell place = place_cell(inputs.cell, networks.front(), in_state, data, data_of, p.gel, p.fit, start,
                                 can_be_shifted ? p.effects.channel_shift : "off", context.threads);
   if (!can_be_shifted)
-    place.effect =
-        decided(kChannelShift, p.effects.channel_shift, false,
-                "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
+    place.effect = stage::decided(
+        kChannelShift, p.effects.channel_shift, false,
+        "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
   data = std::move(place.data);
   if (place.effect.is_on) {
     inputs.beads = in_cell_frame(in_state, place.placement);
@@ -406,13 +412,14 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
   write_missing_adhesions(context.output("out", "missing_adhesions.csv"), missing_places);
   const auto drawn = cross_validation_of(fit, data, networks.front(), inputs.cell, p.fit, context.threads);
   if (drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *drawn);
-  write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
-  write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
-  write_fit_summary(context.output("out", "fit.json"), summary, inputs.cell.fibres);
+  files::write_tensions(context.output("out", "tensions.csv"), tensions, inputs.cell.fibres);
+  files::write_adhesion_forces(context.output("out", "adhesion_forces.csv"), forces, inputs.cell.adhesions);
+  files::write_fit_summary(context.output("out", "fit.json"), summary, inputs.cell.fibres);
   write_contracted(context.output("out", "contracted.vtu"), networks.front(), fit);
   write_tractions_vtp(context.output("out", "tractions.vtp"), inputs.cell, forces);
-  write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
-  write_displacement(context.output("out", "displacement_without_fibres.csv"), fitted_field(models.front().forces_nN));
+  files::write_displacement(context.output("out", "fitted_displacement.csv"), fitted);
+  files::write_displacement(context.output("out", "displacement_without_fibres.csv"),
+                            fitted_field(models.front().forces_nN));
   write_displacement_vtp(context.output("out", "displacement.vtp"), as_tracked, fitted,
                          {most_informed_array(influence), weight_array(data)});
   const auto allow = [&](LinearData& of_frame, const Eigen::VectorXd& forces_nN) {
@@ -466,12 +473,12 @@ StageReport fit(const FitStageParameters& given, StageContext& context) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions
 
 int main(int argc, char** argv) {
-  using mbtfm::FileArgument;
-  using namespace mbtfm::inverse;
-  return mbtfm::run_stage<FitStageParameters>(
+  using mbtfm::stage::FileArgument;
+  using namespace mbtfm::tensions;
+  return mbtfm::stage::run_stage<FitStageParameters>(
       {.name = "fit",
        .purpose = "find the tension of every stress fibre and the force of every adhesion from bead displacements",
        .files = {{"cell", FileArgument::Kind::input,

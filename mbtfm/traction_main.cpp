@@ -1,14 +1,16 @@
 /// mbtfm-traction: the standard traction reconstructions, beside the model-based one.
 #include <algorithm>
 
-#include "mbtfm/neighbour_noise.h"
-#include "mbtfm/traction.h"
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/effects.h"
+#include "mbtfm/tractions/neighbour_noise.h"
+#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/stage.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/stage.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 struct TractionStageParameters {
@@ -16,7 +18,7 @@ struct TractionStageParameters {
   TractionParameters traction;
 };
 
-void declare(ParameterList& list, TractionStageParameters& p) {
+void declare(stage::ParameterList& list, TractionStageParameters& p) {
   declare(list, p.gel);
   declare(list, p.traction);
 }
@@ -32,24 +34,24 @@ std::optional<double> assume_noise(DisplacementField& beads) {
 }
 
 /// Of one cell: a whole field may hold many. @throws InputError where no cell pulls like that
-void expect_plausible(StageContext& context, const TractionInputs& inputs, const Reconstruction& r,
+void expect_plausible(stage::StageContext& context, const TractionInputs& inputs, const Reconstruction& r,
                       const TractionSums& sums) {
   if (inputs.outline_um.empty() && inputs.adhesions.empty()) return;
   context.expect_plausible("total_force_nN", sums.total_force_nN);
   if (!r.forces.empty())
-    context.expect_plausible("traction_kPa", traction_of_half_the_force_kPa(r.forces, inputs.adhesions));
+    context.expect_plausible("traction_kPa", stage::traction_of_half_the_force_kPa(r.forces, inputs.adhesions));
 }
 
-StageReport run(const TractionStageParameters& p, StageContext& context) {
+StageReport run(const TractionStageParameters& p, stage::StageContext& context) {
   context.progress(0, "reading");
   TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
-  inputs.beads = read_displacement(context.input("displacement"));
+  inputs.beads = files::read_displacement(context.input("displacement"));
   const auto n_flagged = std::erase_if(inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); });
-  if (context.has_input("adhesions")) inputs.adhesions = read_adhesions(context.input("adhesions"));
-  if (context.has_input("outline")) inputs.outline_um = read_outline(context.input("outline")).front();
+  if (context.has_input("adhesions")) inputs.adhesions = files::read_adhesions(context.input("adhesions"));
+  if (context.has_input("outline")) inputs.outline_um = files::read_outline(context.input("outline")).front();
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
   const std::optional<double> assumed_um = assume_noise(inputs.beads);
-  if (assumed_um) context.assumed.push_back(assumed_noise(*assumed_um));
+  if (assumed_um) context.assumed.push_back(stage::assumed_noise(*assumed_um));
   context.progress(0.1, "reconstructing tractions");
   Reconstruction r = reconstruct(inputs, p.traction, context.threads);
   if (assumed_um) r.figures.emplace_back("assumed_sigma_um", *assumed_um);
@@ -58,15 +60,15 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
 
   write_tractions(context.output("out"), r.patches);
   write_tractions_vtp(context.output_beside("out", ".vtp"), r.patches);
-  write_figures(context.output_beside("out", ".json"), summary_of(r, sums));
+  files::write_figures(context.output_beside("out", ".json"), summary_of(r, sums));
   if (r.scan) {
     write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
     write_lambda_picture(context.output_beside("out", "_lambda.svg"), r,
                          p.traction.lambda_um_per_kPa ? "as given" : "by " + p.traction.lambda_by);
   }
   if (!inputs.adhesions.empty()) {
-    write_adhesion_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces, inputs.adhesions,
-                          columns_of(r.sensitivities));
+    files::write_adhesion_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces, inputs.adhesions,
+                                 columns_of(r.sensitivities));
   }
   context.progress(1, "done");
 
@@ -88,18 +90,18 @@ StageReport run(const TractionStageParameters& p, StageContext& context) {
   }
   report.figures = summary_of(r, sums);
   const bool is_layer = p.traction.gel_model == "layer";
-  report.effects = {decided("finite thickness", is_layer ? "on" : "off", is_layer,
-                            is_layer ? "layer on a rigid base" : "half-space, as gel_model asks")};
+  report.effects = {stage::decided("finite thickness", is_layer ? "on" : "off", is_layer,
+                                   is_layer ? "layer on a rigid base" : "half-space, as gel_model asks")};
   return report;
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions
 
 int main(int argc, char** argv) {
-  using mbtfm::FileArgument;
-  using namespace mbtfm::inverse;
-  return mbtfm::run_stage<TractionStageParameters>(
+  using mbtfm::stage::FileArgument;
+  using namespace mbtfm::tractions;
+  return mbtfm::stage::run_stage<TractionStageParameters>(
       {.name = "traction",
        .purpose = "reconstruct tractions from bead displacements by a standard method",
        .files = {{"displacement", FileArgument::Kind::input,

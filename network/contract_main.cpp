@@ -2,10 +2,12 @@
 #include <map>
 #include <string>
 
-#include "network/cables.h"
-#include "pipeline/contract/effects.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/stage.h"
+#include "network/cables/cables.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm {
 namespace {
@@ -30,16 +32,16 @@ std::vector<double> tensions_by_group(const std::vector<int>& fibre_ids, const s
 }
 
 struct ContractParameters {
-  network::CableParameters cables;
-  EffectSwitches effects;
+  cables::CableParameters cables;
+  stage::EffectSwitches effects;
 };
 
-void declare(ParameterList& list, ContractParameters& p) {
+void declare(stage::ParameterList& list, ContractParameters& p) {
   declare(list, p.cables);
   declare(list, p.effects, {"cable_elasticity"});
 }
 
-StageReport report_of(const network::CableNetwork& cables, const network::Equilibrium& equilibrium,
+StageReport report_of(const cables::CableNetwork& cables, const cables::Equilibrium& equilibrium,
                       const Eigen::VectorXd& forces) {
   double total = 0;
   for (Eigen::Index i = 0; i < forces.size(); i += 2) total += forces.segment<2>(i).norm();
@@ -68,23 +70,23 @@ StageReport report_of(const network::CableNetwork& cables, const network::Equili
 
 int main(int argc, char** argv) {
   using namespace mbtfm;
-  using Kind = FileArgument::Kind;
-  return run_stage<ContractParameters>(
+  using Kind = stage::FileArgument::Kind;
+  return stage::run_stage<ContractParameters>(
       {.name = "contract",
        .purpose = "contract a cable network with given tensions",
        .files = {{"network", Kind::input, "network.vtu"},
                  {"tensions", Kind::input, "tensions.csv: fibre_id, tension_nN; fibre_id 0 is the actin network"},
                  {"out", Kind::output, "the contracted network (.vtu), with the force each cable carries"},
                  {"reactions", Kind::output, "force on what holds it at each held vertex (.csv)"}}},
-      argc, argv, [](const ContractParameters& parameters, StageContext& context) {
+      argc, argv, [](const ContractParameters& parameters, stage::StageContext& context) {
         const Path tensions_file = context.input("tensions");
-        network::CableParameters cable_parameters = parameters.cables;
-        Effect elasticity = decided("elasticity of cables", parameters.effects.cable_elasticity, true,
-                                    "one contraction: to ask for it would cost as much as to have it");
+        cables::CableParameters cable_parameters = parameters.cables;
+        Effect elasticity = stage::decided("elasticity of cables", parameters.effects.cable_elasticity, true,
+                                           "one contraction: to ask for it would cost as much as to have it");
         if (!elasticity.is_on) cable_parameters.axial_stiffness_nN = 0;
-        const network::CableNetwork cables(read_network(context.input("network")), cable_parameters);
-        const auto tensions = tensions_by_group(cables.fibre_ids(), read_tensions(tensions_file), tensions_file);
-        const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+        const cables::CableNetwork cables(files::read_network(context.input("network")), cable_parameters);
+        const auto tensions = tensions_by_group(cables.fibre_ids(), files::read_tensions(tensions_file), tensions_file);
+        const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
         const std::vector<Vec2> by_vertex = cables.reactions_nN(tensions, equilibrium);
         std::vector<int> vertices;
         std::vector<Vec2> forces;
@@ -93,9 +95,9 @@ int main(int argc, char** argv) {
             vertices.push_back(static_cast<int>(v));
             forces.push_back(by_vertex[v]);
           }
-        write_contracted_network(context.output("out"), cables.network(), equilibrium.positions_um,
-                                 equilibrium.link_force_nN, equilibrium.link_states);
-        write_reactions(context.output("reactions"), vertices, forces);
+        files::write_contracted_network(context.output("out"), cables.network(), equilibrium.positions_um,
+                                        equilibrium.link_force_nN, equilibrium.link_states);
+        files::write_reactions(context.output("reactions"), vertices, forces);
         StageReport report = report_of(cables, equilibrium, cables.adhesion_forces_nN(tensions, equilibrium));
         report.effects = {elasticity};
         return report;

@@ -1,11 +1,12 @@
 #include <algorithm>
 #include <string>
 
-#include "network/effects.h"
-#include "network/mesh.h"
-#include "pipeline/contract/effects.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/stage.h"
+#include "network/cables/effects.h"
+#include "network/mesh/mesh.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm {
 namespace {
@@ -21,16 +22,16 @@ std::string listed(const std::vector<int>& ids) {
 }
 
 struct NetworkStageParameters {
-  network::NetworkParameters network;
-  EffectSwitches effects;
+  mesh::NetworkParameters network;
+  stage::EffectSwitches effects;
 };
 
-void declare(ParameterList& list, NetworkStageParameters& p) {
+void declare(stage::ParameterList& list, NetworkStageParameters& p) {
   declare(list, p.network);
   declare(list, p.effects, {"stress_fibres"});
 }
 
-StageReport report_of(const network::GeneratedNetwork& generated) {
+StageReport report_of(const mesh::GeneratedNetwork& generated) {
   const Network& net = generated.network;
   const int n_held = static_cast<int>(net.vertices_um.size()) -
                      static_cast<int>(std::count(net.adhesion_id.begin(), net.adhesion_id.end(), 0));
@@ -75,17 +76,17 @@ StageReport report_of(const network::GeneratedNetwork& generated) {
 
 int main(int argc, char** argv) {
   using namespace mbtfm;
-  return run_stage<NetworkStageParameters>(
+  return stage::run_stage<NetworkStageParameters>(
       {.name = "network",
        .purpose = "span a contractile cable network over a segmented cell",
-       .files = {{"cell", FileArgument::Kind::input,
+       .files = {{"cell", stage::FileArgument::Kind::input,
                   "folder of adhesions.csv, fibres.csv, fibre_points.csv, outline.csv"},
-                 {"out", FileArgument::Kind::output, "network.vtu"}}},
-      argc, argv, [](const NetworkStageParameters& parameters, StageContext& context) {
-        Cell cell = read_cell(context.input("cell", kCellFiles));
-        const Effect fibres = network::take_fibres(cell, parameters.effects.stress_fibres);
-        const network::GeneratedNetwork generated = network::generate_network(cell, parameters.network);
-        write_network(context.output("out"), generated.network);
+                 {"out", stage::FileArgument::Kind::output, "network.vtu"}}},
+      argc, argv, [](const NetworkStageParameters& parameters, stage::StageContext& context) {
+        Cell cell = files::read_cell(context.input("cell", files::kCellFiles));
+        const Effect fibres = cables::take_fibres(cell, parameters.effects.stress_fibres);
+        const mesh::GeneratedNetwork generated = mesh::generate_network(cell, parameters.network);
+        files::write_network(context.output("out"), generated.network);
         StageReport report = report_of(generated);
         report.effects = {fibres};
         return report;

@@ -1,7 +1,7 @@
 /// mbtfm-stats: tables, tests and figures over all finished cells of a folder.
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/stage.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/stage/stage.h"
 #include "pipeline/statistics/png.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -9,7 +9,7 @@ namespace mbtfm::statistics {
 namespace {
 
 /// The study read, its files entered into the record.
-Study read_study(const StudyParameters& parameters, StageContext& context) {
+Study read_study(const StudyParameters& parameters, stage::StageContext& context) {
   const Path folder = context.input("cells");
   const std::optional<Path> table = context.has_input("table") ? std::optional(context.input("table")) : std::nullopt;
   Study study = read_study(folder, parameters, table, context.threads);
@@ -17,25 +17,25 @@ Study read_study(const StudyParameters& parameters, StageContext& context) {
     for (const std::string& file : files_of_a_cell()) context.input("cells", {cell.name + "/" + file});
     for (const std::string& file : further_files_of_a_cell()) {
       const std::string name = cell.name + "/" + file;
-      if (is_own_file(folder / name)) context.input("cells", {name});
+      if (files::is_own_file(folder / name)) context.input("cells", {name});
     }
   }
   return study;
 }
 
-StageReport statistics(const StudyParameters& parameters, StageContext& context) {
+StageReport statistics(const StudyParameters& parameters, stage::StageContext& context) {
   const Study study = read_study(parameters, context);
   const Analysis analysis = analyse(study, parameters);
-  for (const auto& [name, text] : tables_of(study, analysis)) write_text(context.output("out", name), text);
+  for (const auto& [name, text] : tables_of(study, analysis)) files::write_text(context.output("out", name), text);
   const std::vector<Figure> figures = figures_of(study, analysis, parameters);
   constexpr double kPixels = 2;  // by unit of the drawing: sharp in print at 8 cm for each chart (300 dpi)
   for (const Figure& figure : figures) {
     if (figure.charts.empty()) continue;  // its caption in the report says why
     const std::string svg = svg_of(figure);
-    write_text(context.output("out", "figures/" + figure.name + ".svg"), svg);
+    files::write_text(context.output("out", "figures/" + figure.name + ".svg"), svg);
     write_png(context.output("out", "figures/" + figure.name + ".png"), svg, kPixels);
   }
-  write_text(context.output("out", "report.html"), study_html(study, analysis, figures, parameters));
+  files::write_text(context.output("out", "report.html"), study_html(study, analysis, figures, parameters));
   StageReport report;
   report.summary = std::to_string(study.cells.size()) + " cells, " +
                    std::to_string(analysis.tensions.sample.values.size()) + " tensions; " +
@@ -50,12 +50,12 @@ StageReport statistics(const StudyParameters& parameters, StageContext& context)
 int main(int argc, char** argv) {
   using namespace mbtfm;
   using namespace mbtfm::statistics;
-  return run_stage<StudyParameters>(
+  return stage::run_stage<StudyParameters>(
       {.name = "stats",
        .purpose = "statistics of stress-fibre tensions and adhesion forces over all finished cells of a folder",
-       .files = {{"cells", FileArgument::Kind::input, "folder with cell folders"},
-                 {"table", FileArgument::Kind::optional_input,
+       .files = {{"cells", stage::FileArgument::Kind::input, "folder with cell folders"},
+                 {"table", stage::FileArgument::Kind::optional_input,
                   "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},
-                 {"out", FileArgument::Kind::output_folder, "tables, figures/ (SVG and PNG), report.html"}}},
+                 {"out", stage::FileArgument::Kind::output_folder, "tables, figures/ (SVG and PNG), report.html"}}},
       argc, argv, statistics::statistics);
 }

@@ -1,13 +1,13 @@
 /// mbtfm-simulate: a synthetic experiment with known truth.
 #include <string_view>
 
-#include "pipeline/contract/stage.h"
-#include "samples/cell_folder.h"
+#include "pipeline/stage/stage.h"
+#include "samples/experiment/cell_folder.h"
 
 namespace {
 
 using namespace mbtfm;
-using namespace mbtfm::samples;
+using namespace mbtfm::experiment;
 
 /// The scenario named on the command line: its file sets the values that all other flags override.
 std::string scenario_named(int argc, char** argv, const std::string& otherwise) {
@@ -28,12 +28,12 @@ void refuse_given_segmentation(const std::filesystem::path& cell) {
   }
 }
 
-StageReport run(const ScenarioParameters& parameters, StageContext& context) {
+StageReport run(const drawing::ScenarioParameters& parameters, stage::StageContext& context) {
   if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
-  const Experiment experiment = simulate(parameters, context.threads, context.progress);
+  const experiment::Experiment experiment = experiment::simulate(parameters, context.threads, context.progress);
   const auto file = [&](const std::string& name) { return context.output("out", name); };
-  write_cell_folder(experiment, parameters, file);
-  if (parameters.images) write_images(experiment, parameters, file, context.threads, context.progress);
+  experiment::write_cell_folder(experiment, parameters, file);
+  if (parameters.images) experiment::write_images(experiment, parameters, file, context.threads, context.progress);
   StageReport report;
   report.figures = {{"n_adhesions", static_cast<std::int64_t>(experiment.cell.adhesions.size())},
                     {"n_fibres", static_cast<std::int64_t>(experiment.cell.fibres.size())},
@@ -56,15 +56,16 @@ StageReport run(const ScenarioParameters& parameters, StageContext& context) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  ScenarioParameters parameters;
-  return run_stage(
+  using namespace mbtfm;
+  drawing::ScenarioParameters parameters;
+  return stage::run_stage(
       {.name = "simulate",
        .purpose = "simulate a traction force microscopy experiment with known truth",
-       .files = {{"out", FileArgument::Kind::output_folder, "cell folder to write"}}},
+       .files = {{"out", stage::FileArgument::Kind::output_folder, "cell folder to write"}}},
       argc, argv,
-      [&](ParameterList& list) {
+      [&](stage::ParameterList& list) {
         declare(list, parameters);
-        read_toml(list, scenario_file(scenario_named(argc, argv, parameters.scenario)));
+        stage::read_toml(list, drawing::scenario_file(scenario_named(argc, argv, parameters.scenario)));
       },
-      [&](StageContext& context) { return run(parameters, context); });
+      [&](stage::StageContext& context) { return run(parameters, context); });
 }

@@ -1,16 +1,16 @@
 /// mbtfm-add-fibres: the fibres of a segmentation and those that the beads call for, as ImageJ selections to run with.
 #include <string>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/stage.h"
-#include "segment/roi.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/stage/stage.h"
+#include "segment/rois/roi.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::rois {
 namespace {
 
 struct AddFibresParameters {};
-void declare(ParameterList& list, AddFibresParameters& parameters) {
+void declare(stage::ParameterList& list, AddFibresParameters& parameters) {
   (void)list;
   (void)parameters;
 }
@@ -28,7 +28,7 @@ Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std
                    "RoiSet.zip and missing_fibres.csv must be of the same run: mbtfm run CELL");
 }
 
-StageReport add_fibres(const AddFibresParameters&, StageContext& context) {
+StageReport add_fibres(const AddFibresParameters&, stage::StageContext& context) {
   const auto rois_file = context.input("rois"), missing_file = context.input("missing");
   const std::vector<Roi> rois = read_rois(rois_file);
   std::vector<Roi> fibres;
@@ -36,7 +36,7 @@ StageReport add_fibres(const AddFibresParameters&, StageContext& context) {
     if (is_line(roi.shape)) fibres.push_back(roi);
   }
   const auto n_segmented = static_cast<std::int64_t>(fibres.size());
-  const CsvTable missing(missing_file);
+  const files::CsvTable missing(missing_file);
   for (int row = 0; row < missing.n_rows(); ++row) {
     Roi fibre;
     fibre.shape = RoiShape::polyline;
@@ -54,12 +54,12 @@ StageReport add_fibres(const AddFibresParameters&, StageContext& context) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::rois
 
 int main(int argc, char** argv) {
-  using mbtfm::FileArgument;
-  using namespace mbtfm::segment;
-  return mbtfm::run_stage<AddFibresParameters>(
+  using mbtfm::stage::FileArgument;
+  using namespace mbtfm::rois;
+  return mbtfm::stage::run_stage<AddFibresParameters>(
       {.name = "add-fibres",
        .purpose = "put the fibres that the beads call for beside the segmented ones, as fibres.zip for mbtfm run",
        .files = {{"rois", FileArgument::Kind::input, "1_segment/RoiSet.zip of the cell"},

@@ -2,34 +2,37 @@
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/stage.h"
-#include "segment/cell_rois.h"
-#include "segment/contact_sheet.h"
-#include "segment/overlay.h"
-#include "segment/segment_cell.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/stage.h"
+#include "segment/cells/cell_rois.h"
+#include "segment/cells/contact_sheet.h"
+#include "segment/cells/overlay.h"
+#include "segment/cells/segment_cell.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 
 namespace {
 
-std::optional<Channel> channel(StageContext& context, const std::string& argument, const PlaneChoice& plane,
-                               int binning) {
+std::optional<images::Channel> channel(stage::StageContext& context, const std::string& argument,
+                                       const images::PlaneChoice& plane, int binning) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  return Channel{file.string(), binned(read_image(file, plane), binning)};
+  return images::Channel{file.string(), binned(images::read_image(file, plane), binning)};
 }
 
-std::optional<RoiSet> roi_set(StageContext& context, const std::string& argument, int binning) {
+std::optional<RoiSet> roi_set(stage::StageContext& context, const std::string& argument, int binning) {
   if (!context.has_input(argument)) return std::nullopt;
   const auto file = context.input(argument);
-  RoiSet set{file.string(), read_rois(file)};
-  for (Roi& roi : set.rois) roi = binned(std::move(roi), binning);
+  RoiSet set{file.string(), rois::read_rois(file)};
+  for (rois::Roi& roi : set.rois) roi = binned(std::move(roi), binning);
   return set;
 }
 
-std::shared_ptr<const LabelMask> mask(StageContext& context, const std::string& argument, int binning) {
+std::shared_ptr<const LabelMask> mask(stage::StageContext& context, const std::string& argument, int binning) {
   if (!context.has_input(argument)) return nullptr;
   LabelMask mask = read_mask(context.input(argument));
   mask.binning = binning;
@@ -203,23 +206,23 @@ StageReport report_of(const std::vector<Segmentation>& cells) {
           .findings = {}};
 }
 
-void write_cell(StageContext& context, const std::string& folder, const Segmentation& s, const Picture& overlay,
-                const Ground& ground, int binning) {
+void write_cell(stage::StageContext& context, const std::string& folder, const Segmentation& s,
+                const images::Picture& overlay, const Ground& ground, int binning) {
   const auto out = [&](const char* file) { return context.output("out", folder + file); };
-  write_adhesions(out("adhesions.csv"), s.cell.adhesions);
-  write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
-  write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um, s.cell.is_cut);
-  write_cell_vtp(out("cell.vtp"), s.cell);
-  write_png(out("overlay.png"), overlay);
-  write_jpeg(out("images.jpg"), ground.picture);
-  CsvText place({"x_um", "y_um", "width_um", "height_um"});
+  files::write_adhesions(out("adhesions.csv"), s.cell.adhesions);
+  files::write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
+  files::write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um, s.cell.is_cut);
+  files::write_cell_vtp(out("cell.vtp"), s.cell);
+  images::write_png(out("overlay.png"), overlay);
+  images::write_jpeg(out("images.jpg"), ground.picture);
+  files::CsvText place({"x_um", "y_um", "width_um", "height_um"});
   place.add(ground.low_um.x).add(ground.low_um.y).add(ground.size_um.x).add(ground.size_um.y).end_row();
-  write_text(out("images.csv"), place.str());
+  files::write_text(out("images.csv"), place.str());
   if (s.second) {
-    write_adhesions(out("adhesions_2.csv"), s.second->adhesions);
-    write_fibres(out("fibres_2.csv"), out("fibre_points_2.csv"), s.second->fibres);
+    files::write_adhesions(out("adhesions_2.csv"), s.second->adhesions);
+    files::write_fibres(out("fibres_2.csv"), out("fibre_points_2.csv"), s.second->fibres);
   }
-  write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um / binning));  // they lie on the image as it is
+  rois::write_roi_set(out("RoiSet.zip"), rois_of(s.cell, s.pixel_size_um / binning));  // they lie on the image as it is
 }
 
 void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
@@ -235,7 +238,7 @@ void add_drawn_by_hand(StageReport& report, const HandDrawn& drawn) {
 }
 
 /// @throws InputError where no cell looks like that
-void expect_plausible(StageContext& context, const Segmentation& s) {
+void expect_plausible(stage::StageContext& context, const Segmentation& s) {
   context.expect_plausible("cell_area_um2", s.area_um2);
   std::vector<double> areas_um2;
   for (const Adhesion& a : s.cell.adhesions) {
@@ -247,7 +250,7 @@ void expect_plausible(StageContext& context, const Segmentation& s) {
   context.expect_plausible("adhesion_area_um2", *middle);
 }
 
-StageReport run(const SegmentParameters& given, StageContext& context) {
+StageReport run(const SegmentParameters& given, stage::StageContext& context) {
   cv::setNumThreads(context.threads);
   SegmentParameters parameters = given;
   const int binning = parameters.binning;
@@ -256,9 +259,9 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
   const auto actin = channel(context, "actin-image", parameters.actin_plane, binning);
   for (const auto& image : {adhesion, actin}) {
     if (!image) continue;
-    context.doubt(doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
-    context.notice(noticed_loss(*image));
-    context.notice(noticed_saturation(*image));
+    context.doubt(images::doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
+    context.notice(images::noticed_loss(*image));
+    context.notice(images::noticed_saturation(*image));
   }
   const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
                         roi_set(context, "fibre-rois", binning), mask(context, "outline-mask", binning),
@@ -271,7 +274,8 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
                draw_ground(adhesion, actin, cells[i]), binning);
   }
   if (!parameters.contact_sheet.empty())
-    write_png(context.output("out", "contact_sheet.png"), draw_contact_sheet(adhesion, actin, parameters, drawn));
+    images::write_png(context.output("out", "contact_sheet.png"),
+                      draw_contact_sheet(adhesion, actin, parameters, drawn));
   StageReport report =
       parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), parameters.candidates.adhesions == "auto");
   add_drawn_by_hand(report, drawn);
@@ -280,11 +284,11 @@ StageReport run(const SegmentParameters& given, StageContext& context) {
 
 }  // namespace
 
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells
 
 int main(int argc, char** argv) {
-  using mbtfm::FileArgument;
-  return mbtfm::run_stage<mbtfm::segment::SegmentParameters>(
+  using mbtfm::stage::FileArgument;
+  return mbtfm::stage::run_stage<mbtfm::cells::SegmentParameters>(
       {.name = "segment",
        .purpose = "find adhesions, stress fibres and the outline of a cell in its microscope images",
        .files = {{"adhesion-image", FileArgument::Kind::optional_input,
@@ -302,5 +306,5 @@ int main(int argc, char** argv) {
                  {"out", FileArgument::Kind::output_folder,
                   "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
                   "images.jpg, images.csv, RoiSet.zip"}}},
-      argc, argv, mbtfm::segment::run);
+      argc, argv, mbtfm::cells::run);
 }

@@ -4,38 +4,42 @@
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/stage.h"
-#include "segment/channels.h"
-#include "segment/given_field.h"
-#include "segment/track.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/named_array.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/stage.h"
+#include "segment/beads/given_field.h"
+#include "segment/beads/track.h"
+#include "segment/images/channels.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 namespace fs = std::filesystem;
 
 constexpr double kRadian_deg = 180 / std::numbers::pi;
 
-void write_field_vtp(StageContext& context, const DisplacementField& field, const std::string& name) {
+void write_field_vtp(stage::StageContext& context, const DisplacementField& field, const std::string& name) {
   std::vector<Vec2> points;
-  PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
-  PointArray sigma{.name = "sigma_um", .scalars = {}, .vectors = {}};
-  PointArray is_good{.name = "is_good", .scalars = {}, .vectors = {}};
+  files::PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
+  files::PointArray sigma{.name = "sigma_um", .scalars = {}, .vectors = {}};
+  files::PointArray is_good{.name = "is_good", .scalars = {}, .vectors = {}};
   for (const Bead& bead : field) {
     points.push_back(bead.position_um);
     displacement.vectors.push_back(bead.displacement_um);
     sigma.scalars.push_back(bead.sigma_um);
     is_good.scalars.push_back(bead.flag.empty() ? 1 : 0);
   }
-  write_points_vtp(context.output("out", name + ".vtp"), points, {displacement, sigma, is_good});
+  files::write_points_vtp(context.output("out", name + ".vtp"), points, {displacement, sigma, is_good});
 }
 
-void write_field(StageContext& context, const DisplacementField& field, const std::string& name) {
-  write_displacement(context.output("out", name + ".csv"), field);
+void write_field(stage::StageContext& context, const DisplacementField& field, const std::string& name) {
+  files::write_displacement(context.output("out", name + ".csv"), field);
   write_field_vtp(context, field, name);
 }
 
@@ -149,7 +153,7 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
 /// A stressed image.
 struct Frame {
   fs::path file;
-  PlaneChoice plane;
+  images::PlaneChoice plane;
   std::string name() const {
     if (plane.page) return file.string() + ", page " + std::to_string(*plane.page);
     return file.string() + (plane.time ? ", time " + std::to_string(*plane.time) : "");
@@ -173,7 +177,7 @@ std::vector<Frame> frames_of_file(const fs::path& file, const TrackParameters& p
 constexpr const char* kImageExtensions[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
 
 /// The images of a folder in the order of their names, or those of a file.
-std::vector<Frame> frames_of(StageContext& context, const TrackParameters& parameters) {
+std::vector<Frame> frames_of(stage::StageContext& context, const TrackParameters& parameters) {
   const fs::path& given = context.inputs_.at("stressed");
   if (!fs::is_directory(given)) return frames_of_file(context.input("stressed"), parameters);
   std::vector<std::string> names;
@@ -219,15 +223,16 @@ struct TrackedFrame {
   double pixel_size_um = 0;
 };
 
-TrackedFrame tracked(const Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
-                     const TrackParameters& parameters, int binning, const Progress& progress, StageContext& context) {
-  const Channel stressed{frame.name(), binned(read_image(frame.file, frame.plane), binning)};
-  require_equal_sizes(relaxed, stressed);
-  const double pixel_size_um = common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
-  for (const Channel* image : {&relaxed, &stressed}) {
-    context.doubt(doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
-    context.notice(noticed_loss(*image));
-    context.notice(noticed_saturation(*image));
+TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
+                     const TrackParameters& parameters, int binning, const Progress& progress,
+                     stage::StageContext& context) {
+  const images::Channel stressed{frame.name(), images::binned(images::read_image(frame.file, frame.plane), binning)};
+  images::require_equal_sizes(relaxed, stressed);
+  const double pixel_size_um = images::common_pixel_size_um(relaxed, stressed, parameters.pixel_size_um);
+  for (const images::Channel* image : {&relaxed, &stressed}) {
+    context.doubt(images::doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
+    context.notice(images::noticed_loss(*image));
+    context.notice(images::noticed_saturation(*image));
   }
   if (stressed.image.pixels == relaxed.image.pixels) {
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
@@ -257,14 +262,14 @@ class FrameList {
   std::string str() const { return list_.str(); }
 
  private:
-  CsvText& begin(const Frame& frame) { return list_.add(++n_).add(frame.name()); }
+  files::CsvText& begin(const Frame& frame) { return list_.add(++n_).add(frame.name()); }
   int n_ = 0;
-  CsvText list_{{"frame", "image", "n_tracked", "drift_x_um", "drift_y_um", "turn_deg", "noise_um",
-                 "largest_displacement_um", "refused"}};
+  files::CsvText list_{{"frame", "image", "n_tracked", "drift_x_um", "drift_y_um", "turn_deg", "noise_um",
+                        "largest_displacement_um", "refused"}};
 };
 
 /// The first frame that could be tracked stands for the series; one that could not does not stop the others.
-StageReport track_series(const std::vector<Frame>& frames, StageContext& context,
+StageReport track_series(const std::vector<Frame>& frames, stage::StageContext& context,
                          const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
   FrameList list;
   std::optional<StageReport> first;
@@ -276,7 +281,7 @@ StageReport track_series(const std::vector<Frame>& frames, StageContext& context
     };
     try {
       const auto [tracking, pixel_size_um] = tracked_frame(frames[k], progress);
-      const fs::path name = displacement_of_frame(static_cast<int>(k) + 1);
+      const fs::path name = files::displacement_of_frame(static_cast<int>(k) + 1);
       write_field(context, tracking.field, name.stem().string());
       list.add(frames[k], tracking);
       if (first) continue;
@@ -288,7 +293,7 @@ StageReport track_series(const std::vector<Frame>& frames, StageContext& context
     }
   }
   if (!first) throw refused.front();
-  write_text(context.output("out", "frames.csv"), list.str());
+  files::write_text(context.output("out", "frames.csv"), list.str());
   StageReport& report = *first;
   report.figures.emplace_back("n_frames", static_cast<std::int64_t>(frames.size()));
   report.figures.emplace_back("n_frames_refused", static_cast<std::int64_t>(refused.size()));
@@ -302,7 +307,7 @@ StageReport track_series(const std::vector<Frame>& frames, StageContext& context
 }
 
 /// The folder of an earlier run with the same images and parameters, where its list, record and first frame are there.
-std::optional<fs::path> earlier_run(const StageContext& context) {
+std::optional<fs::path> earlier_run(const stage::StageContext& context) {
   if (!context.has_input("kept")) return std::nullopt;
   const fs::path folder = context.inputs_.at("kept");
   for (const char* name : {"frames.csv", "displacement.csv", "record.json"}) {
@@ -312,22 +317,22 @@ std::optional<fs::path> earlier_run(const StageContext& context) {
 }
 
 /// The bytes as they are.
-void keep_field(StageContext& context, const fs::path& folder, const std::string& name) {
+void keep_field(stage::StageContext& context, const fs::path& folder, const std::string& name) {
   fs::copy_file(folder / name, context.output("out", name));
-  write_field_vtp(context, read_displacement(folder / name), fs::path(name).stem().string());
+  write_field_vtp(context, files::read_displacement(folder / name), fs::path(name).stem().string());
 }
 
 /// Track the frames whose files are gone once more. All else, list and report included, is what the earlier run found:
 /// from the same images it is the same again.
-StageReport complete_series(const std::vector<Frame>& frames, StageContext& context, const fs::path& earlier,
+StageReport complete_series(const std::vector<Frame>& frames, stage::StageContext& context, const fs::path& earlier,
                             const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
-  const CsvTable list(earlier / "frames.csv");
+  const files::CsvTable list(earlier / "frames.csv");
   keep_field(context, earlier, "displacement.csv");
   std::int64_t n_kept = 0;
   for (int row = 0; row < list.n_rows(); ++row) {
     if (!list.text(row, "refused").empty()) continue;
     const int frame = list.integer(row, "frame", 1);
-    const std::string name = displacement_of_frame(frame);
+    const std::string name = files::displacement_of_frame(frame);
     if (fs::is_regular_file(earlier / name)) {
       keep_field(context, earlier, name);
       ++n_kept;
@@ -337,24 +342,25 @@ StageReport complete_series(const std::vector<Frame>& frames, StageContext& cont
     write_field(context, again.tracking.field, fs::path(name).stem().string());
   }
   fs::copy_file(earlier / "frames.csv", context.output("out", "frames.csv"));
-  StageReport report = read_report(earlier / "record.json");
+  StageReport report = stage::read_report(earlier / "record.json");
   std::erase_if(report.figures, [](const auto& figure) { return figure.first == "n_frames_kept"; });
   report.figures.emplace_back("n_frames_kept", n_kept);
   return report;
 }
 
-StageReport track(TrackParameters parameters, int binning, StageContext& context) {
+StageReport track(TrackParameters parameters, int binning, stage::StageContext& context) {
   if (parameters.pixel_size_um) *parameters.pixel_size_um *= binning;
   const std::vector<Frame> frames = frames_of(context, parameters);
   const fs::path relaxed_file = context.input("relaxed");
-  const Channel relaxed{relaxed_file.string(), binned(read_image(relaxed_file, parameters.relaxed_plane), binning)};
+  const images::Channel relaxed{relaxed_file.string(),
+                                images::binned(images::read_image(relaxed_file, parameters.relaxed_plane), binning)};
   const RelaxedBeads beads =
       with_names(relaxed.name, [&] { return RelaxedBeads(relaxed.image, parameters, context.threads); });
   const auto tracked_frame = [&](const Frame& frame, const Progress& progress) {
     return tracked(relaxed, beads, frame, parameters, binning, progress, context);
   };
   const std::optional<fs::path> earlier = earlier_run(context);
-  if (earlier && CsvTable(*earlier / "frames.csv").n_rows() == static_cast<int>(frames.size())) {
+  if (earlier && files::CsvTable(*earlier / "frames.csv").n_rows() == static_cast<int>(frames.size())) {
     return complete_series(frames, context, *earlier, tracked_frame);
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
@@ -367,13 +373,13 @@ StageReport track(TrackParameters parameters, int binning, StageContext& context
 struct TrackStageParameters {
   TrackParameters track;
   int binning = 1;  ///< to be quick: beads closer than a few pixels of the reduced images are lost
-  EffectSwitches effects;
+  stage::EffectSwitches effects;
 };
 
-void declare(ParameterList& list, TrackStageParameters& p) {
+void declare(stage::ParameterList& list, TrackStageParameters& p) {
   declare(list, p.track);
   list.table("track");
-  list.add("binning", p.binning, Range::between(1, kLargestBinning),
+  list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
            "the images are reduced first: means of blocks of so many pixels a side");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});
 }
@@ -386,7 +392,7 @@ TrackParameters switched(const TrackStageParameters& given) {
   return parameters;
 }
 
-StageReport run(const TrackStageParameters& given, StageContext& context) {
+StageReport run(const TrackStageParameters& given, stage::StageContext& context) {
   const TrackParameters parameters = switched(given);
   cv::setNumThreads(context.threads);
   const bool has_images = context.has_input("stressed") || context.has_input("relaxed");
@@ -411,12 +417,12 @@ StageReport run(const TrackStageParameters& given, StageContext& context) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads
 
 int main(int argc, char** argv) {
-  using mbtfm::FileArgument;
+  using mbtfm::stage::FileArgument;
   using Kind = FileArgument::Kind;
-  return mbtfm::run_stage<mbtfm::segment::TrackStageParameters>(
+  return mbtfm::stage::run_stage<mbtfm::beads::TrackStageParameters>(
       {.name = "track",
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
        .files =
@@ -427,5 +433,5 @@ int main(int argc, char** argv) {
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
             {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
-      argc, argv, mbtfm::segment::run);
+      argc, argv, mbtfm::beads::run);
 }

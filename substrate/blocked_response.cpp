@@ -7,8 +7,8 @@
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/parallel.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/parallel.h"
 #include "substrate/response.h"
 
 namespace mbtfm::substrate {
@@ -111,10 +111,11 @@ class Blocked final : public Response {
   MatrixXd displace(const MatrixXd& forces_nN) const override {
     MBTFM_ASSERT(forces_nN.rows() == n_columns_);
     MatrixXd u = MatrixXd::Zero(rows(), forces_nN.cols());
-    parallel_for(static_cast<int>(blocks_.size()), threads_, [&](int b) {
+    numerics::parallel_for(static_cast<int>(blocks_.size()), threads_, [&](int b) {
       const Block& block = blocks_[static_cast<std::size_t>(b)];
-      const MatrixXd own = product(block.modes.cast<double>(), product(block.far->cast<double>(), forces_nN)) +
-                           product(block.near.cast<double>(), forces_nN(*block.near_columns, Eigen::all));
+      const MatrixXd own =
+          numerics::product(block.modes.cast<double>(), numerics::product(block.far->cast<double>(), forces_nN)) +
+          numerics::product(block.near.cast<double>(), forces_nN(*block.near_columns, Eigen::all));
       u(rows_of(block), Eigen::all) = own;
     });
     return u;
@@ -124,13 +125,14 @@ class Blocked final : public Response {
     MBTFM_ASSERT(displacements.rows() == rows());
     constexpr std::size_t kPieces = 8;  // that sums are made of, whatever the threads
     std::vector<MatrixXd> parts(kPieces, MatrixXd::Zero(n_columns_, displacements.cols()));
-    parallel_for(kPieces, threads_, [&](int piece) {
+    numerics::parallel_for(kPieces, threads_, [&](int piece) {
       MatrixXd& sum = parts[static_cast<std::size_t>(piece)];
       for (std::size_t b = static_cast<std::size_t>(piece); b < blocks_.size(); b += kPieces) {
         const Block& block = blocks_[b];
         const MatrixXd own = displacements(rows_of(block), Eigen::all);
-        sum += transposed_product(block.far->cast<double>(), transposed_product(block.modes.cast<double>(), own));
-        sum(*block.near_columns, Eigen::all) += transposed_product(block.near.cast<double>(), own);
+        sum += numerics::transposed_product(block.far->cast<double>(),
+                                            numerics::transposed_product(block.modes.cast<double>(), own));
+        sum(*block.near_columns, Eigen::all) += numerics::transposed_product(block.near.cast<double>(), own);
       }
     });
     for (std::size_t piece = 1; piece < kPieces; ++piece) parts.front() += parts[piece];
@@ -149,14 +151,15 @@ class Blocked final : public Response {
     constexpr std::size_t kAtOnce = 8;
     for (std::size_t begin = 0; begin < blocks_.size(); begin += kAtOnce) {
       std::vector<Part> parts(std::min(kAtOnce, blocks_.size() - begin));
-      parallel_for(static_cast<int>(parts.size()), threads_, [&](int i) {
+      numerics::parallel_for(static_cast<int>(parts.size()), threads_, [&](int i) {
         const Block& block = blocks_[begin + static_cast<std::size_t>(i)];
         const VectorXd root = weight(rows_of(block)).cwiseSqrt();
         const MatrixXd modes = root.asDiagonal() * block.modes.cast<double>();
         const MatrixXd near = root.asDiagonal() * block.near.cast<double>();
         const MatrixXd far = block.far->cast<double>();
-        parts[static_cast<std::size_t>(i)] = {product(square_root(gram(modes)), far),
-                                              transposed_product(far, transposed_product(modes, near)), gram(near)};
+        parts[static_cast<std::size_t>(i)] = {
+            numerics::product(square_root(numerics::gram(modes)), far),
+            numerics::transposed_product(far, numerics::transposed_product(modes, near)), numerics::gram(near)};
       });
       Index n_rows = 0;
       for (const Part& part : parts) n_rows += part.root_far.rows();
@@ -167,7 +170,7 @@ class Blocked final : public Response {
         n_rows += part.root_far.rows();
         part.root_far.resize(0, 0);
       }
-      add_upper_gram(roots, square, threads_);
+      numerics::add_upper_gram(roots, square, threads_);
       for (std::size_t i = 0; i < parts.size(); ++i)
         add_near(*blocks_[begin + i].near_columns, parts[i].mixed, parts[i].own, square);
     }
@@ -285,7 +288,7 @@ Block block_of(const Substrate& model, const std::vector<Vec2>& points_um, std::
   MatrixXd modes(2 * static_cast<Index>(own_um.size()), common.cols());
   for (const Index axis : {0, 1}) axis_of(modes, axis) = weights * axis_of(common, axis);
   MatrixXf shares = MatrixXf::Zero(common.cols(), 2 * static_cast<Index>(ellipses.size()));
-  shares(Eigen::all, far_columns) = transposed_product(common, at_nodes).cast<float>();
+  shares(Eigen::all, far_columns) = numerics::transposed_product(common, at_nodes).cast<float>();
   return {.points = std::move(points),
           .modes = modes.cast<float>(),
           .far = std::make_shared<const MatrixXf>(std::move(shares)),
@@ -304,7 +307,7 @@ SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>&
   const double most = 1.5 * std::sqrt(static_cast<double>(points_um.size()));
   if (!all.empty()) split(points_um, std::move(all), static_cast<std::size_t>(most), parts);
   std::vector<Block> blocks(parts.size());
-  parallel_for(static_cast<int>(parts.size()), threads, [&](int b) {
+  numerics::parallel_for(static_cast<int>(parts.size()), threads, [&](int b) {
     const auto i = static_cast<std::size_t>(b);
     blocks[i] = block_of(model, points_um, std::move(parts[i]), ellipses);
   });

@@ -8,10 +8,11 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/effects.h"
-#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
 #include "pipeline/contract/report.h"
-#include "pipeline/contract/types.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::substrate {
 
@@ -48,11 +49,11 @@ struct SubstrateParameters {
 
   bool stress = false;  ///< of the gel's inside, where it is written
 
-  EffectSwitches effects = {};  ///< declared by those who have them
+  stage::EffectSwitches effects = {};  ///< declared by those who have them
 
   double memory_limit_GB = 0;  ///< of split and refined; 0: four fifths of what the machine has
 };
-void declare(ParameterList& list, SubstrateParameters& parameters);
+void declare(stage::ParameterList& list, SubstrateParameters& parameters);
 
 /// A solution inside the gel, on boxes.
 struct VolumeField {
@@ -92,11 +93,5 @@ class Substrate {
   /// Its size, and what the calls so far cost.
   virtual Figures figures() const = 0;
 };
-
-/// The model named in the parameters. The same bits for any number of threads. @throws UsageError, InvalidData
-std::unique_ptr<Substrate> make_substrate(const Gel& gel, const SubstrateParameters& parameters, int threads);
-
-/// The same for `half-space` and `layer` alone, which need no finite elements: links without deal.II.
-std::unique_ptr<Substrate> make_greens(const Gel& gel, const SubstrateParameters& parameters, int threads);
 
 }  // namespace mbtfm::substrate

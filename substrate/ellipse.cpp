@@ -5,6 +5,7 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/quadrature.h"
 
 namespace mbtfm::substrate {
 
@@ -40,26 +41,12 @@ void check_points(const std::vector<Vec2>& points_um) {
   }
 }
 
-GaussRule gauss_legendre(int n) {
-  GaussRule rule;
-  for (int i = 0; i < n; ++i) {
-    // Newton's method on P_n from its asymptotic root: quadratic, so a handful of steps reach rounding for any n here
-    double x = std::cos(pi * (i + 0.75) / (n + 0.5));
-    double slope = 1;
-    for (int step = 0; step < 8; ++step) {
-      double p = 1, previous = 0;
-      for (int k = 1; k <= n; ++k) {
-        const double next = ((2 * k - 1) * x * p - (k - 1) * previous) / k;
-        previous = p;
-        p = next;
-      }
-      slope = n * (x * p - previous) / (x * x - 1);
-      x -= p / slope;
-    }
-    rule.nodes.push_back(x);
-    rule.weights.push_back(2 / ((1 - x * x) * slope * slope));
-  }
-  return rule;
+Vec2 half_extent_um(const Ellipse& ellipse) {
+  const double c = std::cos(ellipse.angle_rad);
+  const double s = std::sin(ellipse.angle_rad);
+  const double a2 = ellipse.semi_major_um * ellipse.semi_major_um;
+  const double b2 = ellipse.semi_minor_um * ellipse.semi_minor_um;
+  return {std::sqrt(a2 * c * c + b2 * s * s), std::sqrt(a2 * s * s + b2 * c * c)};
 }
 
 namespace {
@@ -84,7 +71,7 @@ std::vector<DiscPoint> disc_rule(int degree) {
     // r dr = d(r²)/2: n Gauss points in r² take r^(4n-2); 4n angles take harmonics below 4n. Together degree 4n - 1,
     // as odd degrees vanish by symmetry.
     const int n_rings = (degree + 4) / 4;
-    const GaussRule gauss = gauss_legendre(n_rings);
+    const numerics::GaussRule gauss = numerics::gauss_legendre(n_rings);
     for (int k = 0; k < n_rings; ++k) {
       add_ring(rule, std::sqrt(0.5 * (1 + gauss.nodes[k])), 4 * n_rings, 0.5 * gauss.weights[k]);
     }

@@ -25,10 +25,7 @@ std::vector<DiscPoint> disc_rule(int degree);
 /// The rule's points on the ellipse, relative to its centre.
 std::vector<DiscPoint> ellipse_rule(const Ellipse& ellipse, int degree);
 
-/// Nodes on (-1, 1) and weights of Gauss and Legendre.
-struct GaussRule {
-  std::vector<double> nodes, weights;
-};
-GaussRule gauss_legendre(int n);
+/// Half the sides of the smallest axis-parallel rectangle around the ellipse.
+Vec2 half_extent_um(const Ellipse& ellipse);
 
 }  // namespace mbtfm::substrate

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/memory.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/memory.h"
 #include "substrate/scene.h"
 
 namespace mbtfm::substrate {
@@ -53,11 +53,11 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
   const std::vector<double> x = graded_lines(scene.low_um.x, scene.high_um.x, step);
   const std::vector<double> y = graded_lines(scene.low_um.y, scene.high_um.y, step);
   constexpr double kBytes = 300;  // of a point: itself, what it moves by, the same for its file
-  expect_room_for({.what = "the gel's surface in substrate.vtu",
-                   .count = static_cast<double>(x.size()) * static_cast<double>(y.size()),
-                   .parts = "points",
-                   .bytes_each = kBytes,
-                   .remedy = "choose fewer surface_lines"});
+  numerics::expect_room_for({.what = "the gel's surface in substrate.vtu",
+                             .count = static_cast<double>(x.size()) * static_cast<double>(y.size()),
+                             .parts = "points",
+                             .bytes_each = kBytes,
+                             .remedy = "choose fewer surface_lines"});
   std::vector<Vec2> points;
   for (const double y_um : y) {
     for (const double x_um : x) points.push_back({x_um, y_um});
@@ -67,7 +67,7 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
   const std::vector<double> vertical = substrate.has_vertical() ? substrate.vertical_um(points, ellipses, forces_nN)
                                                                 : std::vector<double>(points.size());
 
-  Grid grid;
+  files::Grid grid;
   grid.point_arrays = {{"displacement_um", 3, {}}};
   grid.cell_arrays = {{"traction_kPa", 3, {}}};
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -85,23 +85,23 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
     const Vec2 t = traction_kPa(ellipses, forces_nN, {0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])});
     for (const double value : {t.x, t.y, 0.0}) grid.cell_arrays[0].values.push_back(value);
   }
-  write_grid_vtu(file, grid);
+  files::write_grid_vtu(file, grid);
 }
 
 void write_volume_vtu(const std::filesystem::path& file, const VolumeField& field) {
-  Grid grid;
+  files::Grid grid;
   grid.corners = 8;
   grid.points_um = field.points_um;
   grid.cells = field.box_corners;
-  GridArray displacement{"displacement_um", 3, {}};
+  files::GridArray displacement{"displacement_um", 3, {}};
   for (const auto& u : field.displacement_um) displacement.values.insert(displacement.values.end(), u.begin(), u.end());
   grid.point_arrays.push_back(std::move(displacement));
   if (!field.stress_kPa.empty()) {
-    GridArray stress{"stress_kPa", 6, {}};
+    files::GridArray stress{"stress_kPa", 6, {}};
     for (const auto& s : field.stress_kPa) stress.values.insert(stress.values.end(), s.begin(), s.end());
     grid.cell_arrays.push_back(std::move(stress));
   }
-  write_grid_vtu(file, grid);
+  files::write_grid_vtu(file, grid);
 }
 
 }  // namespace mbtfm::substrate

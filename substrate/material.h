@@ -5,9 +5,11 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/gel.h"
 
 namespace mbtfm::substrate {
+
+inline double shear_modulus_kPa(const Gel& gel) { return gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio)); }
 
 /// Young's modulus (kPa) at a depth (um) below the surface.
 struct ModulusAtDepth {

@@ -14,12 +14,6 @@ struct Model {
   bool takes_incompressible = false;  ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
 };
 
-std::unique_ptr<Substrate> make_half_space(const Gel& gel, const SubstrateParameters& parameters, int threads);
-std::unique_ptr<Substrate> make_layer(const Gel& gel, const SubstrateParameters& parameters, int threads);
-std::unique_ptr<Substrate> make_split(const Gel& gel, const SubstrateParameters& parameters, int threads);
-std::unique_ptr<Substrate> make_automatic(const Gel& gel, const SubstrateParameters& parameters, int threads);
-std::unique_ptr<Substrate> make_refined(const Gel& gel, const SubstrateParameters& parameters, int threads);
-
 /// @throws UsageError where no model of the table has the name or it takes no incompressible gel, InvalidData as
 /// check(gel)
 std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,

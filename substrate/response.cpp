@@ -17,15 +17,15 @@ class Dense final : public Response {
   Index rows() const override { return matrix_.rows(); }
   Index cols() const override { return matrix_.cols(); }
   MatrixXd displace(const MatrixXd& forces_nN) const override {
-    return forces_nN.cols() == 1 ? MatrixXd(matrix_ * forces_nN) : product(matrix_, forces_nN, threads_);
+    return forces_nN.cols() == 1 ? MatrixXd(matrix_ * forces_nN) : numerics::product(matrix_, forces_nN, threads_);
   }
   MatrixXd pull_back(const MatrixXd& displacements) const override {
     return displacements.cols() == 1 ? MatrixXd(matrix_.transpose() * displacements)
-                                     : transposed_product(matrix_, displacements, threads_);
+                                     : numerics::transposed_product(matrix_, displacements, threads_);
   }
   MatrixXd upper_gram(const VectorXd& weight) const override {
     MatrixXd square = MatrixXd::Zero(cols(), cols());
-    add_upper_gram(weight.cwiseSqrt().asDiagonal() * matrix_, square, threads_);
+    numerics::add_upper_gram(weight.cwiseSqrt().asDiagonal() * matrix_, square, threads_);
     return square;
   }
   SharedResponse at_points(const std::vector<Index>& points) const override {

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "pipeline/contract/errors.h"
-#include "substrate/ellipse_load.h"
+#include "substrate/ellipse.h"
 
 namespace mbtfm::substrate {
 

@@ -4,9 +4,12 @@
 #include <numbers>
 #include <string>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/stage.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/stage/stage.h"
+#include "substrate/choice/factory.h"
 #include "substrate/gel_vtu.h"
 
 namespace mbtfm {
@@ -17,7 +20,7 @@ struct Parameters {
   substrate::SubstrateParameters substrate;
 };
 
-void declare(ParameterList& list, Parameters& p) {
+void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.gel);
   declare(list, p.substrate);
   declare(list, p.substrate.effects,
@@ -31,11 +34,11 @@ struct Load {
 
 Load read_forces(const Path& adhesions_file, const Path& file) {
   std::map<int, substrate::Ellipse> ellipse_of_id;
-  for (const Adhesion& adhesion : read_adhesions(adhesions_file)) {
+  for (const Adhesion& adhesion : files::read_adhesions(adhesions_file)) {
     ellipse_of_id[adhesion.adhesion_id] = substrate::ellipse_of(adhesion);
   }
   Load load;
-  for (const AdhesionForce& force : read_adhesion_forces(file)) {
+  for (const AdhesionForce& force : files::read_adhesion_forces(file)) {
     const auto found = ellipse_of_id.find(force.adhesion_id);
     if (found == ellipse_of_id.end()) {
       throw InputError(file.string(), "the adhesion_id of a row of " + adhesions_file.string(),
@@ -70,8 +73,8 @@ Vec2 spacing_of(const std::vector<Vec2>& points, const Path& file) {
 
 /// Each patch as a disc of its area: the same force; the second moment is 5 % off, a side away 0.4 % of its field.
 Load read_tractions(const Path& file) {
-  const CsvTable table(file);
-  const std::vector<Vec2> points = read_points(file);
+  const files::CsvTable table(file);
+  const std::vector<Vec2> points = files::read_points(file);
   const bool has_areas = table.has("area_um2");
   const Vec2 spacing = has_areas ? Vec2{} : spacing_of(points, file);
   Load load;
@@ -86,7 +89,7 @@ Load read_tractions(const Path& file) {
   return load;
 }
 
-Load read_load(StageContext& context) {
+Load read_load(stage::StageContext& context) {
   const bool has_forces = context.has_input("forces") && context.has_input("adhesions");
   const bool has_tractions = context.has_input("traction");
   if (has_forces == has_tractions) {
@@ -97,8 +100,9 @@ Load read_load(StageContext& context) {
 }
 
 /// displacement.csv at the points; uz_um after its columns where the model has it.
-void write_at_points(StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
-  const std::vector<Vec2> points = read_points(context.input("points"));
+void write_at_points(stage::StageContext& context, const substrate::Substrate& model, const Load& load,
+                     Figures& figures) {
+  const std::vector<Vec2> points = files::read_points(context.input("points"));
   const std::vector<Vec2> displacements = model.displacements_um(points, load.ellipses, load.forces_nN);
   double largest_um = 0;
   DisplacementField field;
@@ -108,17 +112,17 @@ void write_at_points(StageContext& context, const substrate::Substrate& model, c
   }
   figures.emplace_back("n_points", static_cast<std::int64_t>(points.size()));
   figures.emplace_back("largest_displacement_um", largest_um);
-  if (!model.has_vertical()) return write_displacement(context.output("out"), field);
+  if (!model.has_vertical()) return files::write_displacement(context.output("out"), field);
   const std::vector<double> vertical = model.vertical_um(points, load.ellipses, load.forces_nN);
-  CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um", "uz_um"});
+  files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um", "uz_um"});
   for (std::size_t i = 0; i < points.size(); ++i) {
     csv.add(points[i].x).add(points[i].y).add(displacements[i].x).add(displacements[i].y).add(0.0).add(vertical[i]);
     csv.end_row();
   }
-  write_text(context.output("out"), csv.str());
+  files::write_text(context.output("out"), csv.str());
 }
 
-void write_result(StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
+void write_result(stage::StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
   if (context.has_input("points")) return write_at_points(context, model, load, figures);
   const Path file = context.output("out");
   if (context.outputs_.at("out").extension() != ".vtu") {
@@ -131,11 +135,11 @@ void write_result(StageContext& context, const substrate::Substrate& model, cons
   }
 }
 
-StageReport run(const Parameters& given, StageContext& context) {
+StageReport run(const Parameters& given, stage::StageContext& context) {
   Parameters parameters = given;
   std::string& vertical = parameters.substrate.effects.vertical_displacement;
   if (vertical == "auto" && !context.has_input("points")) vertical = "on";  // a surface in space has three components
-  const auto model = substrate::make_substrate(parameters.gel, parameters.substrate, context.threads);
+  const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   const Load load = read_load(context);
   context.progress(0.1, "solving for the substrate");
   StageReport report;
@@ -157,8 +161,8 @@ StageReport run(const Parameters& given, StageContext& context) {
 
 int main(int argc, char** argv) {
   using namespace mbtfm;
-  using Kind = FileArgument::Kind;
-  return run_stage<Parameters>(
+  using Kind = stage::FileArgument::Kind;
+  return stage::run_stage<Parameters>(
       {.name = "substrate",
        .purpose = "displace a gel by forces spread over adhesions, or by tractions",
        .files = {{"adhesions", Kind::optional_input, "adhesions.csv: the ellipses"},

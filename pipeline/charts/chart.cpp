@@ -5,13 +5,13 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/contract/names.h"
+#include "pipeline/files/names.h"
 
 namespace mbtfm::charts {
 
 std::string html_escaped(std::string_view text) {
   std::string safe;
-  for (const char c : shown_name(text)) {
+  for (const char c : files::shown_name(text)) {
     switch (c) {
       case '&':
         safe += "&amp;";

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::charts {
 

@@ -9,7 +9,7 @@
 #include <nlohmann/json.hpp>
 
 #include "pipeline/charts/chart.h"
-#include "pipeline/contract/json.h"
+#include "pipeline/files/json.h"
 
 namespace mbtfm::charts {
 namespace {
@@ -298,7 +298,7 @@ ordered_json axis_of(const std::string& scale, const char* orient, const Axis& a
   if (!is_upright) result["grid"] = false;
   result["labelOverlap"] = false;
   result["encode"]["labels"]["update"]["text"] =
-      signal(json_text(names) + "[indexof(" + json_text(values) + ", datum.value)]");
+      signal(files::json_text(names) + "[indexof(" + files::json_text(values) + ", datum.value)]");
   return result;
 }
 
@@ -347,7 +347,7 @@ std::string Chart::vega() const {
     for (last = first; last < marks_.size() && go_together(marks_[first], marks_[last]); ++last) continue;
     add_marks(spec, marks_, first, last, axes);
   }
-  return json_text(spec);
+  return files::json_text(spec);
 }
 
 }  // namespace mbtfm::charts

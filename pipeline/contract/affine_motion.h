@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm {
 

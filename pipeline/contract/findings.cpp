@@ -4,8 +4,8 @@
 #include <cmath>
 #include <set>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 
 namespace mbtfm {
 

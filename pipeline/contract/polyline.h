@@ -3,7 +3,8 @@
 
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm {
 

@@ -5,11 +5,11 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/json_record.h"
 #include "pipeline/cost/presets.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::cost {
 
@@ -91,7 +91,7 @@ AccuracyOutcome reach_accuracy(double wanted, const std::function<ErrorBudget(co
 void record_accuracy(const std::filesystem::path& cell, double wanted, const AccuracyOutcome& outcome) {
   const std::filesystem::path file = cell / "run.json";
   nlohmann::ordered_json run =
-      JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run").json();
+      files::JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run").json();
   const RelativeError& e = outcome.reached;
   run["accuracy"] = {{"wanted", wanted},
                      {"reached", e.total},
@@ -102,7 +102,7 @@ void record_accuracy(const std::filesystem::path& cell, double wanted, const Acc
                      {"met", outcome.is_met},
                      {"preset", outcome.preset},
                      {"verdict", outcome.verdict}};
-  write_whole(file, json_text(run, 1) + "\n");
+  files::write_whole(file, files::json_text(run, 1) + "\n");
 }
 
 }  // namespace mbtfm::cost

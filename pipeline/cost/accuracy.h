@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
 
 namespace mbtfm::cost {
 

@@ -31,7 +31,9 @@ double width_of(const std::string& text) { return kLetter_px * static_cast<doubl
 void add_names(charts::Chart& chart, const charts::Axis& x, const charts::Axis& y, double frame_height_px,
                const std::vector<NamedDot>& dots, const std::vector<std::string>& key) {
   const Vec2 frame{charts::Chart::kFrameWidth_px, frame_height_px};
-  const auto in_frame = [&](Vec2 at) { return Vec2{frame.x * share(x, at.x), frame.y * (1 - share(y, at.y))}; };
+  const auto in_frame = [&](Vec2 at) {
+    return Vec2{frame.x * charts::share(x, at.x), frame.y * (1 - charts::share(y, at.y))};
+  };
   const auto value_at = [](const charts::Axis& axis, double at) {
     return axis.low * std::pow(axis.high / axis.low, at);
   };

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <map>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/cost/presets.h"
 
 namespace mbtfm::cost {

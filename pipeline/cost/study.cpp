@@ -7,9 +7,11 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/contract/results.h"
 #include "pipeline/cost/accuracy.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/match_fibres.h"
 #include "pipeline/runner/process.h"
@@ -49,7 +51,7 @@ bool is_from_images(const runner::Stage& stage) { return !stage.images.empty(); 
 /// All that segmentation and tracking read is there.
 bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
   for (const runner::Stage& stage : runner::stages()) {
-    for (const runner::ImageInput& image : images_of(stage, names)) {
+    for (const runner::ImageInput& image : runner::images_of(stage, names)) {
       if (runner::match_image(cell, runner::name_of_image(names, image.key)).files.size() != 1) return false;
     }
   }
@@ -60,7 +62,7 @@ bool has_all_images(const fs::path& cell, const runner::ImageNames& names) {
 void copy_files(const fs::path& from, const fs::path& to) {
   fs::create_directories(to);
   for (const fs::directory_entry& entry : fs::directory_iterator(from)) {
-    if (is_own_file(entry.path())) fs::copy_file(entry.path(), to / entry.path().filename());
+    if (files::is_own_file(entry.path())) fs::copy_file(entry.path(), to / entry.path().filename());
   }
 }
 
@@ -70,19 +72,19 @@ class Scratch {
   Scratch(const fs::path& cell, const StudyOptions& options)
       : options_(options),
         cell_(cell),
-        folder_(inside(cell, "cost/scratch", cell.string())),  // it is emptied
+        folder_(files::inside(cell, "cost/scratch", cell.string())),  // it is emptied
         images_(runner::read_image_names(cell)) {
-    check_cell_folder(cell);
+    files::check_cell_folder(cell);
     has_images_ = has_all_images(cell, images_);
     for (const char* file : {"1_segment/adhesions.csv", "2_track/displacement.csv", "cell.toml"}) {
-      if (is_file(cell / file)) continue;
+      if (files::is_file(cell / file)) continue;
       throw InputError((cell / file).string(), "a cell whose images were segmented and tracked", "none",
                        "run it first: mbtfm run " + cell.string());
     }
     fs::remove_all(folder_);
     fs::create_directories(folder_);
     fs::copy_file(cell / "cell.toml", folder_ / "cell.toml");
-    if (is_folder(cell / "truth")) copy_files(cell / "truth", folder_ / "truth");
+    if (files::is_folder(cell / "truth")) copy_files(cell / "truth", folder_ / "truth");
     take_from_cell();
   }
   ~Scratch() {
@@ -111,11 +113,11 @@ class Scratch {
 
   Answer answer() const {
     Answer answer;
-    answer.fibres = read_cell(folder_ / "1_segment").fibres;
-    for (const Tension& t : read_tensions(folder_ / "4_fit/tensions.csv")) {
+    answer.fibres = files::read_cell(folder_ / "1_segment").fibres;
+    for (const Tension& t : files::read_tensions(folder_ / "4_fit/tensions.csv")) {
       if (t.fibre_id != 0) answer.tensions_nN[t.fibre_id] = t.tension_nN;
     }
-    answer.total_force_nN = read_fit_summary(folder_ / "4_fit/fit.json").total_force_nN;
+    answer.total_force_nN = files::read_fit_summary(folder_ / "4_fit/fit.json").total_force_nN;
     return answer;
   }
 
@@ -133,13 +135,13 @@ class Scratch {
     const fs::path file = folder_ / "2_track/displacement.csv";
     DisplacementField some;
     double sum = 0;
-    for (const Bead& bead : read_displacement(file)) {
+    for (const Bead& bead : files::read_displacement(file)) {
       sum += share;
       if (sum < 1) continue;
       sum -= 1;
       some.push_back(bead);
     }
-    write_displacement(file, some);
+    files::write_displacement(file, some);
   }
 
   Run run_stages(const Rung& rung, bool from_images) const {
@@ -162,11 +164,11 @@ class Scratch {
       command.push_back("--" + flag);
       command.push_back(value);
     };
-    for (const runner::ImageInput& image : images_of(stage, images_)) {
-      if (const auto file = resolve_image(cell_, images_, image)) add(image.flag, file->string());
+    for (const runner::ImageInput& image : runner::images_of(stage, images_)) {
+      if (const auto file = runner::resolve_image(cell_, images_, image)) add(image.flag, file->string());
     }
     for (const runner::ImageInput& image : stage.optional_images) {
-      if (const auto file = resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
+      if (const auto file = runner::resolve_optional_image(cell_, images_, image.key)) add(image.flag, file->string());
     }
     for (const runner::PathArgument& argument : stage.arguments) {
       if (argument.where.empty()) add(argument.flag, (folder_ / argument.path).string());  // else: of a time series
@@ -271,7 +273,7 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
       if (repeat > 0 || !run.failure.empty()) continue;
       const Answer answer = scratch.answer();
       compare(m, answer, finest_answer ? by_fibres_of(answer, *finest_answer) : truth_of(scratch.folder()));
-      const auto budget = read_fit_summary(scratch.folder() / "4_fit/fit.json").error_budget;
+      const auto budget = files::read_fit_summary(scratch.folder() / "4_fit/fit.json").error_budget;
       if (budget && m.tension_error > 0) m.stated_error = relative_error(*budget).total;
       say(fmt::format("{} of {}: {} {}: {:.1f} s, error {:.3f}", i + 1, runs.size(), m.rung.knob, m.rung.value,
                       run.seconds, m.tension_error));

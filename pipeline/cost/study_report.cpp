@@ -6,8 +6,9 @@
 #include <map>
 
 #include "pipeline/charts/chart.h"
-#include "pipeline/contract/csv.h"
 #include "pipeline/cost/labels.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::cost {
 namespace fs = std::filesystem;
@@ -24,8 +25,8 @@ std::string name_of(const Rung& rung) { return rung.value.empty() ? rung.knob : 
 std::string stages_of(const Study& study) { return study.has_images ? "all stages" : "network and fit"; }
 
 void write_csv(const fs::path& file, const Study& study) {
-  CsvText csv({"knob", "value", "seconds", "cpu_seconds", "peak_memory_MB", "n_runs", "tension_error", "force_error",
-               "stated_tension_error", "n_fibres", "is_on_front", "failure"});
+  files::CsvText csv({"knob", "value", "seconds", "cpu_seconds", "peak_memory_MB", "n_runs", "tension_error",
+                      "force_error", "stated_tension_error", "n_fibres", "is_on_front", "failure"});
   const std::vector<int> front = front_of(study.measurements);
   for (std::size_t i = 0; i < study.measurements.size(); ++i) {
     const Measurement& m = study.measurements[i];
@@ -39,7 +40,7 @@ void write_csv(const fs::path& file, const Study& study) {
     }
     csv.add(is_on_front ? 1 : 0).add(m.n_runs == 0 ? "no time left" : m.failure).end_row();
   }
-  write_text(file, csv.str());
+  files::write_text(file, csv.str());
 }
 
 std::vector<Vec2> points_of(const std::vector<Measurement>& measurements, const std::vector<int>& indices) {
@@ -98,11 +99,11 @@ void draw(const fs::path& file, const Study& study, const std::string& cell_name
   for (const char* group : {"network and meshes", "gel", "equilibrium and fit", "data, presets, threads"}) {
     list.push_back(chart_of(group, study, x, y));
   }
-  write_text(file,
-             charts::svg_file(
-                 list, 2,
-                 {cell_name + ": |t − reference| / |reference| over the fibres; reference: " + study.reference + ".",
-                  "Grey: the front, which no other choice beats in both. Circle: the settings of the cell."}));
+  files::write_text(
+      file, charts::svg_file(
+                list, 2,
+                {cell_name + ": |t − reference| / |reference| over the fibres; reference: " + study.reference + ".",
+                 "Grey: the front, which no other choice beats in both. Circle: the settings of the cell."}));
 }
 
 /// The quickest rung of a knob that errs no more than `error`.
@@ -211,7 +212,7 @@ void write_study(const fs::path& folder, const Study& study, const std::string& 
   fs::create_directories(folder);
   write_csv(folder / "cost.csv", study);
   draw(folder / "cost.svg", study, cell_name);
-  write_text(folder / "cost.md", page(study, cell_name));
+  files::write_text(folder / "cost.md", page(study, cell_name));
 }
 
 }  // namespace mbtfm::cost

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/parallel.h"
 
 extern "C" {
 void dgemm_(const char* transpose_a, const char* transpose_b, const int* m, const int* n, const int* k,
@@ -18,7 +18,7 @@ void dtrmm_(const char* side, const char* triangle, const char* transpose, const
 void dpotrf_(const char* triangle, const int* n, double* a, const int* lda, int* info);
 }
 
-namespace mbtfm {
+namespace mbtfm::numerics {
 
 namespace {
 
@@ -140,4 +140,4 @@ void multiply_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle
 void solve_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrsm_, 'N', U, B, threads); }
 void solve_upper_transposed(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrsm_, 'T', U, B, threads); }
 
-}  // namespace mbtfm
+}  // namespace mbtfm::numerics

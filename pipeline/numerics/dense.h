@@ -5,7 +5,7 @@
 
 #include <Eigen/Core>
 
-namespace mbtfm {
+namespace mbtfm::numerics {
 
 /// A B
 Eigen::MatrixXd product(const Eigen::MatrixXd& A, const Eigen::MatrixXd& B, int threads = 1);
@@ -36,4 +36,4 @@ void multiply_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 
 void solve_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
 void solve_upper_transposed(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
 
-}  // namespace mbtfm
+}  // namespace mbtfm::numerics

@@ -6,8 +6,10 @@
 #include <map>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/report/match_fibres.h"
 
 namespace mbtfm::report {
@@ -51,22 +53,23 @@ std::string label(const std::optional<Fibre>& fibre) { return fibre ? std::to_st
 
 }  // namespace
 
-bool has_truth(const fs::path& cell) { return is_own_file(cell / "truth/tensions.csv"); }
+bool has_truth(const fs::path& cell) { return files::is_own_file(cell / "truth/tensions.csv"); }
 
 Comparison compare_with_truth(const fs::path& cell) {
-  check_cell_folder(cell);
+  files::check_cell_folder(cell);
   if (!has_truth(cell)) {
     throw InputError((cell / "truth/tensions.csv").string(), "the true tensions of a simulated cell", "none");
   }
-  const std::vector<Fibre> found = read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
-  const bool by_place = is_own_file(cell / "truth/fibres.csv");
+  const std::vector<Fibre> found =
+      files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
+  const bool by_place = files::is_own_file(cell / "truth/fibres.csv");
   const std::vector<Fibre> truth =
-      by_place ? read_fibres(cell / "truth/fibres.csv", cell / "truth/fibre_points.csv") : found;
+      by_place ? files::read_fibres(cell / "truth/fibres.csv", cell / "truth/fibre_points.csv") : found;
 
   std::map<int, Tension> tension;
-  for (const Tension& t : read_tensions(cell / "4_fit/tensions.csv")) tension[t.fibre_id] = t;
+  for (const Tension& t : files::read_tensions(cell / "4_fit/tensions.csv")) tension[t.fibre_id] = t;
   std::map<int, double> true_tension_nN;
-  for (const Tension& t : read_tensions(cell / "truth/tensions.csv")) true_tension_nN[t.fibre_id] = t.tension_nN;
+  for (const Tension& t : files::read_tensions(cell / "truth/tensions.csv")) true_tension_nN[t.fibre_id] = t.tension_nN;
 
   Comparison comparison;
   comparison.network = tension[0];
@@ -96,9 +99,9 @@ Comparison compare_with_truth(const fs::path& cell) {
     comparison.fibres.push_back(std::move(missed));
   }
   add_figures(comparison);
-  comparison.total_force_nN = read_fit_summary(cell / "4_fit/fit.json").total_force_nN;
-  if (is_own_file(cell / "truth/adhesion_forces.csv")) {
-    comparison.true_total_force_nN = sum_of_magnitudes(read_adhesion_forces(cell / "truth/adhesion_forces.csv"));
+  comparison.total_force_nN = files::read_fit_summary(cell / "4_fit/fit.json").total_force_nN;
+  if (files::is_own_file(cell / "truth/adhesion_forces.csv")) {
+    comparison.true_total_force_nN = sum_of_magnitudes(files::read_adhesion_forces(cell / "truth/adhesion_forces.csv"));
   }
   return comparison;
 }

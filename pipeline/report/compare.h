@@ -6,7 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/results.h"
 
 namespace mbtfm::report {
 

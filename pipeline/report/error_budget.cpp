@@ -4,16 +4,16 @@
 
 #include <algorithm>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/json_record.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 
 namespace mbtfm::report {
 namespace {
 
-BudgetLine line_of(const JsonRecord& record, const char* value) {
+BudgetLine line_of(const files::JsonRecord& record, const char* value) {
   BudgetLine line{.value_nN = record.at(value).number(), .total_nN = record.at("total_nN").number()};
   for (const auto& [source, part] : record.at("parts_nN").members()) {
     line.parts_nN.emplace_back(source, part.json().is_null() ? std::nullopt : std::optional(part.number()));
@@ -22,7 +22,7 @@ BudgetLine line_of(const JsonRecord& record, const char* value) {
 }
 
 /// The table has a column for each source of the first line.
-void expect_same_sources(const JsonRecord& record, const BudgetLine& line, const BudgetLine& first) {
+void expect_same_sources(const files::JsonRecord& record, const BudgetLine& line, const BudgetLine& first) {
   const bool is_same = std::ranges::equal(line.parts_nN, first.parts_nN,
                                           [](const auto& a, const auto& b) { return a.first == b.first; });
   if (!is_same) record.at("parts_nN").fail("of the same sources as the first");
@@ -37,9 +37,9 @@ std::string name_of(const BudgetLine& line) {
 const char* colour(std::size_t i) { return charts::kColours[i % std::size(charts::kColours)]; }
 
 std::string share_text(const BudgetLine& line, const std::string& source, double part_nN) {
-  return fmt::format("{}: {} ± {} nN\n{}: {} nN, {:.0f} % of the squared error", name_of(line), readable(line.value_nN),
-                     readable(line.total_nN), source, readable(part_nN),
-                     100 * part_nN * part_nN / (line.total_nN * line.total_nN));
+  return fmt::format("{}: {} ± {} nN\n{}: {} nN, {:.0f} % of the squared error", name_of(line),
+                     charts::readable(line.value_nN), charts::readable(line.total_nN), source,
+                     charts::readable(part_nN), 100 * part_nN * part_nN / (line.total_nN * line.total_nN));
 }
 
 /// A bar as long as the standard error, each source's piece by its share of the square.
@@ -78,21 +78,21 @@ charts::Chart chart_of(const std::vector<BudgetLine>& lines) {
 
 std::vector<BudgetLine> read_error_budget(const std::filesystem::path& run_file) {
   std::vector<BudgetLine> lines;
-  if (!is_own_file(run_file)) return lines;
-  const JsonRecord run(run_file, "a run.json as mbtfm run writes it",
-                       "delete it; if that does not help, 4_fit/fit.json, too");
+  if (!files::is_own_file(run_file)) return lines;
+  const files::JsonRecord run(run_file, "a run.json as mbtfm run writes it",
+                              "delete it; if that does not help, 4_fit/fit.json, too");
   const auto budget = run.find("error_budget");
   if (!budget) return lines;
-  const auto add = [&](const JsonRecord& record, BudgetLine line) {
+  const auto add = [&](const files::JsonRecord& record, BudgetLine line) {
     if (!lines.empty()) expect_same_sources(record, line, lines.front());
     lines.push_back(std::move(line));
   };
-  const auto add_sum = [&](const JsonRecord& record, const char* name, const char* value) {
+  const auto add_sum = [&](const files::JsonRecord& record, const char* name, const char* value) {
     BudgetLine line = line_of(record, value);
     line.type = name;
     add(record, std::move(line));
   };
-  for (const JsonRecord& fibre : budget->at("fibres").list()) {
+  for (const files::JsonRecord& fibre : budget->at("fibres").list()) {
     BudgetLine line = line_of(fibre, "tension_nN");
     line.fibre_id = fibre.at("fibre_id").integer();
     line.type = fibre.at("type").text();
@@ -115,11 +115,12 @@ std::string error_budget_html(const std::vector<BudgetLine>& budget, const std::
   for (const BudgetLine& line : budget) {
     // the network's tension is that of a cable, hundreds of times smaller
     if (line.fibre_id && *line.fibre_id > 0) fibres.push_back(line);
-    std::vector<std::string> row = {html_escaped(name_of(line)), readable(line.value_nN), readable(line.total_nN)};
+    std::vector<std::string> row = {charts::html_escaped(name_of(line)), charts::readable(line.value_nN),
+                                    charts::readable(line.total_nN)};
     csv += fmt::format("\n{},{},{},{}", line.fibre_id ? std::to_string(*line.fibre_id) : "", line.type,
                        shortest(line.value_nN), shortest(line.total_nN));
     for (const auto& [source, part] : line.parts_nN) {
-      row.push_back(part ? readable(*part) : "–");
+      row.push_back(part ? charts::readable(*part) : "–");
       csv += "," + (part ? shortest(*part) : std::string());
     }
     table.rows.push_back(std::move(row));

@@ -32,8 +32,8 @@ std::string of_cut(const FitSummary& fit) {
   return fmt::format(
       " The image cuts the cell: {} ± {} nN (x {} ± {}, y {} ± {}; y points down) pass through the cut and balance the "
       "forces of the adhesions in view.",
-      readable(cut->force_nN), readable(cut->sigma_nN), readable(cut->x_nN), readable(cut->x_sigma_nN),
-      readable(cut->y_nN), readable(cut->y_sigma_nN));
+      charts::readable(cut->force_nN), charts::readable(cut->sigma_nN), charts::readable(cut->x_nN),
+      charts::readable(cut->x_sigma_nN), charts::readable(cut->y_nN), charts::readable(cut->y_sigma_nN));
 }
 
 /// Those that were seen, and those that were put where nobody saw one.
@@ -74,8 +74,8 @@ std::string what(const CellResults& results) {
              counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
              n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
-             readable(results.fit.total_force_nN), readable(results.fit.fibre_force_nN),
-             readable(results.fit.network_force_nN)) +
+             charts::readable(results.fit.total_force_nN), charts::readable(results.fit.fibre_force_nN),
+             charts::readable(results.fit.network_force_nN)) +
          of_candidates(results.cell) + of_cut(results.fit);
 }
 
@@ -144,17 +144,18 @@ std::vector<std::string> on_outputs(const Provenance& provenance) {
 }
 
 std::string item(const char* kind, const char* mark, const std::string& text, const std::string& more = {}) {
-  return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, html_escaped(text), more);
+  return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, charts::html_escaped(text), more);
 }
 
 /// The remedy in sight; number, threshold and its reason unfold.
 std::string details_of(const Finding& f) {
   std::string html;
-  if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + html_escaped(f.remedy);
+  if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + charts::html_escaped(f.remedy);
   if (f.number && f.threshold) {
-    html += fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", html_escaped(f.id),
-                        html_escaped(f.number_is), readable(*f.number), readable(*f.threshold), html_escaped(f.reason),
-                        is_open(f) ? "" : " " + html_escaped(f.remedy));
+    html +=
+        fmt::format("<details><summary>{}</summary>{}: {}. Threshold: {}; {}.{}</details>", charts::html_escaped(f.id),
+                    charts::html_escaped(f.number_is), charts::readable(*f.number), charts::readable(*f.threshold),
+                    charts::html_escaped(f.reason), is_open(f) ? "" : " " + charts::html_escaped(f.remedy));
   }
   return html;
 }

@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/polyline.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/arrows.h"
 #include "pipeline/report/base64.h"
 #include "pipeline/report/colours.h"
@@ -35,8 +35,8 @@ Box map_box(const CellResults& results) {
   return {box.low - margin, box.high + margin};
 }
 
-Chart empty_map(const Box& box, const std::string& title) {
-  Chart map(title, {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
+charts::Chart empty_map(const Box& box, const std::string& title) {
+  charts::Chart map(title, {"x (µm)", box.low.x, box.high.x}, {"y (µm)", box.high.y, box.low.y});
   map.same_scales();
   return map;
 }
@@ -44,7 +44,7 @@ Chart empty_map(const Box& box, const std::string& title) {
 constexpr const char* kCutStyle = "fill:none;stroke:#777;stroke-width:2.6;stroke-dasharray:9 5";
 
 /// The outline, and over it where the image cuts the cell.
-void draw_outline(Chart& map, const Cell& cell, const std::string& style) {
+void draw_outline(charts::Chart& map, const Cell& cell, const std::string& style) {
   map.polygon(cell.outline_um, style);
   Polyline cut;
   for (const auto& [a, b] : cuts_of(cell)) {
@@ -62,15 +62,15 @@ std::string caption_of_cut(const Cell& cell) {
   return cuts_of(cell).empty() ? "" : " Heavy grey dashes: the cut, where the image ends and the cell goes on.";
 }
 
-Chart new_map(const CellResults& results, const std::string& title) {
-  Chart map = empty_map(map_box(results), title);
+charts::Chart new_map(const CellResults& results, const std::string& title) {
+  charts::Chart map = empty_map(map_box(results), title);
   draw_outline(map, results.cell, kOutlineStyle);
   return map;
 }
 
 enum class Hover { none, whole };  // texts make the page large: not on each map
 
-void draw_adhesions(Chart& map, const CellResults& results, const std::string& style, Hover hover) {
+void draw_adhesions(charts::Chart& map, const CellResults& results, const std::string& style, Hover hover) {
   for (const Adhesion& adhesion : results.cell.adhesions) {
     map.polygon(ellipse_corners(adhesion, kEllipseCorners), style,
                 hover == Hover::whole ? hover_of(adhesion, results) : std::string());
@@ -103,9 +103,9 @@ std::map<int, std::string> fibre_texts(const CellResults& results) {
   return texts;
 }
 
-void draw_fibre_ids(Chart& map, const CellResults& results) {
+void draw_fibre_ids(charts::Chart& map, const CellResults& results) {
   const Box box = map_box(results);
-  const double clear_um = 15 * (box.high.x - box.low.x) / Chart::kFrameWidth_px;  // about a label's width
+  const double clear_um = 15 * (box.high.x - box.low.x) / charts::Chart::kFrameWidth_px;  // about a label's width
   for (const Fibre& fibre : results.cell.fibres) {
     map.label(label_places_um(fibre, results.cell.fibres, clear_um).front(), std::to_string(fibre.fibre_id));
   }
@@ -121,7 +121,7 @@ ColourScale tension_scale(const CellResults& results, NetworkForm form) {
   return scale;
 }
 
-void draw_web(Chart& map, const CellResults& results, const Pieces& web, Hover hover) {
+void draw_web(charts::Chart& map, const CellResults& results, const Pieces& web, Hover hover) {
   map.pieces(web, "stroke:#bbb;stroke-width:0.5");
   draw_adhesions(map, results, "fill:#cfe3f3;stroke:#7aa6c8;stroke-width:0.5", hover);
 }
@@ -143,7 +143,7 @@ bool are_all_candidates(const Cell& cell) {
 }
 
 Figure original_network(const CellResults& results) {
-  Chart map = new_map(results, "Where the fibres are");
+  charts::Chart map = new_map(results, "Where the fibres are");
   const ColourScale scale = tension_scale(results, NetworkForm::original);
   const SortedLinks links = sorted_links(results.network, {});
   const std::map<int, std::string> texts = fibre_texts(results);
@@ -166,7 +166,7 @@ Figure original_network(const CellResults& results) {
 }
 
 Figure contracted_network(const CellResults& results) {
-  Chart map = new_map(results, "Network in equilibrium");
+  charts::Chart map = new_map(results, "Network in equilibrium");
   const ColourScale scale = tension_scale(results, NetworkForm::contracted);
   const SortedLinks links = sorted_links(results.contracted.network, results.contracted.link_force_nN);
   const std::map<int, std::string> texts = fibre_texts(results);
@@ -176,7 +176,7 @@ Figure contracted_network(const CellResults& results) {
     map.pieces(pieces, kHalo, texts.at(id));
     for (std::size_t k = 0; k < pieces.size(); ++k) {
       map.pieces({pieces[k]}, kThick + scale.colour(carried_nN[k]),
-                 fmt::format("{}\nthis link carries {} nN", texts.at(id), readable(carried_nN[k])));
+                 fmt::format("{}\nthis link carries {} nN", texts.at(id), charts::readable(carried_nN[k])));
     }
   }
   return {map,
@@ -202,11 +202,11 @@ std::string adhesion_keys(const Cell& cell) {
 
 Figure segmentation_map(const CellResults& results) {
   const bool is_dark = results.images.has_value();
-  Chart map =
+  charts::Chart map =
       empty_map(is_dark ? Box{results.images->low_um, results.images->high_um} : map_box(results), "Segmentation");
   if (is_dark) {
     map.picture(results.images->low_um, results.images->high_um,
-                "data:image/jpeg;base64," + base64(read_text(results.images->file)));
+                "data:image/jpeg;base64," + base64(files::read_text(results.images->file)));
   }
   draw_outline(map, results.cell, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
   // nearly invisible fill: the mouse finds the whole ellipse
@@ -232,17 +232,19 @@ Figure segmentation_map(const CellResults& results) {
   draw_fibre_ids(map, results);
   const auto by_id = adhesions_by_id(results.cell);
   for (const MissingFibre& f : results.missing_fibres) {
-    map.curve({by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
-              std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
-              fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN",
-                          f.start_adhesion_id, f.end_adhesion_id, readable(f.tension_nN), readable(f.sigma_nN)));
+    map.curve(
+        {by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
+        std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
+        fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN", f.start_adhesion_id,
+                    f.end_adhesion_id, charts::readable(f.tension_nN), charts::readable(f.sigma_nN)));
   }
   for (const MissingAdhesion& a : results.missing_adhesions) {
     const Adhesion circle{.adhesion_id = 0, .position_um = a.position_um, .major_axis_um = 2, .minor_axis_um = 2};
-    map.polygon(ellipse_corners(circle, 24),
-                std::string("fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:") +
-                    (is_dark ? "#ffe14d" : "#b00020"),
-                fmt::format("a force that the beads call for, no adhesion found\n{} nN", readable(norm(a.force_nN))));
+    map.polygon(
+        ellipse_corners(circle, 24),
+        std::string("fill:#fff;fill-opacity:0.01;stroke-width:2.2;stroke-dasharray:4 3;stroke:") +
+            (is_dark ? "#ffe14d" : "#b00020"),
+        fmt::format("a force that the beads call for, no adhesion found\n{} nN", charts::readable(norm(a.force_nN))));
   }
   const std::string missing =
       results.missing_fibres.empty() && results.missing_adhesions.empty()
@@ -258,7 +260,7 @@ Figure segmentation_map(const CellResults& results) {
 }
 
 Figure adhesion_map(const CellResults& results) {
-  Chart map = new_map(results, "Forces on the substrate");
+  charts::Chart map = new_map(results, "Forces on the substrate");
   const auto by_id = adhesions_by_id(results.cell);
   std::vector<double> tractions;
   std::vector<Vec2> forces;
@@ -305,7 +307,7 @@ std::vector<Figure> displacement_maps(const CellResults& results) {
   const ArrowScale scale = arrow_scale(means.means.vectors);
   const auto drawn = [&](const VectorField& field, const std::string& title, const std::string& what,
                          const std::string& caption) {
-    Chart map = new_map(results, title);
+    charts::Chart map = new_map(results, title);
     draw_adhesions(map, results, "fill:#ddd", Hover::none);
     const std::string explained = draw_arrows(map, field, scale, what, "µm");
     return Figure{map, caption, explained};

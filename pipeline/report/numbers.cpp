@@ -21,7 +21,7 @@ std::string with_minus(const std::string& text) {
 int decimals_for(double error) { return std::clamp(1 - static_cast<int>(std::floor(std::log10(error))), 0, 9); }
 
 std::string rounded(double value, std::optional<int> decimals) {
-  if (!decimals) return readable(value);
+  if (!decimals) return charts::readable(value);
   const int exponent = value != 0 ? static_cast<int>(std::floor(std::log10(std::abs(value)))) : 0;
   return with_minus(fmt::format("{:.{}f}", value, std::clamp(2 - exponent, 0, *decimals)));
 }

@@ -46,7 +46,7 @@ std::string html_of(const Table& table) {
   std::string html = "<div class=\"scroll\"><table><thead><tr>";
   for (const Table::Column& column : table.columns) {
     html += std::string("<th") + (column.is_number ? " class=\"n\"" : "") +
-            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + html_escaped(column.title) +
+            "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + charts::html_escaped(column.title) +
             "</span></th>";
   }
   html += "</tr></thead><tbody>\n";
@@ -64,51 +64,52 @@ std::string html_of(const Table& table, const Download& csv) {
   return "<div class=\"table\">" + html_of(table) +
          fmt::format(
              "<a class=\"download\" download=\"{0}\" href=\"data:text/csv;base64,{1}\">Download {0}</a></div>\n",
-             html_escaped(csv.name), base64(csv.text));
+             charts::html_escaped(csv.name), base64(csv.text));
 }
 
 std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs) {
   std::string html = "<div class=\"scroll\"><table><tbody>\n";
   for (const auto& [name, value] : pairs) {
-    html += "<tr><td>" + html_escaped(name) + "</td><td class=\"long\">" + html_escaped(value) + "</td></tr>\n";
+    html += "<tr><td>" + charts::html_escaped(name) + "</td><td class=\"long\">" + charts::html_escaped(value) +
+            "</td></tr>\n";
   }
   return html + "</tbody></table></div>\n";
 }
 
 std::string section(const std::string& title, const std::string& content) {
-  return "<section id=\"" + html_escaped(anchor_of(title)) + "\"><h2>" + html_escaped(title) + "</h2>\n" + content +
-         "</section>\n";
+  return "<section id=\"" + charts::html_escaped(anchor_of(title)) + "\"><h2>" + charts::html_escaped(title) +
+         "</h2>\n" + content + "</section>\n";
 }
 
 std::string folded(const std::string& title, const std::string& content) {
-  return "<details><summary>" + html_escaped(title) + "</summary>\n" + content + "</details>\n";
+  return "<details><summary>" + charts::html_escaped(title) + "</summary>\n" + content + "</details>\n";
 }
 
 std::string figure(const charts::Chart& chart, const std::string& caption, const std::string& legend) {
-  std::string html = "<figure><h3>" + html_escaped(chart.title()) + "</h3>\n";
+  std::string html = "<figure><h3>" + charts::html_escaped(chart.title()) + "</h3>\n";
   if (!chart.subtitle().empty()) {
     html += fmt::format("<div class=\"note\" style=\"color:{}\">{}</div>\n", chart.subtitle_colour(),
-                        html_escaped(chart.subtitle()));
+                        charts::html_escaped(chart.subtitle()));
   }
   if (!chart.keys().empty()) {
     html += "<div class=\"keys\">";
     for (const auto& [text, colour] : chart.keys()) {
-      html += fmt::format("<span style=\"color:{}\">{}</span>", colour, html_escaped(text));
+      html += fmt::format("<span style=\"color:{}\">{}</span>", colour, charts::html_escaped(text));
     }
     html += "</div>\n";
   }
   return html + "<div class=\"chart\"></div><script type=\"application/json\">" + inside_script(chart.vega()) +
-         "</script>\n" + legend + (caption.empty() ? "" : "<figcaption>" + html_escaped(caption) + "</figcaption>") +
-         "</figure>\n";
+         "</script>\n" + legend +
+         (caption.empty() ? "" : "<figcaption>" + charts::html_escaped(caption) + "</figcaption>") + "</figure>\n";
 }
 
 std::string page(const std::string& title, const std::string& head, const std::string& body) {
   return "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\">"
          "<meta name=\"viewport\" content=\"width=device-width,initial-scale=1\">"
          "<link rel=\"icon\" href=\"data:,\"><title>" +
-         html_escaped(title) + "</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n" + head +
-         contents(body) + "<noscript><p>The charts of this page need JavaScript.</p></noscript>\n" + body + "</main>" +
-         script(kVega) + script(kScript) + "</body></html>\n";
+         charts::html_escaped(title) + "</title><style>" + std::string(kStyle) + "</style></head>\n<body><main>\n" +
+         head + contents(body) + "<noscript><p>The charts of this page need JavaScript.</p></noscript>\n" + body +
+         "</main>" + script(kVega) + script(kScript) + "</body></html>\n";
 }
 
 }  // namespace mbtfm::report

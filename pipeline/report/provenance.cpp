@@ -2,9 +2,9 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/json_record.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
 #include "pipeline/report/numbers.h"
 
 namespace mbtfm::report {
@@ -17,7 +17,7 @@ std::string text_of(const ordered_json& value) {
   if (value.is_string()) return value.get<std::string>();
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
   if (value.is_null()) return "not set";
-  if (value.is_number_float()) return readable(value.get<double>());
+  if (value.is_number_float()) return charts::readable(value.get<double>());
   return value.dump();
 }
 
@@ -33,7 +33,7 @@ void flatten(const ordered_json& json, const std::string& prefix, Pairs& pairs) 
   }
 }
 
-Pairs flat(const std::optional<JsonRecord>& record, const char* key) {
+Pairs flat(const std::optional<files::JsonRecord>& record, const char* key) {
   Pairs pairs;
   const auto member = record ? record->find(key) : std::nullopt;
   if (!member) return pairs;
@@ -42,12 +42,12 @@ Pairs flat(const std::optional<JsonRecord>& record, const char* key) {
   return pairs;
 }
 
-std::string number_of(const std::optional<JsonRecord>& record, const char* key) {
+std::string number_of(const std::optional<files::JsonRecord>& record, const char* key) {
   const auto member = record ? record->find(key) : std::nullopt;
-  return member ? readable(member->number()) : std::string();
+  return member ? charts::readable(member->number()) : std::string();
 }
 
-StageLine stage_of(const std::string& name, const JsonRecord& record) {
+StageLine stage_of(const std::string& name, const files::JsonRecord& record) {
   const auto run = record.find("run");
   return {.name = name,
           .state = record.at("state").text(),
@@ -62,7 +62,7 @@ StageLine stage_of(const std::string& name, const JsonRecord& record) {
           .inputs = flat(run, "inputs")};
 }
 
-EffectLine effect_line_of(const JsonRecord& record) {
+EffectLine effect_line_of(const files::JsonRecord& record) {
   return {.name = record.at("name").text(),
           .stage = record.text_or("stage", ""),
           .why = record.text_or("why", ""),
@@ -74,9 +74,9 @@ EffectLine effect_line_of(const JsonRecord& record) {
 
 Provenance read_provenance(const std::filesystem::path& run_file) {
   Provenance provenance;
-  if (!is_own_file(run_file)) return provenance;
-  const JsonRecord run(run_file, "a run.json as mbtfm run writes it",
-                       "delete it; if that does not help, the record.json of the stage, too");
+  if (!files::is_own_file(run_file)) return provenance;
+  const files::JsonRecord run(run_file, "a run.json as mbtfm run writes it",
+                              "delete it; if that does not help, the record.json of the stage, too");
   provenance.version = run.at("version").text();
   provenance.preset = run.text_or("preset", "");
   if (const auto accuracy = run.find("accuracy")) {
@@ -84,8 +84,8 @@ Provenance read_provenance(const std::filesystem::path& run_file) {
         WantedAccuracy{.verdict = accuracy->at("verdict").text(), .is_met = accuracy->at("met").is_true()};
   }
   for (const auto& [name, stage] : run.at("stages").members()) provenance.stages.push_back(stage_of(name, stage));
-  for (const JsonRecord& effect : run.at("effects").list()) provenance.effects.push_back(effect_line_of(effect));
-  provenance.findings = findings_of(run);
+  for (const files::JsonRecord& effect : run.at("effects").list()) provenance.effects.push_back(effect_line_of(effect));
+  provenance.findings = files::findings_of(run);
   return provenance;
 }
 

@@ -4,10 +4,10 @@
 
 #include <algorithm>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/hash.h"
-#include "pipeline/contract/own_files.h"
 #include "pipeline/contract/version.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/error_budget.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/maps.h"
@@ -29,7 +29,7 @@ std::string html_of(const Figure& map) { return figure(map.chart, map.caption, m
 /// A file of the cell as it lies in its folder.
 Download file_of(const CellResults& results, const std::string& file) {
   const std::filesystem::path path = results.folder / file;
-  return {results.name + "_" + path.filename().string(), read_text(path)};
+  return {results.name + "_" + path.filename().string(), files::read_text(path)};
 }
 
 std::string tension_section(const CellResults& results) {
@@ -110,12 +110,12 @@ std::string adhesion_section(const CellResults& results) {
 std::string figure_pairs(const CellResults& results) {
   const FitSummary& fit = results.fit;
   std::vector<std::pair<std::string, std::string>> pairs = {
-      {"relative L2", readable(fit.relative_l2)},
-      {"relative L2 expected of the noise", readable(fit.expected_relative_l2)},
-      {"noise of a displacement component (nm)", readable(1000 * fit.noise_um)},
-      {"total force (nN)", readable(fit.total_force_nN)},
-      {"force of the network (nN)", readable(fit.network_force_nN)},
-      {"force of the fibres (nN)", readable(fit.fibre_force_nN)},
+      {"relative L2", charts::readable(fit.relative_l2)},
+      {"relative L2 expected of the noise", charts::readable(fit.expected_relative_l2)},
+      {"noise of a displacement component (nm)", charts::readable(1000 * fit.noise_um)},
+      {"total force (nN)", charts::readable(fit.total_force_nN)},
+      {"force of the network (nN)", charts::readable(fit.network_force_nN)},
+      {"force of the fibres (nN)", charts::readable(fit.fibre_force_nN)},
       {"meshes", std::to_string(fit.n_meshes)},
       {"iterations", std::to_string(fit.iterations)},
       {"converged", fit.converged ? "yes" : "no"}};
@@ -125,7 +125,7 @@ std::string figure_pairs(const CellResults& results) {
                                    using V = std::decay_t<decltype(v)>;
                                    if constexpr (std::is_same_v<V, std::string>) return v;
                                    if constexpr (std::is_same_v<V, bool>) return v ? "yes" : "no";
-                                   if constexpr (std::is_same_v<V, double>) return readable(v);
+                                   if constexpr (std::is_same_v<V, double>) return charts::readable(v);
                                    if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
                                  },
                                  value));
@@ -139,8 +139,8 @@ std::string effects_table(const Provenance& provenance) {
   Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}}, {}};
   if (are_timed) table.columns.push_back({"seconds", true});
   for (const EffectLine& effect : provenance.effects) {
-    std::vector<std::string> row = {html_escaped(effect.name), html_escaped(effect.stage), effect.is_on ? "on" : "off",
-                                    html_escaped(effect.why)};
+    std::vector<std::string> row = {charts::html_escaped(effect.name), charts::html_escaped(effect.stage),
+                                    effect.is_on ? "on" : "off", charts::html_escaped(effect.why)};
     if (are_timed) row.push_back(effect.seconds);
     table.rows.push_back(row);
   }
@@ -150,14 +150,14 @@ std::string effects_table(const Provenance& provenance) {
 std::string provenance_section(const CellResults& results, const Provenance& provenance) {
   Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}};
   for (const StageLine& stage : provenance.stages) {
-    stages.rows.push_back({html_escaped(stage.name), html_escaped(stage.state),
-                           html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
-                           stage.peak_memory_MB, html_escaped(stage.version)});
+    stages.rows.push_back({charts::html_escaped(stage.name), charts::html_escaped(stage.state),
+                           charts::html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
+                           stage.peak_memory_MB, charts::html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
   if (!provenance.preset.empty())
     html += fmt::format("<p class=\"sub\">Preset: {}, where cell.toml says nothing.</p>\n",
-                        html_escaped(provenance.preset));
+                        charts::html_escaped(provenance.preset));
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
   html += folded("Figures of the fit", figure_pairs(results));
   for (const StageLine& stage : provenance.stages) {
@@ -174,9 +174,9 @@ std::string fingerprint(const std::filesystem::path& cell) {
   namespace fs = std::filesystem;
   std::vector<fs::path> files = {cell / "cell.toml"};
   for (const char* folder : {"1_segment", "2_track", "3_network", "4_fit", "truth"}) {
-    if (!is_folder(cell / folder)) continue;
+    if (!files::is_folder(cell / folder)) continue;
     for (const fs::directory_entry& entry : fs::directory_iterator(cell / folder)) {
-      if (is_own_file(entry.path())) files.push_back(entry.path());
+      if (files::is_own_file(entry.path())) files.push_back(entry.path());
     }
   }
   std::sort(files.begin(), files.end());
@@ -184,9 +184,9 @@ std::string fingerprint(const std::filesystem::path& cell) {
   std::string all =
       std::string(kVersion) + " " + provenance.preset + " " + (provenance.accuracy ? provenance.accuracy->verdict : "");
   for (const fs::path& file : files) {
-    all += "\n" + file.lexically_relative(cell).generic_string() + " " + sha256_of_file(file);
+    all += "\n" + file.lexically_relative(cell).generic_string() + " " + files::sha256_of_file(file);
   }
-  return sha256(all);
+  return files::sha256(all);
 }
 
 }  // namespace
@@ -198,8 +198,8 @@ std::string report_html(const std::filesystem::path& cell) {
       "<h1>{}</h1><p class=\"what\">Tensions of the stress fibres and forces of the adhesions of one cell, by "
       "model-based traction force microscopy</p>\n<p class=\"sub\">Gel: Young’s modulus {} kPa, Poisson’s ratio {}, {} "
       "µm thick · mbtfm {}</p>\n",
-      html_escaped(results.name), readable(results.gel.youngs_modulus_kPa), readable(results.gel.poisson_ratio),
-      readable(results.gel.thickness_um), kVersion);
+      charts::html_escaped(results.name), charts::readable(results.gel.youngs_modulus_kPa),
+      charts::readable(results.gel.poisson_ratio), charts::readable(results.gel.thickness_um), kVersion);
   std::string body = findings_section(results, provenance);
   if (!results.cell.fibres.empty()) body += tension_section(results);
   body += map_section(results) + adhesion_section(results);
@@ -210,13 +210,14 @@ std::string report_html(const std::filesystem::path& cell) {
 }
 
 void update_report(const std::filesystem::path& cell) {
-  check_cell_folder(cell);
+  files::check_cell_folder(cell);
   const std::filesystem::path script = cell / "view_in_paraview.py";
-  if (!is_own_text(script) || read_text(script) != kParaviewScript) write_whole(script, std::string(kParaviewScript));
+  if (!files::is_own_text(script) || files::read_text(script) != kParaviewScript)
+    files::write_whole(script, std::string(kParaviewScript));
   const std::filesystem::path file = cell / "report.html";
   const std::string signature = "<!-- made from " + fingerprint(cell) + " -->\n";
-  if (is_own_text(file) && read_text(file).ends_with(signature)) return;
-  write_whole(file, report_html(cell) + signature);
+  if (files::is_own_text(file) && files::read_text(file).ends_with(signature)) return;
+  files::write_whole(file, report_html(cell) + signature);
 }
 
 }  // namespace mbtfm::report

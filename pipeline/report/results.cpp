@@ -2,10 +2,13 @@
 
 #include <cmath>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/parameters.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::report {
 namespace fs = std::filesystem;
@@ -13,8 +16,8 @@ namespace {
 
 /// Both files hold the unflagged beads in the same order. @throws InputError where they do not
 std::optional<Residual> residual_of(const DisplacementField& measured, const Path& fitted_file) {
-  if (!is_own_file(fitted_file)) return {};
-  const DisplacementField fitted = read_displacement(fitted_file);
+  if (!files::is_own_file(fitted_file)) return {};
+  const DisplacementField fitted = files::read_displacement(fitted_file);
   Residual residual;
   for (const Bead& bead : measured) {
     if (!bead.flag.empty()) continue;
@@ -31,8 +34,8 @@ std::optional<Residual> residual_of(const DisplacementField& measured, const Pat
 
 std::optional<Images> images_of(const Path& segmentation) {
   const Path file = segmentation / "images.jpg", place = segmentation / "images.csv";
-  if (!is_own_file(file) || !is_own_file(place)) return {};
-  const CsvTable table(place);
+  if (!files::is_own_file(file) || !files::is_own_file(place)) return {};
+  const files::CsvTable table(place);
   if (table.n_rows() != 1) throw InputError(place.string(), "one row", std::to_string(table.n_rows()));
   const Vec2 low_um{table.number(0, "x_um"), table.number(0, "y_um")};
   return Images{file, low_um, low_um + Vec2{table.number(0, "width_um"), table.number(0, "height_um")}};
@@ -40,8 +43,8 @@ std::optional<Images> images_of(const Path& segmentation) {
 
 std::vector<MissingFibre> missing_fibres_in(const Path& file, const Cell& cell) {
   std::vector<MissingFibre> fibres;
-  if (!is_own_file(file)) return fibres;
-  const CsvTable table(file);
+  if (!files::is_own_file(file)) return fibres;
+  const files::CsvTable table(file);
   const auto by_id = adhesions_by_id(cell);
   for (int row = 0; row < table.n_rows(); ++row) {
     MissingFibre fibre{.start_adhesion_id = table.integer(row, "start_adhesion_id", 1),
@@ -60,8 +63,8 @@ std::vector<MissingFibre> missing_fibres_in(const Path& file, const Cell& cell) 
 
 std::vector<MissingAdhesion> missing_adhesions_in(const Path& file) {
   std::vector<MissingAdhesion> adhesions;
-  if (!is_own_file(file)) return adhesions;
-  const CsvTable table(file);
+  if (!files::is_own_file(file)) return adhesions;
+  const files::CsvTable table(file);
   for (int row = 0; row < table.n_rows(); ++row) {
     adhesions.push_back({.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
                          .force_nN = {table.number(row, "fx_nN"), table.number(row, "fy_nN")}});
@@ -72,21 +75,21 @@ std::vector<MissingAdhesion> missing_adhesions_in(const Path& file) {
 }  // namespace
 
 CellResults read_results(const Path& cell) {
-  check_cell_folder(cell);
+  files::check_cell_folder(cell);
   CellResults results;
   results.folder = cell;
   results.name = fs::weakly_canonical(cell).filename().string();
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, results.gel);
-  read_toml(list, cell / "cell.toml");
-  results.cell = read_cell(cell / "1_segment");
-  results.displacement = read_displacement(cell / "2_track/displacement.csv");
-  results.network = read_network(cell / "3_network/network.vtu");
-  results.contracted = read_contracted_network(cell / "4_fit/contracted.vtu");
-  for (const Tension& tension : read_tensions(cell / "4_fit/tensions.csv"))
+  stage::read_toml(list, cell / "cell.toml");
+  results.cell = files::read_cell(cell / "1_segment");
+  results.displacement = files::read_displacement(cell / "2_track/displacement.csv");
+  results.network = files::read_network(cell / "3_network/network.vtu");
+  results.contracted = files::read_contracted_network(cell / "4_fit/contracted.vtu");
+  for (const Tension& tension : files::read_tensions(cell / "4_fit/tensions.csv"))
     results.tensions[tension.fibre_id] = tension;
-  results.forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
-  results.fit = read_fit_summary(cell / "4_fit/fit.json");
+  results.forces = files::read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
+  results.fit = files::read_fit_summary(cell / "4_fit/fit.json");
   results.residual = residual_of(results.displacement, cell / "4_fit/fitted_displacement.csv");
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
   results.images = images_of(cell / "1_segment");

@@ -6,7 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/gel.h"
+#include "pipeline/contract/network.h"
+#include "pipeline/contract/path.h"
+#include "pipeline/contract/results.h"
 #include "pipeline/report/compare.h"
 
 namespace mbtfm::report {

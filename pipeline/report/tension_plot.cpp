@@ -22,10 +22,10 @@ double largest_nN(const std::vector<FibreRow>& rows) {
   return largest > 0 ? 1.03 * largest : 1;
 }
 
-void draw_row(Chart& chart, const FibreRow& row, double y, const CellResults& results) {
+void draw_row(charts::Chart& chart, const FibreRow& row, double y, const CellResults& results) {
   const std::string colour = colour_of(row.fibre->type);
   std::string hover = hover_of(*row.fibre, results);
-  if (row.true_tension_nN) hover += "\ntruth " + readable(*row.true_tension_nN) + " nN";
+  if (row.true_tension_nN) hover += "\ntruth " + charts::readable(*row.true_tension_nN) + " nN";
   const Tension& t = row.tension;
   if (t.low_nN && t.high_nN) chart.error({*t.low_nN, y}, {*t.high_nN, y}, "stroke-width:2;stroke:" + colour, hover);
   chart.dot({t.tension_nN, y}, 4.5, "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff"),
@@ -113,13 +113,13 @@ std::vector<FibreRow> fibre_rows(const CellResults& results) {
   return rows;
 }
 
-Chart tension_plot(const CellResults& results) {
+charts::Chart tension_plot(const CellResults& results) {
   const std::vector<FibreRow> rows = fibre_rows(results);
   std::vector<std::string> names;
   for (const FibreRow& row : rows) names.push_back(fmt::format("{} {}", name_of(row.fibre->type), row.fibre->fibre_id));
   const double largest = largest_nN(rows);
   // from a little below zero: the mark of a tension of zero is seen whole
-  Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(names));
+  charts::Chart chart("Tension of each fibre", {"tension (nN)", -0.02 * largest, largest}, charts::row_axis(names));
   constexpr double kRow_px = 20;
   chart.frame_height(kRow_px * static_cast<double>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) draw_row(chart, rows[i], static_cast<double>(i), results);

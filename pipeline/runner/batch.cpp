@@ -7,10 +7,11 @@
 #include <mutex>
 #include <thread>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/parallel.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
@@ -81,7 +82,7 @@ BatchCell run_one(const fs::path& cell, const BatchOptions& options) {
   command.insert(command.end(), options.arguments.begin(), options.arguments.end());
   BatchCell outcome{.cell = cell, .message = {}, .failed_stage = {}, .how = {}};
   try {
-    write_text(cell / "run.log", "");
+    files::write_text(cell / "run.log", "");
     const auto record_before = time_of_record(cell);
     std::ofstream log(cell / "run.log", std::ios::app);
     const ProcessResult result = run_process(command, limits_of_cell(options.run.limits),
@@ -184,7 +185,7 @@ void check_parameters_once(std::vector<Look>& looks, const BatchOptions& options
 }  // namespace
 
 FoundCells find_cells(const fs::path& folder) {
-  if (!is_folder(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");
+  if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder of cell folders", "none");
   FoundCells found;
   collect_cells(folder, found);
   if (found.cells.empty()) {
@@ -202,7 +203,7 @@ FoundCells find_cells(const fs::path& folder) {
 std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const BatchOptions& options) {
   const int n = static_cast<int>(cells.size());
   std::vector<Look> looks(cells.size());
-  parallel_for(n, options.threads, [&](int i) { looks[i] = look_at(cells[i], options.run); });
+  numerics::parallel_for(n, options.threads, [&](int i) { looks[i] = look_at(cells[i], options.run); });
   check_parameters_once(looks, options);
   std::vector<BatchCell> outcomes;
   std::vector<int> to_run, busy;
@@ -215,7 +216,7 @@ std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const Batch
   if (options.say) options.say(std::to_string(n) + " cells, " + std::to_string(n_to_run) + " of them to run");
   BatchProgress progress(n_to_run, options);
   std::mutex busy_mutex;
-  parallel_for(static_cast<int>(to_run.size()), options.jobs, [&](int k) {
+  numerics::parallel_for(static_cast<int>(to_run.size()), options.jobs, [&](int k) {
     const int i = to_run[k];
     progress.starts(cells[i]);
     outcomes[i] = run_one(cells[i], options);
@@ -224,7 +225,7 @@ std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const Batch
     const std::lock_guard guard(busy_mutex);
     busy.push_back(i);
   });
-  parallel_for(static_cast<int>(busy.size()), options.jobs, [&](int k) {
+  numerics::parallel_for(static_cast<int>(busy.size()), options.jobs, [&](int k) {
     outcomes[busy[k]] = run_when_free(cells[busy[k]], options);
     progress.ended(outcomes[busy[k]]);
   });
@@ -233,7 +234,7 @@ std::vector<BatchCell> run_batch(const std::vector<fs::path>& cells, const Batch
 
 std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const RunOptions& options, int threads) {
   std::vector<BatchCell> outcomes(cells.size());
-  parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
+  numerics::parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
     const Look look = look_at(cells[i], options);
     outcomes[i] = look.outcome;
     if (look.finding == Look::Finding::done || look.outcome.exit_code != 0) return;
@@ -247,7 +248,7 @@ std::vector<BatchCell> outcomes_so_far(const std::vector<fs::path>& cells, const
 std::string list_cells(const std::vector<fs::path>& cells, const RunOptions& options, int threads) {
   std::vector<std::optional<CellOutcome>> looks(cells.size());
   std::vector<std::string> errors(cells.size());
-  parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
+  numerics::parallel_for(static_cast<int>(cells.size()), threads, [&](int i) {
     try {
       looks[i] = look_at_cell(cells[i], options);
     } catch (const InputError& error) {
@@ -256,7 +257,7 @@ std::string list_cells(const std::vector<fs::path>& cells, const RunOptions& opt
       errors[i] = error.what();
     }
   });
-  CsvText csv({"cell", "stage", "state", "why"});
+  files::CsvText csv({"cell", "stage", "state", "why"});
   for (std::size_t i = 0; i < cells.size(); ++i) {
     if (!looks[i]) {
       csv.add(cells[i].string()).add("").add("unreadable").add(errors[i]);

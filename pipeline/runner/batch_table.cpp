@@ -7,11 +7,13 @@
 #include <set>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/json_record.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/runner/record.h"
 
 namespace mbtfm::runner {
@@ -41,10 +43,10 @@ std::string text_of(const Value& value) {
 /// None where there is no record, or a damaged one: the run itself tells.
 std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
   const fs::path file = record_file_of(cell, stage);
-  if (!is_own_file(file)) return std::nullopt;
+  if (!files::is_own_file(file)) return std::nullopt;
   try {
-    const JsonRecord record(file, "a stage's record");
-    StageSays says{.summary = record.text_or("summary", ""), .figures = {}, .findings = findings_of(record)};
+    const files::JsonRecord record(file, "a stage's record");
+    StageSays says{.summary = record.text_or("summary", ""), .figures = {}, .findings = files::findings_of(record)};
     for (const auto& [name, value] : record.at("figures").members()) {
       // null: not a number, in JSON
       says.figures.emplace_back(name, value.json().is_null() ? std::string() : text_of(value.figure()));
@@ -88,7 +90,7 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
       }
     }
   }
-  CsvText csv(header);
+  files::CsvText csv(header);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     csv.add(cells[i].cell.lexically_relative(folder).generic_string())
         .add(cells[i].exit_code)
@@ -99,7 +101,7 @@ void write_batch_table(const fs::path& file, const fs::path& folder, const std::
     for (std::size_t k = n_fixed; k < header.size(); ++k) csv.add(rows[i][header[k]]);
     csv.end_row();
   }
-  write_whole(file, csv.str());
+  files::write_whole(file, csv.str());
 }
 
 std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& cells) {

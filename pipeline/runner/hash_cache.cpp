@@ -8,11 +8,11 @@
 #include <fstream>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/hash.h"
-#include "pipeline/contract/names.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/names.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -31,7 +31,7 @@ fs::path file_in(const fs::path& cell) { return cell / ".mbtfm.hashes"; }
 /// What the file system's clock says, by touching a file; 0 where it cannot be touched.
 std::int64_t file_system_time_ns(const fs::path& file) {
   try {
-    make_way(file);  // a file elsewhere must not be touched through a link
+    files::make_way(file);  // a file elsewhere must not be touched through a link
   } catch (const OutputError&) {
     return 0;
   }
@@ -46,7 +46,7 @@ std::int64_t file_system_time_ns(const fs::path& file) {
 }  // namespace
 
 HashCache::HashCache(fs::path cell) : cell_(std::move(cell)) {
-  if (!is_own_text(file_in(cell_))) return;
+  if (!files::is_own_text(file_in(cell_))) return;
   std::ifstream file(file_in(cell_));
   for (std::string line; std::getline(file, line);) {
     std::istringstream fields(line);
@@ -79,13 +79,13 @@ Hashes HashCache::hash(const std::vector<std::string>& names) {
     if (!stamp) continue;
     std::unique_lock guard(mutex_);
     if (const auto known = entries_.find(name); known != entries_.end() && known->second.stamp == *stamp) {
-      hashes[shown_name(name)] = known->second.sha256;
+      hashes[files::shown_name(name)] = known->second.sha256;
       continue;
     }
     const bool is_kept = has_rested(*stamp) && name.find('\n') == std::string::npos;
     guard.unlock();
-    const std::string sha256 = sha256_of_file(cell_ / name);
-    hashes[shown_name(name)] = sha256;
+    const std::string sha256 = files::sha256_of_file(cell_ / name);
+    hashes[files::shown_name(name)] = sha256;
     if (!is_kept) continue;
     guard.lock();
     entries_[name] = {.stamp = *stamp, .sha256 = sha256};
@@ -104,7 +104,7 @@ void HashCache::save() {
     text << ' ' << name << '\n';
   }
   try {
-    write_whole(file_in(cell_), text.str());
+    files::write_whole(file_in(cell_), text.str());
   } catch (const OutputError&) {
     // it saves time only
   }

@@ -4,10 +4,10 @@
 #include <map>
 #include <regex>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/runner/images.h"
 
 namespace mbtfm::runner {
@@ -44,7 +44,7 @@ void collect_files(const fs::path& folder, std::vector<fs::path>& files) {
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
     if (!entry->is_symlink(is_gone) && entry->is_directory(is_gone)) {
       collect_files(entry->path(), files);
-    } else if (is_file(entry->path())) {
+    } else if (files::is_file(entry->path())) {
       files.push_back(entry->path());
     }
   }
@@ -88,7 +88,7 @@ std::map<std::string, ImageSet> group_images(const fs::path& folder, const std::
 }
 
 /// A basic string of TOML, whose escapes are those of JSON.
-std::string quoted(const std::string& text) { return json_text(text); }
+std::string quoted(const std::string& text) { return files::json_text(text); }
 
 std::string toml_of(const std::string& settings, const ImageSet& images, const fs::path& folder, const fs::path& cell) {
   std::string text = settings;
@@ -105,9 +105,9 @@ ImagePattern parse_pattern(const std::string& text) {
   const auto equals = text.find('=');
   const ImagePattern p{text.substr(0, equals), equals == std::string::npos ? "" : text.substr(equals + 1)};
   ImageNames names;
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, names);
-  parameter_named(list, p.key);  // throws where there is none
+  stage::parameter_named(list, p.key);  // throws where there is none
   const auto cell = p.pattern.find(kCell);
   if (cell == std::string::npos || p.pattern.find(kCell, cell + 1) != std::string::npos)
     throw UsageError("--pattern " + text + ": expected {cell} once, as in " + p.key + "='{cell}_" + p.key + ".tif'");
@@ -116,19 +116,19 @@ ImagePattern parse_pattern(const std::string& text) {
 
 std::vector<std::string> make_cell_folders(const fs::path& folder, const std::vector<ImagePattern>& patterns,
                                            const fs::path& template_toml) {
-  if (!is_folder(folder)) throw InputError(folder.string(), "a folder of images", "none");
-  const std::string settings = template_toml.empty() ? "" : read_text(template_toml);
+  if (!files::is_folder(folder)) throw InputError(folder.string(), "a folder of images", "none");
+  const std::string settings = template_toml.empty() ? "" : files::read_text(template_toml);
   if (std::regex_search(settings, std::regex(R"((^|\n)\s*\[images\])")))
     throw InputError(template_toml.string(), "settings without [images]", "[images]",
                      "the images of each cell come from --pattern");
   std::vector<std::string> cells;
   for (const auto& [name, images] : group_images(folder, patterns)) {
     // '.._pax.tif' is a name, too
-    const fs::path cell = inside(folder, name, folder.string()), toml = cell / "cell.toml";
+    const fs::path cell = files::inside(folder, name, folder.string()), toml = cell / "cell.toml";
     cells.push_back(name);
     if (fs::exists(fs::symlink_status(toml))) continue;
     fs::create_directories(cell);
-    write_whole(toml, toml_of(settings, images, folder, cell));
+    files::write_whole(toml, toml_of(settings, images, folder, cell));
   }
   return cells;
 }

@@ -5,13 +5,13 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/names.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/names.h"
+#include "pipeline/files/own_files.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
 
-void declare(ParameterList& list, ImageNames& names) {
+void declare(stage::ParameterList& list, ImageNames& names) {
   list.table("images");
   list.add(
       "adhesion", names.adhesion,
@@ -54,8 +54,8 @@ std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
 
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {
   ImageMatch match{.files = {}, .pattern = name_or_glob};
-  const fs::path exact = file_shown_as(folder, name_or_glob);
-  if (is_file(exact)) {
+  const fs::path exact = files::file_shown_as(folder, name_or_glob);
+  if (files::is_file(exact)) {
     match.files = {exact};
     return match;
   }
@@ -72,7 +72,7 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
   std::error_code error;  // of a folder that is not there, or cannot be read: no file of it is found
   for (fs::directory_iterator entry(parent, error), end; !error && entry != end; entry.increment(error)) {
     const std::string name = entry->path().filename().string();
-    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0 && is_file(entry->path())) {
+    if (fnmatch(pattern.c_str(), name.c_str(), FNM_PERIOD) == 0 && files::is_file(entry->path())) {
       match.files.push_back(entry->path());
     }
   }
@@ -105,7 +105,7 @@ std::optional<fs::path> resolve_optional_image(const fs::path& folder, const Ima
   const bool is_default = name == name_of_image(ImageNames{}, key);
   // a link that leads nowhere is there, and somebody wants it
   std::error_code error;
-  const bool is_there = fs::exists(fs::symlink_status(file_shown_as(folder, name), error));
+  const bool is_there = fs::exists(fs::symlink_status(files::file_shown_as(folder, name), error));
   if (is_default && !is_there && match_image(folder, name).files.empty()) return std::nullopt;
   return resolve_image(folder, names, key);
 }

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/parameters.h"
 #include "pipeline/runner/stages.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::runner {
 
@@ -26,7 +26,7 @@ struct ImageNames {
   std::string outline_mask = "outline_mask.tif|outline_mask.png";
   std::string adhesion_mask = "adhesion_mask.tif|adhesion_mask.png";
 };
-void declare(ParameterList& list, ImageNames& names);
+void declare(stage::ParameterList& list, ImageNames& names);
 
 /// The name or glob of a key of [images]. @throws InternalError for any other key
 const std::string& name_of_image(const ImageNames& names, const std::string& key);

@@ -16,9 +16,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "pipeline/contract/console.h"
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/stage/console.h"
 
 namespace mbtfm::runner {
 namespace {
@@ -151,10 +151,10 @@ ProcessResult Child::result() {
 
 }  // namespace
 
-void watch_interrupts() { watch_signals(SecondSignal::is_noted); }
+void watch_interrupts() { stage::watch_signals(stage::SecondSignal::is_noted); }
 
 void throw_if_interrupted() {
-  if (is_stop_asked()) throw Interrupted("interrupted; finished stages are kept");
+  if (stage::is_stop_asked()) throw Interrupted("interrupted; finished stages are kept");
 }
 
 void print_on(std::string_view text) {
@@ -174,7 +174,7 @@ ProcessResult run_process(const std::vector<std::string>& command, const Process
   auto exceeded = ProcessResult::Limit::none;
   while (!child.has_ended()) {
     child.listen();
-    if (is_stop_asked() && !asked_to_end) {
+    if (stage::is_stop_asked() && !asked_to_end) {
       asked_to_end = Clock::now();
       child.signal_group(SIGTERM);
     }

@@ -4,13 +4,14 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/json_record.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/toml.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/toml.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -19,12 +20,12 @@ using nlohmann::json;
 namespace {
 
 /// A stage's record as it and mbtfm wrote it; none where it is not there.
-std::optional<JsonRecord> open_record(const fs::path& file) {
-  if (!is_own_file(file)) return std::nullopt;
-  return JsonRecord(file, "a record of mbtfm run", "delete it to run the stage again");
+std::optional<files::JsonRecord> open_record(const fs::path& file) {
+  if (!files::is_own_file(file)) return std::nullopt;
+  return files::JsonRecord(file, "a record of mbtfm run", "delete it to run the stage again");
 }
 
-Hashes hashes_of(const JsonRecord& run, const std::string& key) {
+Hashes hashes_of(const files::JsonRecord& run, const std::string& key) {
   Hashes hashes;
   const auto list = run.find(key);
   if (!list) return hashes;
@@ -64,12 +65,12 @@ bool are_of_series(const std::vector<Difference>& differences) {
 
 /// Those of a time series that the tracker wrote, one for each frame that it did not refuse.
 std::vector<std::string> frames_read(const fs::path& cell, const std::string& list) {
-  const CsvTable table(cell / list);
+  const files::CsvTable table(cell / list);
   table.require({"frame", "refused"});
   std::vector<std::string> names;
   for (int row = 0; row < table.n_rows(); ++row) {
     if (!table.text(row, "refused").empty()) continue;
-    const fs::path file = fs::path(list).parent_path() / displacement_of_frame(table.integer(row, "frame", 1));
+    const fs::path file = fs::path(list).parent_path() / files::displacement_of_frame(table.integer(row, "frame", 1));
     names.push_back(file.generic_string());
   }
   return names;
@@ -80,7 +81,7 @@ std::vector<std::string> frames_read(const fs::path& cell, const std::string& li
 fs::path record_file_of(const fs::path& cell, const Stage& stage) { return cell / stage.folder / "record.json"; }
 
 fs::path output_file(const fs::path& cell, const Stage& stage, const fs::path& name, const std::string& told_by) {
-  const fs::path file = inside(cell, name, told_by);
+  const fs::path file = files::inside(cell, name, told_by);
   if (!name.empty() && *name.begin() == stage.folder) return file;
   throw InputError(told_by, "outputs of " + stage.name + " in " + stage.folder, "'" + name.string() + "'",
                    "remove the file if it is not yours");
@@ -88,7 +89,7 @@ fs::path output_file(const fs::path& cell, const Stage& stage, const fs::path& n
 
 std::optional<StageRecord> read_record(const fs::path& cell, const Stage& stage) {
   const fs::path file = record_file_of(cell, stage);
-  const std::optional<JsonRecord> whole = open_record(file);
+  const std::optional<files::JsonRecord> whole = open_record(file);
   if (!whole) return {};
   StageRecord record;
   const auto run = whole->find("run");
@@ -109,15 +110,15 @@ void write_begun(const fs::path& record_file, const Stage& stage, const std::str
   nlohmann::ordered_json begun = {{"stage", stage.name}};
   if (!record_before.empty()) begun = nlohmann::ordered_json::parse(record_before);
   begun["run"] = {{"finished", false}};
-  write_whole(record_file, json_text(begun, 1) + "\n");
+  files::write_whole(record_file, files::json_text(begun, 1) + "\n");
 }
 
 std::vector<std::string> series_outputs(const fs::path& cell, const Stage& stage) {
   std::vector<std::string> names;
-  const std::optional<JsonRecord> record = open_record(record_file_of(cell, stage));
+  const std::optional<files::JsonRecord> record = open_record(record_file_of(cell, stage));
   const auto outputs = record ? record->find("outputs") : std::nullopt;
   if (!outputs) return names;
-  for (const JsonRecord& output : outputs->list()) {
+  for (const files::JsonRecord& output : outputs->list()) {
     const std::string name = (fs::path(stage.folder) / output.at("file").text()).generic_string();
     if (is_of_series(stage, name)) names.push_back(name);
   }
@@ -131,12 +132,12 @@ void forget_begun(const fs::path& record_file) {
 }
 
 bool is_begun(const fs::path& record_file) {
-  const std::optional<JsonRecord> record = open_record(record_file);
+  const std::optional<files::JsonRecord> record = open_record(record_file);
   return record && record->find("run");
 }
 
 void complete_record(const fs::path& record_file, const StageRecord& record, const StageRun& run) {
-  const std::optional<JsonRecord> of_stage = open_record(record_file);
+  const std::optional<files::JsonRecord> of_stage = open_record(record_file);
   if (!of_stage) throw InputError(record_file.string(), "the record that the stage wrote", "none");
   nlohmann::ordered_json whole = of_stage->json();
   whole["run"] = {{"finished", record.finished},
@@ -148,11 +149,11 @@ void complete_record(const fs::path& record_file, const StageRecord& record, con
                   {"command", run.command},
                   {"seconds", run.seconds},
                   {"peak_memory_MB", run.peak_memory_MB}};
-  write_whole(record_file, json_text(whole, 1) + "\n");
+  files::write_whole(record_file, files::json_text(whole, 1) + "\n");
 }
 
 Settings read_settings(const fs::path& toml_file, const std::vector<Setting>& beneath) {
-  const toml::table whole = parse_toml(toml_file);
+  const toml::table whole = files::parse_toml(toml_file);
   Settings settings;
   for (const Stage& stage : stages()) {
     toml::table relevant;
@@ -201,9 +202,9 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   for (std::string& name : files_of(stage.optional_images, cell, images)) names.push_back(std::move(name));
   names.insert(names.end(), stage.reads.begin(), stage.reads.end());
   std::ranges::copy_if(stage.reads_where_there, std::back_inserter(names),
-                       [&](const std::string& file) { return is_own_file(cell / file); });
+                       [&](const std::string& file) { return files::is_own_file(cell / file); });
   for (const PathArgument& argument : stage.arguments) {
-    if (argument.where.empty() || !is_own_file(cell / argument.where)) continue;
+    if (argument.where.empty() || !files::is_own_file(cell / argument.where)) continue;
     names.push_back(argument.where);
     for (std::string& name : frames_read(cell, argument.where)) names.push_back(std::move(name));
   }

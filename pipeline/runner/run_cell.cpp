@@ -6,10 +6,10 @@
 #include <mutex>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/parallel.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
 
@@ -39,7 +39,7 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
     if (const auto file = resolve_optional_image(cell, images, image.key)) add(image.flag, file->string());
   }
   for (const PathArgument& argument : stage.arguments) {
-    if (argument.where.empty() || is_own_file(cell / argument.where))
+    if (argument.where.empty() || files::is_own_file(cell / argument.where))
       add(argument.flag, (cell / argument.path).string());
   }
   add("config", (cell / "cell.toml").string());
@@ -66,7 +66,7 @@ void remove_partial_files(const fs::path& folder) {
   std::error_code error;
   std::vector<fs::path> partial;
   for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
-    if (entry->path().filename().string().starts_with(kPartialPrefix)) partial.push_back(entry->path());
+    if (entry->path().filename().string().starts_with(files::kPartialPrefix)) partial.push_back(entry->path());
   }
   for (const fs::path& file : partial)
     fs::remove(file, error);  // a link, not what it points to; no folder that is full
@@ -99,7 +99,7 @@ void note_failure(StageOutcome& outcome, const std::function<void()>& work) {
 }
 
 fs::path checked(fs::path cell) {
-  check_cell_folder(cell);
+  files::check_cell_folder(cell);
   return cell;
 }
 
@@ -228,7 +228,7 @@ Hashes CellRun::outputs_of(const Stage& stage, const Present& before) {
 void CellRun::start(const Stage& stage, const Present& before, int threads, StageOutcome& outcome) {
   const StageSurroundings& now = before.surroundings;
   for (const std::string& file : stage.reads) {
-    if (!is_own_file(cell_ / file)) {
+    if (!files::is_own_file(cell_ / file)) {
       throw InputError((cell_ / file).string(), "a file that an earlier stage makes", "none",
                        "run all stages: mbtfm run without --only");
     }
@@ -236,8 +236,8 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
   const fs::path record_file = record_file_of(cell_, stage);
   std::vector<std::string> command = command_of(stage, cell_, images_, options_, threads);
   for (const std::string& flag : flags_of(stage, beneath_)) command.push_back(flag);
-  const bool had_record = is_own_file(record_file);
-  const std::string record_before = had_record ? read_text(record_file) : std::string();
+  const bool had_record = files::is_own_file(record_file);
+  const std::string record_before = had_record ? files::read_text(record_file) : std::string();
   remove_partial_files(record_file.parent_path());
   if (before.status.keeps_frames) {
     command.push_back("--kept");
@@ -251,7 +251,7 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
   const bool has_outputs = !result.signal && (result.exit_code == 0 || (!outcome.converged && !is_begun(record_file)));
   if (!has_outputs) {
     // A stage that ends by itself has left its outputs as they were: so must be the record.
-    if (!result.signal && had_record) write_whole(record_file, record_before);
+    if (!result.signal && had_record) files::write_whole(record_file, record_before);
     if (!result.signal && !had_record) forget_begun(record_file);
     throw StageFailed(stage.name, failure_of(result));
   }
@@ -285,7 +285,7 @@ void CellRun::run_chains(CellOutcome& outcome) {
   const int threads = workers == 1 ? options_.threads : std::max(2, options_.threads / 2);
   // A chain that fails does not stop the other: what is done does not depend on the number of threads.
   std::vector<std::exception_ptr> errors(chains.size());
-  parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
+  numerics::parallel_for(static_cast<int>(chains.size()), workers, [&](int chain) {
     try {
       for (const int i : chains[chain]) bring_up_to_date(all[i], threads, outcome.stages[i]);
     } catch (...) {
@@ -361,15 +361,15 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
 }
 
 ImageNames read_image_names(const fs::path& cell) {
-  if (!is_folder(cell)) throw InputError(cell.string(), "a cell folder", "none");
-  if (!is_file(cell / "cell.toml")) {
+  if (!files::is_folder(cell)) throw InputError(cell.string(), "a cell folder", "none");
+  if (!files::is_file(cell / "cell.toml")) {
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",
                      "write one with pixel_size_um and, in [gel], youngs_modulus_kPa");
   }
   ImageNames names;
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, names);
-  read_toml(list, cell / "cell.toml");
+  stage::read_toml(list, cell / "cell.toml");
   return names;
 }
 
@@ -395,7 +395,7 @@ bool is_done(const fs::path& cell, const RunOptions& options, const CellOutcome&
     // What was changed by hand since then is neither checked nor reported.
     if (state == StageState::replaced && recorded_state(cell, stage.stage) != name_of(state)) return false;
   }
-  if (is_asked(stages().back(), options.only) && !is_own_file(cell / "report.html")) return false;
+  if (is_asked(stages().back(), options.only) && !files::is_own_file(cell / "report.html")) return false;
   return run_record_tells_of(cell, options);
 }
 

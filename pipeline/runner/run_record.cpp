@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/hash.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/json_record.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/runner/lock.h"
 
 namespace mbtfm::runner {
@@ -20,14 +20,14 @@ namespace {
 constexpr const char* kNotRun = "not run";
 
 /// None where there is none: a link, which the next one replaces, is none of ours.
-std::optional<JsonRecord> open_run_record(const fs::path& cell) {
+std::optional<files::JsonRecord> open_run_record(const fs::path& cell) {
   const fs::path file = cell / "run.json";
-  if (!is_own_file(file)) return std::nullopt;
-  return JsonRecord(file, "a run.json of mbtfm run", "delete it: the next run writes another");
+  if (!files::is_own_file(file)) return std::nullopt;
+  return files::JsonRecord(file, "a run.json of mbtfm run", "delete it: the next run writes another");
 }
 
 /// What an earlier run told of a stage; none where it told nothing.
-std::optional<JsonRecord> entry_of(const std::optional<JsonRecord>& run, const std::string& stage) {
+std::optional<files::JsonRecord> entry_of(const std::optional<files::JsonRecord>& run, const std::string& stage) {
   const auto entries = run ? run->find("stages") : std::nullopt;
   const auto entry = entries ? entries->find(stage) : std::nullopt;
   if (entry) entry->expect_object();
@@ -44,7 +44,7 @@ ordered_json json_of(const StageFailure& failure) {
   return {{"exit_code", failure.exit_code}, {"how", failure.how}, {"message", failure.message}};
 }
 
-std::optional<StageFailure> failure_in(const JsonRecord& entry) {
+std::optional<StageFailure> failure_in(const files::JsonRecord& entry) {
   const auto failure = entry.find("failure");
   if (!failure) return std::nullopt;
   return StageFailure{.exit_code = failure->at("exit_code").integer(),
@@ -53,7 +53,7 @@ std::optional<StageFailure> failure_in(const JsonRecord& entry) {
 }
 
 ordered_json stage_entry(const Stage& stage, const StageOutcome& outcome, const fs::path& cell,
-                         const std::optional<JsonRecord>& before) {
+                         const std::optional<files::JsonRecord>& before) {
   ordered_json entry;
   entry["state"] = state_of(outcome);
   entry["why"] = outcome.status.why;
@@ -67,20 +67,20 @@ ordered_json stage_entry(const Stage& stage, const StageOutcome& outcome, const 
   if (outcome.failure) entry["failure"] = json_of(*outcome.failure);
   if (outcome.status.state == StageState::given || outcome.status.state == StageState::replaced) {
     Hashes outputs;  // not ours: what they are is all that is known of them
-    for (const std::string& file : stage.writes) outputs[file] = sha256_of_file(cell / file);
+    for (const std::string& file : stage.writes) outputs[file] = files::sha256_of_file(cell / file);
     entry["outputs"] = outputs;
     return entry;
   }
   const fs::path record_file = record_file_of(cell, stage);
-  if (!is_own_file(record_file)) return entry;
-  const JsonRecord record(record_file, "a record of mbtfm run", "delete it to run the stage again");
+  if (!files::is_own_file(record_file)) return entry;
+  const files::JsonRecord record(record_file, "a record of mbtfm run", "delete it to run the stage again");
   for (const auto& [key, value] : record.members()) {
     if (!entry.contains(key)) entry[key] = value.json();
   }
   if (const auto effects = record.find("effects")) {
-    for (const JsonRecord& effect : effects->list()) effect.expect_object();
+    for (const files::JsonRecord& effect : effects->list()) effect.expect_object();
   }
-  findings_of(record);  // are such
+  files::findings_of(record);  // are such
   return entry;
 }
 
@@ -117,7 +117,7 @@ std::string outcome_of(const ordered_json& entries) {
 
 void write_run_record(const fs::path& cell, const RunOptions& options, const CellOutcome& outcome) {
   const RunRecordLock lock(cell);
-  const std::optional<JsonRecord> before = open_run_record(cell);
+  const std::optional<files::JsonRecord> before = open_run_record(cell);
   ordered_json run, entries;
   ordered_json effects = ordered_json::array(), findings = ordered_json::array();
   const auto gather = [](ordered_json& all, const ordered_json& entry, const char* key, const std::string& stage) {
@@ -147,19 +147,20 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   const bool has_fit = is_done_entry(entries[stages().back().name]);
   run["stages"] = std::move(entries);
   const fs::path fit_file = cell / "4_fit/fit.json";
-  if (has_fit && is_own_file(fit_file)) {
-    const JsonRecord fit(fit_file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
+  if (has_fit && files::is_own_file(fit_file)) {
+    const files::JsonRecord fit(fit_file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
     if (const auto budget = fit.find("error_budget")) run["error_budget"] = budget->json();
   }
-  write_whole(cell / "run.json", json_text(run, 1) + "\n");
+  files::write_whole(cell / "run.json", files::json_text(run, 1) + "\n");
 }
 
 bool run_record_tells_of(const fs::path& cell, const RunOptions& options) {
   const fs::path file = cell / "run.json";
-  if (!is_own_file(file)) return false;
+  if (!files::is_own_file(file)) return false;
   // The line as we write it, outside of any string, as these hold no line breaks: spares parsing thousands of files.
-  if (is_own_text(file) && read_text(file).find("\n \"outcome\": \"done\",") != std::string::npos) return true;
-  const std::optional<JsonRecord> run = open_run_record(cell);
+  if (files::is_own_text(file) && files::read_text(file).find("\n \"outcome\": \"done\",") != std::string::npos)
+    return true;
+  const std::optional<files::JsonRecord> run = open_run_record(cell);
   return std::all_of(stages().begin(), stages().end(), [&](const Stage& stage) {
     const auto entry = entry_of(run, stage.name);
     return !is_asked(stage, options.only) || (entry && is_done_state(entry->text_or("state", "")));
@@ -172,7 +173,7 @@ std::string recorded_state(const fs::path& cell, const std::string& stage) {
 }
 
 std::optional<RecordedFailure> recorded_failure(const fs::path& cell) {
-  const std::optional<JsonRecord> run = open_run_record(cell);
+  const std::optional<files::JsonRecord> run = open_run_record(cell);
   for (const Stage& stage : stages()) {
     const auto entry = entry_of(run, stage.name);
     const auto failure = entry ? failure_in(*entry) : std::nullopt;

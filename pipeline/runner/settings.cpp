@@ -2,13 +2,13 @@
 
 #include <algorithm>
 
-#include "pipeline/contract/toml.h"
+#include "pipeline/files/toml.h"
 
 namespace mbtfm::runner {
 
 std::vector<Setting> unset_in(const std::filesystem::path& toml_file, const std::vector<Setting>& settings) {
   if (settings.empty()) return {};
-  const toml::table whole = parse_toml(toml_file);
+  const toml::table whole = files::parse_toml(toml_file);
   std::vector<Setting> unset;
   for (const Setting& setting : settings) {
     if (!whole[setting.table][setting.key]) unset.push_back(setting);

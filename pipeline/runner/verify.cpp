@@ -4,13 +4,13 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/hash.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/json_record.h"
-#include "pipeline/contract/names.h"
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/names.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -26,28 +26,29 @@ struct KnownFile {
   std::string sha256;
 };
 
-JsonRecord open_run_json(const fs::path& file) {
-  if (!is_file(file))
+files::JsonRecord open_run_json(const fs::path& file) {
+  if (!files::is_file(file))
     throw InputError(file.string(), "a run.json of mbtfm run", "none", "run the cell first: mbtfm run");
-  return JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run");
+  return files::JsonRecord(file, "a run.json of mbtfm run", "delete it and run the cell again: mbtfm run");
 }
 
 /// A stage's record lists files relative to its folder; of what the user gave, a hash by path in the cell folder.
-void add_files(const std::string& kind, const Stage& stage, const JsonRecord& entry, std::vector<KnownFile>& files) {
+void add_files(const std::string& kind, const Stage& stage, const files::JsonRecord& entry,
+               std::vector<KnownFile>& files) {
   const auto all = entry.find(kind + "s");
   if (!all) return;
   if (all->json().is_object()) {
     for (const auto& [path, sha256] : all->members()) files.push_back({stage.name, kind, path, sha256.text()});
     return;
   }
-  for (const JsonRecord& file : all->list()) {
+  for (const files::JsonRecord& file : all->list()) {
     const fs::path path = fs::path(stage.folder) / file.at("file").text();
     files.push_back({stage.name, kind, path.lexically_normal(), file.at("sha256").text()});
   }
 }
 
 /// @throws InputError where a file that is called an output does not lie in the stage's folder
-std::vector<KnownFile> files_in(const JsonRecord& run, const fs::path& run_json) {
+std::vector<KnownFile> files_in(const files::JsonRecord& run, const fs::path& run_json) {
   std::vector<KnownFile> files;
   for (const Stage& stage : stages()) {
     const auto entry = run.at("stages").find(stage.name);
@@ -84,7 +85,7 @@ bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector
   const auto is_same = [&](const fs::path& image) { return fs::weakly_canonical(image, error) == file; };
   if (!error && std::any_of(images.begin(), images.end(), is_same)) return true;
   try {
-    inside(folder, name, "");
+    files::inside(folder, name, "");
     return true;
   } catch (const InputError&) {
     return false;
@@ -94,12 +95,12 @@ bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector
 void compare(const KnownFile& known, const fs::path& folder, const std::vector<fs::path>& images, Verification& found) {
   ++found.n_files;
   const std::string name = known.path.generic_string(), role = " (" + known.kind + " of " + known.stage + ")";
-  const fs::path file = file_shown_as(folder, name);
+  const fs::path file = files::file_shown_as(folder, name);
   if (!may_be_read(file.lexically_relative(folder), folder, images)) {
     found.differences.push_back(name + " is outside of the cell folder, and no setting names it: not read" + role);
-  } else if (!is_file(file)) {
+  } else if (!files::is_file(file)) {
     found.differences.push_back(name + " is gone" + role);
-  } else if (sha256_of_file(file) != known.sha256) {
+  } else if (files::sha256_of_file(file) != known.sha256) {
     found.differences.push_back(name + " differs" + role);
   }
 }
@@ -109,12 +110,12 @@ bool is_output(const KnownFile& file, const std::vector<KnownFile>& files) {
                      [&](const KnownFile& other) { return other.kind == "output" && other.path == file.path; });
 }
 
-bool is_given(const std::optional<JsonRecord>& entry) {
+bool is_given(const std::optional<files::JsonRecord>& entry) {
   const std::string state = entry ? entry->text_or("state", "") : "";
   return state == name_of(StageState::given) || state == name_of(StageState::replaced);
 }
 
-bool is_given(const JsonRecord& run, const std::string& stage) { return is_given(run.at("stages").find(stage)); }
+bool is_given(const files::JsonRecord& run, const std::string& stage) { return is_given(run.at("stages").find(stage)); }
 
 void add_values(const ordered_json& table, std::string& text) {
   for (const auto& [key, value] : table.items()) {
@@ -123,16 +124,17 @@ void add_values(const ordered_json& table, std::string& text) {
 }
 
 /// The images that a run had, by key of [images].
-std::map<std::string, fs::path> images_in(const JsonRecord& run, const fs::path& inputs) {
+std::map<std::string, fs::path> images_in(const files::JsonRecord& run, const fs::path& inputs) {
   std::map<std::string, fs::path> images;
   const auto list = run.find("images");
   if (!list) return images;
-  for (const auto& [key, file] : list->members()) images[key] = file_shown_as(inputs, file.text()).lexically_normal();
+  for (const auto& [key, file] : list->members())
+    images[key] = files::file_shown_as(inputs, file.text()).lexically_normal();
   return images;
 }
 
 /// cell.toml of the parameters that the stages had, and of the images where they lie.
-std::string toml_of(const JsonRecord& run, const fs::path& inputs, const fs::path& out) {
+std::string toml_of(const files::JsonRecord& run, const fs::path& inputs, const fs::path& out) {
   ordered_json all = ordered_json::object();
   for (const auto& [stage, entry] : run.at("stages").members()) {
     const auto parameters = entry.find("parameters");
@@ -149,13 +151,14 @@ std::string toml_of(const JsonRecord& run, const fs::path& inputs, const fs::pat
   }
   text += "\n[images]\n";
   for (const auto& [key, file] : images_in(run, inputs)) {
-    if (is_file(file)) text += key + " = " + json_text(fs::proximate(file, out).generic_string()) + "\n";
+    if (files::is_file(file)) text += key + " = " + files::json_text(fs::proximate(file, out).generic_string()) + "\n";
   }
   return text;
 }
 
 /// The new folder: inputs where they lie, what the user gave copied.
-void prepare(const JsonRecord& run, const std::vector<KnownFile>& files, const fs::path& inputs, const fs::path& out) {
+void prepare(const files::JsonRecord& run, const std::vector<KnownFile>& files, const fs::path& inputs,
+             const fs::path& out) {
   std::vector<fs::path> images;
   for (const auto& [key, file] : images_in(run, inputs)) images.push_back(file);
   Verification of_inputs;
@@ -173,17 +176,17 @@ void prepare(const JsonRecord& run, const std::vector<KnownFile>& files, const f
     fs::create_directories((out / file.path).parent_path());
     fs::copy_file(inputs / file.path, out / file.path);
   }
-  write_whole(out / "cell.toml", toml_of(run, inputs, out));
+  files::write_whole(out / "cell.toml", toml_of(run, inputs, out));
 }
 
 }  // namespace
 
 Verification verify_cell(const fs::path& cell) {
-  check_cell_folder(cell);
+  files::check_cell_folder(cell);
   const fs::path run_json = cell / "run.json";
-  if (!is_own_file(run_json) && is_file(run_json))
+  if (!files::is_own_file(run_json) && files::is_file(run_json))
     throw InputError(run_json.string(), "a file of the cell's own", "a link");
-  const JsonRecord run = open_run_json(run_json);
+  const files::JsonRecord run = open_run_json(run_json);
   const std::vector<fs::path> images = named_images(cell);
   Verification found;
   for (const KnownFile& file : files_in(run, run_json)) compare(file, cell, images, found);
@@ -203,8 +206,8 @@ Verification verify_cell(const fs::path& cell) {
 
 Verification repeat_run(const fs::path& run_json, const fs::path& inputs, const fs::path& out,
                         const RunOptions& options, const std::function<void(const std::string&)>& note) {
-  check_cell_folder(inputs);
-  const JsonRecord run = open_run_json(run_json);
+  files::check_cell_folder(inputs);
+  const files::JsonRecord run = open_run_json(run_json);
   const std::string outcome = run.text_or("outcome", "unknown"), version = run.text_or("version", "unknown");
   if (outcome != "done") throw InputError(run_json.string(), "a run that ended", "outcome '" + outcome + "'");
   if (fs::exists(fs::symlink_status(out)))

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <map>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
 
 namespace mbtfm::statistics {
 namespace {
@@ -27,7 +27,7 @@ std::string folder_of(const std::string& name, int level) {
 }
 
 /// By its whole name, or by that of its own folder where no other cell's is the same.
-std::size_t index_of_cell(const std::vector<std::string>& names, const CsvTable& table, int row) {
+std::size_t index_of_cell(const std::vector<std::string>& names, const files::CsvTable& table, int row) {
   const std::string asked = table.text(row, "cell");
   const auto exact = std::find(names.begin(), names.end(), asked);
   if (exact != names.end()) return static_cast<std::size_t>(exact - names.begin());
@@ -56,7 +56,7 @@ std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std:
   std::vector<CellNote> notes(names.size());
   for (std::size_t i = 0; level > 0 && i < names.size(); ++i) notes[i].condition = folder_of(names[i], level);
   if (!table) return notes;
-  const CsvTable rows(*table);
+  const files::CsvTable rows(*table);
   rows.require(is_column ? std::vector<std::string>{"cell", condition_from} : std::vector<std::string>{"cell"});
   std::vector<bool> is_named(names.size(), false);
   for (int row = 0; row < rows.n_rows(); ++row) {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/files/csv_files.h"
 
 namespace mbtfm::statistics {
 

@@ -5,7 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/cell.h"
 
 namespace mbtfm::statistics {
 

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/files/csv_files.h"
 
 namespace mbtfm::statistics {
 

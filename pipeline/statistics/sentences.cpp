@@ -27,10 +27,10 @@ std::string mean_text(const Summary& s, const Measure& m) {
   const std::string& unit = m.sample.unit;
   if (!s.model) {
     const std::string reason = s.n_cells == 1 ? "there is a single cell" : m.obstacle;
-    return fmt::format("{} {} (no interval: {})", readable(s.plain.mean), unit, reason);
+    return fmt::format("{} {} (no interval: {})", charts::readable(s.plain.mean), unit, reason);
   }
-  return fmt::format("{} {} [95 % CI {} to {}]", readable(s.model->estimate), unit, readable(s.model->low),
-                     readable(s.model->high));
+  return fmt::format("{} {} [95 % CI {} to {}]", charts::readable(s.model->estimate), unit,
+                     charts::readable(s.model->low), charts::readable(s.model->high));
 }
 
 /// "ventral fibres carry a tension of 4.1 nN [95 % CI …; the cell as the unit, 12 cells, 80 fibres]".
@@ -47,8 +47,8 @@ std::vector<std::string> means(const Measure& m) {
     text += ")";
     if (m.sample.each != "cells" && s.typical_error && s.n > 2) {
       text += fmt::format("; they scatter by {} {}, of which {} {} remain without the error of their measurement",
-                          readable(*s.plain.standard_deviation), m.sample.unit,
-                          readable(s.without_error->standard_deviation), m.sample.unit);
+                          charts::readable(*s.plain.standard_deviation), m.sample.unit,
+                          charts::readable(s.without_error->standard_deviation), m.sample.unit);
     }
     list.push_back(capitalised(text + "."));
   }
@@ -104,14 +104,16 @@ void add_differences(const Measure& m, Findings& findings) {
         is_of_kinds
             ? fmt::format("{}the {} of {} is {} larger than that of {}", prefix_of(c.within), m.sample.name,
                           plural_of(m.sample, larger),
-                          is_clear ? readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably",
+                          is_clear ? charts::readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably",
                           plural_of(m.sample, smaller))
-            : fmt::format(
-                  "the {} of {} is {} larger under {} than under {}", m.sample.name, plural_of(m.sample, c.within),
-                  is_clear ? readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably", larger, smaller);
-    text += fmt::format(" (difference {} {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
-                        readable(std::abs(c.effect)), m.sample.unit, readable(low), readable(high),
-                        readable(*c.degrees), readable(std::abs(c.statistic)), p_text(*c.p_holm));
+            : fmt::format("the {} of {} is {} larger under {} than under {}", m.sample.name,
+                          plural_of(m.sample, c.within),
+                          is_clear ? charts::readable(std::abs(c.effect)) + " " + m.sample.unit : "not demonstrably",
+                          larger, smaller);
+    text +=
+        fmt::format(" (difference {} {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
+                    charts::readable(std::abs(c.effect)), m.sample.unit, charts::readable(low), charts::readable(high),
+                    charts::readable(*c.degrees), charts::readable(std::abs(c.statistic)), p_text(*c.p_holm));
     const Comparison* ranks = same_pair(m, c, m.sample.each == "cells" ? "Mann-Whitney" : "clustered rank sum");
     if (ranks != nullptr)
       text += fmt::format("; {}, {}", m.sample.each == "cells" ? "Mann–Whitney" : "clustered rank-sum test",
@@ -133,8 +135,8 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
                     "cells], {:.0f} % "
                     "without the blur of the measurement.",
                     prefix_of(s.condition), 100 * s.share.value, plural_of(analysis.tensions.sample, s.kind),
-                    readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high, s.n, s.n_cells,
-                    100 * s.without_error)));
+                    charts::readable(s.threshold_nN), 100 * s.share.interval.low, 100 * s.share.interval.high, s.n,
+                    s.n_cells, 100 * s.without_error)));
   }
   return list;
 }
@@ -147,11 +149,11 @@ std::vector<std::string> lines(const Analysis& analysis) {
                            : c.size == "adhesion_area_um2" ? "µm² of adhesion"
                            : c.size == "cell_area_um2"     ? "µm² of cell"
                                                            : "fibre";
-    const std::string error = c.line.slope_error ? " ± " + readable(*c.line.slope_error) : "";
-    std::string text =
-        fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition), readable(c.line.slope),
-                    error, by, c.line.slope_error ? fmt::format("{} cells", c.line.n) : "a single cell: no error");
-    if (c.line.correlation) text += ", r = " + readable(*c.line.correlation);
+    const std::string error = c.line.slope_error ? " ± " + charts::readable(*c.line.slope_error) : "";
+    std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
+                                   charts::readable(c.line.slope), error, by,
+                                   c.line.slope_error ? fmt::format("{} cells", c.line.n) : "a single cell: no error");
+    if (c.line.correlation) text += ", r = " + charts::readable(*c.line.correlation);
     list.push_back(capitalised(text + ")."));
   }
   return list;

@@ -5,9 +5,10 @@
 #include <set>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/own_files.h"
-#include "pipeline/contract/parallel.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/statistics/conditions.h"
 
@@ -16,17 +17,17 @@ namespace fs = std::filesystem;
 namespace {
 
 std::optional<DisplacementField> field_where_there(const Path& file) {
-  if (!is_own_file(file)) return std::nullopt;
-  return read_displacement(file);
+  if (!files::is_own_file(file)) return std::nullopt;
+  return files::read_displacement(file);
 }
 
 StudyCell read_study_cell(const Path& folder, const std::string& name, const StudyParameters& parameters) {
   StudyCell c{.name = name,
               .condition = 0,
-              .cell = read_cell(folder / "1_segment"),
-              .forces = read_adhesion_forces(folder / "4_fit/adhesion_forces.csv"),
-              .tensions = read_tensions(folder / "4_fit/tensions.csv"),
-              .fit = read_fit_summary(folder / "4_fit/fit.json"),
+              .cell = files::read_cell(folder / "1_segment"),
+              .forces = files::read_adhesion_forces(folder / "4_fit/adhesion_forces.csv"),
+              .tensions = files::read_tensions(folder / "4_fit/tensions.csv"),
+              .fit = files::read_fit_summary(folder / "4_fit/fit.json"),
               .directions = {},
               .findings = {}};
   std::set<int> ids;
@@ -38,7 +39,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
                      "the segmentation changed after the fit: mbtfm run " + folder.string());
   }
   const Path run = folder / further_files_of_a_cell()[3];
-  if (is_own_file(run)) c.findings = findings_of(JsonRecord(run, "a run.json of mbtfm run"));
+  if (files::is_own_file(run)) c.findings = findings_of(files::JsonRecord(run, "a run.json of mbtfm run"));
   c.directions = directions_of(c.cell, {.measured = field_where_there(folder / further_files_of_a_cell()[0]),
                                         .fitted = field_where_there(folder / further_files_of_a_cell()[1]),
                                         .without_fibres = field_where_there(folder / further_files_of_a_cell()[2]),
@@ -50,7 +51,7 @@ StudyCell read_study_cell(const Path& folder, const std::string& name, const Stu
 /// Why a cell cannot enter, as its folder tells; empty: it can.
 std::string obstacle(const Path& cell) {
   for (const std::string& file : files_of_a_cell()) {
-    if (!is_own_file(cell / file)) return "no fit: " + file + " is not there";
+    if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }
   return {};
 }
@@ -78,7 +79,7 @@ bool is_measured(const Tension& t) {
 
 }  // namespace
 
-void declare(ParameterList& list, StudyParameters& parameters) {
+void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.table("stats");
   list.add("condition_from", parameters.condition_from,
            "where a cell's condition is told: `folder` (the first folder below the study's), `folder2` (the one below "
@@ -128,12 +129,12 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   const std::vector<CellNote> notes = notes_of(names, parameters.condition_from, table);
   std::vector<std::optional<StudyCell>> read(folders.size());
   std::vector<std::string> reasons(folders.size());
-  parallel_for(static_cast<int>(folders.size()), threads, [&](int index) {
+  numerics::parallel_for(static_cast<int>(folders.size()), threads, [&](int index) {
     const auto i = static_cast<std::size_t>(index);
     reasons[i] = notes[i].reason_to_exclude;
     if (!reasons[i].empty()) return;
     try {
-      check_cell_folder(folders[i]);
+      files::check_cell_folder(folders[i]);
       reasons[i] = obstacle(folders[i]);
       if (reasons[i].empty()) read[i] = read_study_cell(folders[i], names[i], parameters);
     } catch (const InputError& error) {

@@ -5,8 +5,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/files.h"
-#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/path.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/stage/parameters.h"
 #include "pipeline/statistics/directions.h"
 
 namespace mbtfm::statistics {
@@ -21,7 +22,7 @@ struct StudyParameters {
   std::uint64_t bootstrap_seed = 1;
   int fibre_types = 3;  ///< an edge fibre is held at both ends as a ventral one is, and few cells have enough of them
 };
-void declare(ParameterList& list, StudyParameters& parameters);
+void declare(stage::ParameterList& list, StudyParameters& parameters);
 /// The tensions above which shares are given, each once.
 std::vector<double> thresholds_nN(const StudyParameters& parameters);
 

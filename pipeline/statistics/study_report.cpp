@@ -14,12 +14,12 @@ using charts::html_escaped;
 using charts::readable;
 using report::Table;
 
-std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : readable(p); }
+std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : charts::readable(p); }
 
-std::string number_text(const std::optional<double>& value) { return value ? readable(*value) : "–"; }
+std::string number_text(const std::optional<double>& value) { return value ? charts::readable(*value) : "–"; }
 
 std::string interval_text(const std::optional<Interval>& interval) {
-  return interval ? readable(interval->low) + " to " + readable(interval->high) : "–";
+  return interval ? charts::readable(interval->low) + " to " + charts::readable(interval->high) : "–";
 }
 
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
@@ -27,32 +27,32 @@ bool has_conditions(const Study& study) { return study.conditions.size() > 1 || 
 /// The one place where a figure enters the page.
 std::string embedded(const Figure& figure) {
   if (figure.charts.empty())
-    return "<h3>" + html_escaped(figure.title) + "</h3>\n<p class=\"sub\">Not drawn: " + html_escaped(figure.caption) +
-           "</p>\n";
-  std::string html = "<h3>" + html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
+    return "<h3>" + charts::html_escaped(figure.title) +
+           "</h3>\n<p class=\"sub\">Not drawn: " + charts::html_escaped(figure.caption) + "</p>\n";
+  std::string html = "<h3>" + charts::html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
   for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
-  return html + "</div>\n<p class=\"sub\">" + html_escaped(figure.caption) + "</p>\n";
+  return html + "</div>\n<p class=\"sub\">" + charts::html_escaped(figure.caption) + "</p>\n";
 }
 
-Table types_table(const Study& study, const Analysis& analysis) {
-  Table table{{{"condition"},
-               {"type"},
-               {"cells", true},
-               {"fibres", true},
-               {"mean, mixed model (nN)", true},
-               {"95 %", true},
-               {"plain mean (nN)", true},
-               {"95 %, cells drawn anew", true},
-               {"median (nN)", true},
-               {"SD (nN)", true},
-               {"SD without error (nN)", true}},
-              {}};
+report::Table types_table(const Study& study, const Analysis& analysis) {
+  report::Table table{{{"condition"},
+                       {"type"},
+                       {"cells", true},
+                       {"fibres", true},
+                       {"mean, mixed model (nN)", true},
+                       {"95 %", true},
+                       {"plain mean (nN)", true},
+                       {"95 %, cells drawn anew", true},
+                       {"median (nN)", true},
+                       {"SD (nN)", true},
+                       {"SD without error (nN)", true}},
+                      {}};
   for (const Summary& s : analysis.tensions.summaries) {
     table.rows.push_back(
-        {html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
-         s.model ? readable(s.model->estimate) : "–",
+        {charts::html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
+         s.model ? charts::readable(s.model->estimate) : "–",
          interval_text(s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt),
-         readable(s.plain.mean), interval_text(s.mean_interval), readable(s.plain.median),
+         charts::readable(s.plain.mean), interval_text(s.mean_interval), charts::readable(s.plain.median),
          number_text(s.plain.standard_deviation),
          number_text(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt)});
   }
@@ -63,56 +63,58 @@ Table types_table(const Study& study, const Analysis& analysis) {
   return table;
 }
 
-Table tests_table(const Measure& m) {
-  Table table{{{"within"},
-               {"test"},
-               {"unit"},
-               {"groups"},
-               {"observations"},
-               {"cells"},
-               {"statistic", true},
-               {"d.f.", true},
-               {"p", true},
-               {"p (Holm)", true},
-               {"effect", true},
-               {"95 %"},
-               {"effect is"}},
-              {}};
+report::Table tests_table(const Measure& m) {
+  report::Table table{{{"within"},
+                       {"test"},
+                       {"unit"},
+                       {"groups"},
+                       {"observations"},
+                       {"cells"},
+                       {"statistic", true},
+                       {"d.f.", true},
+                       {"p", true},
+                       {"p (Holm)", true},
+                       {"effect", true},
+                       {"95 %"},
+                       {"effect is"}},
+                      {}};
   for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
-    table.rows.push_back({html_escaped(t.within), t.test, name_of(t.unit),
-                          html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
+    table.rows.push_back({charts::html_escaped(t.within), t.test, name_of(t.unit),
+                          charts::html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
                           is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
                           is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
-                          readable(t.statistic), t.degrees ? readable(*t.degrees) : "–", p_text(t.p_value),
-                          t.p_holm ? p_text(*t.p_holm) : "–", t.effect_name.empty() ? "–" : readable(t.effect),
-                          interval_text(t.interval), html_escaped(t.effect_name)});
+                          charts::readable(t.statistic), t.degrees ? charts::readable(*t.degrees) : "–",
+                          p_text(t.p_value), t.p_holm ? p_text(*t.p_holm) : "–",
+                          t.effect_name.empty() ? "–" : charts::readable(t.effect), interval_text(t.interval),
+                          charts::html_escaped(t.effect_name)});
   }
   return table;
 }
 
-Table cells_table(const Study& study) {
-  Table table{{{"cell"},
-               {"condition"},
-               {"fibres", true},
-               {"adhesions", true},
-               {"total force (nN)", true},
-               {"of fibres (nN)", true},
-               {"of network (nN)", true},
-               {"relative L2", true},
-               {"expected", true},
-               {"enters"}},
-              {}};
+report::Table cells_table(const Study& study) {
+  report::Table table{{{"cell"},
+                       {"condition"},
+                       {"fibres", true},
+                       {"adhesions", true},
+                       {"total force (nN)", true},
+                       {"of fibres (nN)", true},
+                       {"of network (nN)", true},
+                       {"relative L2", true},
+                       {"expected", true},
+                       {"enters"}},
+                      {}};
   for (const StudyCell& c : study.cells) {
-    table.rows.push_back({html_escaped(c.name), html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
-                          std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
-                          readable(c.fit.total_force_nN), is_network_known(c) ? readable(c.fit.fibre_force_nN) : "–",
-                          is_network_known(c) ? readable(c.fit.network_force_nN) : "–", readable(c.fit.relative_l2),
-                          readable(c.fit.expected_relative_l2), c.fit.converged ? "yes" : "yes, not converged"});
+    table.rows.push_back(
+        {charts::html_escaped(c.name), charts::html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
+         std::to_string(c.cell.fibres.size()), std::to_string(c.cell.adhesions.size()),
+         charts::readable(c.fit.total_force_nN), is_network_known(c) ? charts::readable(c.fit.fibre_force_nN) : "–",
+         is_network_known(c) ? charts::readable(c.fit.network_force_nN) : "–", charts::readable(c.fit.relative_l2),
+         charts::readable(c.fit.expected_relative_l2), c.fit.converged ? "yes" : "yes, not converged"});
   }
   for (const LeftOutCell& c : study.left_out) {
-    table.rows.push_back({html_escaped(c.name), html_escaped(c.condition), "", "", "", "", "", "", "",
-                          "<b>no:</b> " + html_escaped(c.reason)});
+    table.rows.push_back({charts::html_escaped(c.name), charts::html_escaped(c.condition), "", "", "", "", "", "", "",
+                          "<b>no:</b> " + charts::html_escaped(c.reason)});
   }
   return table;
 }
@@ -126,8 +128,8 @@ std::string first_of(const std::vector<std::string>& names) {
 }
 
 /// Open findings, each with the cells that have it.
-Table findings_table(const Study& study) {
-  Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}};
+report::Table findings_table(const Study& study) {
+  report::Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}};
   std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
@@ -139,8 +141,8 @@ Table findings_table(const Study& study) {
   }
   for (const auto& [id, found] : by_id) {
     const auto& [finding, cells] = found;
-    table.rows.push_back({html_escaped(id), name_of(finding->severity), std::to_string(cells.size()),
-                          html_escaped(first_of(cells)), html_escaped(finding->remedy)});
+    table.rows.push_back({charts::html_escaped(id), name_of(finding->severity), std::to_string(cells.size()),
+                          charts::html_escaped(first_of(cells)), charts::html_escaped(finding->remedy)});
   }
   return table;
 }
@@ -157,7 +159,7 @@ std::string findings_text(const Study& study, const std::string& table_html) {
 
 std::string list_of(const std::vector<std::string>& sentences) {
   std::string html = "<ul>\n";
-  for (const std::string& s : sentences) html += "<li>" + html_escaped(s) + "</li>\n";
+  for (const std::string& s : sentences) html += "<li>" + charts::html_escaped(s) + "</li>\n";
   return html + "</ul>\n";
 }
 
@@ -217,7 +219,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   std::string pictures;
   for (const Figure& figure : figures) pictures += embedded(figure);
   const auto files = tables_of(study, analysis);
-  const auto with_file = [&](const Table& table, const std::string& name) {
+  const auto with_file = [&](const report::Table& table, const std::string& name) {
     const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
     return report::html_of(table, {file->first, file->second});
   };

@@ -3,13 +3,13 @@
 #include <cmath>
 #include <map>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-CsvText& add(CsvText& csv, const std::optional<Interval>& interval) {
+files::CsvText& add(files::CsvText& csv, const std::optional<Interval>& interval) {
   return csv.add(interval ? std::optional(interval->low) : std::nullopt)
       .add(interval ? std::optional(interval->high) : std::nullopt);
 }
@@ -38,7 +38,7 @@ std::string cells_csv(const Study& study) {
                                            "converged",
                                            "findings",
                                            "n_edge"};
-  CsvText csv(header);
+  files::CsvText csv(header);
   for (const StudyCell& c : study.cells) {
     std::map<FibreType, int> n_of;
     for (const Fibre& fibre : c.cell.fibres) ++n_of[fibre.type];
@@ -70,8 +70,8 @@ std::string cells_csv(const Study& study) {
 }
 
 std::string adhesions_csv(const Study& study) {
-  CsvText csv({"cell", "condition", "adhesion_id", "x_um", "y_um", "area_um2", "eccentricity", "fx_nN", "fy_nN",
-               "force_nN", "traction_kPa", "sigma_nN", "connected", "origin"});
+  files::CsvText csv({"cell", "condition", "adhesion_id", "x_um", "y_um", "area_um2", "eccentricity", "fx_nN", "fy_nN",
+                      "force_nN", "traction_kPa", "sigma_nN", "connected", "origin"});
   for (const StudyCell& c : study.cells) {
     std::map<int, const Adhesion*> by_id;
     for (const Adhesion& adhesion : c.cell.adhesions) by_id[adhesion.adhesion_id] = &adhesion;
@@ -89,8 +89,8 @@ std::string adhesions_csv(const Study& study) {
 }
 
 std::string fibres_csv(const Study& study) {
-  CsvText csv({"cell", "condition", "fibre_id", "type", "length_um", "width_um", "confidence", "tension_nN", "low_nN",
-               "high_nN", "sigma_nN", "identifiable"});
+  files::CsvText csv({"cell", "condition", "fibre_id", "type", "length_um", "width_um", "confidence", "tension_nN",
+                      "low_nN", "high_nN", "sigma_nN", "identifiable"});
   for (const StudyCell& c : study.cells) {
     std::map<int, const Tension*> tension;
     for (const Tension& t : c.tensions) tension[t.fibre_id] = &t;
@@ -107,7 +107,7 @@ std::string fibres_csv(const Study& study) {
   return csv.str();
 }
 
-void add_summary(CsvText& csv, const Summary& s) {
+void add_summary(files::CsvText& csv, const Summary& s) {
   csv.add(s.n_cells).add(s.n).add(s.plain.mean);
   add(csv, s.mean_interval);
   csv.add(s.model ? std::optional(s.model->estimate) : std::nullopt);
@@ -138,7 +138,7 @@ std::string types_csv(const Study& study, const Analysis& analysis) {
     for (const char* what : {"", "_low", "_high", "_without_error"})
       header.push_back(fmt::format("fraction_above_{:g}_nN{}", s.threshold_nN, what));
   }
-  CsvText csv(header);
+  files::CsvText csv(header);
   for (const Summary& s : analysis.tensions.summaries) {
     csv.add(s.condition).add("all").add(s.kind);
     add_summary(csv, s);
@@ -168,7 +168,7 @@ std::string types_csv(const Study& study, const Analysis& analysis) {
 std::string summaries_csv(const Analysis& analysis) {
   std::vector<std::string> header = {"quantity", "condition", "kind"};
   for (const std::string& column : summary_columns("observations", "")) header.push_back(column);
-  CsvText csv(header);
+  files::CsvText csv(header);
   for (const Measure* m : analysis.measures()) {
     for (const Summary& s : m->summaries) {
       csv.add(m->sample.column).add(s.condition).add(s.kind);
@@ -181,7 +181,7 @@ std::string summaries_csv(const Analysis& analysis) {
 
 /// The scatter between cells, between the kinds of a cell and within them.
 std::string variances_csv(const Analysis& analysis) {
-  CsvText csv({"quantity", "component", "standard_deviation", "remark"});
+  files::CsvText csv({"quantity", "component", "standard_deviation", "remark"});
   for (const Measure* m : analysis.measures()) {
     const auto row = [&](const std::string& component, const std::optional<double>& variance) {
       const char* remark = m->model ? "too few values to tell it from the others" : m->obstacle.c_str();
@@ -198,9 +198,9 @@ std::string variances_csv(const Analysis& analysis) {
 }
 
 std::string tests_csv(const Analysis& analysis) {
-  CsvText csv({"quantity", "question", "within", "test", "unit", "group_a", "group_b", "n_a", "n_b", "cells_a",
-               "cells_b", "statistic", "degrees_of_freedom", "p", "p_holm", "effect", "effect_is", "effect_low",
-               "effect_high"});
+  files::CsvText csv({"quantity", "question", "within", "test", "unit", "group_a", "group_b", "n_a", "n_b", "cells_a",
+                      "cells_b", "statistic", "degrees_of_freedom", "p", "p_holm", "effect", "effect_is", "effect_low",
+                      "effect_high"});
   for (const Measure* m : analysis.measures()) {
     for (const Comparison& t : m->comparisons) {
       const bool is_pair = !t.group_b.empty();
@@ -216,7 +216,7 @@ std::string tests_csv(const Analysis& analysis) {
 }
 
 std::string correlations_csv(const Analysis& analysis) {
-  CsvText csv({"force", "size", "condition", "n_cells", "slope", "slope_error", "slope_low", "slope_high", "r"});
+  files::CsvText csv({"force", "size", "condition", "n_cells", "slope", "slope_error", "slope_low", "slope_high", "r"});
   for (const Correlation& c : analysis.correlations) {
     csv.add(c.force).add(c.size).add(c.condition).add(c.line.n).add(c.line.slope).add(c.line.slope_error);
     add(csv, c.slope_interval).add(c.line.correlation).end_row();
@@ -225,8 +225,8 @@ std::string correlations_csv(const Analysis& analysis) {
 }
 
 std::string area_bins_csv(const Analysis& analysis) {
-  CsvText csv({"condition", "connected", "area_low_um2", "area_high_um2", "n_cells", "n_adhesions", "mean_area_um2",
-               "mean_force_nN", "low_nN", "high_nN"});
+  files::CsvText csv({"condition", "connected", "area_low_um2", "area_high_um2", "n_cells", "n_adhesions",
+                      "mean_area_um2", "mean_force_nN", "low_nN", "high_nN"});
   for (const AreaBin& b : analysis.area_bins) {
     csv.add(b.condition).add(b.is_connected ? 1 : 0).add(b.low_um2).add(b.high_um2).add(b.n_cells).add(b.n_adhesions);
     csv.add(b.mean_area_um2).add(b.mean_force_nN);
@@ -236,7 +236,7 @@ std::string area_bins_csv(const Analysis& analysis) {
 }
 
 std::string directions_csv(const Study& study) {
-  CsvText csv({"cell", "condition", "relation", "adhesion_id", "fibre_id", "angle_deg"});
+  files::CsvText csv({"cell", "condition", "relation", "adhesion_id", "fibre_id", "angle_deg"});
   for (const StudyCell& c : study.cells) {
     for (const Direction& d : c.directions) {
       csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(name_of(d.relation));
@@ -247,8 +247,8 @@ std::string directions_csv(const Study& study) {
 }
 
 std::string direction_means_csv(const Analysis& analysis) {
-  CsvText csv({"relation", "condition", "n_cells", "n", "mean_angle_deg", "low_deg", "high_deg", "chance_deg",
-               "mean_cosine", "cosine_low", "cosine_high"});
+  files::CsvText csv({"relation", "condition", "n_cells", "n", "mean_angle_deg", "low_deg", "high_deg", "chance_deg",
+                      "mean_cosine", "cosine_low", "cosine_high"});
   for (const DirectionSummary& s : analysis.directions) {
     csv.add(name_of(s.relation)).add(s.condition).add(s.n_cells).add(s.n).add(s.mean_angle_deg);
     add(csv, s.angle_interval_deg).add(largest_angle_deg(s.relation) / 2).add(s.mean_cosine);
@@ -262,7 +262,7 @@ std::string direction_means_csv(const Analysis& analysis) {
 namespace {
 
 std::string findings_csv(const Study& study) {
-  CsvText csv({"cell", "condition", "id", "severity", "number", "threshold", "text"});
+  files::CsvText csv({"cell", "condition", "id", "severity", "number", "threshold", "text"});
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
       csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(f.id).add(name_of(f.severity));

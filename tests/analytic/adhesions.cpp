@@ -1,12 +1,12 @@
 /// Adhesions are measured as they were drawn, and as others measured them.
 #include <gtest/gtest.h>
 
-#include "segment/adhesions.h"
-#include "segment/blurred_ellipse.h"
+#include "segment/cells/adhesions.h"
+#include "segment/cells/blurred_ellipse.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/real_adhesions.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
@@ -89,7 +89,7 @@ TEST(Adhesions, derivatives_of_the_blurred_ellipse_are_its_differences) {
 }
 
 /// Add an adhesion as a microscope of this blur shows it.
-void draw_blurred(Image& image, const Adhesion& a, double height, double blur_um, double pixel_um) {
+void draw_blurred(images::Image& image, const Adhesion& a, double height, double blur_um, double pixel_um) {
   const EllipseModel model({.x = a.position_um.x / pixel_um - 0.5,
                             .y = a.position_um.y / pixel_um - 0.5,
                             .semi_major = a.major_axis_um / 2 / pixel_um,
@@ -108,7 +108,7 @@ TEST(Adhesions, the_blur_adds_nothing_to_area_and_axes) {
   const double pixel_um = 0.1;
   for (const double blur_um : {0.11, 0.14, 0.18}) {
     SCOPED_TRACE(blur_um);
-    Image image = even_image(300, 300, 100);
+    images::Image image = even_image(300, 300, 100);
     std::vector<Adhesion> drawn;
     for (int i = 0; i < 16; ++i) {  // from 0.4 um wide, little more than twice the blur, to 1 um
       const double minor = 0.4 + 0.04 * i, major = minor * (1.6 + 0.1 * (i % 8));
@@ -146,7 +146,7 @@ TEST(Adhesions, a_blurred_ellipse_in_noise_is_found_with_its_area_place_and_angl
 
 TEST(Adhesions, two_that_touch_are_two) {
   const double pixel_um = 0.1;
-  Image image = even_image(160, 160, 100);
+  images::Image image = even_image(160, 160, 100);
   // tip to tip and side by side, 0.3 um apart: two standard deviations of the blur
   const std::vector<Adhesion> drawn = {ellipse(1, {4, 4}, 1.6, 0.6, 0), ellipse(2, {5.9, 4}, 1.6, 0.6, 0),
                                        ellipse(3, {10, 10}, 1.6, 0.6, 1), ellipse(4, {10.757, 9.509}, 1.6, 0.6, 1)};
@@ -165,7 +165,7 @@ TEST(Adhesions, the_reference_labels_measure_as_their_authors_did) {
   const auto area = table("Area.csv"), centroid = table("Centroid.csv"), major = table("MajorAxisLength.csv"),
              minor = table("MinorAxisLength.csv"), orientation = table("Orientation.csv");
   std::size_t i = 0;
-  for (const auto& [label, pixels] : labels_of(read_image(kFibroblast / "adhesions.png"))) {
+  for (const auto& [label, pixels] : labels_of(images::read_image(kFibroblast / "adhesions.png"))) {
     SCOPED_TRACE(label);
     ASSERT_LT(i, area.size());
     const Adhesion a = measure_ellipse(pixels, 1);
@@ -212,4 +212,4 @@ TEST(Adhesions, noisy_cells_have_the_adhesions_that_people_have_drawn) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -3,14 +3,14 @@
 #include <Eigen/Dense>
 #include <numbers>
 
-#include "network/mesh.h"
+#include "network/mesh/mesh.h"
 #include "tests/support/equilibrium.h"
 
 namespace mbtfm {
 namespace {
 
-using network::CableNetwork;
-using network::CableParameters;
+using cables::CableNetwork;
+using cables::CableParameters;
 
 /// Links at rest where the vertices are.
 Network network_of(std::vector<Vec2> vertices, std::vector<int> adhesion_id,
@@ -24,14 +24,14 @@ Network network_of(std::vector<Vec2> vertices, std::vector<int> adhesion_id,
   return result;
 }
 
-Vec2 force_on(const CableNetwork& cables, const std::vector<double>& tensions, int vertex) {
-  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+Vec2 force_on(const cables::CableNetwork& cables, const std::vector<double>& tensions, int vertex) {
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   return cables.reactions_nN(tensions, equilibrium)[vertex];
 }
 
 TEST(Cables, a_straight_fibre_pulls_both_adhesions_with_its_tension) {
-  const CableNetwork cables(
+  const cables::CableNetwork cables(
       network_of({{0, 0}, {2, 0}, {5, 0}, {6, 0}}, {1, 0, 0, 2}, {{0, 1, 1}, {1, 2, 1}, {2, 3, 1}}));
   const std::vector<double> tensions{0.06, 7};
   // Tension is the same in all links, so none stretches; smoothing takes (eps / l)² / 2 of it.
@@ -48,9 +48,9 @@ TEST(Cables, three_equal_cables_meet_at_the_fermat_point) {
   // lengths are long, so that only tension acts.
   Network net = network_of({{0, 0}, {10, 0}, {3, 7}, {5, 5}}, {1, 2, 3, 0}, {{3, 0, 0}, {3, 1, 0}, {3, 2, 0}});
   for (Link& link : net.links) link.rest_length_um = 100;
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   const std::vector<double> tensions{2};
-  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   const Vec2 centre = equilibrium.positions_um[3];
   for (int i = 0; i < 3; ++i) {
@@ -66,9 +66,9 @@ TEST(Cables, a_corner_wider_than_the_fermat_angle_draws_the_junction_onto_itself
   Network net = network_of({{0, 0}, {8, 0}, {8 * std::cos(angle), 8 * std::sin(angle)}, {1, 1}}, {1, 2, 3, 0},
                            {{3, 0, 0}, {3, 1, 0}, {3, 2, 0}});
   for (Link& link : net.links) link.rest_length_um = 20;
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   const std::vector<double> tensions{1};
-  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   const double eps = 1e-5 * 20;
   EXPECT_LE(norm(equilibrium.positions_um[3]), eps);  // f = d / sqrt(d² + eps²) = 0.52: d = 0.6 eps
@@ -77,7 +77,7 @@ TEST(Cables, a_corner_wider_than_the_fermat_angle_draws_the_junction_onto_itself
 
 TEST(Cables, a_fibre_bent_around_a_corner_presses_it_with_the_sum_of_its_pulls) {
   // The corner is an adhesion of one vertex: t (n1 + n2) on it.
-  const CableNetwork cables(network_of({{0, 0}, {4, 0}, {4, 3}}, {1, 2, 3}, {{0, 1, 1}, {1, 2, 1}}));
+  const cables::CableNetwork cables(network_of({{0, 0}, {4, 0}, {4, 3}}, {1, 2, 3}, {{0, 1, 1}, {1, 2, 1}}));
   const Vec2 corner = force_on(cables, {0, 5}, 1);
   EXPECT_NEAR(corner.x, -5, 1e-9);
   EXPECT_NEAR(corner.y, 5, 1e-9);
@@ -85,9 +85,9 @@ TEST(Cables, a_fibre_bent_around_a_corner_presses_it_with_the_sum_of_its_pulls) 
 
 TEST(Cables, a_stretched_cable_obeys_hooke) {
   // Fibre 1 (t = 4) pulls fibre 2 (t = 1) longer until t1 = t2 + EA (l − l0) / l0: strain 3 / 50, from l0 = 5.
-  const CableNetwork cables(network_of({{0, 0}, {5, 0}, {10, 0}}, {1, 0, 2}, {{0, 1, 1}, {1, 2, 2}}));
+  const cables::CableNetwork cables(network_of({{0, 0}, {5, 0}, {10, 0}}, {1, 0, 2}, {{0, 1, 1}, {1, 2, 2}}));
   const std::vector<double> tensions{0, 4, 1};
-  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   EXPECT_NEAR(equilibrium.positions_um[1].x, 5 - 5 * 3.0 / 50, 1e-8);  // eps² / l0² = 1e-10
   EXPECT_NEAR(equilibrium.link_force_nN[1], 4, 1e-8);
@@ -101,7 +101,7 @@ TEST(Cables, a_slack_fibre_pulls_nothing) {
   // Two fibres between the same adhesions; the second has no tension and is longer than the way.
   Network net =
       network_of({{0, 0}, {6, 0}, {3, 0}, {3, 2}}, {1, 2, 0, 0}, {{0, 2, 1}, {2, 1, 1}, {0, 3, 2}, {3, 1, 2}});
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   // Zero stands for its limit from above: 1e-7 of the largest tension.
   EXPECT_NEAR(force_on(cables, {0, 3, 0}, 0).x, 3, 4e-7);
   EXPECT_NEAR(force_on(cables, {0, 3, 0}, 0).y, 0, 4e-7);
@@ -109,10 +109,10 @@ TEST(Cables, a_slack_fibre_pulls_nothing) {
 
 TEST(Cables, a_link_of_twice_the_share_acts_like_two) {
   const std::vector<Vec2> vertices{{0, 0}, {6, 0}, {2, 5}, {3, 2}};
-  const CableNetwork two(network_of(vertices, {1, 2, 3, 0}, {{0, 3, 1}, {0, 3, 1}, {1, 3, 0}, {2, 3, 0}}));
+  const cables::CableNetwork two(network_of(vertices, {1, 2, 3, 0}, {{0, 3, 1}, {0, 3, 1}, {1, 3, 0}, {2, 3, 0}}));
   Network net = network_of(vertices, {1, 2, 3, 0}, {{0, 3, 1}, {1, 3, 0}, {2, 3, 0}});
   net.links[0].share = 2;
-  const CableNetwork one(net, {});
+  const cables::CableNetwork one(net, {});
   const std::vector<double> short_of_rest{1, 0.8}, stretched{6, 0.1};
   EXPECT_GT(one.equilibrium(stretched).link_force_nN[0], 2 * 2 * 0.1) << "it is to be pulled beyond its rest length";
   for (const auto& tensions : {short_of_rest, stretched}) {
@@ -147,7 +147,7 @@ double free_edge_radius_over_law(double edge_um, std::uint64_t seed, double law_
     a.major_axis_um = a.minor_axis_um = std::sqrt(4e-4 / std::numbers::pi);
     cell.adhesions.push_back(a);
   }
-  Network net = network::generate_network(cell, {.edge_length_um = edge_um, .seed = seed}).network;
+  Network net = mesh::generate_network(cell, {.edge_length_um = edge_um, .seed = seed}).network;
   std::vector<int> edge;
   for (int v = 0; v < static_cast<int>(net.vertices_um.size()); ++v) {
     const Vec2 x = net.vertices_um[v];
@@ -158,10 +158,10 @@ double free_edge_radius_over_law(double edge_um, std::uint64_t seed, double law_
   for (std::size_t i = 1; i < edge.size(); ++i)
     net.links.push_back({.vertex_a = edge[i - 1], .vertex_b = edge[i], .fibre_id = 1, .rest_length_um = edge_um});
   for (Link& link : net.links) link.rest_length_um *= 100;
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   const double surface_tension = 0.1;  // nN/um
   const std::vector<double> tensions{surface_tension * edge_um / std::sqrt(3.0), surface_tension * law_radius_um};
-  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   std::vector<Vec2> arc;
   for (const int v : edge) arc.push_back(equilibrium.positions_um[v]);

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <random>
 
-#include "mbtfm/dense_problem.h"
-#include "mbtfm/regularisation.h"
+#include "mbtfm/tractions/dense_problem.h"
+#include "mbtfm/tractions/regularisation.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 using Eigen::MatrixXd;
@@ -257,4 +257,4 @@ TEST(DenseProblem, its_degrees_of_freedom_and_covariance_are_those_of_its_answer
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions

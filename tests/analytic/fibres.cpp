@@ -1,16 +1,16 @@
 /// Drawn fibres are found where they were drawn, each as one, of the right width and type.
 #include <gtest/gtest.h>
 
-#include "segment/fibres.h"
+#include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/segmentation_accuracy.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
 
-std::vector<Fibre> fibres_of(const Image& image, const std::vector<Adhesion>& adhesions = {}) {
+std::vector<Fibre> fibres_of(const images::Image& image, const std::vector<Adhesion>& adhesions = {}) {
   return find_fibres(image, {}, adhesions, 0.1, FibreParameters{});
 }
 
@@ -20,8 +20,8 @@ std::vector<Fibre> sure(std::vector<Fibre> fibres) {
   return fibres;
 }
 
-Image drawn(const std::vector<Polyline>& lines, double height = 300, double width_um = 0.6) {
-  Image image = even_image(256, 256, 100);
+images::Image drawn(const std::vector<Polyline>& lines, double height = 300, double width_um = 0.6) {
+  images::Image image = even_image(256, 256, 100);
   for (const Polyline& line : lines) draw_line(image, line, height, width_um, 0.1);
   add_noise(image, 10, 1);
   return image;
@@ -132,4 +132,4 @@ TEST(Fibres, of_simulated_cells_are_found) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

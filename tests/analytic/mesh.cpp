@@ -4,14 +4,14 @@
 
 #include <gtest/gtest.h>
 
-#include "network/adhesions.h"
-#include "network/links.h"
-#include "network/mesh.h"
-#include "network/polyline.h"
-#include "network/triangulation.h"
+#include "network/mesh/adhesions.h"
+#include "network/mesh/links.h"
+#include "network/mesh/mesh.h"
+#include "network/mesh/polyline.h"
+#include "network/mesh/triangulation.h"
 #include "tests/support/valid_network.h"
 
-namespace mbtfm::network {
+namespace mbtfm::mesh {
 namespace {
 
 Cell disc(int n_points) {
@@ -249,4 +249,4 @@ TEST(Mesh, straight_fibre_between_two_adhesions_keeps_its_length) {
 }
 
 }  // namespace
-}  // namespace mbtfm::network
+}  // namespace mbtfm::mesh

@@ -2,12 +2,12 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
-#include "segment/ellipse.h"
-#include "segment/segment_cell.h"
+#include "segment/cells/ellipse.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/real_adhesions.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
@@ -15,8 +15,8 @@ using namespace mbtfm::test;
 constexpr double kPixel_um = 0.1;
 const Adhesion kDisc = ellipse(1, {20, 20}, 24, 18, 0.4);
 
-Image drawn_disc(double noise, std::uint64_t seed) {
-  Image image = even_image(400, 400, 100);
+images::Image drawn_disc(double noise, std::uint64_t seed) {
+  images::Image image = even_image(400, 400, 100);
   draw_ellipse(image, kDisc, 200, 0.15, kPixel_um);
   add_noise(image, noise, seed);
   return image;
@@ -42,7 +42,7 @@ TEST(Outline, lies_on_a_blurred_step) {
 TEST(Outline, lies_in_the_middle_of_a_cortex_that_the_microscope_cannot_resolve) {
   for (const double width_um : {0.35, 0.6}) {
     SCOPED_TRACE(width_um);
-    Image image = drawn_disc(5, 2);
+    images::Image image = drawn_disc(5, 2);
     Polyline edge = ellipse_polygon(kDisc, 100);
     edge.push_back(edge.front());
     draw_line(image, edge, 300, width_um, kPixel_um);
@@ -56,7 +56,7 @@ TEST(Outline, lies_on_the_edge_of_a_cell_and_not_of_its_haze) {
   // a tall cell out of focus: a blur of 2 um, and a skirt of a third of the light that reaches three times as far
   for (const double noise : {2.0, 20.0}) {
     SCOPED_TRACE(noise);
-    Image image = even_image(600, 600, 100);
+    images::Image image = even_image(600, 600, 100);
     const Adhesion cell = ellipse(1, {30, 30}, 36, 26, 0.4);
     draw_ellipse(image, cell, 400, 2, kPixel_um);
     draw_ellipse(image, cell, 200, 6, kPixel_um);
@@ -70,7 +70,7 @@ TEST(Outline, lies_on_the_edge_of_a_cell_and_not_of_its_haze) {
 }
 
 TEST(Outline, keeps_a_dim_lamella_whose_edge_is_sharp) {
-  Image image = even_image(500, 500, 100);
+  images::Image image = even_image(500, 500, 100);
   const Adhesion lamella = ellipse(1, {25, 25}, 30, 24, 0.4), body = ellipse(2, {25, 25}, 26, 20, 0.4);
   draw_ellipse(image, lamella, 100, 0.15, kPixel_um);
   draw_ellipse(image, body, 200, 0.5, kPixel_um);  // three times as bright
@@ -94,7 +94,7 @@ TEST(Outline, contains_every_adhesion_it_owns) {
 }
 
 TEST(Outline, a_gap_as_dark_as_outside_is_a_hole_and_what_lies_in_it_is_not_in_the_cell) {
-  Image image = drawn_disc(5, 3);
+  images::Image image = drawn_disc(5, 3);
   const Adhesion gap = ellipse(1, {21, 19}, 6, 4, 1);
   draw_ellipse(image, gap, -200, 0.15, kPixel_um);
   const auto cells = find_cells(image, {}, kPixel_um, {});
@@ -108,7 +108,7 @@ TEST(Outline, a_gap_as_dark_as_outside_is_a_hole_and_what_lies_in_it_is_not_in_t
 }
 
 TEST(Outline, a_dim_middle_is_no_hole) {
-  Image image = drawn_disc(5, 4);
+  images::Image image = drawn_disc(5, 4);
   draw_ellipse(image, ellipse(1, {21, 19}, 6, 4, 1), -100, 0.15, kPixel_um);  // half as bright as the cell
   const auto cells = find_cells(image, {}, kPixel_um, {});
   ASSERT_EQ(cells.size(), 1u);
@@ -116,7 +116,7 @@ TEST(Outline, a_dim_middle_is_no_hole) {
 }
 
 TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
-  Image image = even_image(600, 400, 100);
+  images::Image image = even_image(600, 400, 100);
   const Adhesion small = ellipse(1, {12, 12}, 14, 10, 0.2), large = ellipse(2, {40, 22}, 24, 20, 1),
                  cut = ellipse(3, {8, 38}, 12, 12, 0);
   for (const Adhesion& a : {small, large, cut}) draw_ellipse(image, a, 200, 0.15, kPixel_um);
@@ -133,7 +133,7 @@ TEST(Outline, several_cells_come_by_area_and_the_border_cuts_one) {
 
 TEST(Outline, the_cell_asked_for_is_the_one_segmented) {
   const DrawnScene s = drawn_scene(10, 6);
-  Image adhesion = even_image(520, 256, 100), actin = adhesion;
+  images::Image adhesion = even_image(520, 256, 100), actin = adhesion;
   for (int row = 0; row < 256; ++row)
     for (int column = 0; column < 256; ++column) {
       adhesion.at(column, row) = s.adhesion_image.at(column, row);
@@ -145,7 +145,7 @@ TEST(Outline, the_cell_asked_for_is_the_one_segmented) {
   p.pixel_size_um = s.kPixel_um;
   const auto segmented = [&](int cell) {
     p.cell = cell;
-    return segment_cells(Channel{"adhesion", adhesion}, Channel{"actin", actin}, p);
+    return segment_cells(images::Channel{"adhesion", adhesion}, images::Channel{"actin", actin}, p);
   };
   ASSERT_EQ(segmented(1).size(), 1u);
   EXPECT_EQ(segmented(1)[0].n_cells, 2);
@@ -157,4 +157,4 @@ TEST(Outline, the_cell_asked_for_is_the_one_segmented) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

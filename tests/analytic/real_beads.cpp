@@ -6,14 +6,14 @@
 #include <numbers>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "segment/plane.h"
-#include "segment/track.h"
+#include "pipeline/files/text.h"
+#include "segment/beads/plane.h"
+#include "segment/beads/track.h"
 #include "tests/support/mat_tracks.h"
 #include "tests/support/piv.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 const std::filesystem::path kBeads = MBTFM_SOURCE_DIR "/../shared/data/beads";
@@ -36,8 +36,10 @@ TEST(RealBeads, a_layer_of_cells_moves_its_gel_as_image_correlation_says) {
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
   for (const int frame : {1, 2}) {
     SCOPED_TRACE(frame);
-    const auto image = [&](int k) { return read_image(folder / "forPIV" / ("000" + std::to_string(k) + ".tif")); };
-    const Image relaxed = image(2 * frame - 2);
+    const auto image = [&](int k) {
+      return images::read_image(folder / "forPIV" / ("000" + std::to_string(k) + ".tif"));
+    };
+    const images::Image relaxed = image(2 * frame - 2);
     const Tracking tracking = track_beads(relaxed, image(2 * frame - 1), 1.0, {}, 2);
     test::PivGrid grid;
     std::vector<Vec2> theirs;
@@ -61,7 +63,7 @@ TEST(RealBeads, a_cell_that_the_border_cuts_moves_nothing_beyond_its_reach) {
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
   TrackParameters parameters;
   parameters.drift_affine = "auto";
-  const Image stressed = read_image(file, {.page = 1}), relaxed = read_image(file, {.page = 2});
+  const images::Image stressed = images::read_image(file, {.page = 1}), relaxed = images::read_image(file, {.page = 2});
   constexpr double kPixel_um = 0.02025;
   for (const bool is_exchanged : {false, true}) {  // no false word of exchanged images, either way round
     const Tracking tracking = is_exchanged ? track_beads(stressed, relaxed, kPixel_um, parameters, 2)
@@ -96,8 +98,8 @@ TEST(RealBeads, weak_beads_on_a_mottled_ground_are_followed_by_windows_as_image_
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
   TrackParameters parameters;
   parameters.drift_affine = "auto";
-  const Tracking tracking = track_beads(read_image(folder / "beads_relaxed.tif"),
-                                        read_image(folder / "beads_stressed.tif"), 1.0, parameters, 2);
+  const Tracking tracking = track_beads(images::read_image(folder / "beads_relaxed.tif"),
+                                        images::read_image(folder / "beads_stressed.tif"), 1.0, parameters, 2);
   EXPECT_TRUE(tracking.windows.is_on);
   test::PivGrid grid;
   std::vector<Vec2> published;
@@ -137,11 +139,11 @@ TEST(RealBeads, a_growth_cone_moves_its_gel_as_published_tracks_say) {
   constexpr double kPixel_um = 0.116;
   TrackParameters parameters;
   parameters.drift_affine = "auto";
-  const Tracking tracking =
-      track_beads(read_image(folder / "image1.tif"), read_image(folder / "image2.tif"), kPixel_um, parameters, 2);
+  const Tracking tracking = track_beads(images::read_image(folder / "image1.tif"),
+                                        images::read_image(folder / "image2.tif"), kPixel_um, parameters, 2);
   EXPECT_FALSE(tracking.windows.is_on);
   const auto columns =
-      test::matrices_of(read_text(folder / "example_tracks.mat"));  // r, r stressed, displacement; in m
+      test::matrices_of(files::read_text(folder / "example_tracks.mat"));  // r, r stressed, displacement; in m
   ASSERT_EQ(columns.size(), 3u);
   const std::vector<Vec2>&places_m = columns[0], &displacements_m = columns[2];
   ASSERT_EQ(places_m.size(), 2093u);
@@ -171,11 +173,11 @@ class TurnedBeads : public testing::Test {
       truth_[0].push_back({row[0] - 1, row[1] - 1});  // they count from 1
       truth_[1].push_back({row[2] - 1, row[3] - 1});
     }
-    for (const int k : {0, 1}) images_[k] = read_image(folder_ / ("img_100" + std::to_string(k + 1) + ".tif"));
+    for (const int k : {0, 1}) images_[k] = images::read_image(folder_ / ("img_100" + std::to_string(k + 1) + ".tif"));
   }
   std::filesystem::path folder_ = kBeads / "synthetic_rotation_serialtrack";
   std::vector<Vec2> truth_[2];
-  Image images_[2];
+  images::Image images_[2];
 };
 
 TEST_F(TurnedBeads, are_detected) {
@@ -220,4 +222,4 @@ TEST_F(TurnedBeads, are_refused_as_shifted_ones_and_followed_as_turned_ones) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

@@ -1,16 +1,16 @@
 /// Drawn fibres are found where they were drawn.
 #include <gtest/gtest.h>
 
-#include "segment/segment_cell.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
 
 TEST(Segmentation, the_edge_of_a_cell_is_its_outline_and_no_fibre) {
-  Image image = even_image(256, 256, 100);
+  images::Image image = even_image(256, 256, 100);
   const Adhesion cell = ellipse(1, {12.8, 12.8}, 20, 16, 0.3);
   draw_ellipse(image, cell, 300, 0.15, 0.1);
   add_noise(image, 10, 4);
@@ -22,4 +22,4 @@ TEST(Segmentation, the_edge_of_a_cell_is_its_outline_and_no_fibre) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

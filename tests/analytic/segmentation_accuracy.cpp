@@ -12,7 +12,7 @@ Accuracy mean_accuracy(const std::string& scenario, const std::string& quality) 
   Accuracy mean;
   for (std::uint64_t seed = kFirstSeed; seed <= kLastSeed; ++seed) {
     const SimulatedCell cell = simulated_cell(scenario, quality, seed);
-    const Cell found = segment_cell(cell.adhesion, cell.actin, segment::SegmentParameters{}).cell;
+    const Cell found = cells::segment_cell(cell.adhesion, cell.actin, cells::SegmentParameters{}).cell;
     for (const auto& [name, value] : accuracy_of(cell.truth, found))
       mean[name] += value / static_cast<double>(kLastSeed - kFirstSeed + 1);
   }

@@ -5,8 +5,8 @@
 #include <map>
 #include <random>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/statistics/bootstrap.h"
 #include "pipeline/statistics/descriptive.h"
 #include "pipeline/statistics/mixed_model.h"
@@ -27,7 +27,7 @@ struct FromR {
   std::vector<Fibre> fibres;
   std::map<std::string, double> expected;
   FromR() {
-    const CsvTable table(kData / "fibres.csv"), numbers(kData / "expected.csv");
+    const files::CsvTable table(kData / "fibres.csv"), numbers(kData / "expected.csv");
     for (int row = 0; row < table.n_rows(); ++row) {
       const auto type = std::find(kTypes.begin(), kTypes.end(), table.text(row, "type"));
       fibres.push_back({table.integer(row, "cell", 1), static_cast<int>(type - kTypes.begin()),
@@ -74,7 +74,7 @@ TEST(StatisticsBesideR, wilson_interval_and_line_through_the_origin) {
   const Interval wilson = wilson_interval(fraction_above(ventral, 5), static_cast<double>(ventral.size()));
   r.expect("wilson.low", wilson.low, kExact);
   r.expect("wilson.high", wilson.high, kExact);
-  const CsvTable table(kData / "cells.csv");
+  const files::CsvTable table(kData / "cells.csv");
   std::vector<double> x, y;
   for (int row = 0; row < table.n_rows(); ++row) {
     x.push_back(table.number(row, "n_adhesions"));

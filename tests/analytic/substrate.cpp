@@ -7,8 +7,10 @@
 #include <numbers>
 #include <sstream>
 
-#include "substrate/layer.h"
-#include "substrate/layer_vertical.h"
+#include "pipeline/numerics/quadrature.h"
+#include "substrate/greens/layer.h"
+#include "substrate/greens/layer_vertical.h"
+#include "substrate/material.h"
 
 namespace mbtfm::substrate {
 namespace {
@@ -36,23 +38,23 @@ Gel gel_of(const std::vector<double>& row) {
 }
 
 /// One table for each gel of the rows.
-const Layer& layer_of(const Gel& gel) {
-  static std::map<std::pair<double, double>, Layer> layers;
+const greens::Layer& layer_of(const Gel& gel) {
+  static std::map<std::pair<double, double>, greens::Layer> layers;
   return layers.try_emplace({gel.poisson_ratio, gel.thickness_um}, gel).first->second;
 }
 
-double relative_difference(const Sym2& value, const Sym2& reference) {
+double relative_difference(const greens::Sym2& value, const greens::Sym2& reference) {
   const auto size = [](double xx, double xy, double yy) { return std::sqrt(xx * xx + 2 * xy * xy + yy * yy); };
   return size(value.xx - reference.xx, value.xy - reference.xy, value.yy - reference.yy) /
          size(reference.xx, reference.xy, reference.yy);
 }
 
-Sym2 cerruti_surface(const Gel& gel, Vec2 offset) {
+greens::Sym2 cerruti_surface(const Gel& gel, Vec2 offset) {
   const double r = norm(offset);
   const Vec2 e = (1 / r) * offset;
   const double nu = gel.poisson_ratio;
   return 1 / (2 * pi * shear_modulus_kPa(gel) * r) *
-         Sym2{1 - nu + nu * e.x * e.x, nu * e.x * e.y, 1 - nu + nu * e.y * e.y};
+         greens::Sym2{1 - nu + nu * e.x * e.x, nu * e.x * e.y, 1 - nu + nu * e.y * e.y};
 }
 
 TEST(Layer, equals_independent_values_of_a_point_force_in_every_row) {
@@ -61,8 +63,8 @@ TEST(Layer, equals_independent_values_of_a_point_force_in_every_row) {
   for (const auto& row : rows) {
     const Gel gel = gel_of(row);
     const Vec2 offset = {row[3], row[4]};
-    const Sym2 reference = {row[5], row[6], row[7]};
-    const Sym2 value =
+    const greens::Sym2 reference = {row[5], row[6], row[7]};
+    const greens::Sym2 value =
         std::isinf(gel.thickness_um) ? cerruti_surface(gel, offset) : layer_of(gel).point_compliance_um_per_nN(offset);
     // the rows are good to 1e-9, the table to 1e-12 of the half-space's field
     EXPECT_LT(relative_difference(value, reference), 1e-8)
@@ -92,18 +94,18 @@ TEST(DiscRule, averages_powers_up_to_its_degree) {
 
 TEST(Layer, beyond_its_reach_nothing_is_left_of_the_half_spaces_field) {
   const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.3, .thickness_um = 2};
-  const Layer layer(gel);
-  const LayerVertical vertical(gel);
+  const greens::Layer layer(gel);
+  const greens::LayerVertical vertical(gel);
   const Ellipse disc{.centre_um = {}, .semi_major_um = 0.5, .semi_minor_um = 0.5, .angle_rad = 0};
   for (const double thicknesses : {39.0, 41.0, 200.0}) {
     const double r = thicknesses * gel.thickness_um;
     const Vec2 offset = r * Vec2{std::cos(0.7), std::sin(0.7)};
-    Sym2 sum = layer.point_correction_um_per_nN(offset);
-    const Sym2 half_space = cerruti_surface(gel, offset);
+    greens::Sym2 sum = layer.point_correction_um_per_nN(offset);
+    const greens::Sym2 half_space = cerruti_surface(gel, offset);
     sum += half_space;
     EXPECT_LT(std::abs(sum.xx) + std::abs(sum.xy) + std::abs(sum.yy), 1e-10 * half_space.xx) << r;
     const double whole = vertical.vertical_um({offset}, {disc}, {{1, 0}}, 1).front();
-    const double of_half_space = half_space_vertical_um(gel, {offset}, {disc}, {{1, 0}}, 1).front();
+    const double of_half_space = greens::half_space_vertical_um(gel, {offset}, {disc}, {{1, 0}}, 1).front();
     EXPECT_LT(std::abs(whole), 1e-4 * std::abs(of_half_space)) << r;  // the table's 1e-6 of the field near the force
   }
 }
@@ -116,12 +118,13 @@ TEST(Layer, equals_independent_values_of_an_ellipse_in_every_row) {
     const Ellipse ellipse = {
         .centre_um = {3, -7}, .semi_major_um = row[3], .semi_minor_um = row[4], .angle_rad = row[5]};
     const Vec2 point = ellipse.centre_um + Vec2{row[6], row[7]};
-    const Sym2 reference = {row[8], row[9], row[10]};
+    const greens::Sym2 reference = {row[8], row[9], row[10]};
     double difference = 0;
     if (std::isinf(gel.thickness_um)) {
-      difference = relative_difference(HalfSpaceEllipse(gel, ellipse).compliance_um_per_nN(point), reference);
+      difference = relative_difference(greens::HalfSpaceEllipse(gel, ellipse).compliance_um_per_nN(point), reference);
     } else {
-      difference = relative_difference(LayerEllipse(layer_of(gel), ellipse).compliance_um_per_nN(point), reference);
+      difference =
+          relative_difference(greens::LayerEllipse(layer_of(gel), ellipse).compliance_um_per_nN(point), reference);
     }
     // the rules leave out less than 1e-8 of the nearby field
     EXPECT_LT(difference, 1e-8) << "nu " << row[1] << " h " << row[2] << " r " << norm({row[6], row[7]});
@@ -129,8 +132,8 @@ TEST(Layer, equals_independent_values_of_an_ellipse_in_every_row) {
 }
 
 /// The kernel averaged over the ellipse by a fine rule: right outside it.
-Sym2 averaged_cerruti(const Gel& gel, const Ellipse& ellipse, Vec2 point) {
-  Sym2 sum;
+greens::Sym2 averaged_cerruti(const Gel& gel, const Ellipse& ellipse, Vec2 point) {
+  greens::Sym2 sum;
   for (const DiscPoint& p : ellipse_rule(ellipse, 159)) {
     sum += p.weight * cerruti_surface(gel, point - ellipse.centre_um - p.position);
   }
@@ -149,7 +152,7 @@ TEST(HalfSpace, field_of_an_ellipse_is_the_average_of_the_point_force_outside_it
       const Vec2 local = {(aspect + 0.25 * aspect) * std::cos(direction), (1 + 0.25 * aspect) * std::sin(direction)};
       const double c = std::cos(ellipse.angle_rad), s = std::sin(ellipse.angle_rad);
       const Vec2 point = ellipse.centre_um + Vec2{c * local.x - s * local.y, s * local.x + c * local.y};
-      EXPECT_LT(relative_difference(HalfSpaceEllipse(kGel, ellipse).compliance_um_per_nN(point),
+      EXPECT_LT(relative_difference(greens::HalfSpaceEllipse(kGel, ellipse).compliance_um_per_nN(point),
                                     averaged_cerruti(kGel, ellipse, point)),
                 1e-11)
           << "aspect " << aspect << ", direction " << direction;
@@ -158,8 +161,8 @@ TEST(HalfSpace, field_of_an_ellipse_is_the_average_of_the_point_force_outside_it
 }
 
 /// Chord moments by brute force: directions in equal steps, the chord of each from its quadratic equation.
-Sym2 brute_chord_moments(Vec2 p, double a, double b, int n) {
-  Sym2 sum;
+greens::Sym2 brute_chord_moments(Vec2 p, double a, double b, int n) {
+  greens::Sym2 sum;
   for (int k = 0; k < n; ++k) {
     const double t = pi * (k + 0.5) / n;
     const Vec2 e = {std::cos(t), std::sin(t)};
@@ -168,7 +171,7 @@ Sym2 brute_chord_moments(Vec2 p, double a, double b, int n) {
     const double qc = p.x * p.x / (a * a) + p.y * p.y / (b * b) - 1;
     const double under = qb * qb - qa * qc;
     const double chord = under > 0 ? 2 * std::sqrt(under) / qa : 0;
-    sum += pi / n * chord * Sym2{e.x * e.x, e.x * e.y, e.y * e.y};
+    sum += pi / n * chord * greens::Sym2{e.x * e.x, e.x * e.y, e.y * e.y};
   }
   return sum;
 }
@@ -181,9 +184,9 @@ TEST(HalfSpace, chord_moments_equal_brute_force_inside_outside_and_on_the_rim) {
         const Vec2 point = {aspect * r * std::cos(angle), r * std::sin(angle)};
         // outside, brute force errs where a chord begins, as a square root: step^(3/2) of the ellipse's own angle;
         // on the rim, where the chord has a kink: step². Both below 1e-8.
-        EXPECT_LT(
-            relative_difference(chord_moments_um(point, aspect, 1), brute_chord_moments(point, aspect, 1, kDirections)),
-            1e-8)
+        EXPECT_LT(relative_difference(greens::chord_moments_um(point, aspect, 1),
+                                      brute_chord_moments(point, aspect, 1, kDirections)),
+                  1e-8)
             << "aspect " << aspect << ", r " << r << ", angle " << angle;
       }
     }
@@ -196,7 +199,7 @@ TEST(HalfSpace, centre_of_a_uniform_disc_moves_by_the_textbook_value) {
   const double q = 1 / (pi * radius * radius);
   const double nu = kGel.poisson_ratio;
   const double expected = (1 + nu) * (2 - nu) * q * radius / kGel.youngs_modulus_kPa;
-  const Sym2 g = HalfSpaceEllipse(kGel, disc).compliance_um_per_nN(disc.centre_um);
+  const greens::Sym2 g = greens::HalfSpaceEllipse(kGel, disc).compliance_um_per_nN(disc.centre_um);
   EXPECT_NEAR(g.xx, expected, 1e-12 * expected);
   EXPECT_NEAR(g.yy, expected, 1e-12 * expected);
   EXPECT_NEAR(g.xy, 0, 1e-12 * expected);
@@ -210,15 +213,15 @@ TEST(HalfSpace, a_hertz_like_patch_moves_the_surface_by_the_known_values) {
   const double known[8][4] = {{0, 0, 0.421406, 0},          {1, 0, 0.376377, 0},        {0, 1, 0.361084, 0},
                               {1.5, 1, 0.259768, 0.022939}, {4, 0, 0.115783, 0},        {0, 4, 0.067946, 0},
                               {3, 3, 0.086334, 0.022774},   {10, 5, 0.037616, 0.007359}};
-  const GaussRule gauss = gauss_legendre(200);
+  const numerics::GaussRule gauss = numerics::gauss_legendre(200);
   for (const auto& [x, y, ux, uy] : known) {
-    Sym2 sum;
+    greens::Sym2 sum;
     for (std::size_t k = 0; k < gauss.nodes.size(); ++k) {
       const double s = 0.5 * (1 + gauss.nodes[k]);
       const double radius = a * std::sqrt(1 - s * s);
       const double share = 0.5 * gauss.weights[k] * 1.5 * (1 - s * s);
       const Ellipse disc = {.centre_um = {}, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0};
-      sum += share * force * HalfSpaceEllipse(gel, disc).compliance_um_per_nN({x, y});
+      sum += share * force * greens::HalfSpaceEllipse(gel, disc).compliance_um_per_nN({x, y});
     }
     // the values have six decimals; the stack's kink where a disc's rim passes the point errs by about 1/200² of 0.4
     EXPECT_NEAR(sum.xx, ux, 1e-5) << x << ", " << y;
@@ -231,16 +234,16 @@ TEST(HalfSpace, far_from_an_ellipse_its_field_is_a_point_force) {
   // the next term is the second moment, (a/r)²/4 times a second derivative's factor of at most 2
   for (const double r : {10.0, 100.0, 1000.0}) {
     const Vec2 point = {0.6 * r, -0.8 * r};
-    EXPECT_LT(
-        relative_difference(HalfSpaceEllipse(kGel, ellipse).compliance_um_per_nN(point), cerruti_surface(kGel, point)),
-        0.5 / (r * r));
+    EXPECT_LT(relative_difference(greens::HalfSpaceEllipse(kGel, ellipse).compliance_um_per_nN(point),
+                                  cerruti_surface(kGel, point)),
+              0.5 / (r * r));
   }
 }
 
 TEST(HalfSpace, inner_field_is_in_equilibrium_and_meets_the_surface_field) {
   const double x[3] = {0.7, -1.1, 0.9};
-  const PointForceField on_top = cerruti_field(kGel, x[0], x[1], 0);
-  const Sym2 surface = cerruti_surface(kGel, {x[0], x[1]});
+  const greens::PointForceField on_top = greens::cerruti_field(kGel, x[0], x[1], 0);
+  const greens::Sym2 surface = cerruti_surface(kGel, {x[0], x[1]});
   EXPECT_NEAR(on_top.u_um_per_nN[0][0], surface.xx, 1e-15);
   EXPECT_NEAR(on_top.u_um_per_nN[0][1], surface.xy, 1e-15);
   EXPECT_NEAR(on_top.u_um_per_nN[1][1], surface.yy, 1e-15);
@@ -248,14 +251,14 @@ TEST(HalfSpace, inner_field_is_in_equilibrium_and_meets_the_surface_field) {
   const double step = 1e-5;
   const double nu = kGel.poisson_ratio;
   for (int f = 0; f < 2; ++f) {
-    const PointForceField here = cerruti_field(kGel, x[0], x[1], x[2]);
+    const greens::PointForceField here = greens::cerruti_field(kGel, x[0], x[1], x[2]);
     double divergence_gradient[3], laplacian[3] = {};
     for (int j = 0; j < 3; ++j) {
       double high[3] = {x[0], x[1], x[2]}, low[3] = {x[0], x[1], x[2]};
       high[j] += step;
       low[j] -= step;
-      const PointForceField after = cerruti_field(kGel, high[0], high[1], high[2]);
-      const PointForceField before = cerruti_field(kGel, low[0], low[1], low[2]);
+      const greens::PointForceField after = greens::cerruti_field(kGel, high[0], high[1], high[2]);
+      const greens::PointForceField before = greens::cerruti_field(kGel, low[0], low[1], low[2]);
       double trace = 0;
       for (int i = 0; i < 3; ++i) {
         const double slope = (after.u_um_per_nN[f][i] - before.u_um_per_nN[f][i]) / (2 * step);

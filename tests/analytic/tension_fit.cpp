@@ -1,15 +1,15 @@
-#include "mbtfm/tension_fit.h"
+#include "mbtfm/tensions/tension_fit.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "mbtfm/ensemble.h"
-#include "mbtfm/noise.h"
-#include "mbtfm/robust.h"
+#include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/noise.h"
+#include "mbtfm/tensions/robust.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::tension_scene;
@@ -289,4 +289,4 @@ TEST(BoundedQuadratic, its_minimum_fulfils_the_conditions_of_Karush_Kuhn_and_Tuc
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

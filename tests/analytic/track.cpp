@@ -1,13 +1,13 @@
-#include "segment/track.h"
+#include "segment/beads/track.h"
 
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
-#include "segment/far_field.h"
-#include "segment/local_motion.h"
+#include "segment/beads/far_field.h"
+#include "segment/beads/local_motion.h"
 #include "tests/support/tracking_accuracy.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 using test::BeadScene;
@@ -151,7 +151,7 @@ TEST(Track, swapped_images_have_the_inverse_turn_and_growth_and_mirrored_ones_th
   std::swap(pair.relaxed, pair.stressed);
   expect_recovered(tracked_similarity(pair), {-truth.turn_rad, 1 / (1 + truth.growth) - 1, {0, 0}});
   std::swap(pair.relaxed, pair.stressed);
-  for (Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
     for (int j = 0; j < 384; ++j) std::reverse(&image->at(0, j), &image->at(0, j) + 384);
   }
   expect_recovered(tracked_similarity(pair), {-truth.turn_rad, truth.growth, {0, 0}});
@@ -299,4 +299,4 @@ TEST(Track, beads_are_found_to_a_tenth_of_a_pixel) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

@@ -5,15 +5,15 @@
 #include <functional>
 #include <random>
 
-#include "mbtfm/fttc.h"
-#include "mbtfm/neighbour_noise.h"
-#include "mbtfm/panel.h"
+#include "mbtfm/tractions/fttc.h"
+#include "mbtfm/tractions/neighbour_noise.h"
 #include "pipeline/contract/errors.h"
-#include "substrate/layer.h"
+#include "substrate/greens/layer.h"
+#include "substrate/greens/square.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/substrate_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 using test::ellipse_scene;
@@ -51,7 +51,7 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
   for (const double nu : {0.0, 0.3, 0.4999}) {
     const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = nu, .thickness_um = 4};
     const Lattice lattice{.origin_um = {}, .spacing_um = 0.25, .n_columns = 480, .n_rows = 450};
-    const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
+    const SurfaceSpectrum spectrum(gel, greens::GelModel::layer, lattice, Surroundings::periodic);
     const WaveTransform transform(lattice.n_columns, lattice.n_rows);
     const double radius = 3;
     const Vec2 centre = lattice.position_um(240, 220);
@@ -68,12 +68,12 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
     }
     spectrum.displace(waves);
     const NodeField u = transform.backward(waves);
-    const substrate::Layer layer(gel);
-    const substrate::LayerEllipse disc(
+    const greens::Layer layer(gel);
+    const greens::LayerEllipse disc(
         layer, {.centre_um = centre, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0});
     const double peak = disc.compliance_um_per_nN(centre).xx;
     for (const auto& [i, j] : {std::pair{240, 220}, {244, 220}, {240, 226}, {270, 235}, {215, 240}, {240, 300}}) {
-      const substrate::Sym2 exact = disc.compliance_um_per_nN(lattice.position_um(i, j));
+      const greens::Sym2 exact = disc.compliance_um_per_nN(lattice.position_um(i, j));
       EXPECT_NEAR(u.x[i + lattice.n_columns * j], exact.xx, 3.5e-3 * peak) << nu << " at " << i << ", " << j;
       EXPECT_NEAR(u.y[i + lattice.n_columns * j], exact.xy, 3.5e-3 * peak) << nu << " at " << i << ", " << j;
     }
@@ -89,8 +89,8 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
     // waves of 200 um down to the shortest of a lattice of 0.1 um
     for (double length_um = 200; length_um > 0.14; length_um /= 1.1) {
       const double k = 2 * std::numbers::pi / length_um;
-      const WaveCompliance layer = wave_compliance(gel, GelModel::layer, k);
-      const WaveCompliance half = wave_compliance(gel, GelModel::half_space, k);
+      const greens::WaveCompliance layer = greens::wave_compliance(gel, greens::GelModel::layer, k);
+      const greens::WaveCompliance half = greens::wave_compliance(gel, greens::GelModel::half_space, k);
       ASSERT_TRUE(std::isfinite(layer.along_um_per_kPa) && std::isfinite(layer.across_um_per_kPa));
       furthest = std::max({furthest, std::abs(layer.along_um_per_kPa / half.along_um_per_kPa - 1),
                            std::abs(layer.across_um_per_kPa / half.across_um_per_kPa - 1)});
@@ -104,8 +104,9 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
 TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 30};
   const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
-  const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
-  const WaveCompliance longest = wave_compliance(gel, GelModel::layer, 1e-6);  // of 2e5 thicknesses
+  const SurfaceSpectrum spectrum(gel, greens::GelModel::layer, lattice, Surroundings::periodic);
+  const greens::WaveCompliance longest =
+      greens::wave_compliance(gel, greens::GelModel::layer, 1e-6);  // of 2e5 thicknesses
   EXPECT_NEAR(spectrum.across_um_per_kPa()[0] / longest.across_um_per_kPa, 1, 1e-6);
   EXPECT_NEAR(spectrum.along_um_per_kPa()[0] / longest.along_um_per_kPa, 1, 1e-6);
 }
@@ -114,7 +115,7 @@ TEST(SurfaceSpectrum, a_loaded_cell_turned_by_a_quarter_displaces_the_same_turne
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.45, .thickness_um = 30};
   const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
   for (const Basis basis : {Basis::waves, Basis::cells}) {
-    const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic, basis);
+    const SurfaceSpectrum spectrum(gel, greens::GelModel::layer, lattice, Surroundings::periodic, basis);
     const WaveTransform transform(32, 32);
     const auto displaced = [&](Eigen::ArrayXd NodeField::*component) {
       NodeField load = transform.no_field();
@@ -148,7 +149,7 @@ TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_
   }
   const LatticeProblem problem(
       beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+      {.model = greens::GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
   EXPECT_GT(static_cast<double>(problem.field().n_nodes()), 2.0 * kBeads);
   EXPECT_NEAR(problem.data_squared() / problem.n_data() / *problem.stated_variance(), 1, 4 / std::sqrt(1.0 * kBeads));
 }
@@ -206,9 +207,12 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         if (noise == 0 && states_errors) continue;
         if (n_side == 256 && states_errors) continue;
         const EllipseScene scene = ellipse_scene(n_side, noise, 7, 0, 64, states_errors);
-        const LatticeProblem problem(
-            scene.field, scene.gel,
-            {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+        const LatticeProblem problem(scene.field, scene.gel,
+                                     {.model = greens::GelModel::half_space,
+                                      .spacing_um = {},
+                                      .padding = 1.5,
+                                      .basis = Basis::waves,
+                                      .threads = 1});
         TikhonovSolver solver(problem);
         const double chosen = chosen_lambda(scan_lambda(problem, solver), "risk");
         const auto error_at = [&](double lambda) {
@@ -384,7 +388,7 @@ TEST(AdhesionForces, sensitivities_are_what_a_wrong_ellipse_does) {
 
 TEST(Panel, squares_that_fill_a_disc_add_up_to_it_and_far_away_to_a_point) {
   const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.4, .thickness_um = 6};
-  const substrate::Layer layer(gel);
+  const greens::Layer layer(gel);
   constexpr double kSide = 0.05, kRadius = 2;
   std::vector<Vec2> squares;
   for (double y = -kRadius + kSide / 2; y < kRadius; y += kSide) {
@@ -394,12 +398,12 @@ TEST(Panel, squares_that_fill_a_disc_add_up_to_it_and_far_away_to_a_point) {
   }
   const double area = kSide * kSide * static_cast<double>(squares.size());
   const double radius = std::sqrt(area / std::numbers::pi);
-  const substrate::LayerEllipse disc(
-      layer, {.centre_um = {}, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0});
+  const greens::LayerEllipse disc(layer,
+                                  {.centre_um = {}, .semi_major_um = radius, .semi_minor_um = radius, .angle_rad = 0});
   for (const Vec2 at : {Vec2{0, 0}, {0.5, 1.1}, {5, 1}, {-9, 14}}) {
-    substrate::Sym2 sum;
-    for (const Vec2 s : squares) sum += square_compliance_um_per_kPa(layer, kSide, at - s);
-    const substrate::Sym2 exact = disc.compliance_um_per_nN(at);
+    greens::Sym2 sum;
+    for (const Vec2 s : squares) sum += greens::square_compliance_um_per_kPa(layer, kSide, at - s);
+    const greens::Sym2 exact = disc.compliance_um_per_nN(at);
     // the staircase of the rim: (side/radius)² of the whole
     const double staircase = 1e-3 * area * disc.compliance_um_per_nN({}).xx;
     EXPECT_NEAR(sum.xx, area * exact.xx, staircase) << at.x;
@@ -444,7 +448,7 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
 
 TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
   const Gel gel{.youngs_modulus_kPa = 8, .poisson_ratio = 0.45, .thickness_um = 20};
-  const substrate::Layer layer(gel);
+  const greens::Layer layer(gel);
   TractionInputs inputs{.beads = {}, .gel = gel, .adhesions = {}, .outline_um = {{0, 0}, {12, 0}, {12, 9}, {0, 9}}};
   for (const Vec2 p : test::scattered_points(600, 14, {6, 4.5}, 3)) {
     inputs.beads.push_back({.position_um = p, .displacement_um = {}, .sigma_um = 0, .flag = {}});
@@ -454,8 +458,8 @@ TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
     for (int i = 0; i < 4; ++i) {
       truth.push_back({std::sin(i + 2.0 * j), std::cos(3.0 * i - j)});
       for (Bead& b : inputs.beads) {
-        const substrate::Sym2 g =
-            square_compliance_um_per_kPa(layer, 3, b.position_um - Vec2{1.5 + 3.0 * i, 1.5 + 3.0 * j});
+        const greens::Sym2 g =
+            greens::square_compliance_um_per_kPa(layer, 3, b.position_um - Vec2{1.5 + 3.0 * i, 1.5 + 3.0 * j});
         const Vec2 t = truth.back();
         b.displacement_um += Vec2{g.xx * t.x + g.xy * t.y, g.xy * t.x + g.yy * t.y};
       }
@@ -493,10 +497,10 @@ TEST(NeighbourNoise, is_not_told_by_few_beads_or_beads_on_a_line) {
 }
 
 TEST(Fttc, a_gel_of_poissons_ratio_one_half_is_the_limit_of_nearly_incompressible_ones) {
-  for (const GelModel model : {GelModel::layer, GelModel::half_space}) {
+  for (const greens::GelModel model : {greens::GelModel::layer, greens::GelModel::half_space}) {
     for (const double k : {0.01, 0.1, 1.0}) {
       const auto at = [&](double nu) {
-        return wave_compliance({.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 60}, model, k);
+        return greens::wave_compliance({.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 60}, model, k);
       };
       EXPECT_NEAR(at(0.5).along_um_per_kPa / at(0.499999).along_um_per_kPa, 1, 1e-5) << k;
       EXPECT_NEAR(at(0.5).across_um_per_kPa / at(0.499999).across_um_per_kPa, 1, 1e-5) << k;
@@ -506,11 +510,11 @@ TEST(Fttc, a_gel_of_poissons_ratio_one_half_is_the_limit_of_nearly_incompressibl
   for (const char* model : {"layer", "half-space"}) {
     const auto at = [&](double nu) {
       const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 60};
-      return substrate::make_greens(gel, {.model = model}, 1)->compliance_um_per_nN({{3, 1}}, ellipses);
+      return greens::make_greens(gel, {.model = model}, 1)->compliance_um_per_nN({{3, 1}}, ellipses);
     };
     EXPECT_LE((at(0.5) - at(0.499999)).norm(), 1e-5 * at(0.5).norm()) << model;
   }
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions

@@ -5,9 +5,9 @@
 #include <regex>
 #include <sstream>
 
-#include "pipeline/contract/files.h"
 #include "pipeline/contract/findings.h"
-#include "pipeline/contract/plausible.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/stage/plausible.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -18,18 +18,18 @@ namespace fs = std::filesystem;
 const fs::path kDocs = fs::path(MBTFM_SOURCE_DIR) / "docs";
 
 TEST(Documents, the_examples_of_the_format_page_are_read) {
-  const std::string page = read_text(kDocs / "formats.md");
+  const std::string page = files::read_text(kDocs / "formats.md");
   const std::regex example("```csv ([a-z_]+\\.csv)\n([^`]*)```");
   const test::TemporaryFolder folder;
   int n_examples = 0;
   for (std::sregex_iterator at(page.begin(), page.end(), example), end; at != end; ++at, ++n_examples) {
-    write_text(folder / (*at)[1], (*at)[2].str());
+    files::write_text(folder / (*at)[1], (*at)[2].str());
   }
   EXPECT_EQ(n_examples, 7);
-  EXPECT_EQ(read_cell(folder.path()).fibres.size(), 2u);
-  EXPECT_EQ(read_displacement(folder / "displacement.csv").size(), 2u);
-  EXPECT_EQ(read_tensions(folder / "tensions.csv").size(), 3u);
-  EXPECT_EQ(read_adhesion_forces(folder / "adhesion_forces.csv").size(), 2u);
+  EXPECT_EQ(files::read_cell(folder.path()).fibres.size(), 2u);
+  EXPECT_EQ(files::read_displacement(folder / "displacement.csv").size(), 2u);
+  EXPECT_EQ(files::read_tensions(folder / "tensions.csv").size(), 3u);
+  EXPECT_EQ(files::read_adhesion_forces(folder / "adhesion_forces.csv").size(), 2u);
 }
 
 std::string parameter_page() {
@@ -48,33 +48,33 @@ std::string parameter_page() {
 /// Set MBTFM_WRITE_DOCS to write the page instead.
 TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "parameters.md", page);
-  EXPECT_EQ(read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "parameters.md", page);
+  EXPECT_EQ(files::read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// The same for the page of findings.
 TEST(Documents, the_page_of_findings_is_what_the_program_declares) {
   const std::string page = findings_page();
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "findings.md", page);
-  EXPECT_EQ(read_text(kDocs / "findings.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "findings.md", page);
+  EXPECT_EQ(files::read_text(kDocs / "findings.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// Set MBTFM_WRITE_DOCS to write the page instead.
 TEST(Documents, the_page_of_plausible_values_is_the_table_that_the_programs_ask) {
-  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) write_text(kDocs / "plausible.md", plausible_page());
-  EXPECT_EQ(read_text(kDocs / "plausible.md"), plausible_page())
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "plausible.md", stage::plausible_page());
+  EXPECT_EQ(files::read_text(kDocs / "plausible.md"), stage::plausible_page())
       << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// tests/mutations.sh plants faults in the sources as they are: the text that each replaces is there, once.
 TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
-  std::istringstream list(read_text(fs::path(MBTFM_SOURCE_DIR) / "tests/mutations.txt"));
+  std::istringstream list(files::read_text(fs::path(MBTFM_SOURCE_DIR) / "tests/mutations.txt"));
   std::string name, file, old;
   int n_faults = 0;
   const auto expect_once = [&] {
     if (file.empty()) return;
     ++n_faults;
-    const std::string source = read_text(fs::path(MBTFM_SOURCE_DIR) / file);
+    const std::string source = files::read_text(fs::path(MBTFM_SOURCE_DIR) / file);
     const auto at = source.find(old);
     EXPECT_NE(at, source.npos) << name << ": no longer in " << file;
     if (at == source.npos) return;
@@ -96,10 +96,10 @@ TEST(Documents, the_list_of_planted_faults_fits_the_sources) {
 
 /// Each test of tests/stability says what is hard and what must come out, and has its line in the catalogue.
 TEST(Documents, the_catalogue_lists_every_hard_case) {
-  const std::string page = read_text(kDocs / "hard-cases.md");
+  const std::string page = files::read_text(kDocs / "hard-cases.md");
   const std::regex any_test("\nTEST(_P)?\\("), stated("\nTEST(_P)?\\(\\w+, (\\w+)\\) \\{\\s*test::hard_case\\(");
   for (const auto& entry : fs::directory_iterator(fs::path(MBTFM_SOURCE_DIR) / "tests/stability")) {
-    const std::string text = read_text(entry.path());
+    const std::string text = files::read_text(entry.path());
     const auto count = [&](const std::regex& what) {
       return std::distance(std::sregex_iterator(text.begin(), text.end(), what), {});
     };

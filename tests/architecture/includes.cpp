@@ -1,6 +1,8 @@
-/// The layers of the project, read from its #include lines.
+/// The layers of the project, read from its #include lines. A folder is a library, a namespace and a node of their
+/// graph.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <map>
@@ -9,142 +11,258 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/files/text.h"
+#include "tests/architecture/graph.h"
+
 namespace {
 
 namespace fs = std::filesystem;
+using mbtfm::test::Graph;
 
 const fs::path kRoot = MBTFM_SOURCE_DIR;
+const std::string kPrograms = "programs";
 
-/// Which of our folders each folder may include. pipeline/contract is at the bottom, then the mathematics that several
-/// stages need and the drawing of charts; stages do not know each other.
-const std::map<std::string, std::set<std::string>> kMayInclude = {
+/// Every node, and which others it may include. The programs (*_main.cpp and what is theirs alone) lie above all.
+const Graph kMayInclude = {
     {"pipeline/contract", {}},
-    {"pipeline/numerics", {"pipeline/contract"}},
-    {"pipeline/charts", {"pipeline/contract"}},
-    {"pipeline", {"pipeline/contract", "pipeline/charts"}},
-    {"segment", {"pipeline/contract"}},
-    {"network", {"pipeline/contract"}},
-    {"substrate", {"pipeline/contract", "pipeline/numerics"}},
-    {"mbtfm", {"pipeline/contract", "pipeline/numerics", "pipeline/charts", "network", "substrate"}},
-    {"samples", {"pipeline/contract", "segment", "network", "substrate", "mbtfm"}},
+    {"pipeline/files", {"pipeline/contract"}},
+    {"pipeline/numerics", {"pipeline/contract", "pipeline/files"}},
+    {"pipeline/stage", {"pipeline/contract", "pipeline/files", "pipeline/numerics"}},
+    {"pipeline/charts", {"pipeline/contract", "pipeline/files"}},
+    {"pipeline/runner", {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage"}},
+    {"pipeline/report", {"pipeline/contract", "pipeline/files", "pipeline/stage", "pipeline/charts"}},
+    {"pipeline/statistics",
+     {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/charts",
+      "pipeline/runner", "pipeline/report"}},
+    {"pipeline/cost", {"pipeline/contract", "pipeline/files", "pipeline/charts", "pipeline/runner", "pipeline/report"}},
+    {"segment/images", {"pipeline/contract", "pipeline/stage"}},
+    {"segment/rois", {"pipeline/contract"}},
+    {"segment/cells", {"pipeline/contract", "pipeline/stage", "segment/images", "segment/rois"}},
+    {"segment/beads", {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "segment/images"}},
+    {"network/mesh", {"pipeline/contract", "pipeline/numerics", "pipeline/stage"}},
+    {"network/cables", {"pipeline/contract", "pipeline/numerics", "pipeline/stage"}},
+    {"substrate", {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage"}},
+    {"substrate/greens", {"pipeline/contract", "pipeline/numerics", "substrate"}},
+    {"substrate/boxes", {"pipeline/contract", "pipeline/numerics", "substrate", "substrate/greens"}},
+    {"substrate/choice", {"pipeline/contract", "pipeline/stage", "substrate", "substrate/greens", "substrate/boxes"}},
+    {"mbtfm/tensions",
+     {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/charts", "network/cables",
+      "substrate", "substrate/greens"}},
+    {"mbtfm/tractions",
+     {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/charts", "substrate",
+      "substrate/greens"}},
+    {"samples/drawing", {"pipeline/contract", "pipeline/numerics", "pipeline/stage", "segment/images"}},
+    {"samples/experiment",
+     {"pipeline/contract", "pipeline/files", "pipeline/numerics", "samples/drawing", "network/mesh", "network/cables",
+      "substrate", "substrate/greens"}},
 };
 
-/// Third-party headers and the folders that may see them, by the beginning of the include.
+/// Third-party headers and the nodes that may see them, by the beginning of the include.
 const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
-    {"opencv2/", {"segment"}},
-    {"tiff", {"segment"}},
-    {"png", {"segment"}},
-    {"jpeglib", {"segment"}},
-    {"zip", {"segment"}},
-    {"expat", {"segment", "pipeline/contract"}},
-    {"CGAL/", {"network"}},
-    {"Eigen/", {"network", "substrate", "mbtfm", "samples", "pipeline", "pipeline/numerics"}},
-    {"fftw3", {"mbtfm"}},
-    {"deal.II/", {"substrate"}},
-    {"cholmod", {"substrate"}},
-    {"metis", {"network", "substrate"}},
-    {"cblas", {"substrate"}},
-    {"boost/math/", {"mbtfm", "pipeline", "substrate"}},
-    {"boost/", {"mbtfm", "pipeline/contract"}},
-    {"vtk", {"pipeline/contract"}},
-    {"CLI/", {"pipeline", "pipeline/contract"}},
-    {"nlohmann/", {"pipeline", "pipeline/charts", "pipeline/contract"}},
-    {"fmt/", {"pipeline", "pipeline/charts", "pipeline/contract"}},
-    {"toml++/", {"pipeline", "pipeline/contract"}},
-    {"openssl/", {"pipeline/contract"}},
-    {"librsvg/", {"pipeline"}},
-    {"cairo/", {"pipeline"}},
+    {"opencv2/", {"segment/cells", "segment/beads", kPrograms}},
+    {"tiff", {"segment/images"}},
+    {"png", {"segment/images"}},
+    {"jpeglib", {"segment/images"}},
+    {"zip", {"segment/rois"}},
+    {"expat", {"segment/images", "pipeline/files"}},
+    {"CGAL/", {"network/mesh"}},
+    {"Eigen/",
+     {"pipeline/numerics", "pipeline/statistics", "network/cables", "substrate", "substrate/greens", "substrate/boxes",
+      "mbtfm/tensions", "mbtfm/tractions"}},
+    {"fftw3", {"mbtfm/tractions"}},
+    {"deal.II/", {"substrate/boxes"}},
+    {"cholmod", {"pipeline/numerics"}},
+    {"metis", {"pipeline/numerics"}},
+    {"boost/math/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/statistics"}},
+    {"boost/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/numerics"}},
+    {"vtk", {"pipeline/files"}},
+    {"CLI/", {"pipeline/stage", kPrograms}},
+    {"nlohmann/",
+     {"pipeline/files", "pipeline/stage", "pipeline/charts", "pipeline/runner", "pipeline/report", "pipeline/cost"}},
+    {"fmt/", {"pipeline/charts", "pipeline/report", "pipeline/cost", "pipeline/statistics"}},
+    {"toml++/", {"pipeline/files"}},
+    {"openssl/", {"pipeline/files"}},
+    {"librsvg/", {"pipeline/statistics"}},
+    {"cairo/", {"pipeline/statistics"}},
 };
+
+/// Headers that show a third party's names to the pipeline's other folders, each told so in its first lines.
+const std::set<std::string> kShown = {"pipeline/files/json.h", "pipeline/files/json_record.h", "pipeline/files/toml.h"};
 
 struct Include {
-  std::string from_folder, from_file, header;
+  std::string from, from_file, header;  ///< from: the node
 };
 
-std::string folder_of(const fs::path& relative) {
-  const std::string text = relative.generic_string();
-  for (const char* inner : {"pipeline/contract", "pipeline/numerics", "pipeline/charts"}) {
-    if (text.starts_with(std::string(inner) + "/")) return inner;
-  }
-  return text.substr(0, text.find('/'));
+std::string top_of(const std::string& path) { return path.substr(0, path.find('/')); }
+
+/// Where a header belongs; the programs where no node has its folder.
+std::string node_of(const std::string& file) {
+  const std::string folder = fs::path(file).parent_path().generic_string();
+  return kMayInclude.contains(folder) && !file.ends_with("_main.cpp") ? folder : kPrograms;
 }
 
-std::vector<Include> all_includes() {
+std::vector<std::string> sources() {
+  std::vector<std::string> found;
+  for (const char* top : {"pipeline", "segment", "network", "substrate", "mbtfm", "samples"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
+      const std::string extension = entry.path().extension();
+      if (extension != ".h" && extension != ".cpp" && extension != ".inc") continue;
+      found.push_back(fs::relative(entry.path(), kRoot).generic_string());
+    }
+  }
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+std::vector<Include> read_includes() {
   static const std::regex include_line(R"(^\s*#\s*include\s*[<"]([^>"]+)[>"])");
   std::vector<Include> found;
-  for (const auto& [folder, allowed] : kMayInclude) {
-    if (folder.find('/') != folder.npos) continue;  // inside pipeline
-    for (const auto& entry : fs::recursive_directory_iterator(kRoot / folder)) {
-      if (entry.path().extension() != ".h" && entry.path().extension() != ".cpp") continue;
-      const fs::path relative = fs::relative(entry.path(), kRoot);
-      std::ifstream stream(entry.path());
-      for (std::string line; std::getline(stream, line);) {
-        std::smatch match;
-        if (!std::regex_search(line, match, include_line)) continue;
-        found.push_back({folder_of(relative), relative.generic_string(), match[1]});
-      }
+  for (const std::string& file : sources()) {
+    std::ifstream stream(kRoot / file);
+    for (std::string line; std::getline(stream, line);) {
+      std::smatch match;
+      if (line.find("include") == line.npos) continue;  // cheaper than the expression
+      if (std::regex_search(line, match, include_line)) found.push_back({node_of(file), file, match[1]});
     }
   }
   return found;
 }
 
-bool is_ours(const std::string& header) {
-  return kMayInclude.contains(folder_of(header)) && header.find('/') != header.npos;
+const std::vector<Include>& all_includes() {
+  static const std::vector<Include> includes = read_includes();
+  return includes;
 }
 
-const std::set<std::string>* third_party_folders(const std::string& header) {
-  for (const auto& [prefix, folders] : kThirdParty) {
-    if (header.starts_with(prefix)) return &folders;
+bool is_ours(const std::string& header) {
+  return header.find('/') != header.npos && fs::exists(kRoot / header.substr(0, header.find('/')));
+}
+
+const std::set<std::string>* third_party_nodes(const std::string& header) {
+  for (const auto& [prefix, nodes] : kThirdParty) {
+    if (header.starts_with(prefix)) return &nodes;
   }
   return nullptr;
 }
 
-TEST(Architecture, stages_know_the_contract_and_not_each_other) {
-  const auto includes = all_includes();
-  ASSERT_GT(includes.size(), 100u) << "the sources were not found under " << kRoot;
+/// What is included in fact.
+Graph graph_of_sources() {
+  Graph graph;
+  for (const Include& i : all_includes()) {
+    auto& to = graph[i.from];
+    if (is_ours(i.header) && node_of(i.header) != i.from) to.insert(node_of(i.header));
+  }
+  return graph;
+}
+
+TEST(Architecture, nodes_include_what_the_table_lets_them_and_no_more) {
+  const auto& includes = all_includes();
+  ASSERT_GT(includes.size(), 1000u) << "the sources were not found under " << kRoot;
   for (const Include& i : includes) {
-    if (!is_ours(i.header)) continue;
-    const std::string to = folder_of(i.header);
-    EXPECT_TRUE(to == i.from_folder || kMayInclude.at(i.from_folder).contains(to))
-        << i.from_file << " includes " << i.header;
+    if (!is_ours(i.header) || i.from == kPrograms || node_of(i.header) == i.from) continue;
+    EXPECT_TRUE(kMayInclude.at(i.from).contains(node_of(i.header))) << i.from_file << " includes " << i.header;
+  }
+  const Graph graph = graph_of_sources();
+  for (const auto& [node, allowed] : kMayInclude) {
+    ASSERT_TRUE(graph.contains(node)) << node << " has no source";
+    for (const std::string& to : allowed) {
+      EXPECT_TRUE(graph.at(node).contains(to))
+          << node << " does not include " << to << " any more: take it off the table";
+    }
   }
 }
 
-TEST(Architecture, third_party_headers_stay_in_their_folders) {
+TEST(Architecture, the_table_has_no_cycle_and_no_stage_knows_another) {
+  EXPECT_EQ(mbtfm::test::levels_of(kMayInclude).size(), kMayInclude.size()) << "a cycle";
+  const std::set<std::string> stages = {"segment", "network", "substrate", "mbtfm", "samples"};
+  for (const auto& [node, allowed] : kMayInclude) {
+    for (const std::string& to : allowed) {
+      if (top_of(node) == "mbtfm" || top_of(node) == "samples" || top_of(to) == top_of(node)) continue;
+      EXPECT_EQ(top_of(to), "pipeline") << node << " knows " << to;
+    }
+  }
+}
+
+TEST(Architecture, every_source_lies_in_a_node_or_belongs_to_a_program) {
+  const std::set<std::string> of_programs = {"mbtfm/fit_effects.h", "mbtfm/fit_effects.cpp"};
+  for (const std::string& file : sources()) {
+    EXPECT_TRUE(node_of(file) != kPrograms || file.ends_with("_main.cpp") || of_programs.contains(file))
+        << file << ": its folder is not in the table";
+  }
+}
+
+/// substrate/greens is the library substrate_greens.
+TEST(Architecture, a_node_is_a_library) {
+  for (const auto& [node, allowed] : kMayInclude) {
+    std::string library = node;
+    std::replace(library.begin(), library.end(), '/', '_');
+    const std::string list = mbtfm::files::read_text(kRoot / node / "CMakeLists.txt");
+    EXPECT_NE(list.find("mbtfm_library(" + library), list.npos) << node << " makes no library " << library;
+    for (const std::string& file : sources()) {
+      const std::string name = fs::path(file).filename();
+      if (node_of(file) != node || !name.ends_with(".cpp")) continue;
+      EXPECT_NE((" " + list).find(name), list.npos) << file << " is not built";
+    }
+  }
+}
+
+/// substrate/greens is mbtfm::greens; the contract, everybody's vocabulary, is mbtfm itself.
+TEST(Architecture, a_node_is_a_namespace) {
+  static const std::regex opened(R"(^namespace (mbtfm(::\w+)?) \{)");
+  for (const std::string& file : sources()) {
+    if (node_of(file) == kPrograms) continue;
+    const std::string name = fs::path(node_of(file)).filename();
+    std::ifstream stream(kRoot / file);
+    for (std::string line; std::getline(stream, line);) {
+      std::smatch match;
+      if (!line.starts_with("namespace") || !std::regex_search(line, match, opened)) continue;
+      EXPECT_EQ(match[1], name == "contract" ? "mbtfm" : "mbtfm::" + name) << file;
+    }
+  }
+}
+
+TEST(Architecture, third_party_headers_stay_in_their_nodes) {
   for (const Include& i : all_includes()) {
     if (is_ours(i.header)) continue;
-    const auto* folders = third_party_folders(i.header);
-    if (folders == nullptr) {
-      // what is left is the standard library, POSIX and generated headers
-      EXPECT_TRUE(i.header.find('/') == std::string::npos || i.header.starts_with("sys/") ||
-                  i.header.starts_with("pipeline/contract/"))
-          << i.from_file << " includes " << i.header << ", which no folder owns: add it to the table or drop it";
+    const auto* nodes = third_party_nodes(i.header);
+    if (nodes == nullptr) {
+      // what is left is the standard library and POSIX
+      EXPECT_TRUE(i.header.find('/') == std::string::npos || i.header.starts_with("sys/"))
+          << i.from_file << " includes " << i.header << ", which no node owns: add it to the table or drop it";
       continue;
     }
-    EXPECT_TRUE(folders->contains(i.from_folder)) << i.from_file << " includes " << i.header;
+    EXPECT_TRUE(nodes->contains(i.from)) << i.from_file << " includes " << i.header;
   }
 }
 
-TEST(Architecture, headers_that_other_folders_include_show_no_third_party_but_eigen) {
+TEST(Architecture, headers_that_other_nodes_include_show_no_third_party_but_eigen) {
   std::map<std::string, std::vector<Include>> includes_of;
   std::set<std::string> shown;
-  const auto includes = all_includes();
+  const auto& includes = all_includes();
   for (const Include& i : includes) {
     includes_of[i.from_file].push_back(i);
-    if (is_ours(i.header) && folder_of(i.header) != i.from_folder &&
-        !(i.from_folder.starts_with("pipeline") && folder_of(i.header).starts_with("pipeline/"))) {
-      shown.insert(i.header);
-    }
+    const bool is_own_program =
+        i.from == kPrograms && top_of(i.from_file) == top_of(i.header);  // it sees all of its stage
+    if (is_ours(i.header) && node_of(i.header) != i.from && !is_own_program) shown.insert(i.header);
   }
+  for (const std::string& header : kShown) shown.erase(header);
   std::vector<std::string> queue(shown.begin(), shown.end());
   while (!queue.empty()) {
     const std::string header = queue.back();
     queue.pop_back();
     for (const Include& i : includes_of[header]) {
-      if (is_ours(i.header) && shown.insert(i.header).second) queue.push_back(i.header);
-      EXPECT_TRUE(third_party_folders(i.header) == nullptr || i.header.starts_with("Eigen/"))
-          << header << ", which other folders include, shows " << i.header;
+      if (is_ours(i.header) && !kShown.contains(i.header) && shown.insert(i.header).second) queue.push_back(i.header);
+      EXPECT_TRUE(third_party_nodes(i.header) == nullptr || i.header.starts_with("Eigen/"))
+          << header << ", which other nodes include, shows " << i.header;
     }
   }
+}
+
+/// Set MBTFM_WRITE_DOCS to draw it anew.
+TEST(Architecture, the_picture_of_the_graph_is_what_the_sources_include) {
+  const fs::path file = kRoot / "docs/images/architecture.svg";
+  const std::string picture = mbtfm::test::drawn(graph_of_sources(), "What includes what");
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) mbtfm::files::write_text(file, picture);
+  EXPECT_EQ(mbtfm::files::read_text(file), picture) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_includes";
 }
 
 }  // namespace

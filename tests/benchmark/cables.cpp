@@ -4,19 +4,19 @@
 
 #include <map>
 
-#include "network/block_cholesky.h"
-#include "network/cables.h"
-#include "network/mesh.h"
+#include "network/cables/cables.h"
+#include "network/mesh/mesh.h"
+#include "pipeline/numerics/block_cholesky.h"
 #include "tests/support/lattice.h"
 #include "tests/support/random_cell.h"
 
 namespace {
 
 using namespace mbtfm;
-using network::BlockCholesky;
-using network::CableNetwork;
-using network::CableParameters;
-using network::Equilibrium;
+using cables::CableNetwork;
+using cables::CableParameters;
+using cables::Equilibrium;
+using numerics::BlockCholesky;
 
 /// A cell of 2 000 um² with 19 fibres on a mesh of about so many vertices. The network's links keep its surface tension
 /// and stiffness: 0.06 nN and 50 nN at an edge of 1.5 um.
@@ -24,7 +24,7 @@ Network make_mesh(int n_vertices) {
   const Cell cell =
       testing::random_cell(4, {.radius_um = 27, .n_adhesions = 60, .n_fibres = 19, .least_distance_um = 2});
   const double edge_um = std::sqrt(std::abs(signed_area_um2(cell.outline_um)) / (std::sqrt(0.75) * n_vertices));
-  Network result = network::generate_network(cell, {.edge_length_um = edge_um}).network;
+  Network result = mesh::generate_network(cell, {.edge_length_um = edge_um}).network;
   for (Link& link : result.links)
     if (link.fibre_id == 0) link.share *= edge_um / 1.5;
   return result;
@@ -37,14 +37,14 @@ const Network& mesh(int n_vertices) {
 }
 
 struct Scene {
-  explicit Scene(const benchmark::State& state, CableParameters parameters = {})
+  explicit Scene(const benchmark::State& state, cables::CableParameters parameters = {})
       : cables(mesh(static_cast<int>(state.range(0))), parameters),
         tensions(test::random_tensions_nN(cables.fibre_ids().size(), 1)) {}
-  CableNetwork cables;
+  cables::CableNetwork cables;
   std::vector<double> tensions;
 };
 
-void record(benchmark::State& state, const Equilibrium& equilibrium) {
+void record(benchmark::State& state, const cables::Equilibrium& equilibrium) {
   state.counters["steps"] = equilibrium.report.iterations;
   state.counters["vertices"] = static_cast<double>(equilibrium.positions_um.size());
   if (!equilibrium.report.converged) state.SkipWithError(equilibrium.report.reason.c_str());
@@ -52,29 +52,29 @@ void record(benchmark::State& state, const Equilibrium& equilibrium) {
 
 void analyse(benchmark::State& state) {
   const Network& network = mesh(static_cast<int>(state.range(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(CableNetwork(network));
+  for (auto _ : state) benchmark::DoNotOptimize(cables::CableNetwork(network));
 }
 
 void cold(benchmark::State& state) {
   const Scene scene(state);
-  Equilibrium equilibrium;
+  cables::Equilibrium equilibrium;
   for (auto _ : state) equilibrium = scene.cables.equilibrium(scene.tensions);
   record(state, equilibrium);
 }
 
 void warm_after_5_per_cent(benchmark::State& state) {
   const Scene scene(state);
-  const Equilibrium before = scene.cables.equilibrium(scene.tensions);
+  const cables::Equilibrium before = scene.cables.equilibrium(scene.tensions);
   std::vector<double> changed = scene.tensions;
   for (std::size_t g = 0; g < changed.size(); ++g) changed[g] *= g % 2 == 0 ? 1.05 : 0.95;
-  Equilibrium equilibrium;
+  cables::Equilibrium equilibrium;
   for (auto _ : state) equilibrium = scene.cables.equilibrium(changed, before.positions_um);
   record(state, equilibrium);
 }
 
 void derivatives_of_20_groups(benchmark::State& state) {
   const Scene scene(state);
-  const Equilibrium equilibrium = scene.cables.equilibrium(scene.tensions);
+  const cables::Equilibrium equilibrium = scene.cables.equilibrium(scene.tensions);
   for (auto _ : state) benchmark::DoNotOptimize(scene.cables.adhesion_force_derivatives(scene.tensions, equilibrium));
   record(state, equilibrium);
 }
@@ -82,7 +82,7 @@ void derivatives_of_20_groups(benchmark::State& state) {
 /// The thesis' method, to the same residual.
 void cold_by_conjugate_gradients(benchmark::State& state) {
   const Scene scene(state, {.contraction = "conjugate-gradient"});
-  Equilibrium equilibrium;
+  cables::Equilibrium equilibrium;
   for (auto _ : state) equilibrium = scene.cables.equilibrium(scene.tensions);
   record(state, equilibrium);
 }
@@ -108,11 +108,11 @@ std::vector<std::array<int, 2>> pairs_of(const Network& network) {
 void factorise(benchmark::State& state) {
   const Network& net = mesh(static_cast<int>(state.range(0)));
   const auto pairs = pairs_of(net);
-  BlockCholesky matrix(static_cast<int>(net.vertices_um.size()), pairs);
+  numerics::BlockCholesky matrix(static_cast<int>(net.vertices_um.size()), pairs);
   matrix.set_zero();
   for (std::size_t k = 0; k < pairs.size(); ++k)
-    matrix.add_spring(static_cast<int>(k), BlockCholesky::Block::Identity());
-  for (int i = 0; i < matrix.n_blocks(); ++i) matrix.add_diagonal(i, 0.01 * BlockCholesky::Block::Identity());
+    matrix.add_spring(static_cast<int>(k), numerics::BlockCholesky::Block::Identity());
+  for (int i = 0; i < matrix.n_blocks(); ++i) matrix.add_diagonal(i, 0.01 * numerics::BlockCholesky::Block::Identity());
   for (auto _ : state) matrix.factorise();
 }
 

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "network/mesh.h"
+#include "network/mesh/mesh.h"
 #include "tests/support/random_cell.h"
 
 namespace {
@@ -21,11 +21,11 @@ Cell cell_of(double n_vertices) {
 
 void mesh(benchmark::State& state, const char* anchor) {
   const Cell cell = cell_of(static_cast<double>(state.range(0)));
-  network::NetworkParameters p;
+  mesh::NetworkParameters p;
   p.adhesion_anchor = anchor;
   std::size_t n_vertices = 0;
   for (auto _ : state) {
-    const network::GeneratedNetwork generated = network::generate_network(cell, p);
+    const mesh::GeneratedNetwork generated = mesh::generate_network(cell, p);
     n_vertices = generated.network.vertices_um.size();
     state.counters["sweeps"] = generated.report.iterations;
     state.counters["mean_quality"] = generated.mean_quality;

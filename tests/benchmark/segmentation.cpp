@@ -27,20 +27,20 @@ const test::SimulatedCell& cell_of(int side_px) {
 
 void adhesions(benchmark::State& state) {
   const auto& cell = cell_of(static_cast<int>(state.range(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(find_adhesions(cell.adhesion.image, 0.1, {}));
+  for (auto _ : state) benchmark::DoNotOptimize(cells::find_adhesions(cell.adhesion.image, 0.1, {}));
   state.SetComplexityN(state.range(0) * state.range(0));
 }
 
 void outline(benchmark::State& state) {
   const auto& cell = cell_of(static_cast<int>(state.range(0)));
-  for (auto _ : state) benchmark::DoNotOptimize(find_outline(cell.actin.image, {}, 0.1, {}));
+  for (auto _ : state) benchmark::DoNotOptimize(cells::find_outline(cell.actin.image, {}, 0.1, {}));
   state.SetComplexityN(state.range(0) * state.range(0));
 }
 
 void fibres(benchmark::State& state) {
   const auto& cell = cell_of(static_cast<int>(state.range(0)));
-  const auto found = find_adhesions(cell.adhesion.image, 0.1, {});
-  for (auto _ : state) benchmark::DoNotOptimize(find_fibres(cell.actin.image, {}, found, 0.1, {}));
+  const auto found = cells::find_adhesions(cell.adhesion.image, 0.1, {});
+  for (auto _ : state) benchmark::DoNotOptimize(cells::find_fibres(cell.actin.image, {}, found, 0.1, {}));
   state.SetComplexityN(state.range(0) * state.range(0));
 }
 

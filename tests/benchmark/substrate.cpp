@@ -1,6 +1,7 @@
 /// Time of each model's matrix against adhesions and beads.
 #include <benchmark/benchmark.h>
 
+#include "substrate/choice/factory.h"
 #include "tests/support/substrate_scene.h"
 
 namespace {
@@ -12,7 +13,7 @@ void matrix(benchmark::State& state, const char* model, double thickness_um) {
   const auto ellipses = test::scattered_ellipses(static_cast<int>(state.range(0)), 35);
   const Gel gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = thickness_um};
   for (auto _ : state) {
-    const auto substrate = substrate::make_substrate(gel, test::model_named(model), 2);
+    const auto substrate = choice::make_substrate(gel, test::model_named(model), 2);
     benchmark::DoNotOptimize(substrate->compliance_um_per_nN(points, ellipses).data());
   }
 }

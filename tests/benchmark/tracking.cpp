@@ -2,7 +2,7 @@
 
 #include <map>
 
-#include "segment/track.h"
+#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
 namespace {
@@ -21,7 +21,7 @@ const test::BeadPair& pair_of(int width, int n_beads) {
 void track(benchmark::State& state, int width, int n_beads) {
   const test::BeadPair& pair = pair_of(width, n_beads);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(segment::track_beads(pair.relaxed, pair.stressed, 0.1, {}, 2));
+    benchmark::DoNotOptimize(beads::track_beads(pair.relaxed, pair.stressed, 0.1, {}, 2));
   }
 }
 

@@ -1,10 +1,10 @@
 /// Times of traction reconstructions on the eight-ellipse scene.
 #include <benchmark/benchmark.h>
 
-#include "mbtfm/fttc.h"
+#include "mbtfm/tractions/fttc.h"
 #include "tests/support/ellipse_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 void traction(benchmark::State& state, const std::string& method) {
@@ -22,4 +22,4 @@ BENCHMARK_CAPTURE(traction, sparse, "sparse")->Arg(128)->Unit(benchmark::kMillis
 BENCHMARK_CAPTURE(traction, adhesion_forces, "adhesion-forces")->Arg(128)->Unit(benchmark::kMillisecond);
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions

@@ -1,8 +1,11 @@
 /// What `refined` promises beyond convergence: the error it reports, layered gels, symmetries, the gel's inside.
 #include <gtest/gtest.h>
 
-#include "substrate/layer.h"
-#include "substrate/layer_vertical.h"
+#include "substrate/choice/factory.h"
+#include "substrate/greens/layer.h"
+#include "substrate/greens/layer_vertical.h"
+#include "substrate/greens/models.h"
+#include "substrate/material.h"
 #include "tests/support/layered_gel.h"
 #include "tests/support/substrate_scene.h"
 
@@ -43,10 +46,10 @@ TEST(Refined, reports_its_error_within_a_factor_of_two_and_meets_the_tolerance) 
     const auto ellipses = test::scattered_ellipses(c.adhesions, 15, 7);
     SubstrateParameters parameters = refined_to(c.tolerance);
     parameters.element = c.element;
-    const auto model = make_substrate(gel, parameters, 2);
+    const auto model = choice::make_substrate(gel, parameters, 2);
     const Eigen::MatrixXd matrix = model->compliance_um_per_nN(points, ellipses);
     const double error = test::mean_column_difference(
-        matrix, make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses));
+        matrix, greens::make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses));
     const double reported = reported_error(*model);
     EXPECT_LE(reported, c.tolerance);
     EXPECT_LT(reported, 2 * error) << c.element << " nu " << c.poisson_ratio << " h " << c.thickness_um;
@@ -57,11 +60,11 @@ TEST(Refined, reports_its_error_within_a_factor_of_two_and_meets_the_tolerance) 
 TEST(LayeredGel, of_one_modulus_is_the_layer) {
   const Gel gel = gel_of(0.45, 20);
   const test::LayeredGel layered({{5, 8.4}, {3, 8.4}, {12, 8.4}}, 0.45);
-  const Layer layer(gel);
+  const greens::Layer layer(gel);
   const Ellipse ellipse = {{1, 2}, 1, 0.5, 0.4};
   for (const Vec2 point : {Vec2{1, 2}, Vec2{4, 2}, Vec2{-12, 20}}) {
-    const Sym2 a = layered.compliance_um_per_nN(ellipse, point);
-    const Sym2 b = LayerEllipse(layer, ellipse).compliance_um_per_nN(point);
+    const greens::Sym2 a = layered.compliance_um_per_nN(ellipse, point);
+    const greens::Sym2 b = greens::LayerEllipse(layer, ellipse).compliance_um_per_nN(point);
     // the layered gel's own averages are of degree 5 over an ellipse of a fifth of its first layer: (1/20)^6 = 2e-8
     EXPECT_NEAR(a.xx, b.xx, 1e-6 * std::abs(b.xx));
     EXPECT_NEAR(a.xy, b.xy, 1e-6 * std::abs(b.xx));
@@ -74,7 +77,7 @@ Eigen::MatrixXd compliance(const test::LayeredGel& gel, const std::vector<Vec2>&
   Eigen::MatrixXd matrix(2 * points.size(), 2 * ellipses.size());
   for (std::size_t j = 0; j < ellipses.size(); ++j) {
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const Sym2 g = gel.compliance_um_per_nN(ellipses[j], points[i]);
+      const greens::Sym2 g = gel.compliance_um_per_nN(ellipses[j], points[i]);
       matrix.block<2, 2>(2 * i, 2 * j) << g.xx, g.xy, g.xy, g.yy;
     }
   }
@@ -86,7 +89,8 @@ TEST(Refined, takes_layers_and_graded_gels) {
   const auto points = test::scattered_points(150, 15);
   const std::vector<Ellipse> ellipses = {{{1, 2}, 1.2, 0.6, 0.4}};
   const Gel gel = gel_of(nu, 20);
-  const Eigen::MatrixXd even = make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd even =
+      greens::make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
   std::vector<test::EvenLayer> graded;
   // 20 kPa to 4 kPa: steps of a 24th of the depth differ from the line by less than the tolerance squared
   for (int k = 0; k < 24; ++k) graded.push_back({20.0 / 24, 20 - 16 * (k + 0.5) / 24});
@@ -96,7 +100,7 @@ TEST(Refined, takes_layers_and_graded_gels) {
         std::pair{std::string("0:20, 20:4"), graded}}) {
     SubstrateParameters parameters = refined_to(0.02);
     parameters.modulus_profile = profile;
-    const Eigen::MatrixXd matrix = make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses);
+    const Eigen::MatrixXd matrix = choice::make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses);
     const Eigen::MatrixXd exact = compliance(test::LayeredGel(layers, nu), points, ellipses);
     EXPECT_GT(test::mean_column_difference(even, exact), 0.2) << profile;  // not the even gel's
     EXPECT_LT(test::mean_column_difference(matrix, exact), 2 * 0.02) << profile;
@@ -107,10 +111,12 @@ TEST(Refined, split_and_layer_agree_on_a_wide_block) {
   const Gel gel = gel_of(0.49, 15);
   const auto points = test::scattered_points(800, 12);
   const auto ellipses = test::scattered_ellipses(3, 8);
-  const Eigen::MatrixXd layer = make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd layer =
+      greens::make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses);
   const Eigen::MatrixXd split =
-      make_substrate(gel, test::model_named("split"), 2)->compliance_um_per_nN(points, ellipses);
-  const Eigen::MatrixXd refined = make_substrate(gel, refined_to(0.01), 2)->compliance_um_per_nN(points, ellipses);
+      choice::make_substrate(gel, test::model_named("split"), 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd refined =
+      choice::make_substrate(gel, refined_to(0.01), 2)->compliance_um_per_nN(points, ellipses);
   EXPECT_LT(test::mean_column_difference(split, layer), 1e-3);
   EXPECT_LT(test::mean_column_difference(refined, layer), 0.02);
   EXPECT_LT(test::mean_column_difference(refined, split), 0.02);
@@ -129,7 +135,7 @@ TEST(Refined, turns_mirrors_scales_and_superposes_with_the_scene) {
   const Gel gel = gel_of(0.49, 15);
   SubstrateParameters exact = refined_to(0);
   exact.precision = "double";
-  const auto model = make_substrate(gel, exact, 2);
+  const auto model = choice::make_substrate(gel, exact, 2);
   const SquareScene scene;
   const Eigen::MatrixXd before = model->compliance_um_per_nN(scene.points, scene.ellipses);
   SquareScene turned, mirrored;
@@ -147,7 +153,8 @@ TEST(Refined, turns_mirrors_scales_and_superposes_with_the_scene) {
   const Eigen::MatrixXd across = model->compliance_um_per_nN(mirrored.points, mirrored.ellipses);
   Gel stiff = gel;
   stiff.youngs_modulus_kPa *= 3;
-  const Eigen::MatrixXd scaled = make_substrate(stiff, exact, 2)->compliance_um_per_nN(scene.points, scene.ellipses);
+  const Eigen::MatrixXd scaled =
+      choice::make_substrate(stiff, exact, 2)->compliance_um_per_nN(scene.points, scene.ellipses);
   // solved to rounding times the condition: 1e4 nodes and lambda / mu = 50
   const double tiny = 1e-9 * before.cwiseAbs().maxCoeff();
   EXPECT_LT((3 * scaled - before).cwiseAbs().maxCoeff(), tiny);
@@ -172,10 +179,11 @@ TEST(Refined, is_the_same_for_any_number_of_threads) {
   for (const double nu : {0.49, 0.4999}) {  // in single and double precision
     const Gel gel = gel_of(nu, 15);
     const Eigen::MatrixXd one =
-        make_substrate(gel, refined_to(0.03), 1)->compliance_um_per_nN(scene.points, scene.ellipses);
+        choice::make_substrate(gel, refined_to(0.03), 1)->compliance_um_per_nN(scene.points, scene.ellipses);
     for (const int threads : {2, 4}) {
-      EXPECT_TRUE(one ==
-                  make_substrate(gel, refined_to(0.03), threads)->compliance_um_per_nN(scene.points, scene.ellipses));
+      EXPECT_TRUE(
+          one ==
+          choice::make_substrate(gel, refined_to(0.03), threads)->compliance_um_per_nN(scene.points, scene.ellipses));
     }
   }
 }
@@ -189,7 +197,8 @@ TEST(Refined, is_reciprocal_between_two_loaded_ellipses) {
   for (const Ellipse& ellipse : pair) {
     for (const DiscPoint& p : ellipse_rule(ellipse, 39)) points.push_back(ellipse.centre_um + p.position);
   }
-  const Eigen::MatrixXd g = make_substrate(gel_of(0.49, 10), refined_to(0), 2)->compliance_um_per_nN(points, pair);
+  const Eigen::MatrixXd g =
+      choice::make_substrate(gel_of(0.49, 10), refined_to(0), 2)->compliance_um_per_nN(points, pair);
   Eigen::Matrix2d mean[2] = {Eigen::Matrix2d::Zero(), Eigen::Matrix2d::Zero()};
   for (int at = 0; at < 2; ++at) {
     const auto rule = ellipse_rule(pair[at], 39);
@@ -201,12 +210,12 @@ TEST(Refined, is_reciprocal_between_two_loaded_ellipses) {
 TEST(Vertical, of_the_half_space_is_the_average_of_the_point_force) {
   const Gel gel = gel_of(0.3, 1000);
   const Ellipse ellipse = {{1, 2}, 1.5, 0.4, 0.7};
-  const auto model = make_substrate(gel, test::model_named("half-space"), 1);
+  const auto model = choice::make_substrate(gel, test::model_named("half-space"), 1);
   for (const Vec2 point : {Vec2{4, 3}, Vec2{-1, 4}, Vec2{2.5, 0}}) {
     double expected = 0;
     for (const DiscPoint& p : ellipse_rule(ellipse, 99)) {
       const Vec2 offset = point - ellipse.centre_um - p.position;
-      const PointForceField field = cerruti_field(gel, offset.x, offset.y, 0);
+      const greens::PointForceField field = greens::cerruti_field(gel, offset.x, offset.y, 0);
       expected += p.weight * (2 * field.u_um_per_nN[0][2] - field.u_um_per_nN[1][2]);
     }
     EXPECT_NEAR(model->vertical_um({point}, {ellipse}, {{2, -1}})[0], expected, 1e-9 * std::abs(expected));
@@ -226,11 +235,11 @@ TEST(Vertical, of_layer_and_split_agree) {
     const Gel gel = gel_of(nu, 15);
     SubstrateParameters fine = test::model_named("split");
     fine.cells_per_thickness = 4;
-    const auto by_split = make_substrate(gel, fine, 2);
+    const auto by_split = choice::make_substrate(gel, fine, 2);
     const auto split = by_split->vertical_um(scene.points, scene.ellipses, forces);
     const auto along = by_split->displacements_um(scene.points, scene.ellipses, forces);
     const auto layer =
-        make_substrate(gel, test::model_named("layer"), 2)->vertical_um(scene.points, scene.ellipses, forces);
+        choice::make_substrate(gel, test::model_named("layer"), 2)->vertical_um(scene.points, scene.ellipses, forces);
     double difference = 0, size = 0, vertical = 0;
     for (std::size_t i = 0; i < split.size(); ++i) {
       difference += (split[i] - layer[i]) * (split[i] - layer[i]);
@@ -244,14 +253,16 @@ TEST(Vertical, of_layer_and_split_agree) {
 
 TEST(Vertical, of_a_thick_layer_is_that_of_the_half_space) {
   for (const double nu : {0.0, 0.3, 0.4999}) {
-    EXPECT_NEAR(layer_vertical_factor(nu, 30), 0.5 * (1 - 2 * nu), 1e-12);
-    EXPECT_NEAR(layer_vertical_factor(nu, 0.01), 0, 1e-4);  // long waves shear the layer: as (kh)²
+    EXPECT_NEAR(greens::layer_vertical_factor(nu, 30), 0.5 * (1 - 2 * nu), 1e-12);
+    EXPECT_NEAR(greens::layer_vertical_factor(nu, 0.01), 0, 1e-4);  // long waves shear the layer: as (kh)²
   }
   const std::vector<Vec2> points = {{1, 0.5}, {3, -2}};
   const std::vector<Ellipse> ellipses = {{{0, 0}, 1, 0.5, 0.3}};
   const Gel thick = gel_of(0.3, 1e5);
-  const auto layer = make_substrate(thick, test::model_named("layer"), 1)->vertical_um(points, ellipses, {{1, 2}});
-  const auto half = make_substrate(thick, test::model_named("half-space"), 1)->vertical_um(points, ellipses, {{1, 2}});
+  const auto layer =
+      choice::make_substrate(thick, test::model_named("layer"), 1)->vertical_um(points, ellipses, {{1, 2}});
+  const auto half =
+      choice::make_substrate(thick, test::model_named("half-space"), 1)->vertical_um(points, ellipses, {{1, 2}});
   for (std::size_t i = 0; i < points.size(); ++i) EXPECT_NEAR(layer[i], half[i], 1e-6 * std::abs(half[i]));
 }
 
@@ -260,10 +271,11 @@ TEST(Vertical, of_split_and_refined_agree) {
   for (const double nu : {0.3, 0.49}) {
     const Gel gel = gel_of(nu, 15);
     const std::vector<Vec2> forces = {{1, 2}, {-3, 0.5}};
-    const auto by_split = make_substrate(gel, test::model_named("split"), 2);
+    const auto by_split = choice::make_substrate(gel, test::model_named("split"), 2);
     const auto split = by_split->vertical_um(scene.points, scene.ellipses, forces);
     const auto along = by_split->displacements_um(scene.points, scene.ellipses, forces);
-    const auto refined = make_substrate(gel, refined_to(0.02), 2)->vertical_um(scene.points, scene.ellipses, forces);
+    const auto refined =
+        choice::make_substrate(gel, refined_to(0.02), 2)->vertical_um(scene.points, scene.ellipses, forces);
     double difference = 0, size = 0;
     for (std::size_t i = 0; i < split.size(); ++i) {
       difference += (split[i] - refined[i]) * (split[i] - refined[i]);
@@ -303,7 +315,7 @@ Imbalance imbalance(const char* element, double poisson_ratio, double growth) {
   parameters.growth = std::string(element) == "q1-p0" ? 8 * growth : growth;  // the same meshes
   const Vec2 load = {2, 1};
   const VolumeField field =
-      make_substrate(gel_of(poisson_ratio, 10), parameters, 2)->volume({{{0, 0}, 4, 2, 0.4}}, {load});
+      choice::make_substrate(gel_of(poisson_ratio, 10), parameters, 2)->volume({{{0, 0}, 4, 2, 0.4}}, {load});
   constexpr int kCuts = 128;  // none along a face of boxes, which halve the thickness some five times
   Vec2 sum;
   double squares = 0;
@@ -344,7 +356,7 @@ TEST(Volume, holds_the_stress_of_the_half_space_where_the_base_is_far) {
     const Gel gel = gel_of(nu, 200);
     const double mu = shear_modulus_kPa(gel), lambda = 2 * mu * nu / (1 - 2 * nu);
     const Ellipse disc = {{0, 0}, 0.8, 0.8, 0};
-    const VolumeField field = make_substrate(gel, parameters, 2)->volume({disc}, {{3, 0}});
+    const VolumeField field = choice::make_substrate(gel, parameters, 2)->volume({disc}, {{3, 0}});
     ASSERT_EQ(field.stress_kPa.size() * 8, field.box_corners.size());
     double difference = 0, size = 0;
     for (std::size_t box = 0; box < field.stress_kPa.size(); ++box) {
@@ -354,7 +366,7 @@ TEST(Volume, holds_the_stress_of_the_half_space_where_the_base_is_far) {
       for (int k = 0; k < 3; ++k) x[k] = 0.5 * (low[k] + high[k]);
       const double r = std::hypot(x[0], x[1], x[2]);
       if (r < 4 || r > 20) continue;
-      const auto g = cerruti_field(gel, x[0], x[1], x[2]).gradient_per_nN[0];
+      const auto g = greens::cerruti_field(gel, x[0], x[1], x[2]).gradient_per_nN[0];
       const double even = lambda * (g[0][0] + g[1][1] + g[2][2]);
       const double exact[6] = {even + 2 * mu * g[0][0],  even + 2 * mu * g[1][1],  even + 2 * mu * g[2][2],
                                mu * (g[0][1] + g[1][0]), mu * (g[1][2] + g[2][1]), mu * (g[0][2] + g[2][0])};

@@ -3,9 +3,12 @@
 
 #include <numeric>
 
-#include "substrate/elastic_system.h"
-#include "substrate/ellipse_load.h"
-#include "substrate/half_space.h"
+#include "substrate/boxes/elastic_system.h"
+#include "substrate/boxes/ellipse_load.h"
+#include "substrate/choice/factory.h"
+#include "substrate/ellipse.h"
+#include "substrate/greens/half_space.h"
+#include "substrate/material.h"
 #include "substrate/stated_error.h"
 #include "tests/support/substrate_scene.h"
 
@@ -20,7 +23,7 @@ Gel gel_of(double poisson_ratio, double thickness_um) {
 
 Eigen::MatrixXd compliance(const Gel& gel, const SubstrateParameters& parameters, const std::vector<Vec2>& points,
                            const std::vector<Ellipse>& ellipses) {
-  return make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses);
+  return choice::make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses);
 }
 
 TEST(BoxStiffness, rigid_motions_store_no_energy_and_strains_store_theirs) {
@@ -29,7 +32,7 @@ TEST(BoxStiffness, rigid_motions_store_no_energy_and_strains_store_theirs) {
   const double mu = shear_modulus_kPa(gel);
   const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
   for (const int order : {1, 2}) {
-    const Eigen::MatrixXd k = box_stiffness({gel, {}}, order, {{}, size});
+    const Eigen::MatrixXd k = boxes::box_stiffness({gel, {}}, order, {{}, size});
     const auto displaced = [&](const Eigen::Matrix3d& gradient) {
       Eigen::VectorXd u(k.rows());
       const int n = order + 1;
@@ -60,15 +63,15 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
                                  Ellipse{{0.25, 0.25}, 0.05, 0.04, 2}, Ellipse{{0, 0}, 3, 1, 0.5 * pi}}) {
     double sum = 0;
     Vec2 first;
-    Sym2 second;
+    greens::Sym2 second;
     for (double y = -4; y < 4; y += 0.25) {
       for (double x = -4; x < 4; x += 0.25) {
-        for (const DiscPoint& p : clipped_ellipse_rule(ellipse, {{x, y}, {x + 0.25, y + 0.25}})) {
+        for (const DiscPoint& p : boxes::clipped_ellipse_rule(ellipse, {{x, y}, {x + 0.25, y + 0.25}})) {
           EXPECT_GE(p.weight, 0);
           const Vec2 offset = p.position - ellipse.centre_um;
           sum += p.weight;
           first += p.weight * offset;
-          second += p.weight * Sym2{offset.x * offset.x, offset.x * offset.y, offset.y * offset.y};
+          second += p.weight * greens::Sym2{offset.x * offset.x, offset.x * offset.y, offset.y * offset.y};
         }
       }
     }
@@ -85,14 +88,15 @@ TEST(EllipseLoad, pieces_cut_by_a_grid_add_up_to_the_ellipse) {
 }
 
 TEST(ElasticSystem, the_base_bears_the_whole_load) {
-  const GridLines lines = {{-20, -10, 0, 10, 20}, {-20, -10, 0, 10, 20}, {0, 10}};
+  const boxes::GridLines lines = {{-20, -10, 0, 10, 20}, {-20, -10, 0, 10, 20}, {0, 10}};
   const Ellipse ellipse = {{1, 2}, 1.5, 0.6, 0.4};
   for (const int order : {1, 2}) {
-    const auto is_too_large = [](const Box& box) {
+    const auto is_too_large = [](const boxes::Box& box) {
       return box.low_um[2] == 0 && box.size_um[0] > 1 && std::abs(box.low_um[0]) < 3 && std::abs(box.low_um[1]) < 3;
     };
-    const ElasticSystem system({gel_of(0.4999, 10), {}}, make_block_mesh(lines, order, is_too_large, 100000, 2),
-                               {.threads = 2, .memory_limit_GB = 2});
+    const boxes::ElasticSystem system({gel_of(0.4999, 10), {}},
+                                      boxes::make_block_mesh(lines, order, is_too_large, 100000, 2),
+                                      {.threads = 2, .memory_limit_GB = 2});
     const auto load = system.load_weights(ellipse);
     double share = 0;
     for (const auto& [node, weight] : load) share += weight;
@@ -102,10 +106,10 @@ TEST(ElasticSystem, the_base_bears_the_whole_load) {
     std::iota(all_nodes.begin(), all_nodes.end(), 0);
     system.factor().solve(
         1, all_nodes,
-        [&](int, const NodalColumn& b) {
+        [&](int, const numerics::NodalColumn& b) {
           for (const auto& [node, weight] : load) b(node, 0) += weight;
         },
-        [&](int, const NodalColumn& u) {
+        [&](int, const numerics::NodalColumn& u) {
           Eigen::VectorXd values(system.n_unknowns());
           for (Eigen::Index k = 0; k < values.size(); ++k) {
             values[k] = u(static_cast<int>(k / 3), static_cast<int>(k % 3));
@@ -193,7 +197,7 @@ TEST(Split, states_an_error_that_falls_as_its_own_does) {
     SubstrateParameters parameters = test::model_named("split");
     parameters.cells_per_thickness = cells;
     parameters.margin_thicknesses = 6;  // beyond which the sides change nothing here
-    const auto split = make_substrate(gel, parameters, 2);
+    const auto split = choice::make_substrate(gel, parameters, 2);
     const double error = test::mean_column_difference(split->compliance_um_per_nN(points, ellipses), layer);
     const double stated = stated_error(parameters, split->figures());
     std::printf("split with %d cells: error %.2g, stated %.2g\n", cells, error, stated);
@@ -228,7 +232,7 @@ TEST(Split, turns_and_superposes_with_the_scene) {
   const Gel gel = gel_of(0.49, 30);
   auto points = test::scattered_points(200, 20);
   auto ellipses = test::scattered_ellipses(4, 15);
-  const auto model = make_substrate(gel, test::model_named("split"), 2);
+  const auto model = choice::make_substrate(gel, test::model_named("split"), 2);
   const Eigen::MatrixXd before = model->compliance_um_per_nN(points, ellipses);
   const std::vector<Vec2> forces = {{1, 2}, {-3, 0.5}, {0, 0}, {2, -1}};
   Eigen::VectorXd f(8);
@@ -258,9 +262,9 @@ TEST(Split, is_the_same_for_any_number_of_threads) {
   const auto ellipses = test::scattered_ellipses(12, 15);
   const SubstrateParameters parameters = test::model_named("split");
   const Gel gel = gel_of(0.49, 30);
-  const Eigen::MatrixXd one = make_substrate(gel, parameters, 1)->compliance_um_per_nN(points, ellipses);
-  EXPECT_TRUE(one == make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses));
-  EXPECT_TRUE(one == make_substrate(gel, parameters, 4)->compliance_um_per_nN(points, ellipses));
+  const Eigen::MatrixXd one = choice::make_substrate(gel, parameters, 1)->compliance_um_per_nN(points, ellipses);
+  EXPECT_TRUE(one == choice::make_substrate(gel, parameters, 2)->compliance_um_per_nN(points, ellipses));
+  EXPECT_TRUE(one == choice::make_substrate(gel, parameters, 4)->compliance_um_per_nN(points, ellipses));
 }
 
 }  // namespace

@@ -3,8 +3,9 @@
 
 #include <algorithm>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -18,13 +19,15 @@ TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
   const std::filesystem::path cell = folder / "cell";
   ASSERT_EQ(run_program("mbtfm-simulate --images --quiet --seed 61 --out " + cell.string()).code, 0);
   // strong fibres alone are segmented
-  write_text(cell / "cell.toml", read_text(cell / "cell.toml") + "\n[segment]\nfibre_start_noise = 60\n");
-  const auto fibres = [&] { return read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv"); };
-  const auto missing = [&] { return CsvTable(cell / "4_fit/missing_fibres.csv"); };
+  files::write_text(cell / "cell.toml", files::read_text(cell / "cell.toml") + "\n[segment]\nfibre_start_noise = 60\n");
+  const auto fibres = [&] {
+    return files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv");
+  };
+  const auto missing = [&] { return files::CsvTable(cell / "4_fit/missing_fibres.csv"); };
   const Outcome first = run_program("mbtfm run --quiet " + cell.string());
   ASSERT_EQ(first.code, 0) << first.output;
   const std::size_t n_segmented = fibres().size();
-  const CsvTable named = missing();
+  const files::CsvTable named = missing();
   ASSERT_GT(named.n_rows(), 0);
 
   const Outcome added =
@@ -41,14 +44,14 @@ TEST(AddFibres, fibres_that_the_beads_call_for_are_in_the_next_run) {
         now, [&](const Fibre& f) { return f.start_adhesion_id == start && f.end_adhesion_id == end; }))
         << "from adhesion " << start << " to " << end;
   }
-  const CsvTable left = missing();
+  const files::CsvTable left = missing();
   EXPECT_NE(left.n_rows() > 0 ? left.integer(0, "start_adhesion_id", 1) : 0, named.integer(0, "start_adhesion_id", 1))
       << "what was added first is called for no longer";
 }
 
 TEST(AddFibres, a_table_of_another_run_is_refused_by_name) {
   const test::TemporaryFolder folder;
-  write_text(folder / "missing.csv", "start_adhesion_id,end_adhesion_id,tension_nN\n1,2,3\n");
+  files::write_text(folder / "missing.csv", "start_adhesion_id,end_adhesion_id,tension_nN\n1,2,3\n");
   const Outcome outcome = run_program("mbtfm-add-fibres --rois " + (folder / "none.zip").string() + " --missing " +
                                       (folder / "missing.csv").string() + " --out " + (folder / "out.zip").string());
   EXPECT_EQ(outcome.code, 3) << outcome.output;

@@ -12,7 +12,7 @@
 #include <sstream>
 #include <thread>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -33,7 +33,7 @@ Files results_in(const fs::path& folder) {
     const std::string stage = path.parent_path().filename().string(), name = path.filename().string();
     const bool is_of_stage = stage == "1_segment" || stage == "2_track" || stage == "3_network" || stage == "4_fit";
     if (!is_of_stage || name == "record.json" || name.starts_with(".")) continue;
-    files[path.generic_string()] = read_text(entry.path());
+    files[path.generic_string()] = files::read_text(entry.path());
   }
   return files;
 }
@@ -96,12 +96,12 @@ class Batches : public testing::Test {
         first.string());
     ASSERT_EQ(made.code, 0) << made.output;
     fs::remove_all(first / "truth");
-    const std::string settings =
-        read_text(first / "cell.toml") + "[fit]\nn_meshes = 1\n[substrate]\nmodel = \"layer\"\n[network]\nseed = ";
+    const std::string settings = files::read_text(first / "cell.toml") +
+                                 "[fit]\nn_meshes = 1\n[substrate]\nmodel = \"layer\"\n[network]\nseed = ";
     for (const char* number : {"1", "2", "3"}) {
       const fs::path cell = *scene_ / (std::string("study/cell") + number);
       if (cell != first) fs::copy(first, cell, fs::copy_options::recursive);
-      write_text(cell / "cell.toml", settings + number + "\n");
+      files::write_text(cell / "cell.toml", settings + number + "\n");
     }
     fs::copy(*scene_ / "study", *scene_ / "whole", fs::copy_options::recursive);
     const Outcome batch = run_program(batch_command(*scene_ / "whole"));
@@ -167,11 +167,11 @@ TEST_F(Batches, a_full_disk_leaves_nothing_half_written) {
 
 TEST_F(Batches, a_parameter_that_was_changed_and_changed_back_gives_the_same_bytes) {
   ASSERT_EQ(run_program(batch_command(study_)).code, 0);
-  const std::string settings = read_text(study_ / "cell2/cell.toml");
-  write_text(study_ / "cell2/cell.toml", settings + "edge_length_um = 2\n");  // of [network]
+  const std::string settings = files::read_text(study_ / "cell2/cell.toml");
+  files::write_text(study_ / "cell2/cell.toml", settings + "edge_length_um = 2\n");  // of [network]
   ASSERT_EQ(run_program(batch_command(study_)).code, 0);
   EXPECT_NE(results_in(study_).at("cell2/4_fit/tensions.csv"), whole_.at("cell2/4_fit/tensions.csv"));
-  write_text(study_ / "cell2/cell.toml", settings);
+  files::write_text(study_ / "cell2/cell.toml", settings);
   ASSERT_EQ(run_program(batch_command(study_)).code, 0);
   expect_the_same(study_, whole_);
 }
@@ -191,16 +191,16 @@ TEST_F(Batches, a_changed_file_is_found_by_verify) {
   ASSERT_EQ(run_program("mbtfm run --quiet " + cell.string()).code, 0);
   EXPECT_EQ(run_program("mbtfm verify " + cell.string()).code, 0);
   for (const char* name : {"4_fit/substrate.vtu", "paxillin.tif"}) {
-    const std::string bytes = read_text(cell / name);
+    const std::string bytes = files::read_text(cell / name);
     std::string changed = bytes;
     changed[changed.size() / 2] ^= 1;
-    write_text(cell / name, changed);
+    files::write_text(cell / name, changed);
     const Outcome found = run_program("mbtfm verify " + cell.string());
     EXPECT_EQ(found.code, 1);
     EXPECT_NE(found.output.find(std::string(name) + " differs"), std::string::npos) << found.output;
-    write_text(cell / name, bytes);
+    files::write_text(cell / name, bytes);
   }
-  write_text(cell / "cell.toml", read_text(cell / "cell.toml") + "edge_length_um = 2\n");
+  files::write_text(cell / "cell.toml", files::read_text(cell / "cell.toml") + "edge_length_um = 2\n");
   EXPECT_EQ(run_program("mbtfm verify " + cell.string()).code, 1);
 }
 

@@ -4,8 +4,10 @@
 #include <algorithm>
 #include <cmath>
 
-#include "pipeline/contract/files.h"
-#include "segment/image.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "segment/images/image.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -23,7 +25,7 @@ constexpr const char* kScenario =
 class WithoutAdhesions : public ::testing::Test {
  protected:
   void SetUp() override {
-    write_text(folder_ / "scenario.toml", kScenario);
+    files::write_text(folder_ / "scenario.toml", kScenario);
     const Outcome made = run_program("mbtfm-simulate --quiet --images --scenario " +
                                      (folder_ / "scenario.toml").string() + " --seed 3 --out " + cell().string());
     ASSERT_EQ(made.code, 0) << made.output;
@@ -32,11 +34,11 @@ class WithoutAdhesions : public ::testing::Test {
   fs::path cell() const { return folder_ / "cell"; }
   static double total_nN(const fs::path& file) {
     double sum = 0;
-    for (const AdhesionForce& f : read_adhesion_forces(file)) sum += norm(f.force_nN);
+    for (const AdhesionForce& f : files::read_adhesion_forces(file)) sum += norm(f.force_nN);
     return sum;
   }
   void set(const std::string& settings) {
-    write_text(cell() / "cell.toml", read_text(cell() / "cell.toml") + settings);
+    files::write_text(cell() / "cell.toml", files::read_text(cell() / "cell.toml") + settings);
   }
 
   test::TemporaryFolder folder_;
@@ -49,18 +51,18 @@ TEST_F(WithoutAdhesions, a_cell_is_fitted_on_candidates_and_says_so) {
   ASSERT_EQ(run.code, 0) << run.output;
   EXPECT_NE(run.output.find("caution (adhesions-assumed): No adhesion image: forces are placed on"), std::string::npos)
       << run.output;
-  const Cell found = read_cell(cell() / "1_segment");
+  const Cell found = files::read_cell(cell() / "1_segment");
   EXPECT_TRUE(
       std::ranges::all_of(found.adhesions, [](const Adhesion& a) { return a.origin == AdhesionOrigin::candidate; }));
   EXPECT_TRUE(fs::exists(cell() / "1_segment/adhesions_2.csv"));
-  const FitSummary fit = read_fit_summary(cell() / "4_fit/fit.json");
+  const FitSummary fit = files::read_fit_summary(cell() / "4_fit/fit.json");
   // Candidates at the rim may be micrometres beside an adhesion; what the whole cell pulls with is known all the same.
   EXPECT_NEAR(fit.total_force_nN / true_total_nN_, 1, 0.3);
   ASSERT_TRUE(fit.error_budget);
   const auto spread = std::ranges::find(fit.more, "total_force_spread_by_placement_nN", &Figures::value_type::first);
   ASSERT_NE(spread, fit.more.end());
   EXPECT_GE(fit.error_budget->total_force_parts_nN.segmentation, std::get<double>(spread->second));
-  const std::string report = read_text(cell() / "report.html");
+  const std::string report = files::read_text(cell() / "report.html");
   EXPECT_NE(report.find("No adhesion was seen: forces are placed where adhesions may be"), std::string::npos);
   EXPECT_NE(report.find("candidate, not seen"), std::string::npos);
   EXPECT_NE(report.find("traction density"), std::string::npos);
@@ -76,9 +78,9 @@ TEST_F(WithoutAdhesions, a_cell_is_fitted_on_candidates_and_says_so) {
 
 TEST_F(WithoutAdhesions, masks_of_what_is_true_give_the_forces) {
   fs::remove(cell() / "paxillin.tif");
-  const segment::Image actin = segment::read_image(cell() / "actin.tif");
-  segment::Image outline = actin, spots = actin;
-  const Cell truth = read_cell(cell() / "truth");
+  const images::Image actin = images::read_image(cell() / "actin.tif");
+  images::Image outline = actin, spots = actin;
+  const Cell truth = files::read_cell(cell() / "truth");
   for (int j = 0; j < actin.height; ++j)
     for (int i = 0; i < actin.width; ++i) {
       const Vec2 at{(i + 0.5) * 0.1, (j + 0.5) * 0.1};
@@ -87,16 +89,16 @@ TEST_F(WithoutAdhesions, masks_of_what_is_true_give_the_forces) {
       for (const Adhesion& a : truth.adhesions)
         if (contains(ellipse_corners(a, 64), at)) spots.at(i, j) = static_cast<float>(a.adhesion_id);
     }
-  segment::write_tiff(cell() / "outline_mask.tif", outline);
-  segment::write_tiff(cell() / "adhesion_mask.tif", spots);
+  images::write_tiff(cell() / "outline_mask.tif", outline);
+  images::write_tiff(cell() / "adhesion_mask.tif", spots);
   const Outcome run = run_program("mbtfm run " + cell().string());
   ASSERT_EQ(run.code, 0) << run.output;
   EXPECT_EQ(run.output.find("adhesions-assumed"), std::string::npos) << run.output;
-  const Cell found = read_cell(cell() / "1_segment");
+  const Cell found = files::read_cell(cell() / "1_segment");
   EXPECT_EQ(found.adhesions.size(), truth.adhesions.size());
   const double area_um2 = std::abs(signed_area_um2(truth.outline_um));
   EXPECT_NEAR(std::abs(signed_area_um2(found.outline_um)), area_um2, 0.01 * area_um2);
-  EXPECT_NEAR(read_fit_summary(cell() / "4_fit/fit.json").total_force_nN / true_total_nN_, 1, 0.2);
+  EXPECT_NEAR(files::read_fit_summary(cell() / "4_fit/fit.json").total_force_nN / true_total_nN_, 1, 0.2);
   EXPECT_FALSE(fs::exists(cell() / "1_segment/adhesions_2.csv"));
 
   set("\n[segment]\nadhesions = \"pattern\"\n");

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <fstream>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/compare.h"
 #include "substrate/compliance.h"
+#include "substrate/greens/models.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -20,17 +23,17 @@ using test::Outcome;
 using test::run_program;
 using test::TemporaryFolder;
 
-Comparison simulate_and_run(const fs::path& cell, const std::string& arguments) {
+report::Comparison simulate_and_run(const fs::path& cell, const std::string& arguments) {
   const Outcome made = run_program("mbtfm-simulate " + arguments + " --quiet --out " + cell.string());
   EXPECT_EQ(made.code, 0) << made.output;
   const Outcome run = run_program("mbtfm run " + cell.string());
   EXPECT_EQ(run.code, 0) << run.output;
-  return compare_with_truth(cell);
+  return report::compare_with_truth(cell);
 }
 
 void expect_no_net_force_and_no_net_torque(const fs::path& cell) {
-  const auto adhesions = read_adhesions(cell / "1_segment/adhesions.csv");
-  const auto forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
+  const auto adhesions = files::read_adhesions(cell / "1_segment/adhesions.csv");
+  const auto forces = files::read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
   ASSERT_EQ(adhesions.size(), forces.size());
   Vec2 net_nN;
   double total_nN = 0, net_torque_nN_um = 0, total_torque_nN_um = 0;
@@ -51,7 +54,7 @@ void expect_no_net_force_and_no_net_torque(const fs::path& cell) {
 TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
-  const Comparison comparison = simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000");
+  const report::Comparison comparison = simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000");
   EXPECT_LE(comparison.relative_error, 0.25);
   EXPECT_NEAR(comparison.total_force_nN / *comparison.true_total_force_nN, 1, 0.1);
   expect_no_net_force_and_no_net_torque(cell);
@@ -60,7 +63,8 @@ TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
 TEST(Chain, tensions_come_back_from_images_alone) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
-  const Comparison comparison = simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000 --images");
+  const report::Comparison comparison =
+      simulate_and_run(cell, "--scenario u2os --seed 1 --noise 0.07 --beads 10000 --images");
   EXPECT_GE(comparison.n_long_found_and_typed, 0.8 * comparison.n_long);
   EXPECT_LE(comparison.relative_error, 0.35);
   EXPECT_NEAR(comparison.total_force_nN / *comparison.true_total_force_nN, 1, 0.1);
@@ -72,7 +76,8 @@ TEST(Chain, tensions_come_back_from_images_alone) {
 /// that no mesh disagrees upon: 0.14.
 TEST(Chain, beads_without_any_noise_are_fitted_no_worse_than_noisy_ones) {
   const TemporaryFolder folder;
-  const Comparison comparison = simulate_and_run(folder / "cell", "--scenario u2os --seed 1 --noise 0 --beads 5000");
+  const report::Comparison comparison =
+      simulate_and_run(folder / "cell", "--scenario u2os --seed 1 --noise 0 --beads 5000");
   EXPECT_LE(comparison.relative_error, 0.1);
 }
 
@@ -87,8 +92,8 @@ TEST(Chain, noise_free_tensions_on_the_simulations_own_network_come_back) {
       (cell / "truth/network.vtu").string() + " --displacement " + (cell / "2_track/displacement.csv").string() +
       " --config " + (cell / "cell.toml").string() + " --out " + (cell / "4_fit").string());
   ASSERT_EQ(fit.code, 0) << fit.output;
-  const auto found = read_tensions(cell / "4_fit/tensions.csv");
-  const auto truth = read_tensions(cell / "truth/tensions.csv");
+  const auto found = files::read_tensions(cell / "4_fit/tensions.csv");
+  const auto truth = files::read_tensions(cell / "truth/tensions.csv");
   ASSERT_EQ(found.size(), truth.size());
   double error = 0, size = 0;
   for (std::size_t i = 1; i < truth.size(); ++i) {
@@ -107,12 +112,12 @@ TEST(Chain, a_second_run_does_nothing_and_a_changed_input_runs_what_depends_on_i
   EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 0);
   EXPECT_EQ(fs::last_write_time(cell / "4_fit/tensions.csv"), before);
 
-  DisplacementField field = read_displacement(cell / "2_track/displacement.csv");
+  DisplacementField field = files::read_displacement(cell / "2_track/displacement.csv");
   for (Bead& bead : field) bead.displacement_um = 2 * bead.displacement_um;
-  write_displacement(cell / "2_track/displacement.csv", field);
-  const double tension = read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN;
+  files::write_displacement(cell / "2_track/displacement.csv", field);
+  const double tension = files::read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN;
   EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 0);
-  EXPECT_GT(read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN, 1.5 * tension);
+  EXPECT_GT(files::read_tensions(cell / "4_fit/tensions.csv")[1].tension_nN, 1.5 * tension);
 }
 
 TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
@@ -124,7 +129,7 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
     fs::remove_all(cell / "4_fit");
     const Outcome run = run_program("mbtfm run --threads " + std::string(threads) + " " + cell.string());
     ASSERT_EQ(run.code, 0) << run.output;
-    const std::string tensions = read_text(cell / "4_fit/tensions.csv");
+    const std::string tensions = files::read_text(cell / "4_fit/tensions.csv");
     if (first.empty()) first = tensions;
     EXPECT_EQ(tensions, first) << threads << " threads";
   }
@@ -135,24 +140,24 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
 /// the noise-free part is computed anew from the listed forces; the noise stays as it is. Where the listed displacement
 /// is right, this changes nothing.
 void recompute_displacement(const fs::path& cell) {
-  const std::vector<Adhesion> adhesions = read_adhesions(cell / "1_segment/adhesions.csv");
+  const std::vector<Adhesion> adhesions = files::read_adhesions(cell / "1_segment/adhesions.csv");
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : adhesions) ellipses.push_back(substrate::ellipse_of(a));
   std::vector<Vec2> forces_nN;
-  for (const AdhesionForce& f : read_adhesion_forces(cell / "truth/adhesion_forces.csv"))
+  for (const AdhesionForce& f : files::read_adhesion_forces(cell / "truth/adhesion_forces.csv"))
     forces_nN.push_back(f.force_nN);
-  const CsvTable truth(cell / "truth/displacement.csv");
-  DisplacementField beads = read_displacement(cell / "2_track/displacement.csv");
+  const files::CsvTable truth(cell / "truth/displacement.csv");
+  DisplacementField beads = files::read_displacement(cell / "2_track/displacement.csv");
   std::vector<Vec2> points_um;
   for (const Bead& b : beads) points_um.push_back(b.position_um);
-  const auto layer = substrate::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-                                            {.model = "layer"}, 2);
+  const auto layer = greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+                                         {.model = "layer"}, 2);
   const std::vector<Vec2> u_um = layer->displacements_um(points_um, ellipses, forces_nN);
   for (int i = 0; i < truth.n_rows(); ++i) {
     const Vec2 listed{truth.number(i, "ux_um"), truth.number(i, "uy_um")};
     beads[i].displacement_um = beads[i].displacement_um - listed + u_um[i];
   }
-  write_displacement(cell / "2_track/displacement.csv", beads);
+  files::write_displacement(cell / "2_track/displacement.csv", beads);
 }
 
 TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_their_forces) {
@@ -170,7 +175,7 @@ TEST(Chain, tensions_of_the_oracle_cells_come_back_from_the_displacement_of_thei
     const Outcome run = run_program("mbtfm run " + cell.string());
     EXPECT_EQ(run.code, 0) << run.output;
     EXPECT_NE(run.output.find("given"), std::string::npos) << "segmentation and tracking are skipped: " << run.output;
-    EXPECT_LE(compare_with_truth(cell).relative_error, 0.30) << name;
+    EXPECT_LE(report::compare_with_truth(cell).relative_error, 0.30) << name;
   }
 }
 

@@ -26,11 +26,11 @@ class SmallCell : public testing::Test {
 
 TEST_F(SmallCell, is_fitted_anew_where_the_preset_changes_and_only_then) {
   ASSERT_EQ(run("run --preset fast").code, 0);
-  EXPECT_NE(read_text(cell / "run.json").find("\"preset\": \"fast\""), std::string::npos);
-  EXPECT_NE(read_text(cell / "4_fit/record.json").find("\"edge_length_um\": 2.5"), std::string::npos);
+  EXPECT_NE(files::read_text(cell / "run.json").find("\"preset\": \"fast\""), std::string::npos);
+  EXPECT_NE(files::read_text(cell / "4_fit/record.json").find("\"edge_length_um\": 2.5"), std::string::npos);
   EXPECT_NE(run("run --preset fast").output.find("fit      up to date"), std::string::npos);
   EXPECT_NE(run("run").output.find("fit      "), std::string::npos);
-  EXPECT_NE(read_text(cell / "4_fit/record.json").find("\"edge_length_um\": 1.5"), std::string::npos);
+  EXPECT_NE(files::read_text(cell / "4_fit/record.json").find("\"edge_length_um\": 1.5"), std::string::npos);
   EXPECT_NE(run("run --preset standard").output.find("fit      up to date"), std::string::npos);
   EXPECT_EQ(run("run --preset quick").code, 2);
 }
@@ -38,14 +38,15 @@ TEST_F(SmallCell, is_fitted_anew_where_the_preset_changes_and_only_then) {
 TEST_F(SmallCell, is_fitted_as_accurately_as_asked_for_or_says_why_not) {
   const Outcome easy = run("run --accuracy 90%");
   EXPECT_EQ(easy.code, 0) << easy.output;
-  EXPECT_NE(read_text(cell / "run.json").find("\"met\": true"), std::string::npos) << easy.output;
-  EXPECT_NE(read_text(cell / "report.html").find("Verified by the error budget: tensions to"), std::string::npos);
+  EXPECT_NE(files::read_text(cell / "run.json").find("\"met\": true"), std::string::npos) << easy.output;
+  EXPECT_NE(files::read_text(cell / "report.html").find("Verified by the error budget: tensions to"),
+            std::string::npos);
   const Outcome hopeless = run("run --accuracy 0.0001%");
   EXPECT_EQ(hopeless.code, 0) << hopeless.output;
   EXPECT_NE(hopeless.output.find("no computing reaches that"), std::string::npos) << hopeless.output;
-  EXPECT_NE(read_text(cell / "report.html").find("no computing reaches that"), std::string::npos);
+  EXPECT_NE(files::read_text(cell / "report.html").find("no computing reaches that"), std::string::npos);
   ASSERT_EQ(run("run").code, 0);
-  EXPECT_EQ(read_text(cell / "report.html").find("Verified by"), std::string::npos);
+  EXPECT_EQ(files::read_text(cell / "report.html").find("Verified by"), std::string::npos);
   EXPECT_EQ(run("run --accuracy 1% --preset fast").code, 2);
 }
 
@@ -53,10 +54,10 @@ TEST_F(SmallCell, has_a_cost_study_within_its_budget) {
   ASSERT_EQ(run("run").code, 0);
   const Outcome study = run("cost --repeats 1 --budget 0.05");
   ASSERT_EQ(study.code, 0) << study.output;
-  const std::string csv = read_text(cell / "cost/cost.csv");
+  const std::string csv = files::read_text(cell / "cost/cost.csv");
   EXPECT_NE(csv.find("as it is,,"), std::string::npos) << csv;
   EXPECT_TRUE(fs::is_regular_file(cell / "cost/cost.svg"));
-  EXPECT_NE(read_text(cell / "cost/cost.md").find("| knob | half the error costs |"), std::string::npos);
+  EXPECT_NE(files::read_text(cell / "cost/cost.md").find("| knob | half the error costs |"), std::string::npos);
   EXPECT_FALSE(fs::exists(cell / "cost/scratch"));
 }
 

@@ -7,9 +7,12 @@
 #include <iostream>
 #include <map>
 
-#include "pipeline/contract/files.h"
-#include "segment/image.h"
-#include "segment/roi.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "segment/images/image.h"
+#include "segment/rois/roi.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -38,19 +41,19 @@ const std::map<std::string, Polyline> kFibres = {
       {70.4, 71.5}}}};
 
 void write_fibres_of_hand(const fs::path& file) {
-  std::vector<segment::Roi> rois;
+  std::vector<rois::Roi> rois;
   for (const auto& [name, line] : kFibres) {
-    segment::Roi roi;
-    roi.shape = segment::RoiShape::polyline;
+    rois::Roi roi;
+    roi.shape = rois::RoiShape::polyline;
     roi.name = name;
     for (const Vec2 p : line) roi.points_px.push_back(1 / kPixel_um * p - Vec2{0.5, 0.5});  // from pixel centres
     rois.push_back(roi);
   }
-  segment::write_roi_set(file, rois);
+  rois::write_roi_set(file, rois);
 }
 
 Vec2 middle_of_pattern_um() {
-  const segment::Image h = segment::read_image(kData / "pattern_derived.tif");
+  const images::Image h = images::read_image(kData / "pattern_derived.tif");
   Vec2 low{1e9, 1e9}, high{-1e9, -1e9};
   for (int j = 0; j < h.height; ++j)
     for (int i = 0; i < h.width; ++i) {
@@ -110,21 +113,21 @@ Answer run(Fibres fibres, Outline outline, double thickness_um = 60) {
   answer.outcome = test::run_program("mbtfm run '" + cell.string() + "' --threads 2");
   EXPECT_EQ(answer.outcome.code, 0) << answer.outcome.output;
   if (answer.outcome.code != 0) return answer;
-  answer.cell = read_cell(cell / "1_segment");
+  answer.cell = files::read_cell(cell / "1_segment");
   std::map<int, Vec2> place;
   for (const Adhesion& a : answer.cell.adhesions) place[a.adhesion_id] = a.position_um;
   const Vec2 middle = middle_of_pattern_um();
-  const std::vector<AdhesionForce> forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
+  const std::vector<AdhesionForce> forces = files::read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
   for (const AdhesionForce& f : forces) {
     const Vec2 at = place.at(f.adhesion_id);
     answer.quadrant_nN[at.y > middle.y][at.x > middle.x] += f.force_nN;
   }
-  for (const Tension& t : read_tensions(cell / "4_fit/tensions.csv")) answer.tensions[t.fibre_id] = t;
-  answer.fit = read_fit_summary(cell / "4_fit/fit.json");
+  for (const Tension& t : files::read_tensions(cell / "4_fit/tensions.csv")) answer.tensions[t.fibre_id] = t;
+  answer.fit = files::read_fit_summary(cell / "4_fit/fit.json");
   if (answer.fit.error_budget)
     for (const TensionError& t : answer.fit.error_budget->tensions)
       answer.by_segmentation_nN[t.fibre_id] = t.parts_nN.segmentation;
-  const DisplacementField field = read_displacement(cell / "2_track/displacement.csv");
+  const DisplacementField field = files::read_displacement(cell / "2_track/displacement.csv");
   for (const Bead& b : field)
     if (b.flag.empty())
       answer.largest_displacement_um = std::max(answer.largest_displacement_um, norm(b.displacement_um));

@@ -5,9 +5,9 @@
 
 #include <fstream>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
-#include "segment/image.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "segment/images/image.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -34,11 +34,11 @@ class Errors : public ::testing::Test {
   void SetUp() override { fs::copy(scene_->path() / "cell", cell_, fs::copy_options::recursive); }
 
   void replace_in_toml(const std::string& what, const std::string& by) const {
-    std::string text = read_text(cell_ / "cell.toml");
+    std::string text = files::read_text(cell_ / "cell.toml");
     const auto at = text.find(what);
     ASSERT_NE(at, std::string::npos) << text;
     text.replace(at, text.find('\n', at) - at, by);
-    write_text(cell_ / "cell.toml", text);
+    files::write_text(cell_ / "cell.toml", text);
   }
 
   /// Run the cell, expect this code and these words, and that no output was left in `folder`.
@@ -76,33 +76,33 @@ TEST_F(Errors, a_truncated_image_is_named) {
 }
 
 TEST_F(Errors, images_of_different_sizes_are_named_with_their_sizes) {
-  segment::Image small = segment::read_image(cell_ / "actin.tif");
+  images::Image small = images::read_image(cell_ / "actin.tif");
   small.height /= 2;
   small.pixels.resize(static_cast<std::size_t>(small.width) * small.height);
-  segment::write_tiff(cell_ / "actin.tif", small);
+  images::write_tiff(cell_ / "actin.tif", small);
   expect_error(kInput, {"actin.tif", std::to_string(small.height)}, "1_segment");
 }
 
 TEST_F(Errors, bead_images_of_different_sizes_are_named_with_their_sizes) {
-  segment::Image small = segment::read_image(cell_ / "beads_relaxed.tif");
+  images::Image small = images::read_image(cell_ / "beads_relaxed.tif");
   small.height /= 2;
   small.pixels.resize(static_cast<std::size_t>(small.width) * small.height);
-  segment::write_tiff(cell_ / "beads_relaxed.tif", small);
+  images::write_tiff(cell_ / "beads_relaxed.tif", small);
   expect_error(kInput, {"beads_relaxed.tif", std::to_string(small.height)}, "2_track");
 }
 
 TEST_F(Errors, an_image_without_adhesions_says_so) {
-  segment::Image noise = segment::read_image(cell_ / "paxillin.tif");
+  images::Image noise = images::read_image(cell_ / "paxillin.tif");
   std::mt19937_64 random(1);
   for (float& value : noise.pixels) value = 200 + static_cast<float>(random() % 32);
-  segment::write_tiff(cell_ / "paxillin.tif", noise);
+  images::write_tiff(cell_ / "paxillin.tif", noise);
   expect_error(kInput, {"no adhesion", "paxillin.tif"}, "1_segment");
 }
 
 TEST_F(Errors, a_constant_image_is_called_so) {
-  segment::Image flat = segment::read_image(cell_ / "paxillin.tif");
+  images::Image flat = images::read_image(cell_ / "paxillin.tif");
   std::fill(flat.pixels.begin(), flat.pixels.end(), 200.0f);
-  segment::write_tiff(cell_ / "paxillin.tif", flat);
+  images::write_tiff(cell_ / "paxillin.tif", flat);
   expect_error(kInput, {"every pixel is 200", "paxillin.tif"}, "1_segment");
 }
 
@@ -114,9 +114,9 @@ TEST_F(Errors, an_unknown_key_names_its_line_and_the_nearest_known_one) {
 TEST_F(Errors, a_missing_pixel_size_is_asked_for) {
   replace_in_toml("pixel_size_um", "");
   for (const char* name : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
-    segment::Image image = segment::read_image(cell_ / name);
+    images::Image image = images::read_image(cell_ / name);
     image.pixel_size_um.reset();
-    segment::write_tiff(cell_ / name, image);
+    images::write_tiff(cell_ / name, image);
   }
   expect_error(kInput, {"pixel_size_um"}, "1_segment");
 }
@@ -133,7 +133,8 @@ TEST_F(Errors, a_poisson_ratio_of_one_half_is_refused_before_anything_runs) {
 
 TEST_F(Errors, not_a_number_in_a_table_names_file_line_and_column) {
   fs::create_directory(cell_ / "2_track");
-  write_text(cell_ / "2_track/displacement.csv", "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.1,0.02\n3,4,nan,0,0.02\n");
+  files::write_text(cell_ / "2_track/displacement.csv",
+                    "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.1,0.02\n3,4,nan,0,0.02\n");
   expect_error(kInput, {"displacement.csv:3", "'ux_um'", "'nan'"}, "4_fit");
 }
 
@@ -142,11 +143,11 @@ TEST_F(Errors, an_adhesion_outside_the_outline_is_named) {
   for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"}) {
     fs::copy(cell_ / "truth" / file, cell_ / "1_segment" / file);
   }
-  auto adhesions = read_adhesions(cell_ / "1_segment/adhesions.csv");
+  auto adhesions = files::read_adhesions(cell_ / "1_segment/adhesions.csv");
   adhesions.push_back(adhesions.front());
   adhesions.back().adhesion_id = 77;
   adhesions.back().position_um = {1000, 1000};
-  write_adhesions(cell_ / "1_segment/adhesions.csv", adhesions);
+  files::write_adhesions(cell_ / "1_segment/adhesions.csv", adhesions);
   expect_error(kInput, {"adhesion 77", "outline"}, "3_network");
 }
 

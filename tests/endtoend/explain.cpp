@@ -4,8 +4,10 @@
 #include <cmath>
 #include <map>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -37,26 +39,26 @@ const Switches kEndlessEvenGel = {{"finite_sides", "off"}, {"depth_graded_gel", 
 class Explained : public ::testing::TestWithParam<int> {
  protected:
   void SetUp() override {
-    write_text(folder_ / "scenario.toml", kScenario);
+    files::write_text(folder_ / "scenario.toml", kScenario);
     const Outcome made = run_program("mbtfm-simulate --quiet --scenario " + (folder_ / "scenario.toml").string() +
                                      " --seed " + std::to_string(GetParam()) + " --out " + cell().string());
     ASSERT_EQ(made.code, 0) << made.output;
-    toml_ = read_text(cell() / "cell.toml") + kSettings;
+    toml_ = files::read_text(cell() / "cell.toml") + kSettings;
   }
   fs::path cell() const { return folder_ / "cell"; }
 
   std::vector<Tension> run(const Switches& switches, const std::string& flags = {}) {
     std::string toml = toml_;
     for (const auto& [name, setting] : switches) toml += name + " = '" + setting + "'\n";
-    write_text(cell() / "cell.toml", toml);
+    files::write_text(cell() / "cell.toml", toml);
     const Outcome outcome = run_program("mbtfm run " + cell().string() + flags);
     EXPECT_EQ(outcome.code, 0) << outcome.output;
-    return read_tensions(cell() / "4_fit/tensions.csv");
+    return files::read_tensions(cell() / "4_fit/tensions.csv");
   }
 
   /// By effect and fibre.
   std::map<std::string, std::map<int, double>> stated() const {
-    const CsvTable table(cell() / "4_fit/effects_left_out.csv");
+    const files::CsvTable table(cell() / "4_fit/effects_left_out.csv");
     std::map<std::string, std::map<int, double>> result;
     for (int row = 0; row < table.n_rows(); ++row) {
       result[table.text(row, "effect")][table.integer(row, "fibre_id", 0)] = table.number(row, "change_nN");
@@ -114,7 +116,7 @@ TEST_P(Explained, fibres_change_the_networks_tension_as_stated) {
 TEST_P(Explained, a_graded_gel_changes_the_tensions_by_no_more_than_stated) {
   Switches switches = kEndlessEvenGel;
   const std::vector<Tension> without = run(switches, " --explain");
-  const std::string record = read_text(cell() / "4_fit/record.json");
+  const std::string record = files::read_text(cell() / "4_fit/record.json");
   const std::string says = "would change the tensions by at most ";
   const auto at = record.find(says);
   ASSERT_NE(at, record.npos) << record;

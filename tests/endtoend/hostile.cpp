@@ -12,7 +12,7 @@
 #include <regex>
 #include <set>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 #include "tests/support/script_stages.h"
 
@@ -49,9 +49,9 @@ struct Scene {
     fs::remove(cell() / in_cell);
     ASSERT_EQ(mkfifo((cell() / in_cell).c_str(), 0600), 0);
   }
-  void write(const std::string& in_cell, const std::string& text) const { write_text(cell() / in_cell, text); }
+  void write(const std::string& in_cell, const std::string& text) const { files::write_text(cell() / in_cell, text); }
   void change(const std::string& in_cell, const std::function<void(ordered_json&)>& edit) const {
-    ordered_json json = ordered_json::parse(read_text(cell() / in_cell));
+    ordered_json json = ordered_json::parse(files::read_text(cell() / in_cell));
     edit(json);
     write(in_cell, json.dump(1) + "\n");
   }
@@ -202,7 +202,7 @@ const std::vector<Way>& ways() {
        [](const Scene& s) {
          s.change("run.json", [&](ordered_json& run) {
            run["stages"]["fit"]["state"] = "given";
-           run["stages"]["fit"]["outputs"] = {{"../../outside/new", sha256_of_file(s.precious())}};
+           run["stages"]["fit"]["outputs"] = {{"../../outside/new", files::sha256_of_file(s.precious())}};
          });
        },
        {3, 0, 0, 0},
@@ -253,11 +253,11 @@ const std::vector<Way>& ways() {
        {},
        0,
        "study/deep"},
-      {"image-leads-above", [](const Scene& s) { write_text(s.study() / ".._pax.tif", ""); }, kReplaced, removed,
+      {"image-leads-above", [](const Scene& s) { files::write_text(s.study() / ".._pax.tif", ""); }, kReplaced, removed,
        "batch STUDY --pattern adhesion={cell}_pax.tif"},
       {"image-leads-through-a-link",
        [](const Scene& s) {
-         write_text(s.study() / "evil_pax.tif", "");
+         files::write_text(s.study() / "evil_pax.tif", "");
          s.link_in_study("evil", "cell");
        },
        kReplaced, removed, "batch STUDY --pattern adhesion={cell}_pax.tif"},
@@ -278,7 +278,7 @@ std::map<std::string, Witness> witnesses_in(const fs::path& folder) {
     witness.type = entry.symlink_status().type();
     witness.has_second_name = entry.is_regular_file() && entry.hard_link_count() > 1;
     if (entry.is_symlink()) witness.bytes = fs::read_symlink(entry.path());
-    if (!entry.is_symlink() && entry.is_regular_file()) witness.bytes = read_text(entry.path());
+    if (!entry.is_symlink() && entry.is_regular_file()) witness.bytes = files::read_text(entry.path());
   }
   return all;
 }
@@ -353,11 +353,11 @@ class HostileCells : public testing::Test {
 
 /// What is outside: a finished cell, files and folders that nobody may touch.
 void make_outside(const fs::path& folder) {
-  write_text(folder / "precious.txt", kSecret);
+  files::write_text(folder / "precious.txt", kSecret);
   fs::create_directories(folder / "cost/scratch");
-  write_text(folder / "cost/scratch/precious.txt", kSecret);
-  write_text(folder / "cost/precious.txt", kSecret);
-  write_text(folder / "cell/1_segment/precious.txt", kSecret);
+  files::write_text(folder / "cost/scratch/precious.txt", kSecret);
+  files::write_text(folder / "cost/precious.txt", kSecret);
+  files::write_text(folder / "cell/1_segment/precious.txt", kSecret);
 }
 
 bool holds_the_secret(const fs::path& folder) {
@@ -368,7 +368,7 @@ bool holds_the_secret(const fs::path& folder) {
     // A second name of a witness is the witness.
     if (entry->is_symlink() || !entry->is_regular_file() || entry->file_size() > kLarge) continue;
     if (entry->hard_link_count() > 1) continue;
-    if (read_text(entry->path()).find(kSecret) != std::string::npos) return true;
+    if (files::read_text(entry->path()).find(kSecret) != std::string::npos) return true;
   }
   return false;
 }
@@ -380,9 +380,9 @@ std::string with_folders(std::string command, const Scene& scene) {
 
 TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
   const TemporaryFolder probe;
-  write_text(probe / "probe", "");
+  files::write_text(probe / "probe", "");
   set_times(probe.path());
-  read_text(probe / "probe");
+  files::read_text(probe / "probe");
   const bool are_reads_noted = was_read(probe / "probe");  // not where the file system is mounted with noatime
   for (const Way& way : ways()) {
     SCOPED_TRACE(way.name);
@@ -425,14 +425,14 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
       for (const Outcome* outcome : {&batch, &list, &table})
         EXPECT_NE(outcome->output.find(way.is_said), std::string::npos) << outcome->output;
       const std::string left_out = fs::path(way.is_said).filename().string();
-      EXPECT_NE(read_text(scene.study() / "statistics/cells.csv").find(left_out), std::string::npos);
+      EXPECT_NE(files::read_text(scene.study() / "statistics/cells.csv").find(left_out), std::string::npos);
     }
     if (way.run_record == Way::RunRecord::removed) run_further();
     expect_untouched(scene.outside(), before, are_reads_noted);
     EXPECT_FALSE(holds_the_secret(scene.study()));
     EXPECT_FALSE(fs::exists(scene.root / "cell.toml"));
     EXPECT_TRUE(fs::exists(fs::symlink_status(scene.cell() / "paxillin.tif")));
-    EXPECT_NE(read_text(scene.study() / "sound/run.json").find("\"outcome\": \"done\""), std::string::npos);
+    EXPECT_NE(files::read_text(scene.study() / "sound/run.json").find("\"outcome\": \"done\""), std::string::npos);
   }
 }
 
@@ -441,13 +441,13 @@ TEST_F(HostileCells, a_link_under_the_name_of_an_unfinished_table_is_not_followe
   const Scene scene{folder.path()};
   copy_cell("sound", scene.study() / "sound");
   fs::create_directories(scene.outside());
-  write_text(scene.outside() / "precious.txt", kSecret);
+  files::write_text(scene.outside() / "precious.txt", kSecret);
   // The number of the process is in the name: the shell has it, and becomes mbtfm.
   const std::string link = (scene.study() / ".partial-$$-batch.csv").string();
   const Outcome batch = test::run_program("mbtfm batch " + scene.study().string() + " --stages-dir " + stages_.string(),
                                           "ln -s " + scene.precious() + " " + link + "; exec ");
   EXPECT_EQ(batch.code, 0) << batch.output;
-  EXPECT_EQ(read_text(scene.precious()), kSecret);
+  EXPECT_EQ(files::read_text(scene.precious()), kSecret);
   EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(scene.study() / "batch.csv")));
 }
 
@@ -470,7 +470,7 @@ TEST_F(HostileCells, a_cell_folder_and_its_images_and_settings_may_be_links) {
 }
 
 TEST(HostileCellsPage, lists_every_way_that_is_tried) {
-  const std::string page = read_text(fs::path(MBTFM_SOURCE_DIR) / "docs/developers/reliability.md");
+  const std::string page = files::read_text(fs::path(MBTFM_SOURCE_DIR) / "docs/developers/reliability.md");
   const auto begin = page.find("## Hostile cell folders");
   const std::string section = page.substr(begin, page.find("\n## ", begin) - begin);
   std::set<std::string> listed, tried;

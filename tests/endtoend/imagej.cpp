@@ -6,9 +6,9 @@
 #include <fstream>
 #include <sstream>
 
-#include "pipeline/contract/files.h"
-#include "segment/ellipse.h"
-#include "segment/roi.h"
+#include "pipeline/files/csv_files.h"
+#include "segment/cells/ellipse.h"
+#include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/program.h"
 
@@ -16,7 +16,7 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
-using segment::Roi;
+using rois::Roi;
 using test::TemporaryFolder;
 
 bool has_imagej() { return std::system("command -v imagej xvfb-run > /dev/null") == 0; }
@@ -28,7 +28,7 @@ std::string run_macro(const fs::path& folder, const std::string& macro) {
   const std::string command = "timeout 120 xvfb-run -a imagej -b '" + (folder / "macro.ijm").string() + "' > '" +
                               log.string() + "' 2>&1 < /dev/null";
   [[maybe_unused]] const int ignored = std::system(command.c_str());
-  return read_text(log);
+  return files::read_text(log);
 }
 
 struct Measured {
@@ -96,8 +96,8 @@ TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_
   const TemporaryFolder folder;
   const test::DrawnScene scene = test::drawn_scene(10, 1);
   const double pixel_um = scene.kPixel_um;
-  segment::write_tiff(folder / "paxillin.tif", scene.adhesion_image);
-  segment::write_tiff(folder / "actin.tif", scene.actin_image);
+  images::write_tiff(folder / "paxillin.tif", scene.adhesion_image);
+  images::write_tiff(folder / "actin.tif", scene.actin_image);
   const test::Outcome outcome = test::run_program(
       "mbtfm-segment --pixel_size_um 0.1 --adhesion-image '" + (folder / "paxillin.tif").string() +
       "' --actin-image '" + (folder / "actin.tif").string() + "' --out '" + folder.path().string() + "'");
@@ -106,7 +106,7 @@ TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_
   run_macro(folder.path(), std::string(kReportFunction) + "roiManager('Open', '" + (folder / "RoiSet.zip").string() +
                                "');\nn = roiManager('count');\nfor (r = 0; r < n; r++) {\n" +
                                "  selectImage('image'); roiManager('select', r); report('" + table.string() + "');\n}");
-  const Cell cell = read_cell(folder.path());
+  const Cell cell = files::read_cell(folder.path());
   std::map<std::string, Measured> by_name = measured_in(table);
   ASSERT_EQ(by_name.size(), 1 + cell.adhesions.size() + cell.fibres.size());
   ASSERT_GE(cell.adhesions.size(), 4u);
@@ -124,7 +124,7 @@ TEST(ImageJ, it_measures_the_areas_and_lengths_of_the_set_that_the_segmentation_
     EXPECT_NEAR(m.area, area_px2, 2.3e-3 * area_px2);
     EXPECT_NEAR(m.shoelace, area_px2, 2.3e-3 * area_px2);
     EXPECT_EQ(m.colour, "#ffaaeb");
-    for (const Vec2 p : m.points_px) EXPECT_NEAR(segment::distance_to_ellipse_um(a, pixel_um * p), 0, 0.01 * pixel_um);
+    for (const Vec2 p : m.points_px) EXPECT_NEAR(cells::distance_to_ellipse_um(a, pixel_um * p), 0, 0.01 * pixel_um);
   }
   for (const Fibre& f : cell.fibres) {
     const Measured& m = by_name[std::string(name_of(f.type)) + " " + std::to_string(f.fibre_id)];
@@ -150,7 +150,7 @@ saveAs("Selection", ")" + (folder / "a.roi").string() + R"("); print("begins", p
   const auto at = output.find("begins ");
   ASSERT_NE(at, std::string::npos) << output;
   const double centre_of_column = std::stod(output.substr(at + 7)) + 0.5;  // from the outer corner
-  EXPECT_NEAR(segment::line_px(segment::read_rois(folder / "a.roi").front()).front().x, centre_of_column, 1e-3);
+  EXPECT_NEAR(rois::line_px(rois::read_rois(folder / "a.roi").front()).front().x, centre_of_column, 1e-3);
 }
 
 TEST(ImageJ, selections_it_saves_are_read_as_it_draws_them) {
@@ -189,28 +189,28 @@ makeRectangle(10, 20, 30, 17); setKeyDown("shift"); makeRectangle(60, 25, 20, 40
   EXPECT_EQ(drawn.size(), 20u);
   for (const auto& [name, m] : drawn) {
     SCOPED_TRACE(name);
-    const Roi roi = segment::read_rois(folder / (name + ".roi")).front();
+    const rois::Roi roi = rois::read_rois(folder / (name + ".roi")).front();
     EXPECT_EQ(roi.name, name);
-    if (segment::is_line(roi.shape)) {
-      const Polyline line = segment::line_px(roi);
+    if (rois::is_line(roi.shape)) {
+      const Polyline line = rois::line_px(roi);
       ASSERT_EQ(line.size(), m.points_px.size());
       for (std::size_t i = 0; i < line.size(); ++i)
         EXPECT_NEAR(norm(line[i] - m.points_px[i] - Vec2{0.5, 0.5}), 0, 1e-3);
-      if (roi.shape != segment::RoiShape::freehand_line) {  // which ImageJ smooths before it measures
+      if (roi.shape != rois::RoiShape::freehand_line) {  // which ImageJ smooths before it measures
         EXPECT_NEAR(length_um(line), m.length, 1e-4 * m.length);
       }
       continue;
     }
-    if (roi.shape == segment::RoiShape::composite) {  // ImageJ counts its pixels
-      EXPECT_EQ(std::abs(signed_area_um2(segment::area_px(roi))), m.area);
+    if (roi.shape == rois::RoiShape::composite) {  // ImageJ counts its pixels
+      EXPECT_EQ(std::abs(signed_area_um2(rois::area_px(roi))), m.area);
       continue;
     }
-    if (roi.shape == segment::RoiShape::oval) {  // which ImageJ widens to whole pixels before it draws and measures
+    if (roi.shape == rois::RoiShape::oval) {  // which ImageJ widens to whole pixels before it draws and measures
       EXPECT_EQ(roi.corner_px, m.corner_px);
       EXPECT_EQ(roi.size_px, m.size_px);
       continue;
     }
-    const Polygon area = segment::area_px(roi);
+    const Polygon area = rois::area_px(roi);
     const double found_px2 = std::abs(signed_area_um2(area));
     // ImageJ draws curves by straight steps: what lies between them and the curve is below a tenth of a pixel
     const bool is_round = name == "ellipse" || name == "rounded rectangle";
@@ -234,8 +234,8 @@ saveAs("Tiff", ")" + file.string() +
     for (int c = 1; c <= 2; ++c)
       for (int z = 1; z <= 3; ++z)
         for (int t = 1; t <= 4; ++t) {
-          const segment::Image image =
-              segment::read_image(file, {.channel = std::to_string(c), .z = std::to_string(z), .time = t});
+          const images::Image image =
+              images::read_image(file, {.channel = std::to_string(c), .z = std::to_string(z), .time = t});
           EXPECT_EQ(image.pixels, std::vector<float>(200, static_cast<float>(100 * (c - 1) + 10 * z + t)));
           EXPECT_EQ(image.pixel_size_um, 0.125);
         }

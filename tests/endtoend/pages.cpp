@@ -24,13 +24,14 @@ class Pages : public testing::Test {
       test::write_given_stages(cell, test::round_cell());
       test::write_invented_fit(cell, seed);
     }
-    write_text(folder_ / "cell_1/run.json", kRun);
-    write_text(cell_page(), report::report_html(folder_ / "cell_1"));
+    files::write_text(folder_ / "cell_1/run.json", kRun);
+    files::write_text(cell_page(), report::report_html(folder_ / "cell_1"));
     const statistics::StudyParameters parameters;
     const auto study = statistics::read_study(folder_.path(), parameters, {}, 2);
     const auto analysis = statistics::analyse(study, parameters);
-    write_text(study_page(), statistics::study_html(study, analysis,
-                                                    statistics::figures_of(study, analysis, parameters), parameters));
+    files::write_text(
+        study_page(),
+        statistics::study_html(study, analysis, statistics::figures_of(study, analysis, parameters), parameters));
   }
   /// One for all tests: it takes seconds to start.
   static Browser& opened(const std::filesystem::path& page) {
@@ -178,7 +179,7 @@ TEST_F(Pages, tables_can_be_taken_out_with_all_their_digits) {
   Browser& browser = opened(cell_page());
   const std::string text = browser.evaluate(
       "fetch ? atob(document.querySelector('a[download$=\"_tensions.csv\"]').href.split(',')[1]) : ''");
-  EXPECT_EQ(text, read_text(folder_ / "cell_1/4_fit/tensions.csv"));
+  EXPECT_EQ(text, files::read_text(folder_ / "cell_1/4_fit/tensions.csv"));
 }
 
 TEST_F(Pages, print_whole) {

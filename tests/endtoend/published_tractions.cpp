@@ -5,11 +5,11 @@
 #include <fstream>
 #include <numbers>
 
-#include "mbtfm/traction.h"
-#include "pipeline/contract/csv.h"
-#include "segment/image.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/files/csv.h"
+#include "segment/images/image.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 namespace fs = std::filesystem;
@@ -103,14 +103,14 @@ TEST(OthersData, discs_of_a_synthetic_cell_carry_their_tractions) {
                         .gel = {.youngs_modulus_kPa = 10, .poisson_ratio = 0.3, .thickness_um = 1e6},
                         .adhesions = {},
                         .outline_um = {}};
-  const CsvTable field(folder / "converted_frame1.csv");
+  const files::CsvTable field(folder / "converted_frame1.csv");
   for (int row = 0; row < field.n_rows(); ++row) {
     inputs.beads.push_back({.position_um = kPixel_um * Vec2{field.number(row, "x_px"), field.number(row, "y_px")},
                             .displacement_um = kPixel_um * Vec2{field.number(row, "u_px"), field.number(row, "v_px")},
                             .sigma_um = 0,
                             .flag = {}});
   }
-  const CsvTable discs(folder / "derived_discs_frame1.csv");
+  const files::CsvTable discs(folder / "derived_discs_frame1.csv");
   for (int row = 0; row < discs.n_rows(); ++row) {
     const double radius = kPixel_um * discs.number(row, "radius_px");
     inputs.adhesions.push_back({.adhesion_id = row + 1,
@@ -170,7 +170,7 @@ Grid read_npy(const fs::path& file) {
 }
 
 /// The pixels that a closed line of one label encloses, itself among them: what a flood from the corner does not reach.
-std::vector<bool> enclosed(const segment::Image& mask, float label) {
+std::vector<bool> enclosed(const images::Image& mask, float label) {
   std::vector<bool> is_inside(mask.pixels.size(), true);
   std::vector<std::pair<int, int>> queue = {{0, 0}};
   is_inside[0] = false;
@@ -201,7 +201,7 @@ struct Colony {
 Colony read_colony(const fs::path& folder, const std::string& name) {
   const auto read = [&](const char* what) { return read_npy(folder / (name + what)); };
   const Grid u = read("_u.npy"), v = read("_v.npy"), tx = read("_tx.npy"), ty = read("_ty.npy");
-  const segment::Image mask = segment::read_image(folder / (name + "_mask.png"));
+  const images::Image mask = images::read_image(folder / (name + "_mask.png"));
   Colony colony{.inputs = {.beads = {},
                            .gel = {.youngs_modulus_kPa = 49, .poisson_ratio = 0.49, .thickness_um = 300},
                            .adhesions = {},
@@ -310,4 +310,4 @@ TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_t
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions

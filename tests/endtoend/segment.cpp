@@ -3,10 +3,10 @@
 #include <gtest/gtest.h>
 #include <tiffio.h>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
-#include "segment/image.h"
-#include "segment/roi.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "segment/images/image.h"
+#include "segment/rois/roi.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/program.h"
 
@@ -14,13 +14,13 @@ namespace mbtfm {
 namespace {
 
 namespace fs = std::filesystem;
-using segment::Roi;
-using segment::RoiShape;
+using rois::Roi;
+using rois::RoiShape;
 
 /// A 16-bit TIFF of one page an image.
-void write_pages(const fs::path& file, const std::vector<segment::Image>& pages, const std::string& description) {
+void write_pages(const fs::path& file, const std::vector<images::Image>& pages, const std::string& description) {
   TIFF* tiff = TIFFOpen(file.c_str(), "w");
-  for (const segment::Image& page : pages) {
+  for (const images::Image& page : pages) {
     TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, page.width);
     TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, page.height);
     TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 16);
@@ -43,8 +43,8 @@ class Segment : public testing::Test {
 
   void SetUp() override {
     for (auto* image : {&scene_.adhesion_image, &scene_.actin_image}) image->pixel_size_um = scene_.kPixel_um;
-    segment::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
-    segment::write_tiff(folder_ / "actin.tif", scene_.actin_image);
+    images::write_tiff(folder_ / "paxillin.tif", scene_.adhesion_image);
+    images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
   }
   std::string path(const std::string& name) const { return "'" + (folder_ / name).string() + "'"; }
   test::Outcome segment(const std::string& out, const std::string& arguments) const {
@@ -60,10 +60,10 @@ TEST_F(Segment, binned_images_show_the_same_cell_at_the_same_place) {
   ASSERT_EQ(segment("whole", both()).code, 0);
   const test::Outcome binned = segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi"));
   EXPECT_EQ(binned.code, 3) << binned.output;  // there is none yet
-  const std::vector<Roi> rois = segment::read_rois(folder_ / "whole/RoiSet.zip");
-  write_text(folder_ / "outline.roi", segment::encode_roi(rois.front()));
+  const std::vector<rois::Roi> rois = rois::read_rois(folder_ / "whole/RoiSet.zip");
+  files::write_text(folder_ / "outline.roi", rois::encode_roi(rois.front()));
   ASSERT_EQ(segment("binned", both() + " --binning 2 --outline-roi " + path("outline.roi")).code, 0);
-  const Cell fine = read_cell(folder_ / "whole"), coarse = read_cell(folder_ / "binned");
+  const Cell fine = files::read_cell(folder_ / "whole"), coarse = files::read_cell(folder_ / "binned");
   const double step_um = scene_.kPixel_um;  // the outline's corners are stored in pixels, with fractions
   ASSERT_EQ(coarse.outline_um.size(), fine.outline_um.size());
   for (std::size_t i = 0; i < fine.outline_um.size(); ++i)
@@ -73,7 +73,7 @@ TEST_F(Segment, binned_images_show_the_same_cell_at_the_same_place) {
     for (const Adhesion& b : coarse.adhesions) n_there += norm(a.position_um - b.position_um) < step_um;
   }
   EXPECT_GE(n_there, 0.9 * static_cast<double>(fine.adhesions.size()));
-  const std::vector<Roi> again = segment::read_rois(folder_ / "binned/RoiSet.zip");
+  const std::vector<rois::Roi> again = rois::read_rois(folder_ / "binned/RoiSet.zip");
   EXPECT_LT(norm(again.front().points_px[0] - rois.front().points_px[0]), 0.01);
 }
 
@@ -81,7 +81,7 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
   const std::string ome =
       "<OME><Image><Pixels DimensionOrder='XYZCT' SizeC='2' SizeZ='2' SizeT='1' PhysicalSizeX='100' "
       "PhysicalSizeXUnit='nm'><Channel Name='paxillin'/><Channel Name='actin'/></Pixels></Image></OME>";
-  const segment::Image dark = test::even_image(256, 256, 0);  // a slice that adds nothing to the projection
+  const images::Image dark = test::even_image(256, 256, 0);  // a slice that adds nothing to the projection
   write_pages(folder_ / "both.ome.tif", {dark, scene_.adhesion_image, dark, scene_.actin_image}, ome);
   const std::string file = path("both.ome.tif");
   const test::Outcome one = segment(
@@ -89,7 +89,7 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
   ASSERT_EQ(one.code, 0) << one.output;
   ASSERT_EQ(segment("two", both()).code, 0);
   for (const char* name : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv", "RoiSet.zip"})
-    EXPECT_EQ(read_text(folder_ / "one" / name), read_text(folder_ / "two" / name)) << name;
+    EXPECT_EQ(files::read_text(folder_ / "one" / name), files::read_text(folder_ / "two" / name)) << name;
 
   const test::Outcome unnamed = segment("none", "--actin-image " + file);
   EXPECT_EQ(unnamed.code, 3);
@@ -100,7 +100,7 @@ TEST_F(Segment, one_file_of_two_channels_is_segmented_as_two_files_of_one) {
 
 TEST_F(Segment, channels_of_different_pixel_sizes_are_an_error) {
   scene_.actin_image.pixel_size_um = 0.11;
-  segment::write_tiff(folder_ / "actin.tif", scene_.actin_image);
+  images::write_tiff(folder_ / "actin.tif", scene_.actin_image);
   const test::Outcome outcome = segment("out", both());
   EXPECT_EQ(outcome.code, 3);
   EXPECT_NE(outcome.output.find("0.11 um"), std::string::npos) << outcome.output;
@@ -108,22 +108,22 @@ TEST_F(Segment, channels_of_different_pixel_sizes_are_an_error) {
 }
 
 TEST_F(Segment, what_is_drawn_by_hand_takes_the_place_of_what_would_be_found) {
-  Roi fibre, outline, adhesion;
+  rois::Roi fibre, outline, adhesion;
   fibre.name = "dorsal 1";
-  fibre.shape = RoiShape::polyline;
+  fibre.shape = rois::RoiShape::polyline;
   fibre.points_px = {{70, 80}, {120, 128}, {184, 180}};
   adhesion.name = "mine";
   adhesion.points_px = {{60, 75}, {80, 75}, {80, 85}, {60, 85}};
   outline.name = "outline";
   outline.points_px = {{20, 20}, {236, 20}, {236, 236}, {20, 236}};
-  segment::write_roi_set(folder_ / "fibres.zip", {fibre});
-  segment::write_roi_set(folder_ / "adhesions.zip", {adhesion});
-  segment::write_roi_set(folder_ / "outline.zip", {outline});
+  rois::write_roi_set(folder_ / "fibres.zip", {fibre});
+  rois::write_roi_set(folder_ / "adhesions.zip", {adhesion});
+  rois::write_roi_set(folder_ / "outline.zip", {outline});
   const test::Outcome outcome = segment("out", both() + " --fibre-rois " + path("fibres.zip") + " --adhesion-rois " +
                                                    path("adhesions.zip") + " --outline-roi " + path("outline.zip"));
   ASSERT_EQ(outcome.code, 0) << outcome.output;
   EXPECT_NE(outcome.output.find("fibres drawn by hand"), std::string::npos) << outcome.output;
-  const Cell cell = read_cell(folder_ / "out");
+  const Cell cell = files::read_cell(folder_ / "out");
   ASSERT_EQ(cell.fibres.size(), 1u);
   EXPECT_EQ(cell.fibres[0].type, FibreType::dorsal);
   EXPECT_EQ(cell.fibres[0].start_adhesion_id, 1);

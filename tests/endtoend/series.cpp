@@ -1,8 +1,9 @@
 /// A cell followed over time, through the programs.
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -14,11 +15,11 @@ using test::run_program;
 
 /// The cell pulls twice as hard in the second frame; the third could not be tracked.
 void write_frames(const fs::path& track) {
-  DisplacementField field = read_displacement(track / "displacement.csv");
-  write_displacement(track / "displacement_0001.csv", field);
+  DisplacementField field = files::read_displacement(track / "displacement.csv");
+  files::write_displacement(track / "displacement_0001.csv", field);
   for (Bead& bead : field) bead.displacement_um = 2 * bead.displacement_um;
-  write_displacement(track / "displacement_0002.csv", field);
-  write_text(track / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n3,c.tif,out of focus\n");
+  files::write_displacement(track / "displacement_0002.csv", field);
+  files::write_text(track / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n3,c.tif,out of focus\n");
 }
 
 TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
@@ -28,13 +29,13 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
       "mbtfm-simulate --scenario two-adhesions --seed 1 --noise 0.05 --beads 800 --quiet --out " + cell.string());
   ASSERT_EQ(made.code, 0) << made.output;
   write_frames(cell / "2_track");
-  std::string toml = read_text(cell / "cell.toml");
-  write_text(cell / "cell.toml", toml + "\n[fit]\nframe_interval_s = 30\n");
+  std::string toml = files::read_text(cell / "cell.toml");
+  files::write_text(cell / "cell.toml", toml + "\n[fit]\nframe_interval_s = 30\n");
   const Outcome run = run_program("mbtfm run " + cell.string());
   ASSERT_EQ(run.code, 0) << run.output;
 
-  const auto single = read_tensions(cell / "4_fit/tensions.csv");
-  const CsvTable tracks(cell / "4_fit/tracks.csv");
+  const auto single = files::read_tensions(cell / "4_fit/tensions.csv");
+  const files::CsvTable tracks(cell / "4_fit/tracks.csv");
   ASSERT_EQ(tracks.n_rows(), 2 * static_cast<int>(single.size()));
   const auto n = static_cast<int>(single.size());
   for (int i = 0; i < n; ++i) {
@@ -49,33 +50,33 @@ TEST(Series, a_run_with_frames_gives_tracks_and_a_changed_frame_is_seen) {
     EXPECT_NEAR(second, 2 * first, 4 * sigma);
     EXPECT_EQ(tracks.number(n + i, "time_s"), 30);
   }
-  const CsvTable frames(cell / "4_fit/frames.csv");
+  const files::CsvTable frames(cell / "4_fit/frames.csv");
   ASSERT_EQ(frames.n_rows(), 3);
   EXPECT_EQ(frames.text(2, "refused"), "out of focus");
   EXPECT_NEAR(frames.number(1, "total_force_nN"), 2 * frames.number(0, "total_force_nN"),
               4 * frames.number(1, "total_force_sigma_nN"));
   EXPECT_TRUE(fs::exists(cell / "4_fit/tracks.svg"));
 
-  const std::string before = read_text(cell / "4_fit/tracks.csv");
-  DisplacementField field = read_displacement(cell / "2_track/displacement_0002.csv");
+  const std::string before = files::read_text(cell / "4_fit/tracks.csv");
+  DisplacementField field = files::read_displacement(cell / "2_track/displacement_0002.csv");
   for (Bead& bead : field) bead.displacement_um = 1.5 * bead.displacement_um;
-  write_displacement(cell / "2_track/displacement_0002.csv", field);
+  files::write_displacement(cell / "2_track/displacement_0002.csv", field);
   const Outcome changed = run_program("mbtfm run " + cell.string());
   ASSERT_EQ(changed.code, 0) << changed.output;
-  EXPECT_NE(read_text(cell / "4_fit/record.json").find("--kept"), std::string::npos);
-  const std::string after = read_text(cell / "4_fit/tracks.csv");
+  EXPECT_NE(files::read_text(cell / "4_fit/record.json").find("--kept"), std::string::npos);
+  const std::string after = files::read_text(cell / "4_fit/tracks.csv");
   EXPECT_EQ(after.substr(0, after.find("\n2,")), before.substr(0, before.find("\n2,")));  // the first frame's rows
-  EXPECT_NEAR(CsvTable(cell / "4_fit/frames.csv").number(1, "total_force_nN"), 3 * frames.number(0, "total_force_nN"),
-              4 * frames.number(1, "total_force_sigma_nN"));
+  EXPECT_NEAR(files::CsvTable(cell / "4_fit/frames.csv").number(1, "total_force_nN"),
+              3 * frames.number(0, "total_force_nN"), 4 * frames.number(1, "total_force_sigma_nN"));
   EXPECT_NE(run_program("mbtfm run " + cell.string()).output.find("up to date"), std::string::npos);
   fs::remove(cell / "2_track/displacement_0002.csv");  // nothing is there to make it from
   EXPECT_EQ(run_program("mbtfm run " + cell.string()).code, 3);
-  write_displacement(cell / "2_track/displacement_0002.csv", field);
+  files::write_displacement(cell / "2_track/displacement_0002.csv", field);
 
-  write_text(cell / "2_track/frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
+  files::write_text(cell / "2_track/frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
   const Outcome again = run_program("mbtfm run " + cell.string());
   EXPECT_EQ(again.code, 0) << again.output;
-  EXPECT_EQ(CsvTable(cell / "4_fit/frames.csv").n_rows(), 2);
+  EXPECT_EQ(files::CsvTable(cell / "4_fit/frames.csv").n_rows(), 2);
 }
 
 }  // namespace

@@ -5,9 +5,9 @@
 #include <random>
 #include <regex>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
-#include "segment/image.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "segment/images/image.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -29,7 +29,7 @@ Vec2 displacement_um(Vec2 p) {
   return 0.4 * (bump(kUpperLeft_um) - bump(kLowerRight_um)) * Vec2{1, 1};
 }
 
-void add_spot(segment::Image& image, Vec2 p_um) {
+void add_spot(images::Image& image, Vec2 p_um) {
   const double x = p_um.x / kPixel_um - 0.5, y = p_um.y / kPixel_um - 0.5, sigma = 1.4;
   for (int row = std::max(0, int(y) - 6); row < std::min(kSize_px, int(y) + 8); ++row) {
     for (int column = std::max(0, int(x) - 6); column < std::min(kSize_px, int(x) + 8); ++column) {
@@ -41,12 +41,12 @@ void add_spot(segment::Image& image, Vec2 p_um) {
 
 void write_bead_images(const fs::path& cell) {
   const std::size_t n_pixels = std::size_t{kSize_px} * kSize_px;
-  segment::Image relaxed{.width = kSize_px,
-                         .height = kSize_px,
-                         .pixels = std::vector<float>(n_pixels, 200),
-                         .pixel_size_um = kPixel_um,
-                         .full_scale = 65535};
-  segment::Image stressed = relaxed;
+  images::Image relaxed{.width = kSize_px,
+                        .height = kSize_px,
+                        .pixels = std::vector<float>(n_pixels, 200),
+                        .pixel_size_um = kPixel_um,
+                        .full_scale = 65535};
+  images::Image stressed = relaxed;
   std::mt19937_64 random(1);
   std::normal_distribution<float> noise(0, 20);
   for (int i = 0; i < 2500; ++i) {
@@ -55,11 +55,11 @@ void write_bead_images(const fs::path& cell) {
     add_spot(relaxed, p);
     add_spot(stressed, p + displacement_um(p));
   }
-  for (segment::Image* image : {&relaxed, &stressed}) {
+  for (images::Image* image : {&relaxed, &stressed}) {
     for (float& value : image->pixels) value += noise(random);
   }
-  segment::write_tiff(cell / "beads_relaxed.tif", relaxed);
-  segment::write_tiff(cell / "beads_stressed.tif", stressed);
+  images::write_tiff(cell / "beads_relaxed.tif", relaxed);
+  images::write_tiff(cell / "beads_stressed.tif", stressed);
 }
 
 Adhesion adhesion(int id, Vec2 position_um) {
@@ -75,33 +75,33 @@ Adhesion adhesion(int id, Vec2 position_um) {
 
 void write_segmentation(const fs::path& folder) {
   fs::create_directory(folder);
-  write_adhesions(folder / "adhesions.csv", {adhesion(1, kUpperLeft_um), adhesion(2, kLowerRight_um)});
-  write_fibres(folder / "fibres.csv", folder / "fibre_points.csv",
-               {{.fibre_id = 1,
-                 .type = FibreType::ventral,
-                 .width_um = 0.6,
-                 .start_adhesion_id = 1,
-                 .end_adhesion_id = 2,
-                 .points_um = {kUpperLeft_um, kLowerRight_um}}});
+  files::write_adhesions(folder / "adhesions.csv", {adhesion(1, kUpperLeft_um), adhesion(2, kLowerRight_um)});
+  files::write_fibres(folder / "fibres.csv", folder / "fibre_points.csv",
+                      {{.fibre_id = 1,
+                        .type = FibreType::ventral,
+                        .width_um = 0.6,
+                        .start_adhesion_id = 1,
+                        .end_adhesion_id = 2,
+                        .points_um = {kUpperLeft_um, kLowerRight_um}}});
   Polygon outline;
   const Vec2 centre = 0.5 * (kUpperLeft_um + kLowerRight_um);
   for (int i = 0; i < 60; ++i)
     outline.push_back(centre + 12.0 * Vec2{std::cos(i * M_PI / 30), std::sin(i * M_PI / 30)});
-  write_outline(folder / "outline.csv", outline);
+  files::write_outline(folder / "outline.csv", outline);
 }
 
 TEST(Signs, image_content_moved_right_and_down_is_a_force_right_and_down_up_to_the_report) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
   fs::create_directory(cell);
-  write_text(cell / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\n[fit]\nn_meshes = 1\n");
+  files::write_text(cell / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\n[fit]\nn_meshes = 1\n");
   write_bead_images(cell);
   write_segmentation(cell / "1_segment");
   const Outcome run = run_program("mbtfm run " + cell.string());
   ASSERT_EQ(run.code, 0) << run.output;
 
   int n_near = 0;
-  for (const Bead& bead : read_displacement(cell / "2_track/displacement.csv")) {
+  for (const Bead& bead : files::read_displacement(cell / "2_track/displacement.csv")) {
     if (!bead.flag.empty() || norm(bead.position_um - kUpperLeft_um) > 1.5) continue;
     EXPECT_GT(bead.displacement_um.x, 0.1);
     EXPECT_GT(bead.displacement_um.y, 0.1);
@@ -109,14 +109,14 @@ TEST(Signs, image_content_moved_right_and_down_is_a_force_right_and_down_up_to_t
   }
   EXPECT_GE(n_near, 3);
 
-  const auto forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
+  const auto forces = files::read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
   ASSERT_EQ(forces.size(), 2u);
   EXPECT_GT(forces[0].force_nN.x, 0.5);
   EXPECT_GT(forces[0].force_nN.y, 0.5);
   EXPECT_LT(forces[1].force_nN.x, -0.5);
   EXPECT_LT(forces[1].force_nN.y, -0.5);
 
-  const std::string report = read_text(cell / "report.html");
+  const std::string report = files::read_text(cell / "report.html");
   const auto map = report.find("\"description\":\"Forces on the substrate\"");
   ASSERT_NE(map, std::string::npos);
   const std::regex arrow(R"--("x":([-\d.]+),"y":([-\d.]+),"path":"M0,0l([-\d.]+),([-\d.]+)m)--");

@@ -7,9 +7,10 @@
 #include <fstream>
 #include <iterator>
 
-#include "pipeline/contract/files.h"
-#include "samples/scenario.h"
-#include "segment/image.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/vtk_files.h"
+#include "samples/drawing/scenario.h"
+#include "segment/images/image.h"
 #include "tests/support/temporary_folder.h"
 
 namespace {
@@ -47,14 +48,14 @@ TEST(Simulate, every_scenario_makes_a_cell_that_reads_back) {
     const fs::path cell = folder / "cell";
     const Outcome outcome = simulate("--beads 500 --scenario " + name + " --out " + cell.string());
     ASSERT_EQ(outcome.code, 0) << outcome.message;
-    const Cell segmented = read_cell(cell / "1_segment");
-    const Cell truth = read_cell(cell / "truth");
+    const Cell segmented = files::read_cell(cell / "1_segment");
+    const Cell truth = files::read_cell(cell / "truth");
     EXPECT_EQ(segmented.adhesions.size(), truth.adhesions.size());
-    EXPECT_EQ(read_tensions(cell / "truth" / "tensions.csv").size(), truth.fibres.size() + 1);
-    EXPECT_EQ(read_adhesion_forces(cell / "truth" / "adhesion_forces.csv").size(), truth.adhesions.size());
-    EXPECT_EQ(read_displacement(cell / "truth" / "displacement.csv").size(), 500u);
-    EXPECT_EQ(read_displacement(cell / "2_track" / "displacement.csv").size(), 500u);
-    EXPECT_FALSE(read_network(cell / "truth" / "network.vtu").links.empty());
+    EXPECT_EQ(files::read_tensions(cell / "truth" / "tensions.csv").size(), truth.fibres.size() + 1);
+    EXPECT_EQ(files::read_adhesion_forces(cell / "truth" / "adhesion_forces.csv").size(), truth.adhesions.size());
+    EXPECT_EQ(files::read_displacement(cell / "truth" / "displacement.csv").size(), 500u);
+    EXPECT_EQ(files::read_displacement(cell / "2_track" / "displacement.csv").size(), 500u);
+    EXPECT_FALSE(files::read_network(cell / "truth" / "network.vtu").links.empty());
     EXPECT_FALSE(fs::exists(cell / "paxillin.tif"));
   }
 }
@@ -66,7 +67,7 @@ TEST(Simulate, images_stand_in_for_segmentation_and_displacement) {
   ASSERT_EQ(outcome.code, 0) << outcome.message;
   for (const char* name : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
     SCOPED_TRACE(name);
-    const segment::Image image = segment::read_image(cell / name);
+    const images::Image image = images::read_image(cell / name);
     EXPECT_EQ(image.width, 512);
     EXPECT_EQ(image.height, 512);
     ASSERT_TRUE(image.pixel_size_um);

@@ -12,7 +12,9 @@
 #include <cmath>
 #include <numbers>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -31,7 +33,7 @@ class SubstrateProgram : public testing::Test {
     write("forces.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN\n1,20,20,3.141592653589793,3,1\n");
     write("points.csv", "x_um,y_um\n20,20\n23,20\n20,26\n30,28\n");
   }
-  void write(const std::string& name, const std::string& text) { write_text(folder_ / name, text); }
+  void write(const std::string& name, const std::string& text) { files::write_text(folder_ / name, text); }
   std::string file(const std::string& name) const { return (folder_ / name).string(); }
   test::Outcome run(const std::string& arguments) {
     return test::run_program("mbtfm-substrate --quiet --gel " + file("gel.toml") + " " + arguments);
@@ -60,7 +62,7 @@ TEST_F(SubstrateProgram, displaces_points_by_forces_and_by_the_same_force_as_tra
   }
   write("traction.csv", rows);
   ASSERT_EQ(run("--traction " + file("traction.csv") + " " + at_points + file("b.csv")).code, 0);
-  const DisplacementField a = read_displacement(file("a.csv")), b = read_displacement(file("b.csv"));
+  const DisplacementField a = files::read_displacement(file("a.csv")), b = files::read_displacement(file("b.csv"));
   ASSERT_EQ(a.size(), 4u);
   const double share = 0.01 * n / 3.141592653589793;  // of the disc that the squares cover
   for (std::size_t i = 0; i < a.size(); ++i) {
@@ -74,12 +76,12 @@ TEST_F(SubstrateProgram, writes_the_vertical_part_where_asked_for) {
                 file("u.csv"))
                 .code,
             0);
-  const CsvTable table{fs::path(file("u.csv"))};
+  const files::CsvTable table{fs::path(file("u.csv"))};
   // a point ahead of the force is pressed into the gel, and one above it keeps still but for its other component
   EXPECT_GT(table.number(1, "uz_um"), 0);
   EXPECT_NEAR(table.number(0, "uz_um"), 0, 1e-3 * table.number(0, "ux_um"));
   ASSERT_EQ(run(forces() + "--model split --points " + file("points.csv") + " --out " + file("v.csv")).code, 0);
-  EXPECT_FALSE(CsvTable{fs::path(file("v.csv"))}.has("uz_um"));
+  EXPECT_FALSE(files::CsvTable{fs::path(file("v.csv"))}.has("uz_um"));
 }
 
 /// As VTK's own reader, and so ParaView, sees a file.

@@ -12,9 +12,9 @@
 #include <nlohmann/json.hpp>
 #include <thread>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/names.h"
+#include "pipeline/files/names.h"
+#include "pipeline/files/text.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -90,8 +90,8 @@ class Surroundings : public ::testing::Test {
     const Outcome made = run_program(
         "mbtfm-simulate --scenario two-adhesions --seed 3 --beads 300 --images --quiet --out " + cell.string());
     ASSERT_EQ(made.code, 0) << made.output;
-    write_text(cell / "cell.toml",
-               read_text(cell / "cell.toml") + "[fit]\nn_meshes = 1\n[substrate]\nmodel = \"layer\"\n[network]\n");
+    files::write_text(cell / "cell.toml", files::read_text(cell / "cell.toml") +
+                                              "[fit]\nn_meshes = 1\n[substrate]\nmodel = \"layer\"\n[network]\n");
   }
   static void TearDownTestSuite() { delete scene_; }
   void SetUp() override { put_cell(cell_); }
@@ -101,7 +101,7 @@ class Surroundings : public ::testing::Test {
     fs::copy(*scene_ / "cell", place, fs::copy_options::recursive);
   }
   void set(const std::string& network) const {
-    write_text(cell_ / "cell.toml", read_text(cell_ / "cell.toml") + network + "\n");
+    files::write_text(cell_ / "cell.toml", files::read_text(cell_ / "cell.toml") + network + "\n");
   }
   void expect_nothing_half_written() const {
     for (const auto& entry : fs::recursive_directory_iterator(cell_))
@@ -132,7 +132,7 @@ TEST_F(Surroundings, what_cannot_be_printed_is_an_output_error) {
     const int messages = open(log.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0600);
     const int full = open("/dev/full", O_WRONLY | O_CLOEXEC);
     EXPECT_EQ(code_of(start(words, full, messages)), kOutput);
-    EXPECT_NE(read_text(log).find("standard output"), std::string::npos) << read_text(log);
+    EXPECT_NE(files::read_text(log).find("standard output"), std::string::npos) << files::read_text(log);
     close(full);
     close(messages);
   }
@@ -203,16 +203,16 @@ TEST_F(Surroundings, a_name_that_is_not_utf8_is_a_name) {
   const fs::path odd = study_ / "caf\xE9", image = odd / "actin_\xFF.tif";
   fs::rename(cell_, odd);
   fs::rename(odd / "actin.tif", image);
-  write_text(odd / "cell.toml", read_text(odd / "cell.toml") + "[images]\nactin = 'actin_*.tif'\n");
+  files::write_text(odd / "cell.toml", files::read_text(odd / "cell.toml") + "[images]\nactin = 'actin_*.tif'\n");
   const Outcome batch = run_program("mbtfm batch --quiet " + study_.string());
   EXPECT_EQ(batch.code, kDone) << batch.output;
-  const auto run = nlohmann::json::parse(read_text(odd / "run.json"));
+  const auto run = nlohmann::json::parse(files::read_text(odd / "run.json"));
   EXPECT_EQ(run["cell"], "caf\\xE9");
   EXPECT_EQ(run["images"]["actin"], "actin_\\xFF.tif");
   for (const fs::path& file : {odd / "report.html", odd / "run.json", study_ / "batch.csv"})
-    EXPECT_TRUE(is_utf8(read_text(file))) << file;
-  EXPECT_NE(read_text(odd / "report.html").find("caf\\xE9"), std::string::npos);
-  EXPECT_NE(read_text(study_ / "batch.csv").find("caf\\xE9,0"), std::string::npos);
+    EXPECT_TRUE(files::is_utf8(files::read_text(file))) << file;
+  EXPECT_NE(files::read_text(odd / "report.html").find("caf\\xE9"), std::string::npos);
+  EXPECT_NE(files::read_text(study_ / "batch.csv").find("caf\\xE9,0"), std::string::npos);
   const Outcome verified = run_program("mbtfm verify '" + odd.string() + "'");
   EXPECT_EQ(verified.code, kDone) << verified.output;
   const Outcome repeated =

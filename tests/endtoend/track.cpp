@@ -6,9 +6,10 @@
 #include <limits>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
-#include "segment/image.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "segment/images/image.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/temporary_folder.h"
 
@@ -34,9 +35,9 @@ std::string files(const test::TemporaryFolder& folder, const std::string& relaxe
          (folder / "out").string();
 }
 
-void write(const std::filesystem::path& file, segment::Image image, std::optional<double> pixel_size_um) {
+void write(const std::filesystem::path& file, images::Image image, std::optional<double> pixel_size_um) {
   image.pixel_size_um = pixel_size_um;
-  segment::write_tiff(file, image);
+  images::write_tiff(file, image);
 }
 
 /// r.tif and two frames of the same beads, shifted by (2, 1) and (-3, 2) px of 0.2 um.
@@ -56,7 +57,7 @@ TEST(TrackEndToEnd, images_become_a_displacement_file_in_um) {
   write(folder / "s.tif", pair.stressed, 0.2);
   const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
   ASSERT_EQ(ended.code, 0) << ended.said;
-  const DisplacementField field = read_displacement(folder / "out/displacement.csv");
+  const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
   EXPECT_GT(field.size(), 150u);
   for (const Bead& bead : field) EXPECT_LE(std::max(bead.position_um.x, bead.position_um.y), 128 * 0.2);
   EXPECT_TRUE(std::filesystem::exists(folder / "out/displacement.vtp"));
@@ -67,13 +68,13 @@ TEST(TrackEndToEnd, a_folder_of_frames_is_tracked_against_one_relaxed_image) {
   write_series(folder);
   const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
   ASSERT_EQ(ended.code, 0) << ended.said;
-  const CsvTable frames(folder / "out/frames.csv");
+  const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 2);
   EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
   EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
-  const auto first = read_displacement(folder / "out/displacement_0001.csv");
-  EXPECT_EQ(first.size(), read_displacement(folder / "out/displacement_0002.csv").size());
-  EXPECT_EQ(read_text(folder / "out/displacement.csv"), read_text(folder / "out/displacement_0001.csv"));
+  const auto first = files::read_displacement(folder / "out/displacement_0001.csv");
+  EXPECT_EQ(first.size(), files::read_displacement(folder / "out/displacement_0002.csv").size());
+  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), files::read_text(folder / "out/displacement_0001.csv"));
 }
 
 TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not) {
@@ -81,28 +82,29 @@ TEST(TrackEndToEnd, a_frame_that_is_lost_is_tracked_again_and_the_others_are_not
   write_series(folder);
   const std::string arguments = files(folder, "r.tif", "frames") + " --record " + (folder / "out/record.json").string();
   ASSERT_EQ(run_track(folder, arguments).code, 0);
-  const std::string list = read_text(folder / "out/frames.csv"), lost = read_text(folder / "out/displacement_0002.csv");
-  const std::string other = read_text(folder / "out/displacement.csv") + "1,1,0,0,0.1,by hand\n";
-  write_text(folder / "out/displacement_0001.csv", other);  // no tracking would give it
+  const std::string list = files::read_text(folder / "out/frames.csv"),
+                    lost = files::read_text(folder / "out/displacement_0002.csv");
+  const std::string other = files::read_text(folder / "out/displacement.csv") + "1,1,0,0,0.1,by hand\n";
+  files::write_text(folder / "out/displacement_0001.csv", other);  // no tracking would give it
   std::filesystem::remove(folder / "out/displacement_0002.csv");
   const Ended ended = run_track(folder, arguments + " --kept " + (folder / "out").string());
   ASSERT_EQ(ended.code, 0) << ended.said;
-  EXPECT_EQ(read_text(folder / "out/displacement_0002.csv"), lost);
-  EXPECT_EQ(read_text(folder / "out/displacement_0001.csv"), other);
-  EXPECT_EQ(read_text(folder / "out/frames.csv"), list);
-  EXPECT_NE(read_text(folder / "out/record.json").find("\"n_frames_kept\": 1"), std::string::npos);
+  EXPECT_EQ(files::read_text(folder / "out/displacement_0002.csv"), lost);
+  EXPECT_EQ(files::read_text(folder / "out/displacement_0001.csv"), other);
+  EXPECT_EQ(files::read_text(folder / "out/frames.csv"), list);
+  EXPECT_NE(files::read_text(folder / "out/record.json").find("\"n_frames_kept\": 1"), std::string::npos);
 }
 
 TEST(TrackEndToEnd, displacements_of_another_program_take_the_place_of_images) {
   const test::TemporaryFolder folder;
-  write_text(folder / "piv.csv", "x,y,u,v\n0,0,1,0\n10,0,1,0\n0,10,1,0\n10,10,NaN,0\n");
+  files::write_text(folder / "piv.csv", "x,y,u,v\n0,0,1,0\n10,0,1,0\n0,10,1,0\n10,10,NaN,0\n");
   const std::string out = " --out " + (folder / "out").string();
   const std::string given = "--displacement " + (folder / "piv.csv").string() + out;
   const std::string columns = " --x_column x --y_column y --ux_column u --uy_column v";
   const Ended ended = run_track(folder, given + columns + " --length_unit px --pixel_size_um 0.5");
   ASSERT_EQ(ended.code, 0) << ended.said;
   EXPECT_NE(ended.said.find("1 flagged"), std::string::npos) << ended.said;
-  const DisplacementField field = read_displacement(folder / "out/displacement.csv");
+  const DisplacementField field = files::read_displacement(folder / "out/displacement.csv");
   ASSERT_EQ(field.size(), 4u);
   EXPECT_EQ(field[1].position_um, (Vec2{5.25, 0.25}));
   EXPECT_EQ(field[1].displacement_um, (Vec2{0.5, 0}));
@@ -152,12 +154,12 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   std::filesystem::create_directory(folder / "frames");
   write(folder / "frames/a.tif", dark.stressed, 0.2);
   write(folder / "frames/b.tif", one.stressed, 0.2);
-  write_text(folder / "frames/c.tif", "no image");
+  files::write_text(folder / "frames/c.tif", "no image");
   write(folder / "frames/d.tif", two.stressed, 0.2);
   const Ended ended = run_track(folder, files(folder, "r.tif", "frames"));
   EXPECT_EQ(ended.code, 4) << ended.said;
   EXPECT_NE(ended.said.find("2 of 4 frames"), std::string::npos) << ended.said;
-  const CsvTable frames(folder / "out/frames.csv");
+  const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 4);
   EXPECT_NE(frames.text(0, "refused").find("bright beads"), std::string::npos);
   EXPECT_EQ(frames.text(0, "n_tracked"), "");
@@ -166,9 +168,9 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
   EXPECT_NEAR(frames.number(3, "drift_x_um"), -0.6, 0.005);
   for (const char* missing : {"1", "3"})
     EXPECT_FALSE(std::filesystem::exists(folder / ("out/displacement_000" + std::string(missing) + ".csv")));
-  EXPECT_EQ(read_text(folder / "out/displacement.csv"), read_text(folder / "out/displacement_0002.csv"));
-  EXPECT_EQ(read_displacement(folder / "out/displacement_0004.csv").size(),
-            read_displacement(folder / "out/displacement.csv").size());
+  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), files::read_text(folder / "out/displacement_0002.csv"));
+  EXPECT_EQ(files::read_displacement(folder / "out/displacement_0004.csv").size(),
+            files::read_displacement(folder / "out/displacement.csv").size());
   std::filesystem::remove(folder / "frames/b.tif");
   std::filesystem::remove(folder / "frames/d.tif");
   std::filesystem::remove_all(folder / "out");
@@ -177,11 +179,11 @@ TEST(TrackEndToEnd, a_frame_that_is_refused_does_not_stop_the_others) {
 }
 
 /// A float TIFF of these images, as ImageJ writes a hyperstack.
-void write_stack(const std::filesystem::path& file, const std::vector<const segment::Image*>& images,
+void write_stack(const std::filesystem::path& file, const std::vector<const images::Image*>& images,
                  const std::string& dimensions) {
   TIFF* tiff = TIFFOpen(file.c_str(), "w");
   const std::string description = "ImageJ=1.53t\nimages=" + std::to_string(images.size()) + "\n" + dimensions;
-  for (const segment::Image* image : images) {
+  for (const images::Image* image : images) {
     TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, image->width);
     TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, image->height);
     TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 32);
@@ -203,7 +205,7 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   const test::TemporaryFolder folder;
   const auto one = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {2, 1}});
   const auto two = test::draw_bead_pair({}, {.width = 128, .n_beads = 330, .drift = {-3, 2}});
-  const segment::Image other = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  const images::Image other = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
   // times 1 and 2 pull, 3 is relaxed; channel 1 shows something else
   write_stack(folder / "s.tif", {&other, &one.stressed, &other, &two.stressed, &other, &one.relaxed},
               "channels=2\nslices=1\nframes=3\nhyperstack=true\n");
@@ -211,14 +213,14 @@ TEST(TrackEndToEnd, channel_time_and_page_are_chosen_for_both_images_alike) {
   const std::string relaxed = " --relaxed_channel 2 --relaxed_time 3", beads = " --stressed_channel 2";
   Ended ended = run_track(folder, both + relaxed + beads + " --stressed_time 1 --stressed_last 2");
   ASSERT_EQ(ended.code, 0) << ended.said;
-  const CsvTable frames(folder / "out/frames.csv");
+  const files::CsvTable frames(folder / "out/frames.csv");
   ASSERT_EQ(frames.n_rows(), 2);
   EXPECT_NEAR(frames.number(0, "drift_x_um"), 0.4, 0.005);
   EXPECT_NEAR(frames.number(1, "drift_x_um"), -0.6, 0.005);
-  const std::string of_time = read_text(folder / "out/displacement_0002.csv");
+  const std::string of_time = files::read_text(folder / "out/displacement_0002.csv");
   ended = run_track(folder, both + " --relaxed_page 6 --stressed_page 4");
   ASSERT_EQ(ended.code, 0) << ended.said;
-  EXPECT_EQ(read_text(folder / "out/displacement.csv"), of_time);
+  EXPECT_EQ(files::read_text(folder / "out/displacement.csv"), of_time);
   EXPECT_EQ(run_track(folder, both).code, 3);                                           // which of them?
   EXPECT_EQ(run_track(folder, both + relaxed + beads).code, 3);                         // of which time?
   EXPECT_EQ(run_track(folder, both + relaxed + beads + " --stressed_last 2").code, 2);  // from where?
@@ -240,10 +242,10 @@ TEST(TrackEndToEnd, exchanged_images_are_an_error_with_the_remedy) {
 TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
   const test::TemporaryFolder folder;
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});
-  segment::Image dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
-  segment::Image one = dark;
+  images::Image dark = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  images::Image one = dark;
   test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
-  segment::Image broken = pair.stressed;
+  images::Image broken = pair.stressed;
   broken.at(6, 11) = std::numeric_limits<float>::quiet_NaN();
   write(folder / "r.tif", pair.relaxed, 0.2);
   write(folder / "s.tif", pair.stressed, 0.2);
@@ -277,8 +279,8 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
     still += place + "0,0\n";
     twice += place + std::to_string(0.01 * (k % 8)) + ",0\n";
   }
-  write_text(folder / "still.csv", still);
-  write_text(folder / "twice.csv", twice + "3,3,0.03,0\n");
+  files::write_text(folder / "still.csv", still);
+  files::write_text(folder / "twice.csv", twice + "3,3,0.03,0\n");
   const auto given = [&](const char* file) {
     return run_track(folder, "--displacement " + (folder / file).string() + " --out " + (folder / "out").string());
   };
@@ -288,7 +290,7 @@ TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_
   const Ended of_twice = given("twice.csv");
   EXPECT_EQ(of_twice.code, 0);
   EXPECT_NE(of_twice.said.find("1 flagged"), std::string::npos) << of_twice.said;
-  EXPECT_EQ(read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
+  EXPECT_EQ(files::read_displacement(folder / "out/displacement.csv").back().flag, "duplicate");
 }
 
 }  // namespace

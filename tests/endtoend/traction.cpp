@@ -1,12 +1,15 @@
 /// The executables that reconstruct tractions and compare them with the fit.
 #include <gtest/gtest.h>
 
-#include "mbtfm/traction.h"
-#include "pipeline/contract/json_record.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/json_record.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/program.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 namespace fs = std::filesystem;
@@ -14,10 +17,10 @@ namespace fs = std::filesystem;
 TEST(TractionProgram, writes_what_it_says_for_every_method) {
   const test::TemporaryFolder folder;
   const test::EllipseScene scene = test::ellipse_scene(48, 0.03);
-  write_displacement(folder / "displacement.csv", scene.field);
-  write_adhesions(folder / "adhesions.csv", scene.adhesions);
-  write_outline(folder / "outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
-  write_text(
+  files::write_displacement(folder / "displacement.csv", scene.field);
+  files::write_adhesions(folder / "adhesions.csv", scene.adhesions);
+  files::write_outline(folder / "outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
+  files::write_text(
       folder / "cell.toml",
       "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n[traction]\nelement_um = 6\n");
   const auto at = [&](const std::string& name) { return (folder / name).string(); };
@@ -27,10 +30,10 @@ TEST(TractionProgram, writes_what_it_says_for_every_method) {
                           at("displacement.csv") + " --adhesions " + at("adhesions.csv") + " --outline " +
                           at("outline.csv") + " --out " + at(method + ".csv"));
     ASSERT_EQ(run.code, 0) << run.output;
-    const CsvTable map(folder / (method + ".csv"));
+    const files::CsvTable map(folder / (method + ".csv"));
     map.require({"x_um", "y_um", "tx_kPa", "ty_kPa"});
     EXPECT_GT(map.n_rows(), 0);
-    EXPECT_EQ(read_adhesion_forces(folder / (method + "_adhesion_forces.csv")).size(), 8u);
+    EXPECT_EQ(files::read_adhesion_forces(folder / (method + "_adhesion_forces.csv")).size(), 8u);
     for (const char* ending : {".vtp", ".json"})
       EXPECT_TRUE(fs::exists(folder / (method + ending))) << method << ending;
     const bool has_scan = method != "sparse" && method != "adhesion-forces";
@@ -43,10 +46,11 @@ TEST(TractionProgram, writes_what_it_says_for_every_method) {
 TEST(TractionProgram, warns_where_tractions_push_outward_as_after_a_swap_of_the_images) {
   const test::TemporaryFolder folder;
   test::EllipseScene scene = test::ellipse_scene(48, 0.1);
-  write_text(folder / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+  files::write_text(folder / "cell.toml",
+                    "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
   for (const bool is_swapped : {false, true}) {
     for (Bead& b : scene.field) b.displacement_um = (is_swapped ? -1.0 : 1.0) * b.displacement_um;
-    write_displacement(folder / "displacement.csv", scene.field);
+    files::write_displacement(folder / "displacement.csv", scene.field);
     for (const std::string method : {"fttc", "sparse"}) {
       const auto run = test::run_program(
           "mbtfm-traction --method " + method + " --gel " + (folder / "cell.toml").string() + " --displacement " +
@@ -59,7 +63,8 @@ TEST(TractionProgram, warns_where_tractions_push_outward_as_after_a_swap_of_the_
 
 TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
   const test::TemporaryFolder folder;
-  write_text(folder / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+  files::write_text(folder / "cell.toml",
+                    "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
   const std::string header = "x_um,y_um,ux_um,uy_um,sigma_um\n", bead = "1,2,0.1,0.1,0.01\n";
   const std::pair<std::string, std::string> cases[] = {
       {header, "three beads"},                                           // none
@@ -68,7 +73,7 @@ TEST(TractionProgram, refuses_bad_displacements_and_names_them) {
       {header + bead + "2,4,0,0,0.01\n3,5,0,0,0.01\n" + bead, "bead 3"}  // the same place twice
   };
   for (const auto& [text, word] : cases) {
-    write_text(folder / "displacement.csv", text);
+    files::write_text(folder / "displacement.csv", text);
     const auto run =
         test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
                           (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
@@ -82,11 +87,11 @@ TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
   const test::TemporaryFolder folder;
   constexpr double kNoise = 0.05;
   const test::EllipseScene scene = test::ellipse_scene(48, kNoise);
-  CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
+  files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
   for (const Bead& b : scene.field) {
     csv.add(b.position_um.x).add(b.position_um.y).add(b.displacement_um.x).add(b.displacement_um.y).end_row();
   }
-  write_text(folder / "displacement.csv", csv.str());
+  files::write_text(folder / "displacement.csv", csv.str());
   const auto run = [&](const std::string& more) {
     return test::run_program("mbtfm-traction --youngs_modulus_kPa 8.4 --displacement " +
                              (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string() +
@@ -96,16 +101,16 @@ TEST(TractionProgram, takes_a_field_without_errors_and_says_which_it_assumed) {
   ASSERT_EQ(told.code, 0) << told.output;
   EXPECT_NE(told.output.find("the field states no errors"), std::string::npos) << told.output;
   // 2304 beads: half of them tell the noise to 2.5 %
-  const double assumed_um = JsonRecord(folder / "traction.json", "figures").at("assumed_sigma_um").number();
+  const double assumed_um = files::JsonRecord(folder / "traction.json", "figures").at("assumed_sigma_um").number();
   EXPECT_NEAR(assumed_um / (kNoise * scene.largest_um), 1, 0.075);
 }
 
 TEST(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_incompressible_gel) {
   const test::TemporaryFolder folder;
   const test::EllipseScene scene = test::ellipse_scene(32, 0.05);
-  write_displacement(folder / "displacement.csv", scene.field);
+  files::write_displacement(folder / "displacement.csv", scene.field);
   const auto run = [&](const std::string& toml) {
-    write_text(folder / "cell.toml", toml);
+    files::write_text(folder / "cell.toml", toml);
     return test::run_program("mbtfm-traction --gel " + (folder / "cell.toml").string() + " --displacement " +
                              (folder / "displacement.csv").string() + " --out " + (folder / "traction.csv").string());
   };
@@ -126,30 +131,31 @@ TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_forc
     for (Bead& b : scene.field) b.displacement_um = double(strength) * b.displacement_um;
     const fs::path cell = folder / ("cell_" + std::to_string(strength));
     for (const char* name : {"1_segment", "2_track", "4_fit"}) fs::create_directories(cell / name);
-    write_text(cell / "cell.toml", "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
-    write_displacement(cell / "2_track/displacement.csv", scene.field);
-    write_outline(cell / "1_segment/outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
+    files::write_text(cell / "cell.toml",
+                      "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.49\nthickness_um = 1000\n");
+    files::write_displacement(cell / "2_track/displacement.csv", scene.field);
+    files::write_outline(cell / "1_segment/outline.csv", {{8, 8}, {57, 8}, {57, 57}, {8, 57}});
     FitSummary fit;
     fit.converged = strength != kNotConverged;
     fit.total_force_nN = fit.converged ? 89.8 * strength : 1;
-    write_fit_summary(cell / "4_fit/fit.json", fit);
+    files::write_fit_summary(cell / "4_fit/fit.json", fit);
   }
   const auto run = test::run_program("mbtfm-calibrate --cells " + folder.path().string() + " --out " +
                                      (folder / "calibration.csv").string());
   ASSERT_EQ(run.code, 0) << run.output;
   EXPECT_NE(run.output.find("FTTC gives the forces of the fit at lambda E"), std::string::npos) << run.output;
   EXPECT_NE(run.output.find("1 left out, whose fit has not converged"), std::string::npos) << run.output;
-  const CsvTable table(folder / "calibration.csv");
+  const files::CsvTable table(folder / "calibration.csv");
   // forces in proportion, and the same noise: nearly one line at any lambda; the less smoothing the steeper
   for (int row = 1; row < table.n_rows(); ++row) {
     EXPECT_GT(table.number(row, "slope"), table.number(row - 1, "slope"));
     EXPECT_GT(table.number(row, "correlation"), 0.9);
   }
-  EXPECT_EQ(CsvTable(folder / "calibration_cells.csv").n_rows(), 3 * table.n_rows());
-  EXPECT_EQ(read_text(folder / "calibration_cells.csv").find("cell_4"), std::string::npos);
-  const std::string picture = read_text(folder / "calibration.svg");
+  EXPECT_EQ(files::CsvTable(folder / "calibration_cells.csv").n_rows(), 3 * table.n_rows());
+  EXPECT_EQ(files::read_text(folder / "calibration_cells.csv").find("cell_4"), std::string::npos);
+  const std::string picture = files::read_text(folder / "calibration.svg");
   EXPECT_NE(picture.find("slope one at ℓ = "), std::string::npos);
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions

@@ -10,7 +10,8 @@
 #include <map>
 #include <set>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -100,16 +101,17 @@ void expect_the_unit_in_the_name_of_every_quantity() {
 
 void expect_the_numbers_of_the_tables() {
   double largest_force_nN = 0, largest_displacement_um = 0;
-  for (const AdhesionForce& f : read_adhesion_forces(cell() / "4_fit/adhesion_forces.csv"))
+  for (const AdhesionForce& f : files::read_adhesion_forces(cell() / "4_fit/adhesion_forces.csv"))
     largest_force_nN = std::max(largest_force_nN, norm(f.force_nN));
-  for (const Bead& b : read_displacement(cell() / "2_track/displacement.csv"))
+  for (const Bead& b : files::read_displacement(cell() / "2_track/displacement.csv"))
     largest_displacement_um = std::max(largest_displacement_um, norm(b.displacement_um));
   // written as doubles, and as shortest round-trip numbers: the same but for the rounding of a norm
   EXPECT_NEAR(extent_of("4_fit/tractions.vtp", "force_nN").high, largest_force_nN, 1e-12 * largest_force_nN);
   EXPECT_NEAR(extent_of("2_track/displacement.vtp", "displacement_um").high, largest_displacement_um,
               1e-12 * largest_displacement_um);
   int largest_id = 0;
-  for (const Tension& t : read_tensions(cell() / "4_fit/tensions.csv")) largest_id = std::max(largest_id, t.fibre_id);
+  for (const Tension& t : files::read_tensions(cell() / "4_fit/tensions.csv"))
+    largest_id = std::max(largest_id, t.fibre_id);
   EXPECT_EQ(extent_of("4_fit/contracted.vtu", "fibre_id").low, 0) << "the actin network";
   EXPECT_EQ(extent_of("4_fit/contracted.vtu", "fibre_id").high, largest_id);
 }

@@ -1,4 +1,4 @@
-#include "segment/image.h"
+#include "segment/images/image.h"
 
 #include <gtest/gtest.h>
 #include <tiffio.h>
@@ -10,10 +10,10 @@
 #include <jpeglib.h>
 
 #include "pipeline/contract/errors.h"
-#include "segment/png.h"
+#include "segment/images/png.h"
 #include "tests/support/temporary_folder.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::images {
 namespace {
 
 namespace fs = std::filesystem;
@@ -190,4 +190,4 @@ TEST(ImageFuzz, the_files_of_other_programs_decode_or_are_refused) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::images

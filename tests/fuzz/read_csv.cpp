@@ -1,6 +1,6 @@
 /// The tables between stages.
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 
@@ -18,13 +18,13 @@ const std::vector<std::string>& cell_tables() {
   static const std::vector<std::string> names = [] {
     test::write_cell(folder() / "whole");
     put("input.csv", "");
-    for (const std::string& damaged : kCellFiles) {
+    for (const std::string& damaged : files::kCellFiles) {
       const fs::path inside = folder() / ("damaged-" + damaged);
       fs::create_directory(inside);
-      for (const std::string& name : kCellFiles)
+      for (const std::string& name : files::kCellFiles)
         fs::create_symlink(name == damaged ? folder() / "input.csv" : folder() / "whole" / name, inside / name);
     }
-    return kCellFiles;
+    return files::kCellFiles;
   }();
   return names;
 }
@@ -44,10 +44,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   using namespace mbtfm;
   const auto& tables = fuzz::cell_tables();
   const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
-  fuzz::answer([&] { read_displacement(file); });
-  fuzz::answer([&] { read_points(file); });
-  fuzz::answer([&] { read_tensions(file); });
-  fuzz::answer([&] { read_adhesion_forces(file); });
-  for (const std::string& name : tables) fuzz::answer([&] { read_cell(fuzz::folder() / ("damaged-" + name)); });
+  fuzz::answer([&] { files::read_displacement(file); });
+  fuzz::answer([&] { files::read_points(file); });
+  fuzz::answer([&] { files::read_tensions(file); });
+  fuzz::answer([&] { files::read_adhesion_forces(file); });
+  for (const std::string& name : tables) fuzz::answer([&] { files::read_cell(fuzz::folder() / ("damaged-" + name)); });
   return 0;
 }

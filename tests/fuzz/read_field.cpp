@@ -1,5 +1,5 @@
 /// Displacement fields of other programs.
-#include "segment/given_field.h"
+#include "segment/beads/given_field.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 
@@ -23,10 +23,10 @@ std::vector<std::string> samples() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
   using namespace mbtfm;
   const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
-  segment::TrackParameters in_pixels;
+  beads::TrackParameters in_pixels;
   in_pixels.length_unit = "px";
   in_pixels.pixel_size_um = 0.1;
-  fuzz::answer([&] { segment::outwardness(segment::read_given_field(file, {})); });
-  fuzz::answer([&] { segment::read_given_field(file, in_pixels); });
+  fuzz::answer([&] { beads::outwardness(beads::read_given_field(file, {})); });
+  fuzz::answer([&] { beads::read_given_field(file, in_pixels); });
   return 0;
 }

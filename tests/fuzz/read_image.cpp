@@ -1,8 +1,8 @@
 /// TIFF, PNG and JPEG images.
 #include <tiffio.h>
 
-#include "segment/image.h"
-#include "segment/png.h"
+#include "segment/images/image.h"
+#include "segment/images/png.h"
 #include "tests/fuzz/target.h"
 
 namespace mbtfm::fuzz {
@@ -52,9 +52,9 @@ std::string tiff(const Layout& layout) {
 
 std::vector<std::string> samples() {
   put("whole.png", "");
-  segment::write_png(folder() / "whole.png", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
+  images::write_png(folder() / "whole.png", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
   put("whole.jpg", "");
-  segment::write_jpeg(folder() / "whole.jpg", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
+  images::write_jpeg(folder() / "whole.jpg", {.width = 40, .height = 30, .rgb = std::vector<std::uint8_t>(3600, 17)});
   std::vector<std::string> files = {bytes_of(folder() / "whole.png"), bytes_of(folder() / "whole.jpg")};
   for (const int compression : {COMPRESSION_NONE, COMPRESSION_LZW, COMPRESSION_PACKBITS, COMPRESSION_ADOBE_DEFLATE,
                                 COMPRESSION_JPEG, COMPRESSION_ZSTD, COMPRESSION_LZMA, COMPRESSION_WEBP}) {
@@ -84,8 +84,8 @@ std::vector<std::string> samples() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
   using namespace mbtfm;
   const auto file = fuzz::put("input", fuzz::text_of(bytes, n));
-  fuzz::answer([&] { segment::read_image(file); });
-  fuzz::answer([&] { segment::read_image(file, {.channel = "2", .z = "1", .time = 1}); });
-  fuzz::answer([&] { segment::read_image(file, 1); });
+  fuzz::answer([&] { images::read_image(file); });
+  fuzz::answer([&] { images::read_image(file, {.channel = "2", .z = "1", .time = 1}); });
+  fuzz::answer([&] { images::read_image(file, 1); });
   return 0;
 }

@@ -1,7 +1,7 @@
 /// What a TIFF says of its dimensions and its pixel size.
-#include "segment/image_file.h"
-#include "segment/ome.h"
-#include "segment/stack.h"
+#include "segment/images/image_file.h"
+#include "segment/images/ome.h"
+#include "segment/images/stack.h"
 #include "tests/fuzz/target.h"
 
 namespace mbtfm::fuzz {
@@ -30,13 +30,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   using namespace mbtfm;
   const std::string description(fuzz::text_of(bytes, n));
   try {
-    if (const auto stack = segment::stack_of(description, "a.tif")) {
+    if (const auto stack = images::stack_of(description, "a.tif")) {
       for (const char* const channel : {"", "1"})
-        fuzz::answer([&] { segment::chosen_pages(*stack, {.channel = channel, .time = 1}, "a.tif"); });
+        fuzz::answer([&] { images::chosen_pages(*stack, {.channel = channel, .time = 1}, "a.tif"); });
     }
   } catch (const InvalidData&) {  // its reader makes it an InputError with the file's name
   }
-  segment::n_imagej_images(description);
-  segment::pixel_size_um({.description = description, .x_resolution_per_unit = 10, .y_resolution_per_unit = 1e-300});
+  images::n_imagej_images(description);
+  images::pixel_size_um({.description = description, .x_resolution_per_unit = 10, .y_resolution_per_unit = 1e-300});
   return 0;
 }

@@ -1,5 +1,6 @@
 /// What the runner reads of a cell that it finds: record.json, fit.json, run.json, and the hashes it keeps.
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/fit_summary.h"
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/run_record.h"
@@ -15,7 +16,7 @@ const int kInputs = 4000;
 std::vector<std::string> samples() {
   const std::string hash(64, 'a');
   put("whole.json", "");
-  write_fit_summary(
+  files::write_fit_summary(
       folder() / "whole.json",
       {.relative_l2 = 0.1,
        .noise_um = 0.02,
@@ -84,7 +85,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   });
 
   const auto fitted = fuzz::cell_with("4_fit/fit.json", input);
-  fuzz::answer([&] { read_fit_summary(fitted / "4_fit/fit.json"); });
+  fuzz::answer([&] { files::read_fit_summary(fitted / "4_fit/fit.json"); });
   fuzz::answer([&] { runner::write_run_record(fitted, options, fuzz::untouched()); });
 
   const auto hashed = fuzz::cell_with(".mbtfm.hashes", input);

@@ -1,10 +1,11 @@
 /// cell.toml, as a stage and as the runner read it.
 #include <optional>
 
-#include "pipeline/contract/parameters.h"
+#include "pipeline/contract/range.h"
 #include "pipeline/runner/record.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/settings.h"
+#include "pipeline/stage/parameters.h"
 #include "tests/fuzz/target.h"
 
 namespace mbtfm::fuzz {
@@ -38,7 +39,7 @@ struct AnyParameters {
   std::string method = "fast", name;
 };
 
-void declare(mbtfm::ParameterList& list, AnyParameters& p) {
+void declare(mbtfm::stage::ParameterList& list, AnyParameters& p) {
   using mbtfm::Range;
   list.table("segment");
   list.add("width_um", p.width_um, Range::positive(), "a width (um)");
@@ -59,10 +60,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   fuzz::answer([&] {
     Gel gel;
     AnyParameters parameters;
-    ParameterList list;
+    stage::ParameterList list;
     declare(list, gel);
     declare(list, parameters);
-    read_toml(list, file);
+    stage::read_toml(list, file);
   });
   fuzz::answer([&] { runner::read_settings(file, {{.table = "gel", .key = "thickness_um", .value = "50"}}); });
   fuzz::answer([&] { runner::unset_in(file, {{.table = "gel", .key = "thickness_um", .value = "50"}}); });

@@ -1,5 +1,5 @@
 /// Networks in VTK files.
-#include "pipeline/contract/files.h"
+#include "pipeline/files/vtk_files.h"
 #include "tests/fuzz/target.h"
 #include "tests/support/fake_tables.h"
 #include "tests/support/vtu_variants.h"
@@ -12,12 +12,12 @@ const int kInputs = 60000;
 std::vector<std::string> samples() {
   const Network network = test::small_network();
   put("whole.vtu", "");
-  write_network(folder() / "whole.vtu", network);
+  files::write_network(folder() / "whole.vtu", network);
   std::vector<std::string> texts = {bytes_of(folder() / "whole.vtu")};
   for (const test::VtuVariant& variant : test::vtu_variants()) texts.push_back(test::stored_as(texts.front(), variant));
-  write_contracted_network(folder() / "whole.vtu", network, network.vertices_um,
-                           std::vector<double>(network.links.size(), 0.25),
-                           std::vector<CableState>(network.links.size(), CableState::taut));
+  files::write_contracted_network(folder() / "whole.vtu", network, network.vertices_um,
+                                  std::vector<double>(network.links.size(), 0.25),
+                                  std::vector<CableState>(network.links.size(), CableState::taut));
   texts.push_back(bytes_of(folder() / "whole.vtu"));
   return texts;
 }
@@ -27,7 +27,7 @@ std::vector<std::string> samples() {
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) {
   using namespace mbtfm;
   const auto file = fuzz::put("input.vtu", fuzz::text_of(bytes, n));
-  fuzz::answer([&] { read_network(file); });
-  fuzz::answer([&] { read_contracted_network(file); });
+  fuzz::answer([&] { files::read_network(file); });
+  fuzz::answer([&] { files::read_contracted_network(file); });
   return 0;
 }

@@ -1,15 +1,15 @@
-#include "segment/roi.h"
+#include "segment/rois/roi.h"
 
 #include <gtest/gtest.h>
 
 #include <fstream>
 #include <random>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
 #include "tests/support/temporary_folder.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::rois {
 namespace {
 
 namespace fs = std::filesystem;
@@ -107,4 +107,4 @@ TEST(RoiFuzz, counts_beyond_the_bytes_take_no_memory) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::rois

@@ -1,7 +1,7 @@
 // The independent reference: its own lengths are smoothed by 1e-5 um, its forces good to 1e-4 nN.
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/csv.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/reference_network.h"
 
@@ -10,21 +10,22 @@ namespace {
 
 class CablesAgainstReference : public testing::TestWithParam<const char*> {
  protected:
-  CsvTable table(const std::string& file) const {
-    return CsvTable(std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/reference/network" / GetParam() / file);
+  files::CsvTable table(const std::string& file) const {
+    return files::CsvTable(std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/reference/network" / GetParam() /
+                           file);
   }
   test::ReferenceNetwork reference = test::reference_network(GetParam());
-  network::CableNetwork cables{reference.network};
+  cables::CableNetwork cables{reference.network};
 };
 
 TEST_P(CablesAgainstReference, agrees_in_forces_derivatives_and_positions) {
   const auto& tensions = reference.tensions_nN;
-  const network::Equilibrium equilibrium = cables.equilibrium(tensions);
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   const std::vector<Vec2> forces = cables.reactions_nN(tensions, equilibrium);
   const Eigen::MatrixXd derivatives = cables.adhesion_force_derivatives(tensions, equilibrium);
 
-  const CsvTable rows = table("reactions.csv");
+  const files::CsvTable rows = table("reactions.csv");
   Eigen::MatrixXd expected(derivatives.rows(), derivatives.cols());
   for (int i = 0; i < rows.n_rows(); ++i) {
     const int v = rows.integer(i, "vertex", 0);
@@ -38,7 +39,7 @@ TEST_P(CablesAgainstReference, agrees_in_forces_derivatives_and_positions) {
   EXPECT_LE((derivatives - expected).norm(), 1e-3 * expected.norm());
 
   // All tensions are positive, so the positions are unique; a collapsed cable's smoothing moves its ends by some eps.
-  const CsvTable positions = table("equilibrium.csv");
+  const files::CsvTable positions = table("equilibrium.csv");
   for (int v = 0; v < positions.n_rows(); ++v)
     EXPECT_LE(norm(equilibrium.positions_um[v] - Vec2{positions.number(v, "x_um"), positions.number(v, "y_um")}), 1e-4);
 }
@@ -47,7 +48,7 @@ TEST_P(CablesAgainstReference, agrees_in_forces_derivatives_and_positions) {
 // = 25 nN/um by the same part: 25 nN/um · 2 um · eps, of which a collapsed cable passes on a few per cent.
 TEST_P(CablesAgainstReference, forces_do_not_depend_on_the_smoothing) {
   const auto forces = [&](double smoothing) {
-    const network::CableNetwork smoothed(reference.network, {.smoothing = smoothing});
+    const cables::CableNetwork smoothed(reference.network, {.smoothing = smoothing});
     return smoothed.adhesion_forces_nN(reference.tensions_nN, smoothed.equilibrium(reference.tensions_nN)).eval();
   };
   const Eigen::VectorXd sharpest = forces(1e-7);

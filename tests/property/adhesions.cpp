@@ -3,11 +3,11 @@
 
 #include <opencv2/core/utility.hpp>
 
-#include "segment/adhesions.h"
-#include "segment/outline.h"
+#include "segment/cells/adhesions.h"
+#include "segment/cells/outline.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::images {
 namespace {
 
 using namespace mbtfm::test;
@@ -20,8 +20,8 @@ struct Found {
 };
 
 Found found_in(const Image& adhesion, const Image& actin) {
-  const auto adhesions = find_adhesions(adhesion, kPixel_um, {});
-  return {adhesions, find_outline(actin, adhesions, kPixel_um, {})};
+  const auto adhesions = cells::find_adhesions(adhesion, kPixel_um, {});
+  return {adhesions, cells::find_outline(actin, adhesions, kPixel_um, {})};
 }
 
 /// `b` is `a` after `move`, a turn by `turn_rad` or a reflection.
@@ -109,4 +109,4 @@ TEST(Adhesions, are_the_same_to_the_last_bit_for_any_number_of_threads) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::images

@@ -3,10 +3,10 @@
 
 #include <cmath>
 
-#include "segment/track.h"
+#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 const std::vector<test::Peak> kCell = test::ring_of_adhesions(384, 6);
@@ -62,4 +62,4 @@ TEST(AffineDrift, the_question_changes_nothing_where_the_answer_is_no) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

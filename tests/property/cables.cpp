@@ -4,15 +4,15 @@
 #include <numbers>
 #include <numeric>
 
-#include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/parallel.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/lattice.h"
 
 namespace mbtfm {
 namespace {
 
-using network::CableNetwork;
-using network::Equilibrium;
+using cables::CableNetwork;
+using cables::Equilibrium;
 
 /// Links of unequal width: each has its share of tension and stiffness.
 Network with_unequal_shares(Network net, unsigned seed) {
@@ -25,16 +25,16 @@ Network with_unequal_shares(Network net, unsigned seed) {
 /// A small lattice, random tensions; forces by adhesion and their scale.
 class Cables : public testing::TestWithParam<unsigned> {
  protected:
-  Eigen::VectorXd forces(const Network& of, const std::vector<double>& t, network::CableParameters p = {}) const {
-    const CableNetwork other(of, p);
-    const Equilibrium result = other.equilibrium(t);
+  Eigen::VectorXd forces(const Network& of, const std::vector<double>& t, cables::CableParameters p = {}) const {
+    const cables::CableNetwork other(of, p);
+    const cables::Equilibrium result = other.equilibrium(t);
     test::expect_equilibrium(other, t, result);
     return other.adhesion_forces_nN(t, result);
   }
   Network net = with_unequal_shares(test::lattice({.seed = GetParam()}), GetParam());
-  CableNetwork cables{net};
+  cables::CableNetwork cables{net};
   std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), GetParam());
-  Equilibrium equilibrium = cables.equilibrium(tensions);
+  cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   Eigen::VectorXd reference = cables.adhesion_forces_nN(tensions, equilibrium);
   // A residual of 1e-9 of the tensions moves soft parts of a network by up to 1e3 as much (EA / t); the last Newton
   // step brings it far lower, so this is generous.
@@ -94,7 +94,7 @@ TEST_P(Cables, any_start_leads_to_the_same_equilibrium) {
   for (int trial = 0; trial < 3; ++trial) {
     std::vector<Vec2> start = net.vertices_um;
     for (Vec2& x : start) x = {anywhere(random), anywhere(random)};
-    const Equilibrium other = cables.equilibrium(tensions, start);
+    const cables::Equilibrium other = cables.equilibrium(tensions, start);
     test::expect_equilibrium(cables, tensions, other);
     EXPECT_LE((cables.adhesion_forces_nN(tensions, other) - reference).lpNorm<Eigen::Infinity>(), tolerance);
   }
@@ -133,9 +133,9 @@ TEST_P(Cables, geometry_gradients_agree_with_central_differences) {
   std::mt19937 random(GetParam());
   std::normal_distribution<double> normal;
   const Eigen::VectorXd weights = Eigen::VectorXd::NullaryExpr(reference.size(), [&] { return normal(random); });
-  const network::GeometryGradient gradient = cables.geometry_gradient(tensions, equilibrium, weights);
+  const cables::GeometryGradient gradient = cables.geometry_gradient(tensions, equilibrium, weights);
   const auto sum = [&](const Network& other) {
-    const CableNetwork changed(other);
+    const cables::CableNetwork changed(other);
     return weights.dot(changed.adhesion_forces_nN(tensions, changed.equilibrium(tensions, equilibrium.positions_um)));
   };
   const double step = 1e-5, scale = gradient.by_held_vertex.lpNorm<Eigen::Infinity>();
@@ -173,7 +173,7 @@ TEST_P(Cables, geometry_gradients_agree_with_central_differences) {
 TEST_P(Cables, each_step_lowers_the_energy) {
   double before = std::numeric_limits<double>::infinity();
   for (int steps = 1; steps <= 20; ++steps) {
-    const CableNetwork bounded(net, {.max_iterations = steps});
+    const cables::CableNetwork bounded(net, {.max_iterations = steps});
     const double energy = bounded.equilibrium(tensions, net.vertices_um).energy_fJ;
     EXPECT_LE(energy, before * (1 + 1e-12)) << steps;  // rounding of sums
     before = energy;
@@ -217,8 +217,8 @@ TEST_P(Cables, are_taut_slack_or_collapsed_as_their_forces_tell) {
 TEST_P(Cables, derivatives_by_vertex_add_up_to_those_by_adhesion_and_exert_no_torque) {
   Network shared = net;  // adhesions of several vertices: each has a moment of its own
   for (int& id : shared.adhesion_id) id = id == 0 ? 0 : 1 + id % 4;
-  const CableNetwork few(shared);
-  const Equilibrium e = few.equilibrium(tensions);
+  const cables::CableNetwork few(shared);
+  const cables::Equilibrium e = few.equilibrium(tensions);
   test::expect_equilibrium(few, tensions, e);
   const Eigen::MatrixXd by_vertex = few.reaction_derivatives(tensions, e);
   Eigen::MatrixXd sum = few.adhesion_force_derivatives(tensions, e);
@@ -262,9 +262,9 @@ Network hexagon(int n, double edge_um) {
 
 TEST(SymmetricCables, symmetric_cells_have_symmetric_forces) {
   for (const double t_fibre : {0.06, 3.0}) {
-    const CableNetwork cables(hexagon(6, 1.5));
+    const cables::CableNetwork cables(hexagon(6, 1.5));
     const std::vector<double> tensions{0.06, t_fibre, t_fibre, t_fibre};
-    const Equilibrium equilibrium = cables.equilibrium(tensions);
+    const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
     test::expect_equilibrium(cables, tensions, equilibrium);
     const Eigen::VectorXd f = cables.adhesion_forces_nN(tensions, equilibrium);
     for (int c = 0; c < 6; ++c) {  // towards the centre, all the same
@@ -281,14 +281,14 @@ TEST(LargeCables, balance_and_come_to_the_same_bytes_when_prepared_at_once) {
   const Network net = test::lattice({.columns = 70, .rows = 70, .seed = 3});
   std::vector<Eigen::VectorXd> forces(4);
   const auto contract = [&](int i) {
-    const CableNetwork cables(net);
+    const cables::CableNetwork cables(net);
     const std::vector<double> t = test::random_tensions_nN(cables.fibre_ids().size(), 3);
-    const Equilibrium equilibrium = cables.equilibrium(t);
+    const cables::Equilibrium equilibrium = cables.equilibrium(t);
     if (i == 0) test::expect_equilibrium(cables, t, equilibrium);
     forces[i] = cables.adhesion_forces_nN(t, equilibrium);
   };
   contract(0);
-  parallel_for(3, 3, [&](int i) { contract(i + 1); });
+  numerics::parallel_for(3, 3, [&](int i) { contract(i + 1); });
   for (int i = 1; i < 4; ++i) EXPECT_EQ(forces[i], forces[0]);
 }
 

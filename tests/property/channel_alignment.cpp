@@ -1,4 +1,4 @@
-#include "segment/channel_alignment.h"
+#include "segment/cells/channel_alignment.h"
 
 #include <gtest/gtest.h>
 
@@ -6,10 +6,10 @@
 #include <numbers>
 #include <random>
 
-#include "segment/segment_cell.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_accuracy.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 /// Fibres in all directions whose ends' lines miss their adhesions' centres by `aside_um`, and adhesions and ends that
@@ -100,7 +100,7 @@ TEST(ChannelAlignment, fibres_of_a_shifted_channel_are_tied_as_if_it_were_not) {
     for (const Fibre& f : s.cell.fibres) n += f.start_adhesion_id.has_value() + f.end_adhesion_id.has_value();
     return n;
   };
-  Channel shifted = cell.adhesion;
+  images::Channel shifted = cell.adhesion;
   constexpr int kRight = 4, kDown = -3;
   for (int j = 0; j < shifted.image.height; ++j) {
     for (int i = 0; i < shifted.image.width; ++i) {
@@ -122,4 +122,4 @@ TEST(ChannelAlignment, fibres_of_a_shifted_channel_are_tied_as_if_it_were_not) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -1,14 +1,14 @@
-#include "mbtfm/common_motion.h"
+#include "mbtfm/tensions/common_motion.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "mbtfm/fit_results.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -27,7 +27,7 @@ LinearData with_motions(const TensionScene& scene, const DisplacementField& bead
 EnsembleFit fit_of(const TensionScene& scene, LinearData& data, const std::string& loss = "squares") {
   FitParameters parameters;
   parameters.loss = loss;
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network(), scene.cables.parameters());
   return fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {});
 }
@@ -163,4 +163,4 @@ TEST(CommonMotion, its_largest_displacement_is_reached_and_never_passed) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "mbtfm/findings.h"
+#include "mbtfm/tensions/findings.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/cut_cell.h"
 
@@ -19,7 +19,7 @@ using test::Window;
 
 /// A small cell that the image cuts at its left third, and its beads.
 struct Scene {
-  samples::Experiment experiment;
+  experiment::Experiment experiment;
   Gel gel;
   Window window;
   CutCell cut;
@@ -27,10 +27,10 @@ struct Scene {
 };
 
 Scene scene(std::uint64_t seed, double part = 0.35) {
-  samples::ScenarioParameters p;
+  drawing::ScenarioParameters p;
   p.seed = seed;
   p.beads = 4000;
-  Scene s{.experiment = samples::simulate(p, 2),
+  Scene s{.experiment = experiment::simulate(p, 2),
           .gel = p.gel,
           .window = {{-1e4, -1e4}, {1e4, 1e4}},
           .cut = {},
@@ -61,35 +61,35 @@ TEST(CutCells, tensions_forces_and_the_force_through_the_cut_are_found_within_th
     const CutFit found = test::fit_cut(s.cut.cell, s.beads, s.gel, 2),
                  blind = test::fit_cut(s.cut.cell, s.beads, s.gel, 2, Beyond::ignored);
     ASSERT_TRUE(found.fit.cut.has_value());
-    const auto tensions = inverse::tensions_of(found.fit);
+    const auto tensions = tensions::tensions_of(found.fit);
     for (std::size_t i = 1; i < tensions.size(); ++i) {
       if (!tensions[i].identifiable) continue;
       const double truth = true_tension(s, tensions[i].fibre_id);
       ++n_tensions;
       n_covered += *tensions[i].low_nN <= truth && truth <= tensions[i].high_nN.value_or(1e9);
-      const auto over_sigma = [&](const inverse::Estimate& e) { return (e.value - truth) / e.standard_error; };
+      const auto over_sigma = [&](const tensions::Estimate& e) { return (e.value - truth) / e.standard_error; };
       error += std::pow(over_sigma(found.fit.tensions_nN[i]), 2);
       error_if_ignored += std::pow(over_sigma(blind.fit.tensions_nN[i]), 2);
     }
-    const Eigen::VectorXd forces = adhesion_forces_nN(found.fit);
+    const Eigen::VectorXd forces = tensions::adhesion_forces_nN(found.fit);
     for (std::size_t a = 0; a < s.cut.cell.adhesions.size(); ++a) {
       const int id = s.cut.cell.adhesions[a].adhesion_id;
       if (s.cut.share_inside.at(id) < 1) continue;
       const Vec2 truth = std::ranges::find(s.experiment.forces, id, &AdhesionForce::adhesion_id)->force_nN;
       const Eigen::Vector2d f = forces.segment<2>(2 * static_cast<Eigen::Index>(a));
-      const inverse::Estimate& e = found.fit.force_magnitudes_nN[a];
+      const tensions::Estimate& e = found.fit.force_magnitudes_nN[a];
       ++n_forces;
-      n_forces_covered +=
-          std::abs(f.norm() - f.normalized().dot(Eigen::Vector2d(truth.x, truth.y))) <= interval_95(e).high - e.value;
+      n_forces_covered += std::abs(f.norm() - f.normalized().dot(Eigen::Vector2d(truth.x, truth.y))) <=
+                          tensions::interval_95(e).high - e.value;
     }
-    const inverse::CutForce& c = *found.fit.cut;
+    const tensions::CutForce& c = *found.fit.cut;
     squares += std::pow((c.x_nN.value - s.cut.outside_nN.x) / c.x_nN.standard_error, 2) +
                std::pow((c.y_nN.value - s.cut.outside_nN.y) / c.y_nN.standard_error, 2);
     cells << "seed " << seed << ": through the cut " << c.x_nN.value << " +- " << c.x_nN.standard_error << ", "
           << c.y_nN.value << " +- " << c.y_nN.standard_error << " of " << s.cut.outside_nN.x << ", "
           << s.cut.outside_nN.y << " nN\n";
-    EXPECT_LT(inverse::imbalance_of(found.fit).force, 1e-6) << seed;
-    EXPECT_LT(inverse::imbalance_of(found.fit).torque, 1e-6) << seed;
+    EXPECT_LT(tensions::imbalance_of(found.fit).force, 1e-6) << seed;
+    EXPECT_LT(tensions::imbalance_of(found.fit).torque, 1e-6) << seed;
   }
   // 95 % of some 60 tensions: .90 less two standard deviations of chance; of some 400 forces chance is 1 %
   EXPECT_GE(n_covered, 0.83 * n_tensions);
@@ -115,7 +115,7 @@ TEST(CutCells, finer_places_change_nothing) {
 
 TEST(CutCells, places_lie_outside_of_the_image_and_tile_what_is_near_the_cut) {
   const Scene s = scene(41);
-  const auto places = inverse::places_beyond(s.cut.cell, 1.5, 1);
+  const auto places = tensions::places_beyond(s.cut.cell, 1.5, 1);
   double area_um2 = 0;
   for (const substrate::Ellipse& p : places) {
     const double radius_um = p.semi_major_um;
@@ -132,42 +132,42 @@ TEST(CutCells, motions_of_expected_size_are_a_covariance_of_the_beads) {
   const Scene s = scene(41);
   DisplacementField beads(s.beads.begin(), s.beads.begin() + 40);
   const Eigen::MatrixXd G = Eigen::MatrixXd::Random(80, 6), M = Eigen::MatrixXd::Random(80, 9);
-  inverse::LinearData data = inverse::reduce(beads, G);
+  tensions::LinearData data = tensions::reduce(beads, G);
   const Eigen::VectorXd precision = Eigen::VectorXd::LinSpaced(9, 0.3, 1e7);
-  inverse::allow_motions(data, M, precision);
-  const Eigen::VectorXd weight = inverse::squared_weights(data), forces = Eigen::VectorXd::Random(6);
+  tensions::allow_motions(data, M, precision);
+  const Eigen::VectorXd weight = tensions::squared_weights(data), forces = Eigen::VectorXd::Random(6);
   Eigen::MatrixXd covariance = M * precision.cwiseInverse().asDiagonal() * M.transpose();
   covariance.diagonal() += weight.cwiseInverse();
   const Eigen::VectorXd left = data.displacement_um - G * forces;
   const double wanted = left.dot(covariance.inverse() * left);
   const double found =
-      (inverse::displace(data.reduced, forces) - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
+      (tensions::displace(data.reduced, forces) - data.reduced.target).squaredNorm() + data.reduced.floor_squared;
   EXPECT_NEAR(found, wanted, 1e-8 * wanted);
   EXPECT_EQ(data.n_used, 80) << "what is expected costs no component";
 }
 
 TEST(CutCells, a_cut_is_a_note_if_allowed_for_and_a_caution_if_not) {
   EXPECT_EQ(properties_of(FindingKind::cell_cut).severity, Severity::note);
-  EffectSwitches switches;
+  stage::EffectSwitches switches;
   const Scene s = scene(41);
-  EXPECT_TRUE(inverse::allows_forces_beyond(switches, s.cut.cell));
-  EXPECT_FALSE(inverse::allows_forces_beyond(switches, s.experiment.cell));
+  EXPECT_TRUE(tensions::allows_forces_beyond(switches, s.cut.cell));
+  EXPECT_FALSE(tensions::allows_forces_beyond(switches, s.experiment.cell));
   switches.beyond_cut = "off";
-  EXPECT_FALSE(inverse::allows_forces_beyond(switches, s.cut.cell));
+  EXPECT_FALSE(tensions::allows_forces_beyond(switches, s.cut.cell));
   switches.beyond_cut = "on";
-  EXPECT_THROW(inverse::allows_forces_beyond(switches, s.experiment.cell), UsageError);
+  EXPECT_THROW(tensions::allows_forces_beyond(switches, s.experiment.cell), UsageError);
 }
 
 TEST(CutCells, with_fewer_than_two_adhesions_the_cut_still_holds_the_network) {
   const Scene s = scene(41);
-  Network network = network::generate_network(s.cut.cell, {}).network;
+  Network network = mesh::generate_network(s.cut.cell, {}).network;
   const int kept = *std::ranges::find_if(network.adhesion_id, [](int id) { return id != 0; });
   for (int& id : network.adhesion_id)
     if (id != kept) id = 0;
-  const network::CableNetwork cables(network);
+  const cables::CableNetwork cables(network);
   EXPECT_EQ(cables.adhesion_ids().size(), 1u);
   network.held_by_cut.clear();
-  EXPECT_THROW(network::CableNetwork{network}, InvalidData);
+  EXPECT_THROW(cables::CableNetwork{network}, InvalidData);
 }
 
 }  // namespace

@@ -6,23 +6,23 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/polyline.h"
-#include "samples/draw.h"
-#include "samples/geometry.h"
-#include "samples/random.h"
+#include "samples/drawing/draw.h"
+#include "samples/drawing/geometry.h"
+#include "samples/drawing/random.h"
 
 namespace {
 
 using namespace mbtfm;
-using namespace mbtfm::samples;
+using namespace mbtfm::drawing;
 
 constexpr double kField_um = 102.4;
 constexpr int kSeeds = 8;
 
 /// Cells of seeds 1 … kSeeds, drawn once for all tests.
-const DrawnCell& cell_of_seed(int seed) {
-  static std::vector<DrawnCell> cells;
+const drawing::DrawnCell& cell_of_seed(int seed) {
+  static std::vector<drawing::DrawnCell> cells;
   for (int next = static_cast<int>(cells.size()) + 1; next <= seed; ++next) {
-    cells.push_back(draw_cell({}, {}, kField_um, next));
+    cells.push_back(drawing::draw_cell({}, {}, kField_um, next));
   }
   return cells[seed - 1];
 }
@@ -34,7 +34,7 @@ double mean_area(const Cell& cell) {
 }
 
 TEST(DrawnCell, has_the_number_and_mean_area_of_adhesions_asked_for) {
-  const CellParameters p;
+  const drawing::CellParameters p;
   double sum = 0;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
@@ -55,17 +55,17 @@ TEST(DrawnCell, has_the_number_and_mean_area_of_adhesions_asked_for) {
 }
 
 TEST(DrawnCell, keeps_adhesions_inside_the_outline_and_apart) {
-  const CellParameters p;
+  const drawing::CellParameters p;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Cell& cell = cell_of_seed(seed).cell;
     EXPECT_GT(signed_area_um2(cell.outline_um), 0) << "the outline turns the wrong way";
     for (std::size_t i = 0; i < cell.adhesions.size(); ++i) {
-      for (const Vec2 point : ellipse_points(cell.adhesions[i], 0)) {
+      for (const Vec2 point : drawing::ellipse_points(cell.adhesions[i], 0)) {
         EXPECT_TRUE(contains(cell.outline_um, point)) << "adhesion " << cell.adhesions[i].adhesion_id;
       }
       for (std::size_t j = 0; j < i; ++j) {
-        EXPECT_FALSE(too_near(cell.adhesions[i], cell.adhesions[j], p.adhesion_clearance_um))
+        EXPECT_FALSE(drawing::too_near(cell.adhesions[i], cell.adhesions[j], p.adhesion_clearance_um))
             << "adhesions " << i + 1 << " and " << j + 1;
       }
     }
@@ -76,7 +76,7 @@ TEST(DrawnCell, keeps_adhesions_inside_the_outline_and_apart) {
 }
 
 TEST(DrawnCell, types_fibres_by_the_adhesions_at_their_ends) {
-  const CellParameters p;
+  const drawing::CellParameters p;
   for (int seed = 1; seed <= kSeeds; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
     const Cell& cell = cell_of_seed(seed).cell;
@@ -92,7 +92,7 @@ TEST(DrawnCell, types_fibres_by_the_adhesions_at_their_ends) {
           if (id == a.adhesion_id) {
             EXPECT_LT(norm(a.position_um - end), 1e-9) << "fibre " << f.fibre_id;
           } else if (!id) {
-            EXPECT_FALSE(covers(a, p.free_end_clearance_um - 1e-9, end)) << "fibre " << f.fibre_id;
+            EXPECT_FALSE(drawing::covers(a, p.free_end_clearance_um - 1e-9, end)) << "fibre " << f.fibre_id;
           }
         }
       }
@@ -104,9 +104,9 @@ TEST(DrawnCell, types_fibres_by_the_adhesions_at_their_ends) {
 }
 
 TEST(DrawnCell, adhesions_carry_their_fibres_with_at_most_the_stress_asked_for) {
-  const CellParameters p;
+  const drawing::CellParameters p;
   for (int seed = 1; seed <= kSeeds; ++seed) {
-    const DrawnCell& drawn = cell_of_seed(seed);
+    const drawing::DrawnCell& drawn = cell_of_seed(seed);
     for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i) {
       for (const auto& id : {drawn.cell.fibres[i].start_adhesion_id, drawn.cell.fibres[i].end_adhesion_id}) {
         if (!id) continue;
@@ -118,8 +118,8 @@ TEST(DrawnCell, adhesions_carry_their_fibres_with_at_most_the_stress_asked_for) 
 }
 
 TEST(DrawnCell, is_the_same_for_the_same_seed_and_another_for_another) {
-  const DrawnCell &a = cell_of_seed(5), &c = cell_of_seed(6);
-  const DrawnCell b = draw_cell({}, {}, kField_um, 5);
+  const drawing::DrawnCell &a = cell_of_seed(5), &c = cell_of_seed(6);
+  const drawing::DrawnCell b = drawing::draw_cell({}, {}, kField_um, 5);
   ASSERT_EQ(a.cell.outline_um.size(), b.cell.outline_um.size());
   EXPECT_TRUE(std::ranges::equal(a.cell.outline_um, b.cell.outline_um));
   EXPECT_EQ(a.tensions_nN, b.tensions_nN);
@@ -130,34 +130,34 @@ TEST(DrawnCell, is_the_same_for_the_same_seed_and_another_for_another) {
 }
 
 TEST(DrawnCell, without_room_says_what_to_change) {
-  CellParameters crowded;
+  drawing::CellParameters crowded;
   crowded.n_adhesions = 5000;
   crowded.adhesion_area_um2 = 1;
-  EXPECT_THROW(draw_cell(crowded, {}, kField_um, 1), UsageError);
-  EXPECT_THROW(draw_cell({}, {}, 40, 1), UsageError) << "a cell of 66 um in a field of 40 um";
+  EXPECT_THROW(drawing::draw_cell(crowded, {}, kField_um, 1), UsageError);
+  EXPECT_THROW(drawing::draw_cell({}, {}, 40, 1), UsageError) << "a cell of 66 um in a field of 40 um";
 }
 
 /// The scenario `dense`, of one seed after another.
-DrawnCell dense_cell(std::uint64_t seed) {
-  ScenarioParameters p;
-  ParameterList list;
+drawing::DrawnCell dense_cell(std::uint64_t seed) {
+  drawing::ScenarioParameters p;
+  stage::ParameterList list;
   declare(list, p);
-  read_toml(list, scenario_file("dense"));
-  return draw_cell(p.cell, p.tension, field_um(p.microscope), seed);
+  stage::read_toml(list, drawing::scenario_file("dense"));
+  return drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), seed);
 }
 
 /// Median over a fibre of the distance to the nearest other one that runs alongside; none where there is none.
 std::optional<double> spacing_um(const Fibre& fibre, const std::vector<Fibre>& fibres) {
   constexpr double kAlongside = 0.2;  // sine of 12 degrees
-  const Polyline points = resampled(fibre.points_um, 0.5);
+  const Polyline points = drawing::resampled(fibre.points_um, 0.5);
   std::vector<double> distances;
   for (std::size_t i = 0; i < points.size(); ++i) {
     double nearest = 1e300;
     for (const Fibre& other : fibres) {
       if (other.fibre_id == fibre.fibre_id) continue;
-      const Polyline others = resampled(other.points_um, 0.25);
+      const Polyline others = drawing::resampled(other.points_um, 0.25);
       for (std::size_t k = 0; k < others.size(); ++k)
-        if (std::abs(cross(tangent(points, i), tangent(others, k))) < kAlongside)
+        if (std::abs(cross(drawing::tangent(points, i), drawing::tangent(others, k))) < kAlongside)
           nearest = std::min(nearest, norm(points[i] - others[k]));
     }
     if (nearest < 4) distances.push_back(nearest);
@@ -170,7 +170,7 @@ std::optional<double> spacing_um(const Fibre& fibre, const std::vector<Fibre>& f
 TEST(DenseCell, has_room_for_its_fibres_whose_types_agree_with_their_ends) {
   for (std::uint64_t seed = 1; seed <= 50; ++seed) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    DrawnCell drawn;
+    drawing::DrawnCell drawn;
     ASSERT_NO_THROW(drawn = dense_cell(seed));
     const Cell& cell = drawn.cell;
     EXPECT_GE(cell.fibres.size(), 30u);
@@ -193,10 +193,10 @@ TEST(DenseCell, has_room_for_its_fibres_whose_types_agree_with_their_ends) {
 }
 
 TEST(DenseCell, has_fibres_side_by_side_at_the_distances_asked_for) {
-  ScenarioParameters p;
+  drawing::ScenarioParameters p;
   std::vector<double> spacings;
   for (std::uint64_t seed = 1; seed <= 5; ++seed) {
-    const DrawnCell drawn = dense_cell(seed);
+    const drawing::DrawnCell drawn = dense_cell(seed);
     for (const Fibre& f : drawn.cell.fibres) {
       if (f.type != FibreType::ventral) continue;
       const auto spacing = spacing_um(f, drawn.cell.fibres);
@@ -228,12 +228,12 @@ TEST(DenseCell, has_edge_bundles_inside_of_concave_arcs) {
 
 TEST(DrawnTensions, follow_the_histograms_of_their_types) {
   // 2000 draws: a fraction p is known to sqrt(p (1−p) / 2000) <= 0.011; four times that
-  const TensionParameters p;
+  const drawing::TensionParameters p;
   const auto fraction_above = [&](double median, double log_sd, double level) {
-    Random random(1, Stream::tensions);
+    drawing::Random random(1, drawing::Stream::tensions);
     int n = 0;
     for (int i = 0; i < 2000; ++i) {
-      n += draw(random, {median, log_sd, p.smallest_tension_nN, p.largest_tension_nN}) > level;
+      n += drawing::draw(random, {median, log_sd, p.smallest_tension_nN, p.largest_tension_nN}) > level;
     }
     return n / 2000.0;
   };
@@ -246,12 +246,12 @@ TEST(DrawnTensions, follow_the_histograms_of_their_types) {
 }
 
 TEST(Ring, turns_into_itself) {
-  CellParameters p;
+  drawing::CellParameters p;
   p.layout = "ring";
   p.n_adhesions = 12;
   p.n_dorsal = 6;
   p.diameter_um = 40;
-  const Cell cell = draw_cell(p, {}, kField_um, 1).cell;
+  const Cell cell = drawing::draw_cell(p, {}, kField_um, 1).cell;
   ASSERT_EQ(cell.adhesions.size(), 12u);
   ASSERT_EQ(cell.fibres.size(), 6u);
   const Vec2 centre{0.5 * kField_um, 0.5 * kField_um};
@@ -262,24 +262,24 @@ TEST(Ring, turns_into_itself) {
   }
   EXPECT_LT(norm(sum), 1e-12);
   p.n_adhesions = 500;
-  EXPECT_THROW(draw_cell(p, {}, kField_um, 1), UsageError);
+  EXPECT_THROW(drawing::draw_cell(p, {}, kField_um, 1), UsageError);
 }
 
 TEST(LogNormal, with_mean_has_that_mean) {
-  const LogNormal d = with_mean({.median = 1, .log_sd = 0.6, .low = 0.1, .high = 3}, 0.46);
-  EXPECT_NEAR(mean_of(d), 0.46, 1e-12);
-  Random random(3, Stream::adhesions);
+  const drawing::LogNormal d = drawing::with_mean({.median = 1, .log_sd = 0.6, .low = 0.1, .high = 3}, 0.46);
+  EXPECT_NEAR(drawing::mean_of(d), 0.46, 1e-12);
+  drawing::Random random(3, drawing::Stream::adhesions);
   double sum = 0;
   constexpr int n = 100000;
-  for (int i = 0; i < n; ++i) sum += draw(random, d);
+  for (int i = 0; i < n; ++i) sum += drawing::draw(random, d);
   EXPECT_NEAR(sum / n, 0.46, 4 * 0.30 / std::sqrt(n));  // four standard errors
-  EXPECT_THROW(with_mean(d, 5), UsageError);
+  EXPECT_THROW(drawing::with_mean(d, 5), UsageError);
 }
 
 TEST(Poisson, has_mean_and_variance_alike) {
   for (const double mean : {0.3, 4.0, 9.9, 10.1, 50.0, 3000.0}) {
     SCOPED_TRACE(mean);
-    Random random(7, Stream::camera);
+    drawing::Random random(7, drawing::Stream::camera);
     constexpr int n = 100000;
     double sum = 0, squares = 0;
     for (int i = 0; i < n; ++i) {

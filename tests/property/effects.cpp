@@ -1,16 +1,16 @@
 /// Which effects a scene calls for, each with a scene that does and one that does not; and what is said of those left
 /// out, against a fit that has them.
-#include "mbtfm/effects.h"
+#include "mbtfm/tensions/effects.h"
 
 #include <gtest/gtest.h>
 
-#include "mbtfm/explain.h"
-#include "network/effects.h"
+#include "mbtfm/tensions/explain.h"
+#include "network/cables/effects.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/effects.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -27,17 +27,17 @@ TensionScene scene(double noise, unsigned seed = 1) {
   return test::scene_of(cell_of_three_fibres(), Eigen::Vector4d(0.06, 3, 5, 2), 1500, noise, seed);
 }
 
-std::vector<network::CableNetwork> networks(int n, network::CableParameters cables = {}) {
-  std::vector<network::CableNetwork> result;
+std::vector<cables::CableNetwork> networks(int n, cables::CableParameters cables = {}) {
+  std::vector<cables::CableNetwork> result;
   for (int m = 0; m < n; ++m) {
-    network::NetworkParameters parameters;
+    mesh::NetworkParameters parameters;
     parameters.seed = 10 + static_cast<std::uint64_t>(m);
-    result.emplace_back(network::generate_network(cell_of_three_fibres(), parameters).network, cables);
+    result.emplace_back(mesh::generate_network(cell_of_three_fibres(), parameters).network, cables);
   }
   return result;
 }
 
-EnsembleFit fitted(const std::vector<network::CableNetwork>& on, LinearData data, const TensionScene& s,
+EnsembleFit fitted(const std::vector<cables::CableNetwork>& on, LinearData data, const TensionScene& s,
                    const std::string& loss = "squares") {
   FitParameters parameters;
   parameters.n_meshes = static_cast<int>(on.size());
@@ -47,12 +47,12 @@ EnsembleFit fitted(const std::vector<network::CableNetwork>& on, LinearData data
 
 TEST(EffectsOfTheFit, stress_fibres_where_the_cell_has_any) {
   Cell with = cell_of_three_fibres(), without = test::round_cell(14, 12), left_out = with;
-  EXPECT_TRUE(network::take_fibres(with, "auto").is_on);
+  EXPECT_TRUE(cables::take_fibres(with, "auto").is_on);
   EXPECT_EQ(with.fibres.size(), 3u);
-  EXPECT_FALSE(network::take_fibres(without, "auto").is_on);
-  EXPECT_FALSE(network::take_fibres(left_out, "off").is_on);
+  EXPECT_FALSE(cables::take_fibres(without, "auto").is_on);
+  EXPECT_FALSE(cables::take_fibres(left_out, "off").is_on);
   EXPECT_TRUE(left_out.fibres.empty());
-  EXPECT_THROW(network::take_fibres(without, "on"), InvalidData);
+  EXPECT_THROW(cables::take_fibres(without, "on"), InvalidData);
 }
 
 /// A triangular lattice whose border is held all round: pulling alike, its cables stay as they are.
@@ -75,9 +75,9 @@ Network held_lattice(int side) {
 }
 
 TEST(EffectsOfTheFit, elasticity_where_cables_would_be_longer_than_at_rest) {
-  EXPECT_FALSE(network::decide_elasticity(network::CableNetwork(held_lattice(7)), {0.06}, {}).is_on);
+  EXPECT_FALSE(cables::decide_elasticity(cables::CableNetwork(held_lattice(7)), {0.06}, {}).is_on);
   const auto cell = networks(1);
-  EXPECT_TRUE(network::decide_elasticity(cell.front(), {0.06, 0.06, 0.06, 0.06}, {}).is_on);
+  EXPECT_TRUE(cables::decide_elasticity(cell.front(), {0.06, 0.06, 0.06, 0.06}, {}).is_on);
 }
 
 TEST(EffectsOfTheFit, elasticity_that_is_off_is_that_of_very_soft_cables) {
@@ -112,4 +112,4 @@ TEST(EffectsOfTheFit, time_coupling_where_there_is_a_frame_before) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -1,11 +1,10 @@
-#include "mbtfm/error_budget.h"
-#include "mbtfm/second_placement.h"
-
 #include <gtest/gtest.h>
 
+#include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/second_placement.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -35,7 +34,7 @@ Cell cell_of(const TensionScene& scene) {
 
 struct Fitted {
   TensionScene scene;
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   EnsembleFit fit;
   ErrorBudget budget(SegmentationErrors errors, double substrate_error = 0, bool lacks_base = false,
                      const Gel& gel = kGel) const {
@@ -62,7 +61,7 @@ Fitted fitted(TensionScene scene) {
 
 /// The fit's answers, in truth, to a change of the displacements.
 Eigen::VectorXd answers(const Fitted& f, const Eigen::VectorXd& displacement_um) {
-  TensionScene other{.cables = network::CableNetwork(f.scene.cables.network()),
+  TensionScene other{.cables = cables::CableNetwork(f.scene.cables.network()),
                      .tensions_nN = f.scene.tensions_nN,
                      .adhesion_ids = f.scene.adhesion_ids,
                      .ellipses = f.scene.ellipses,
@@ -87,9 +86,9 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
     return round;
   }();
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.05, 7);
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   for (std::uint64_t seed = 11; seed < 15; ++seed)
-    networks.emplace_back(network::generate_network(cell, {.seed = seed}).network);
+    networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2, {});
   const ErrorBudget budget = error_budget({.fit = fit,
                                            .data = scene.data,
@@ -149,9 +148,9 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
       };
       link.rest_length_um *= length(network) / length(old);
     }
-    truth.cables = network::CableNetwork(network);
+    truth.cables = cables::CableNetwork(network);
     truth.compliance_um_per_nN =
-        substrate::make_greens(kGel, {.model = "layer"}, 2)->compliance_um_per_nN(truth.points_um, truth.ellipses);
+        greens::make_greens(kGel, {.model = "layer"}, 2)->compliance_um_per_nN(truth.points_um, truth.ellipses);
     test::contract(truth, f.scene.tensions_nN);
     const Eigen::VectorXd error = answers(f, truth.displacement_um);
     for (std::size_t i = 0; i < n; ++i) squares[i] += std::pow(error[static_cast<Eigen::Index>(i)], 2) / kDraws;
@@ -176,7 +175,7 @@ TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
   TensionScene scene = test::tension_scene("case_21", 1500, kLittleNoise, 3);
   const Eigen::VectorXd on_layer = scene.displacement_um;
   scene.compliance_um_per_nN =
-      substrate::make_greens(kGel, {.model = "half-space"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
+      greens::make_greens(kGel, {.model = "half-space"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
   test::contract(scene, scene.tensions_nN);
   test::measure(scene, kLittleNoise, 3);
   const Fitted f = fitted(std::move(scene));
@@ -247,9 +246,9 @@ TEST(ErrorBudget, an_error_of_the_thickness_or_of_poissons_ratio_does_what_anoth
     Gel other = gel;
     other.thickness_um += gel.thickness_sigma_um.value_or(0);
     other.poisson_ratio -= gel.poisson_ratio_sigma.value_or(0);
-    const Eigen::VectorXd change = substrate::make_greens(other, {.model = "layer"}, 2)
-                                       ->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
-                                   f.scene.forces_nN;
+    const Eigen::VectorXd change =
+        greens::make_greens(other, {.model = "layer"}, 2)->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
+        f.scene.forces_nN;
     const Eigen::VectorXd moved = answers(f, change);
     for (std::size_t i = 0; i < budget.tensions.size(); ++i) {
       const double stated = *budget.tensions[i].parts_nN.gel;
@@ -304,4 +303,4 @@ TEST(ErrorBudget, two_placements_of_the_candidates_tell_the_error_of_placing_the
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -3,18 +3,19 @@
 
 #include <cmath>
 
-#include "network/cables.h"
+#include "network/cables/cables.h"
 #include "pipeline/contract/errors.h"
-#include "samples/experiment.h"
+#include "samples/experiment/experiment.h"
 
 namespace {
 
 using namespace mbtfm;
-using namespace mbtfm::samples;
+using namespace mbtfm::drawing;
+using namespace mbtfm::experiment;
 
 /// A small cell, quick to simulate.
-ScenarioParameters small_scenario() {
-  ScenarioParameters p;
+drawing::ScenarioParameters small_scenario() {
+  drawing::ScenarioParameters p;
   p.cell.diameter_um = 30;
   p.cell.n_adhesions = 40;
   p.cell.n_ventral = 2;
@@ -28,31 +29,31 @@ ScenarioParameters small_scenario() {
 TEST(Experiment, exerts_no_net_force_and_no_net_torque) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE("seed " + std::to_string(seed));
-    ScenarioParameters p = small_scenario();
+    drawing::ScenarioParameters p = small_scenario();
     p.seed = seed;
-    const Experiment e = simulate(p, 2);
+    const experiment::Experiment e = experiment::simulate(p, 2);
     Vec2 force;
     for (const AdhesionForce& f : e.forces) force += f.force_nN;
     // each free vertex is at rest to 1e-9 of the largest tension; some thousand of them
     EXPECT_LT(norm(force), 1e-5 * e.total_force_nN);
 
-    const network::CableNetwork cables(e.network);
+    const cables::CableNetwork cables(e.network);
     std::vector<double> tensions;
     for (const Tension& t : e.tensions) tensions.push_back(t.tension_nN);
     ASSERT_EQ(tensions.size(), cables.fibre_ids().size());
     const auto reactions = cables.reactions_nN(tensions, cables.equilibrium(tensions));
     double torque = 0;
     for (std::size_t v = 0; v < reactions.size(); ++v) torque += cross(e.network.vertices_um[v], reactions[v]);
-    EXPECT_LT(std::abs(torque), 1e-5 * e.total_force_nN * field_um(p.microscope));
+    EXPECT_LT(std::abs(torque), 1e-5 * e.total_force_nN * drawing::field_um(p.microscope));
   }
 }
 
 TEST(Experiment, noise_and_beads_leave_the_cell_as_it_is) {
-  const ScenarioParameters p = small_scenario();
-  ScenarioParameters noisy = p;
+  const drawing::ScenarioParameters p = small_scenario();
+  drawing::ScenarioParameters noisy = p;
   noisy.noise = 0.25;
   noisy.beads = 1200;
-  const Experiment a = simulate(p, 1), b = simulate(noisy, 1);
+  const experiment::Experiment a = experiment::simulate(p, 1), b = experiment::simulate(noisy, 1);
   ASSERT_EQ(a.forces.size(), b.forces.size());
   for (std::size_t i = 0; i < a.forces.size(); ++i) EXPECT_TRUE(a.forces[i].force_nN == b.forces[i].force_nN);
   for (std::size_t i = 0; i < a.displacement.size(); ++i) {
@@ -61,17 +62,18 @@ TEST(Experiment, noise_and_beads_leave_the_cell_as_it_is) {
 }
 
 TEST(Experiment, does_not_depend_on_the_number_of_threads) {
-  const Experiment a = simulate(small_scenario(), 1), b = simulate(small_scenario(), 3);
+  const experiment::Experiment a = experiment::simulate(small_scenario(), 1),
+                               b = experiment::simulate(small_scenario(), 3);
   for (std::size_t i = 0; i < a.measured.size(); ++i) {
     EXPECT_TRUE(a.measured[i].displacement_um == b.measured[i].displacement_um) << "bead " << i;
   }
 }
 
 TEST(Experiment, noise_has_the_standard_deviation_asked_for) {
-  ScenarioParameters p = small_scenario();
+  drawing::ScenarioParameters p = small_scenario();
   p.noise = 0.1;
   p.beads = 4000;
-  const Experiment e = simulate(p, 2);
+  const experiment::Experiment e = experiment::simulate(p, 2);
   double squares = 0, largest = 0;
   for (std::size_t i = 0; i < e.measured.size(); ++i) {
     const Vec2 error = e.measured[i].displacement_um - e.displacement[i].displacement_um;
@@ -85,10 +87,10 @@ TEST(Experiment, noise_has_the_standard_deviation_asked_for) {
 }
 
 TEST(Experiment, the_gel_moves_towards_the_middle_of_a_cell_that_contracts) {
-  ScenarioParameters p = small_scenario();
+  drawing::ScenarioParameters p = small_scenario();
   p.noise = 0;
-  const Experiment e = simulate(p, 2);
-  const Vec2 centre{0.5 * field_um(p.microscope), 0.5 * field_um(p.microscope)};
+  const experiment::Experiment e = experiment::simulate(p, 2);
+  const Vec2 centre{0.5 * drawing::field_um(p.microscope), 0.5 * drawing::field_um(p.microscope)};
   double inward = 0;
   for (const Bead& bead : e.measured) inward += dot(bead.displacement_um, centre - bead.position_um);
   EXPECT_GT(inward, 0) << "displacement is stressed minus relaxed position";
@@ -101,9 +103,9 @@ TEST(Experiment, the_gel_moves_towards_the_middle_of_a_cell_that_contracts) {
 
 TEST(Experiment, its_network_has_the_surface_tension_asked_for_on_any_mesh) {
   for (const double edge_um : {0.7, 1.4}) {
-    ScenarioParameters p = small_scenario();
+    drawing::ScenarioParameters p = small_scenario();
     p.mechanics.simulation_edge_length_um = edge_um;
-    const Experiment e = simulate(p, 2);
+    const experiment::Experiment e = experiment::simulate(p, 2);
     double sum = 0;  // half the trace of the network's stress times its area
     for (const Link& link : e.network.links) {
       if (link.fibre_id == 0) sum += 0.5 * link.share * e.tensions.front().tension_nN * link.rest_length_um;
@@ -115,25 +117,25 @@ TEST(Experiment, its_network_has_the_surface_tension_asked_for_on_any_mesh) {
 }
 
 TEST(Beads, keep_their_distance_or_say_that_they_cannot) {
-  ScenarioParameters p = small_scenario();
+  drawing::ScenarioParameters p = small_scenario();
   p.bead_distance_um = 0.8;
-  const std::vector<Vec2> beads = place_beads(p);
+  const std::vector<Vec2> beads = experiment::place_beads(p);
   ASSERT_EQ(static_cast<int>(beads.size()), p.beads);
   for (std::size_t i = 0; i < beads.size(); ++i) {
     for (std::size_t j = 0; j < i; ++j) ASSERT_GE(norm(beads[i] - beads[j]), 0.8);
   }
   p.bead_distance_um = 5;
-  EXPECT_THROW(place_beads(p), UsageError);
+  EXPECT_THROW(experiment::place_beads(p), UsageError);
 }
 
 TEST(TwoAdhesions, feel_the_tension_of_the_fibre_between_them_where_the_network_is_weak) {
-  ScenarioParameters p = small_scenario();
+  drawing::ScenarioParameters p = small_scenario();
   p.cell.layout = "line";
   p.cell.n_adhesions = 2;
   p.cell.elongation = 8;
   p.cell.adhesion_area_um2 = 1;
   p.tension.surface_tension_nN_per_um = 1e-5;
-  const Experiment e = simulate(p, 1);
+  const experiment::Experiment e = experiment::simulate(p, 1);
   ASSERT_EQ(e.forces.size(), 2u);
   // the network adds its tension by width over the 4 um of the spindle, 4e-5 nN, some times that where its cables
   // have lined up with the fibre

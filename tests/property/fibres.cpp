@@ -1,10 +1,10 @@
 /// What must not change the fibres of an image, or change them in a known way.
 #include <gtest/gtest.h>
 
-#include "segment/fibres.h"
+#include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 using namespace mbtfm::test;
@@ -13,10 +13,10 @@ constexpr int kSide = 256;
 constexpr double kPixel_um = DrawnScene::kPixel_um;
 
 struct Scene {
-  Image image;
+  images::Image image;
   Polygon outline_um;
   std::vector<Adhesion> adhesions;
-  std::vector<Fibre> fibres() const { return find_fibres(image, outline_um, adhesions, kPixel_um, {}); }
+  std::vector<Fibre> fibres() const { return cells::find_fibres(image, outline_um, adhesions, kPixel_um, {}); }
 };
 
 Scene scene_of(std::uint64_t seed) {
@@ -106,4 +106,4 @@ TEST(Fibres, do_not_depend_on_gain_and_offset) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

@@ -1,11 +1,11 @@
 /// What the fit tells its user of a cell as a whole.
-#include "mbtfm/fit_results.h"
+#include "mbtfm/tensions/fit_results.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
@@ -13,7 +13,7 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
   for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
   test::TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 4000, 0.1, 7);
   const EnsembleFit fit = test::fit_own_network(scene);
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network());
   const FitSummary summary = summary_of(
       fit, scene.data, {.cell = cell, .network = scene.cables.network(), .beads = scene.beads}, networks, {});
@@ -30,9 +30,9 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
   int n = 0;
   for (std::uint64_t seed = 5; seed < 8; ++seed) {
     test::TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 2000, 0.01, 7, {.seed = 100 + seed});
-    std::vector<network::CableNetwork> networks;
+    std::vector<cables::CableNetwork> networks;
     for (int m = 0; m < 2; ++m) {
-      networks.emplace_back(network::generate_network(cell, {.seed = 10 * seed + m}).network);
+      networks.emplace_back(mesh::generate_network(cell, {.seed = 10 * seed + m}).network);
     }
     const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {.loss = "squares"}, 2, {});
     const std::vector<AdhesionForce> forces = forces_of(fit, cell);
@@ -78,7 +78,7 @@ TEST(FitSummary, surface_tension_of_a_regular_network_is_root_three_times_tensio
   constexpr int kSide = 40;
   constexpr double kEdge_um = 0.7, kTension_nN = 0.06;
   Cell cell;
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(regular_sheet(kSide, kEdge_um, cell.outline_um));
   EnsembleFit fit;
   fit.fibre_ids = {0};
@@ -93,4 +93,4 @@ TEST(FitSummary, surface_tension_of_a_regular_network_is_root_three_times_tensio
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

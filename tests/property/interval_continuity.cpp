@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "mbtfm/ensemble.h"
+#include "mbtfm/tensions/ensemble.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -18,7 +18,7 @@ struct Case {
   std::string name;
   double noise = 0;
   TensionScene scene;
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
 };
 
 Case of_reference(const std::string& name, double noise, unsigned seed) {
@@ -41,9 +41,9 @@ Case of_round_cell(int n_meshes, double noise, unsigned seed) {
          test::scene_of(cell, tensions, 600, noise, seed),
          {}};
   for (int m = 0; m < n_meshes; ++m) {
-    network::NetworkParameters p;
+    mesh::NetworkParameters p;
     p.seed = static_cast<std::uint64_t>(m + 1);
-    c.networks.emplace_back(network::generate_network(cell, p).network);
+    c.networks.emplace_back(mesh::generate_network(cell, p).network);
   }
   return c;
 }
@@ -129,4 +129,4 @@ TEST(Continuity, tensions_and_interval_ends_follow_the_data) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -8,7 +8,7 @@
 #include "tests/support/random_cell.h"
 #include "tests/support/valid_network.h"
 
-namespace mbtfm::network {
+namespace mbtfm::mesh {
 namespace {
 
 using testing::expect_valid;
@@ -196,4 +196,4 @@ TEST(Mesh, scales_with_the_unit_of_length) {
 }
 
 }  // namespace
-}  // namespace mbtfm::network
+}  // namespace mbtfm::mesh

@@ -1,11 +1,11 @@
 /// How far the forces that one cell's tensions exert differ from mesh to mesh.
 #include <gtest/gtest.h>
 
-#include "network/cables.h"
-#include "network/mesh.h"
+#include "network/cables/cables.h"
+#include "network/mesh/mesh.h"
 #include "tests/support/random_cell.h"
 
-namespace mbtfm::network {
+namespace mbtfm::mesh {
 namespace {
 
 /// Variance of all adhesion forces over the meshes, in parts of their mean's square.
@@ -14,7 +14,7 @@ double variance_of_forces(const Cell& cell, const NetworkParameters& formulation
   for (int m = 1; m <= n_meshes; ++m) {
     NetworkParameters parameters = formulation;
     parameters.seed = static_cast<std::uint64_t>(m);
-    const CableNetwork cables(generate_network(cell, parameters).network);
+    const cables::CableNetwork cables(generate_network(cell, parameters).network);
     std::vector<double> tensions_nN;
     for (const int id : cables.fibre_ids()) tensions_nN.push_back(id == 0 ? 0.06 : 0.5 + id % 5);
     forces.push_back(cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN)));
@@ -40,4 +40,4 @@ TEST(MeshSpread, links_to_second_neighbours_gain_more_than_a_second_mesh) {
 }
 
 }  // namespace
-}  // namespace mbtfm::network
+}  // namespace mbtfm::mesh

@@ -1,12 +1,12 @@
-#include "mbtfm/missing_adhesions.h"
+#include "mbtfm/tensions/missing_adhesions.h"
 
 #include <gtest/gtest.h>
 
-#include "mbtfm/common_motion.h"
-#include "mbtfm/fit_results.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -35,7 +35,7 @@ struct Hidden {
     for (const Vec2 place : kPlaces) {
       discs.push_back({.centre_um = place, .semi_major_um = 0.6, .semi_minor_um = 0.4, .angle_rad = 1});
     }
-    const auto gel = substrate::make_greens(kGel, {.model = "layer"}, 1);
+    const auto gel = greens::make_greens(kGel, {.model = "layer"}, 1);
     const Eigen::Vector4d forces(kForce_nN.x, kForce_nN.y, -kForce_nN.x, -kForce_nN.y);
     scene.displacement_um += gel->compliance_um_per_nN(scene.points_um, discs) * forces;
   }
@@ -43,7 +43,7 @@ struct Hidden {
     test::measure(scene, noise, seed);
     LinearData data =
         reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
-    std::vector<network::CableNetwork> networks;
+    std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
     const EnsembleFit fit = fit_ensemble(networks, data, scene.adhesion_ids, {}, 1, {});
     return missing_adhesions(fit, data, cell, kGel, 1);
@@ -77,4 +77,4 @@ TEST(MissingAdhesions, a_cell_without_room_or_beads_has_none) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -1,11 +1,11 @@
 /// Which model the criteria prefer, over many draws of the beads' noise.
-#include "mbtfm/model_checks.h"
+#include "mbtfm/tensions/model_checks.h"
 
 #include <gtest/gtest.h>
 
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 /// One fibre, pulling with this.
@@ -77,4 +77,4 @@ TEST(ModelScores, BIC_finds_a_fibre_that_pulls_once_the_beads_are_many) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -1,4 +1,4 @@
-#include "mbtfm/model_error.h"
+#include "mbtfm/tensions/model_error.h"
 
 #include <gtest/gtest.h>
 
@@ -9,10 +9,10 @@
 #include <numbers>
 #include <random>
 
-#include "mbtfm/model_checks.h"
+#include "mbtfm/tensions/model_checks.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -120,8 +120,8 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
   Cell cell = test::round_cell(14, 16);
   for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.01, 7, {.seed = 5});
-  std::vector<network::CableNetwork> networks;  // twice the same, and not the cell's: only the misfit tells of errors
-  for (int i = 0; i < 2; ++i) networks.emplace_back(network::generate_network(cell, {.seed = 1}).network);
+  std::vector<cables::CableNetwork> networks;  // twice the same, and not the cell's: only the misfit tells of errors
+  for (int i = 0; i < 2; ++i) networks.emplace_back(mesh::generate_network(cell, {.seed = 1}).network);
   const auto fitted = [&](const Eigen::VectorXd& more_nN) {
     DisplacementField beads = scene.beads;
     const Eigen::VectorXd more_um = scene.compliance_um_per_nN * more_nN;
@@ -236,12 +236,12 @@ OverStated errors_over_stated(const char* reach_of_truth, int n_meshes) {
   tensions << 0.06, 3, 4, 2, 3, 2;
   for (unsigned seed = 1; seed <= 4; ++seed) {
     TensionScene scene =
-        test::scene_of(network::generate_network(cell, {.seed = seed, .link_reach = reach_of_truth}).network, tensions,
+        test::scene_of(mesh::generate_network(cell, {.seed = seed, .link_reach = reach_of_truth}).network, tensions,
                        ellipses, 3000, seed);
     test::measure(scene, 0.005, seed);
-    std::vector<network::CableNetwork> networks;
+    std::vector<cables::CableNetwork> networks;
     for (int m = 1; m <= n_meshes; ++m)
-      networks.emplace_back(network::generate_network(cell, {.seed = 100 * seed + static_cast<unsigned>(m)}).network);
+      networks.emplace_back(mesh::generate_network(cell, {.seed = 100 * seed + static_cast<unsigned>(m)}).network);
     const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2, {});
     EXPECT_TRUE(fit.report.converged) << fit.report.reason;
     for (std::size_t i = 1; i < 6; ++i) {
@@ -269,11 +269,11 @@ TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_e
   Cell cell = test::round_cell(12, 12);
   for (int i = 1; i <= 3; ++i) test::add_ventral(cell, i, i + 6);
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 2, 5, 4), 800, 0.05, 3);
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   for (std::uint64_t seed = 11; seed <= 14; ++seed) {
-    network::NetworkParameters p;
+    mesh::NetworkParameters p;
     p.seed = seed;
-    networks.emplace_back(network::generate_network(cell, p).network);
+    networks.emplace_back(mesh::generate_network(cell, p).network);
   }
   FitParameters parameters;
   parameters.n_meshes = 4;
@@ -308,9 +308,9 @@ TEST(ModelError, is_drawn_by_the_bootstrap_as_the_covariance_has_it) {
   Cell cell = test::round_cell(12, 12);
   for (int i = 1; i <= 3; ++i) test::add_ventral(cell, i, i + 6);
   TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 2, 5, 4), 800, 0.01, 3);
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   for (std::uint64_t seed = 11; seed <= 12; ++seed)
-    networks.emplace_back(network::generate_network(cell, {.seed = seed}).network);
+    networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
   FitParameters parameters;
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
   parameters.bootstrap = 80;
@@ -324,4 +324,4 @@ TEST(ModelError, is_drawn_by_the_bootstrap_as_the_covariance_has_it) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -1,17 +1,17 @@
-#include "mbtfm/placement.h"
+#include "mbtfm/tensions/placement.h"
 
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "mbtfm/error_budget.h"
-#include "mbtfm/fit_results.h"
-#include "mbtfm/series.h"
+#include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/series.h"
 #include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -28,7 +28,7 @@ struct ShiftedCell {
 
   /// Fitted on the network that made the forces.
   std::pair<EnsembleFit, FoundPlacement> fit(const std::string& setting = "auto") const {
-    std::vector<network::CableNetwork> networks;
+    std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
     LinearData data = data_of(scene.beads);
     const Trial start = uniform_start({networks.front(), data.reduced, scene.adhesion_ids});
@@ -70,7 +70,7 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
   const auto model = [&](const Placement& at) -> Eigen::VectorXd {
     DisplacementField places;
     for (const Vec2 p : beads) places.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
-    const auto gel = substrate::make_greens(kGel, {.model = "half-space"}, 1);
+    const auto gel = greens::make_greens(kGel, {.model = "half-space"}, 1);
     const Eigen::VectorXd seen =
         gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
     Eigen::VectorXd u(seen.size());
@@ -104,7 +104,7 @@ TEST(Placement, what_carries_a_bead_changes_its_displacement_by_as_much_as_the_f
     by.segment<2>(2 * i) << way.x, way.y;
   }
   for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
-  const auto gel = substrate::make_greens(kGel, {.model = "half-space"}, 1);
+  const auto gel = greens::make_greens(kGel, {.model = "half-space"}, 1);
   const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
   const Eigen::VectorXd wanted =
       (gel->compliance_um_per_nN(carried, ellipses) - gel->compliance_um_per_nN(beads, ellipses)) * forces;
@@ -168,7 +168,7 @@ TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
 
 TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_known) {
   const ShiftedCell still = shifted_cell({}, 0, 0.05, 3);
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
   LinearData known = still.data_of(still.scene.beads);
   const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1, {});
@@ -200,7 +200,7 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
 
 TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   const ShiftedCell shifted = shifted_cell({}, 0, 0.05, 4);
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(shifted.scene.cables.network(), shifted.scene.cables.parameters());
   const LinearData data = shifted.data_of(shifted.scene.beads);
   const std::pair<EnsembleFit, FoundPlacement> known = shifted.fit("on");
@@ -238,4 +238,4 @@ TEST(Placement, added_motions_reduce_as_if_they_had_been_there_from_the_first) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/stage.h"
 #include "pipeline/cost/accuracy.h"
 #include "pipeline/report/error_budget.h"
 #include "pipeline/report/provenance.h"
@@ -14,6 +13,7 @@
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/run_record.h"
 #include "pipeline/runner/verify.h"
+#include "pipeline/stage/stage.h"
 #include "tests/support/script_stages.h"
 #include "tests/support/temporary_folder.h"
 
@@ -76,7 +76,7 @@ class RecordsOfCells : public testing::Test {
     const auto expect = [&](const std::function<void()>& read) { expect_input_errors_only(what, read); };
     const fs::path run_json = cell_ / "run.json";
     const runner::BatchCell cell{.cell = cell_, .message = {}, .failed_stage = {}, .how = {}};
-    expect([&] { is_done(cell_, options_, look_at_cell(cell_, options_)); });
+    expect([&] { runner::is_done(cell_, options_, runner::look_at_cell(cell_, options_)); });
     expect([&] { runner::verify_cell(cell_); });
     expect([&] { runner::recorded_failure(cell_); });
     expect([&] { runner::last_summary(cell_, {}); });
@@ -84,9 +84,9 @@ class RecordsOfCells : public testing::Test {
     expect([&] { runner::write_batch_table(folder_ / "batch.csv", folder_.path(), {cell}, {}); });
     expect([&] { report::read_provenance(run_json); });
     expect([&] { report::error_budget_html(report::read_error_budget(run_json), "cell"); });
-    expect([&] { read_fit_summary(cell_ / "4_fit/fit.json"); });
+    expect([&] { files::read_fit_summary(cell_ / "4_fit/fit.json"); });
     for (const runner::Stage& stage : runner::stages()) {
-      expect([&] { read_report(runner::record_file_of(cell_, stage)); });
+      expect([&] { stage::read_report(runner::record_file_of(cell_, stage)); });
       expect([&] { runner::series_outputs(cell_, stage); });
       expect([&] { runner::is_begun(runner::record_file_of(cell_, stage)); });
     }
@@ -95,21 +95,21 @@ class RecordsOfCells : public testing::Test {
   /// The same for all that writes what it read into another record. run.json is then another.
   void rewrite_all(const std::string& what) {
     const fs::path run_json = cell_ / "run.json";
-    const std::string before = read_text(run_json);
+    const std::string before = files::read_text(run_json);
     for (const runner::StageState state : {runner::StageState::up_to_date, runner::StageState::not_asked}) {
       runner::CellOutcome outcome;
       for (const runner::Stage& stage : runner::stages())
         outcome.stages.push_back({.stage = stage.name, .status = {state, ""}, .failure = {}});
       expect_input_errors_only(what, [&] { runner::write_run_record(cell_, options_, outcome); });
-      write_text(run_json, before);
+      files::write_text(run_json, before);
     }
     expect_input_errors_only(
         what, [&] { cost::record_accuracy(cell_, 0.1, {.preset = "fast", .reached = {}, .verdict = "met"}); });
-    write_text(run_json, before);
+    files::write_text(run_json, before);
   }
 
   void replace_each_value_of(const std::string& file) {
-    const std::string whole = read_text(cell_ / file);
+    const std::string whole = files::read_text(cell_ / file);
     const auto json = ordered_json::parse(whole);
     std::vector<ordered_json::json_pointer> places;
     collect(json, ordered_json::json_pointer(), places);
@@ -121,14 +121,14 @@ class RecordsOfCells : public testing::Test {
       const auto at = text.find('"' + std::string(kMark) + '"');
       for (std::size_t k = 0; k < replacements().size(); ++k) {
         const std::string& other = replacements()[k];
-        write_text(cell_ / file, std::string(text).replace(at, std::string(kMark).size() + 2, other));
+        files::write_text(cell_ / file, std::string(text).replace(at, std::string(kMark).size() + 2, other));
         const std::string what = file + " with " + place.to_string() + " = " + other;
         read_all(what);
         if (k % 3 == 0) rewrite_all(what);  // null, a name, a number too large: the slower of the two
         if (HasFailure()) return;           // one says it
       }
     }
-    write_text(cell_ / file, whole);
+    files::write_text(cell_ / file, whole);
     EXPECT_GT(n_errors_, static_cast<int>(places.size())) << "most replacements are errors of somebody";
   }
 
@@ -152,33 +152,33 @@ TEST_F(RecordsOfCells, a_fit_summary_of_any_other_values_is_an_input_error_at_mo
 
 TEST_F(RecordsOfCells, a_record_cut_short_or_too_deep_is_an_input_error_at_most) {
   for (const char* file : {"run.json", "4_fit/record.json", "4_fit/fit.json"}) {
-    const std::string whole = read_text(cell_ / file);
+    const std::string whole = files::read_text(cell_ / file);
     for (std::size_t n = 0; n < whole.size(); n += 1 + whole.size() / 29) {
-      write_text(cell_ / file, whole.substr(0, n));
+      files::write_text(cell_ / file, whole.substr(0, n));
       read_all(std::string(file) + " cut after " + std::to_string(n));
     }
     for (const std::string& value : {std::string("1e999"), std::string(100000, '[') + std::string(100000, ']')}) {
-      write_text(cell_ / file, "{\"stages\": " + value + "}");
+      files::write_text(cell_ / file, "{\"stages\": " + value + "}");
       read_all(std::string(file) + " with " + value.substr(0, 10));
     }
-    write_text(cell_ / file, whole);
+    files::write_text(cell_ / file, whole);
   }
 }
 
 TEST_F(RecordsOfCells, the_whole_report_and_run_stand_damage_of_each_part_of_the_records) {
   for (const char* file : {"run.json", "4_fit/record.json", "4_fit/fit.json"}) {
-    const std::string whole = read_text(cell_ / file);
+    const std::string whole = files::read_text(cell_ / file);
     const auto json = ordered_json::parse(whole);
     for (const auto& [key, value] : json.items()) {
       for (const ordered_json& other : {ordered_json(), ordered_json(1), ordered_json("x"), ordered_json{1, 2}}) {
         ordered_json changed = json;
         changed[key] = other;
-        write_text(cell_ / file, changed.dump());
+        files::write_text(cell_ / file, changed.dump());
         expect_input_errors_only(std::string(file) + " with " + key + " = " + other.dump(), [&] {
           runner::run_cell(cell_, options_);
           report::update_report(cell_);
         });
-        write_text(cell_ / file, whole);
+        files::write_text(cell_ / file, whole);
       }
     }
   }

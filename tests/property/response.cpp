@@ -5,6 +5,7 @@
 
 #include <random>
 
+#include "substrate/greens/models.h"
 #include "tests/support/substrate_scene.h"
 
 namespace mbtfm::substrate {
@@ -46,8 +47,8 @@ MatrixXd whole(const Response& response) {
 }
 
 std::unique_ptr<Substrate> gel(const std::string& model, double thickness_um) {
-  return make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = thickness_um}, {.model = model},
-                     2);
+  return greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = thickness_um},
+                             {.model = model}, 2);
 }
 
 class BlockedResponse : public testing::TestWithParam<std::pair<const char*, double>> {

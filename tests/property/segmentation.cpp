@@ -1,10 +1,10 @@
 /// What must not change a segmentation, or change it in a known way.
 #include <gtest/gtest.h>
 
-#include "segment/segment_cell.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
@@ -12,10 +12,10 @@ using namespace mbtfm::test;
 constexpr double kPixel_um = DrawnScene::kPixel_um;
 constexpr double kSide_um = 25.6;
 
-Segmentation segmented(const Image& adhesion, const Image& actin) {
+Segmentation segmented(const images::Image& adhesion, const images::Image& actin) {
   SegmentParameters p;
   p.pixel_size_um = kPixel_um;
-  return segment_cell(Channel{"adhesion", adhesion}, Channel{"actin", actin}, p);
+  return segment_cell(images::Channel{"adhesion", adhesion}, images::Channel{"actin", actin}, p);
 }
 
 /// `b` is `a` after `move`: same numbers, every adhesion and fibre type again.
@@ -71,12 +71,12 @@ TEST(Segmentation, moves_with_the_image) {
 
 TEST(Segmentation, does_not_depend_on_gain_and_offset) {
   const DrawnScene s = drawn_scene(20, 6);
-  Image adhesion = s.adhesion_image, actin = s.actin_image;
-  for (Image* image : {&adhesion, &actin})
+  images::Image adhesion = s.adhesion_image, actin = s.actin_image;
+  for (images::Image* image : {&adhesion, &actin})
     for (float& value : image->pixels) value = 4 * value + 1024;  // powers of two: exact but for the last bits
   const Segmentation a = segmented(s.adhesion_image, s.actin_image), b = segmented(adhesion, actin);
   expect_moved(a, b, [](Vec2 p) { return p; });
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -1,14 +1,16 @@
 /// A time series: every frame is a fit of its own on one cell, and follows what the tensions do.
-#include "mbtfm/series.h"
+#include "mbtfm/tensions/series.h"
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 constexpr double kNoise = 0.05;
@@ -43,7 +45,7 @@ Series make_series(int n_frames) {
 }
 
 std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kept = {}) {
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(series.scene.cables.network());
   FitParameters parameters;
   parameters.n_meshes = 1;
@@ -149,7 +151,7 @@ TEST(Series, fits_read_back_are_kept_for_frames_whose_file_is_the_same) {
   const auto written = [&](const std::vector<FrameFit>& fits) {
     write_tracks(folder / "t.csv", fits, {}, 30);
     write_frames(folder / "f.csv", fits, 30);
-    return read_text(folder / "t.csv") + read_text(folder / "f.csv");
+    return files::read_text(folder / "t.csv") + files::read_text(folder / "f.csv");
   };
   EXPECT_EQ(written(known), written(whole));  // the same bytes
 }
@@ -166,7 +168,7 @@ TEST(Series, time_begins_with_the_first_frame) {
   write_frames(folder / "frames.csv", fits, 30);
   write_tracks(folder / "tracks.csv", fits, {}, 30);
   for (const char* name : {"frames.csv", "tracks.csv"}) {
-    const CsvTable table(folder / name);
+    const files::CsvTable table(folder / name);
     EXPECT_EQ(table.number(0, "time_s"), 0) << name;
     EXPECT_EQ(table.number(1, "time_s"), 90) << name;
   }
@@ -175,10 +177,10 @@ TEST(Series, time_begins_with_the_first_frame) {
 TEST(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
   const test::TemporaryFolder folder;
   Series series = make_series(2);
-  write_text(folder / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
-  write_displacement(folder / "displacement_0001.csv", series.frames[0].beads);
+  files::write_text(folder / "frames.csv", "frame,image,refused\n1,a.tif,\n2,b.tif,\n");
+  files::write_displacement(folder / "displacement_0001.csv", series.frames[0].beads);
   series.frames[1].beads[7].position_um.x += 1;
-  write_displacement(folder / "displacement_0002.csv", series.frames[1].beads);
+  files::write_displacement(folder / "displacement_0002.csv", series.frames[1].beads);
   try {
     read_series(folder / "");
     FAIL() << "beads of another place were taken";
@@ -188,4 +190,4 @@ TEST(Series, frames_of_other_beads_are_an_error_that_names_the_file) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

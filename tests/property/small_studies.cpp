@@ -8,7 +8,7 @@
 #include <set>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/small_study.h"
 #include "tests/support/temporary_folder.h"
@@ -54,14 +54,14 @@ std::vector<std::string> header_of(const std::string& text) {
 }
 
 /// The fibres' force is a difference.
-bool may_be_negative(const CsvTable& table, int row) {
+bool may_be_negative(const files::CsvTable& table, int row) {
   for (const char* column : {"quantity", "force"}) {
     if (table.has(column) && table.text(row, column) == "fibre_force_nN") return true;
   }
   return false;
 }
 
-void expect_intervals(const CsvTable& table, int row, const std::string& name) {
+void expect_intervals(const files::CsvTable& table, int row, const std::string& name) {
   for (const Bounded& b : kIntervals) {
     if (!table.has(b.value) || !table.has(b.low)) continue;
     const auto value = table.optional_number(row, b.value), low = table.optional_number(row, b.low),
@@ -79,7 +79,7 @@ void expect_intervals(const CsvTable& table, int row, const std::string& name) {
 }
 
 void expect_table(const std::string& text, const std::string& name) {
-  const CsvTable table(text, name);
+  const files::CsvTable table(text, name);
   const std::vector<std::string> header = header_of(text);
   for (int row = 0; row < table.n_rows(); ++row) {
     for (const std::string& column : header) {

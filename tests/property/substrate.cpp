@@ -1,7 +1,8 @@
 /// Symmetries of the half-space and the layer.
 #include <gtest/gtest.h>
 
-#include "substrate/layer.h"
+#include "substrate/greens/layer.h"
+#include "substrate/greens/models.h"
 #include "tests/support/substrate_scene.h"
 
 namespace mbtfm::substrate {
@@ -17,7 +18,7 @@ class ClosedForm : public testing::TestWithParam<const char*> {
  protected:
   Eigen::MatrixXd compliance(const Gel& gel, const std::vector<Vec2>& points, const std::vector<Ellipse>& ellipses,
                              int threads = 2) const {
-    return make_greens(gel, test::model_named(GetParam()), threads)->compliance_um_per_nN(points, ellipses);
+    return greens::make_greens(gel, test::model_named(GetParam()), threads)->compliance_um_per_nN(points, ellipses);
   }
 };
 
@@ -107,7 +108,7 @@ TEST_P(ClosedForm, forces_superpose) {
   const auto points = test::scattered_points(30, 40);
   const auto ellipses = test::scattered_ellipses(4, 30);
   const std::vector<Vec2> forces = {{1, 2}, {-3, 0.5}, {0, 0}, {2, -1}};
-  const auto model = make_greens(kGel, test::model_named(GetParam()), 2);
+  const auto model = greens::make_greens(kGel, test::model_named(GetParam()), 2);
   const Eigen::MatrixXd g = model->compliance_um_per_nN(points, ellipses);
   const auto sum = model->displacements_um(points, ellipses, forces);
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -127,13 +128,13 @@ TEST(Layer, tends_to_the_half_space_as_it_grows_thick) {
   const auto points = test::scattered_points(50, 10);
   const auto ellipses = test::scattered_ellipses(3, 8);
   const Eigen::MatrixXd limit =
-      make_greens(kGel, test::model_named("half-space"), 1)->compliance_um_per_nN(points, ellipses);
+      greens::make_greens(kGel, test::model_named("half-space"), 1)->compliance_um_per_nN(points, ellipses);
   double previous = 0;
   for (const double thickness : {1e2, 1e3, 1e4}) {
     Gel gel = kGel;
     gel.thickness_um = thickness;
     const Eigen::MatrixXd layer =
-        make_greens(gel, test::model_named("layer"), 1)->compliance_um_per_nN(points, ellipses);
+        greens::make_greens(gel, test::model_named("layer"), 1)->compliance_um_per_nN(points, ellipses);
     const double difference = (layer - limit).norm();
     // the correction is a constant over h to leading order, the next term in (r/h)²: 1/10 to (20/100)² at first
     if (previous > 0) {
@@ -150,7 +151,7 @@ TEST(IncompressibleGel, is_the_limit_of_nearly_incompressible_ones) {
   const std::vector<Vec2> points = {{0, 0}, {3, 1}, {20, 5}};
   for (const std::string model : {"half-space", "layer"}) {
     const auto compliance = [&](const Gel& gel) {
-      return make_greens(gel, {.model = model}, 1)->compliance_um_per_nN(points, {ellipse});
+      return greens::make_greens(gel, {.model = model}, 1)->compliance_um_per_nN(points, {ellipse});
     };
     // smooth in nu: 1e-4 of it changes the compliance by some 1e-4; a layer's own numbers are right to as much
     EXPECT_LE((compliance(incompressible) - compliance(nearly)).norm(), 2e-3 * compliance(nearly).norm()) << model;

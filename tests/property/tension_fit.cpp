@@ -1,15 +1,15 @@
 /// What the tension fit must do over many repeats: its errors are as small as the data allow and as large as it says.
-#include "mbtfm/tension_fit.h"
+#include "mbtfm/tensions/tension_fit.h"
 
 #include <gtest/gtest.h>
 
-#include "mbtfm/cross_validation.h"
-#include "mbtfm/model_checks.h"
-#include "mbtfm/robust.h"
-#include "pipeline/contract/parallel.h"
+#include "mbtfm/tensions/cross_validation.h"
+#include "mbtfm/tensions/model_checks.h"
+#include "mbtfm/tensions/robust.h"
+#include "pipeline/numerics/parallel.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::fit_own_network;
@@ -79,7 +79,7 @@ TEST(TensionFit, the_bias_of_forces_that_bend_is_told_where_noise_is_large) {
   const double bias = bending_bias_nN(problem, truth, J, covariance, covariance, 2)[0];
   constexpr int kRepeats = 1600;  // tell a bias of a fiftieth of the tension from chance by five standard errors
   std::vector<double> rests(kRepeats);
-  parallel_for(kRepeats, 2, [&](int repeat) {
+  numerics::parallel_for(kRepeats, 2, [&](int repeat) {
     std::mt19937_64 random(static_cast<unsigned>(repeat) + 1);
     std::normal_distribution<double> normal(0, 1);
     Eigen::VectorXd noise(J.rows());
@@ -263,7 +263,7 @@ TEST(TensionFit, a_mirrored_and_turned_experiment_gives_the_same_tensions) {
   Network network = reference.network;
   for (Vec2& v : network.vertices_um) v = turned(v);
   TensionScene other = tension_scene("case_21", 500, 0.07, 7);
-  other.cables = network::CableNetwork(network);
+  other.cables = cables::CableNetwork(network);
   std::vector<Vec2> points;
   for (Bead& bead : other.beads) {
     bead.position_um = turned(bead.position_um);
@@ -275,8 +275,8 @@ TEST(TensionFit, a_mirrored_and_turned_experiment_gives_the_same_tensions) {
     e.centre_um = turned(e.centre_um);
     e.angle_rad = -1.5707963267948966 - e.angle_rad;
   }
-  const auto gel = substrate::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-                                          {.model = "layer"}, 2);
+  const auto gel = greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+                                       {.model = "layer"}, 2);
   other.data = reduce(other.beads, gel->compliance_um_per_nN(points, ellipses));
   for (const std::string loss : {"squares", "tukey"}) {
     FitParameters parameters;
@@ -339,7 +339,7 @@ TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
     if (link.fibre_id == removed) link.fibre_id = 0;
   }
   TensionScene without = tension_scene("case_21", 2000, 0.05, 9);
-  without.cables = network::CableNetwork(network);
+  without.cables = cables::CableNetwork(network);
   const double rise =
       2 * (fit_own_network(without, parameters).meshes[0].fit.trial.objective - fit.meshes[0].fit.trial.objective);
   // The local misfit is quadratic; forces are nearly linear in the tensions: a fifth.
@@ -370,7 +370,7 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
     if (link.fibre_id == 3) link.fibre_id = 2;
   }
   TensionScene lacking = test::scene_of(cell, Eigen::Vector4d(0.06, 4, 5, 6), 3000, 0.05, 10);
-  lacking.cables = network::CableNetwork(network);
+  lacking.cables = cables::CableNetwork(network);
   const EnsembleFit without = fit_own_network(lacking);
   const std::vector<MissingFibre> missing = missing_fibres(without, cell.adhesions);
   ASSERT_FALSE(missing.empty());
@@ -407,4 +407,4 @@ TEST(ModelChecks, tensions_drawn_by_type_explain_the_beads_better_than_with_type
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

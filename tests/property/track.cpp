@@ -1,9 +1,9 @@
 #include <gtest/gtest.h>
 
-#include "segment/track.h"
+#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 constexpr double kSide = 192;
@@ -14,8 +14,8 @@ test::BeadPair small_pair() {
 
 /// new(i, j) = old(place(i, j))
 template <class Place>
-Image rearranged(const Image& image, const Place& place) {
-  Image result = image;
+images::Image rearranged(const images::Image& image, const Place& place) {
+  images::Image result = image;
   for (int j = 0; j < image.height; ++j) {
     for (int i = 0; i < image.width; ++i) {
       const auto [a, b] = place(i, j);
@@ -78,7 +78,7 @@ TEST(TrackProperty, a_scene_turned_by_a_quarter_gives_the_turned_field) {
 
 TEST(TrackProperty, gain_and_offset_of_an_image_do_not_matter) {
   const auto pair = small_pair();
-  Image brighter = pair.stressed;
+  images::Image brighter = pair.stressed;
   for (float& value : brighter.pixels) value = 1.7f * value + 300;
   const auto same = [](Vec2 v) { return v; };
   expect_same(track_beads(pair.relaxed, pair.stressed, 1.0), track_beads(pair.relaxed, brighter, 1.0), same, same);
@@ -119,4 +119,4 @@ TEST(TrackProperty, any_number_of_threads_gives_the_same_numbers) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

@@ -4,11 +4,11 @@
 #include <numbers>
 #include <random>
 
-#include "mbtfm/fttc.h"
+#include "mbtfm/tractions/fttc.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/ellipse_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tractions {
 namespace {
 
 using test::ellipse_scene;
@@ -117,7 +117,7 @@ TEST(Tractions, forces_are_found_on_gels_of_any_compressibility) {
     for (const double nu : {0.0, 0.25, 0.49, 0.4999, 0.4999999}) {
       TractionInputs inputs = inputs_of(scene);
       inputs.gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 20};
-      const auto greens = substrate::make_greens(inputs.gel, {.model = model}, 2);
+      const auto greens = greens::make_greens(inputs.gel, {.model = model}, 2);
       const std::vector<Vec2> u = greens->displacements_um(points, ellipses, scene.forces_nN);
       for (std::size_t i = 0; i < u.size(); ++i) inputs.beads[i].displacement_um = u[i];
       for (const auto& [method, most] : {std::pair{"fttc", 0.05}, {"adhesion-forces", 1e-6}}) {
@@ -190,7 +190,7 @@ TEST(Fttc, cross_validation_smooths_more_where_there_is_more_noise) {
     const EllipseScene scene = ellipse_scene(96, noise, 2, 0, 64, false);
     const LatticeProblem problem(
         scene.field, scene.gel,
-        {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+        {.model = greens::GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
     TikhonovSolver solver(problem);
     const LambdaScan scan = scan_lambda(problem, solver);
     EXPECT_GT(scan.by_gcv, before);
@@ -221,7 +221,7 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
   const EllipseScene scene = ellipse_scene(96, 0);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  const auto greens = substrate::make_greens(scene.gel, {.model = "half-space"}, 2);
+  const auto greens = greens::make_greens(scene.gel, {.model = "half-space"}, 2);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> place(0, 64);
   std::vector<Vec2> points;
@@ -330,4 +330,4 @@ TEST(Tractions, bad_input_is_named) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tractions

@@ -1,15 +1,15 @@
-#include "mbtfm/under_load.h"
+#include "mbtfm/tensions/under_load.h"
 
 #include <gtest/gtest.h>
 
-#include "mbtfm/common_motion.h"
-#include "mbtfm/fit_results.h"
-#include "mbtfm/placement.h"
-#include "pipeline/contract/effects.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/placement.h"
+#include "pipeline/stage/effects.h"
 #include "tests/support/layer_data.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::TensionScene;
@@ -38,7 +38,7 @@ struct PullingCell {
   }
   /// Fitted on the network that made the forces.
   EnsembleFit fit(LinearData data) const {
-    std::vector<network::CableNetwork> networks;
+    std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
     return fit_ensemble(networks, data, scene.adhesion_ids, {}, 1, {});
   }
@@ -78,7 +78,7 @@ TEST(UnderLoad, tensions_of_a_cell_seen_under_load_are_right_by_the_beads_there)
     const PullingCell cell = pulling_cell(1, kNoise, seed);
     ASSERT_GT(cell.scene.largest_um, 0.4) << "an adhesion's radius";
     const BeadsOfState state = cell.state(cell.at_rest);
-    EXPECT_TRUE(state.effect.is_on) << line_of(state.effect);
+    EXPECT_TRUE(state.effect.is_on) << stage::line_of(state.effect);
     // three tensions: chance exceeds three standard errors of their sum of squares once in hundreds
     EXPECT_LT(error_of(cell, cell.fit(state.data)), 3);
     EXPECT_GT(error_of(cell, cell.fit(cell.data_of(cell.at_rest))), 3);
@@ -91,7 +91,7 @@ TEST(UnderLoad, beads_that_are_given_under_load_stay_there) {
     SCOPED_TRACE(seed);
     const PullingCell cell = pulling_cell(1, kNoise, seed);
     const BeadsOfState state = cell.state(cell.scene.beads);
-    EXPECT_FALSE(state.effect.is_on) << line_of(state.effect);
+    EXPECT_FALSE(state.effect.is_on) << stage::line_of(state.effect);
     EXPECT_EQ(state.beads[7].position_um.x, cell.scene.beads[7].position_um.x);
     // so clearly that the data under load are not asked for; by them it is the same
     const auto fail = [](const DisplacementField&) -> LinearData { throw std::logic_error("asked"); };
@@ -113,4 +113,4 @@ TEST(UnderLoad, beads_that_hardly_move_are_not_asked) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

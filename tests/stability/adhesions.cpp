@@ -4,19 +4,19 @@
 #include <limits>
 
 #include "pipeline/contract/errors.h"
-#include "segment/emptiness.h"
-#include "segment/segment_cell.h"
+#include "segment/cells/emptiness.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
 
 TEST(Adhesions, names_a_pixel_that_is_no_number) {
   test::hard_case("a NaN in the image", "an error that names the pixel");
-  Image image = even_image(20, 20, 1);
+  images::Image image = even_image(20, 20, 1);
   image.at(3, 4) = std::numeric_limits<float>::quiet_NaN();
   EXPECT_THROW(find_adhesions(image, 0.1, AdhesionParameters{}), InvalidData);
 }
@@ -32,11 +32,11 @@ TEST(Adhesions, takes_saturated_adhesions) {
 }
 
 /// The error of a segmentation that finds nothing.
-std::string finding(const std::optional<Image>& adhesion, const std::optional<Image>& actin) {
+std::string finding(const std::optional<images::Image>& adhesion, const std::optional<images::Image>& actin) {
   SegmentParameters p;
   p.pixel_size_um = 0.1;
-  const auto channel = [](const std::optional<Image>& image) {
-    return image ? std::optional(Channel{"image", *image}) : std::nullopt;
+  const auto channel = [](const std::optional<images::Image>& image) {
+    return image ? std::optional(images::Channel{"image", *image}) : std::nullopt;
   };
   try {
     segment_cell(channel(adhesion), channel(actin), p);
@@ -46,8 +46,8 @@ std::string finding(const std::optional<Image>& adhesion, const std::optional<Im
   return "a cell";
 }
 
-Image noisy(float level, double noise, std::uint64_t seed) {
-  Image image = even_image(400, 300, level);
+images::Image noisy(float level, double noise, std::uint64_t seed) {
+  images::Image image = even_image(400, 300, level);
   add_noise(image, noise, seed);
   return image;
 }
@@ -84,7 +84,7 @@ TEST(Emptiness, noise_alone_is_called_so_and_says_by_how_much) {
 
 TEST(Emptiness, spots_of_the_wrong_size_are_called_so) {
   test::hard_case("all spots are smaller than asked for", "an error with their number and the parameter");
-  Image image = noisy(100, 5, 4);
+  images::Image image = noisy(100, 5, 4);
   draw_ellipse(image, ellipse(1, {20, 15}, 0.8, 0.5, 0), 500, 0.15, 0.1);
   AdhesionParameters p;
   p.adhesion_smallest_um2 = 1;
@@ -103,7 +103,7 @@ TEST(Emptiness, a_picture_is_not_called_empty) {
 
 TEST(Emptiness, a_sheet_of_cells_is_called_so) {
   test::hard_case("touching cells fill the field", "an error that asks for single cells");
-  Image image = even_image(900, 900, 100);
+  images::Image image = even_image(900, 900, 100);
   for (int i = 0; i < 16; ++i)
     draw_ellipse(image, ellipse(1, {45.0 * (i % 4) + 22, 45.0 * (i / 4) + 22}, 52, 47, 0.3 * i), 100, 0.2, 0.2);
   for (float& value : image.pixels) value = std::min(value, 300.0f);
@@ -112,7 +112,7 @@ TEST(Emptiness, a_sheet_of_cells_is_called_so) {
   p.pixel_size_um = 0.2;
   p.outline.outline_largest_um2 = 20000;
   try {
-    segment_cell(std::nullopt, Channel{"sheet", image}, p);
+    segment_cell(std::nullopt, images::Channel{"sheet", image}, p);
     FAIL() << "a sheet of cells passes as one";
   } catch (const InputError& error) {
     EXPECT_EQ(error.expected, "single cells");
@@ -125,9 +125,9 @@ TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
     // noise summed over 7 x 7 pixels twice: clouds of all shapes, which no ellipse fits
-    Image image = noisy(0, 100, seed);
+    images::Image image = noisy(0, 100, seed);
     for (int round = 0; round < 2; ++round) {
-      Image sums = image;
+      images::Image sums = image;
       for (int row = 0; row < image.height; ++row)
         for (int column = 0; column < image.width; ++column) {
           float sum = 0;
@@ -147,7 +147,7 @@ TEST(Adhesions, of_a_texture_without_ellipses_are_valid) {
 
 TEST(Adhesions, are_not_the_bright_body_of_a_cell) {
   test::hard_case("a bright cell body without adhesions", "none, and the reason");
-  Image image = noisy(100, 5, 5);
+  images::Image image = noisy(100, 5, 5);
   draw_ellipse(image, ellipse(1, {20, 15}, 24, 16, 0.5), 1000, 0.15, 0.1);
   EXPECT_TRUE(find_adhesions(image, 0.1, {}).empty());
   test::came_out(why_no_adhesions(image, 0.1, {}));
@@ -156,4 +156,4 @@ TEST(Adhesions, are_not_the_bright_body_of_a_cell) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -10,11 +10,11 @@
 namespace mbtfm {
 namespace {
 
-using network::CableNetwork;
-using network::Equilibrium;
+using cables::CableNetwork;
+using cables::Equilibrium;
 
-Equilibrium solved(const CableNetwork& cables, const std::vector<double>& tensions) {
-  const Equilibrium equilibrium = cables.equilibrium(tensions);
+cables::Equilibrium solved(const cables::CableNetwork& cables, const std::vector<double>& tensions) {
+  const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
   test::expect_equilibrium(cables, tensions, equilibrium);
   EXPECT_TRUE(cables.adhesion_force_derivatives(tensions, equilibrium).allFinite());
   return equilibrium;
@@ -22,9 +22,9 @@ Equilibrium solved(const CableNetwork& cables, const std::vector<double>& tensio
 
 TEST(HardCables, without_tension_nothing_moves_and_nothing_pulls) {
   test::hard_case("nothing pulls; any position without stretch is at rest", "nothing moves, forces at rounding");
-  const CableNetwork cables(test::lattice({}));
+  const cables::CableNetwork cables(test::lattice({}));
   const std::vector<double> tensions(cables.fibre_ids().size(), 0);
-  const Equilibrium equilibrium = solved(cables, tensions);
+  const cables::Equilibrium equilibrium = solved(cables, tensions);
   EXPECT_EQ(equilibrium.positions_um, cables.network().vertices_um);
   EXPECT_LE(cables.adhesion_forces_nN(tensions, equilibrium).lpNorm<Eigen::Infinity>(), 1e-12);  // rounding of EA
 }
@@ -34,7 +34,7 @@ TEST(HardCables, one_strong_fibre_among_weak_cables) {
                   "convergence, no net force, no net torque; 5 networks");
   for (unsigned seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
-    const CableNetwork cables(test::lattice({.seed = seed}));
+    const cables::CableNetwork cables(test::lattice({.seed = seed}));
     std::vector<double> tensions(cables.fibre_ids().size(), 0.01);
     tensions[1] = 1000;
     solved(cables, tensions);
@@ -46,7 +46,7 @@ TEST(HardCables, only_the_network_or_only_the_fibres_pull) {
                   "the limit of a vanishing tension; 5 networks");
   for (unsigned seed = 1; seed <= 5; ++seed) {
     SCOPED_TRACE(seed);
-    const CableNetwork cables(test::lattice({.seed = seed}));
+    const cables::CableNetwork cables(test::lattice({.seed = seed}));
     std::vector<double> tensions(cables.fibre_ids().size(), 0);
     tensions[0] = 0.06;
     solved(cables, tensions);
@@ -62,7 +62,7 @@ TEST(HardCables, a_fibre_alone_collapses_in_a_slack_network_however_weakly_it_pu
       "over seventeen",
       "convergence for 10 to 1e-9 nN");
   const std::vector<Vec2> rim = test::on_circle(0, 360, 4);
-  const CableNetwork cables(test::mesh_of({rim, {{rim[1], {1, 2}}}}));
+  const cables::CableNetwork cables(test::mesh_of({rim, {{rim[1], {1, 2}}}}));
   for (const double t : {10., 0.1, 1e-3, 1e-6, 1e-9}) {
     SCOPED_TRACE(t);
     solved(cables, {0, t});
@@ -73,7 +73,7 @@ TEST(HardCables, any_axial_stiffness) {
   test::hard_case("EA from 1 to 1e6 nN: cables that stretch to any length, cables that do not stretch", "convergence");
   for (const double axial_stiffness : {1.0, 1e2, 1e4, 1e6}) {
     SCOPED_TRACE(axial_stiffness);
-    const CableNetwork cables(test::lattice({.seed = 2}), {.axial_stiffness_nN = axial_stiffness});
+    const cables::CableNetwork cables(test::lattice({.seed = 2}), {.axial_stiffness_nN = axial_stiffness});
     solved(cables, test::random_tensions_nN(cables.fibre_ids().size(), 2));
   }
 }
@@ -84,7 +84,7 @@ TEST(HardCables, fewer_than_two_adhesions_have_no_equilibrium_but_a_point) {
     Network net = test::lattice({.columns = 4, .rows = 4});
     for (int& a : net.adhesion_id) a = 0;
     net.adhesion_id[0] = id;
-    EXPECT_THROW(CableNetwork{net}, InvalidData);
+    EXPECT_THROW(cables::CableNetwork{net}, InvalidData);
   }
 }
 
@@ -94,9 +94,9 @@ TEST(HardCables, two_adhesions_pull_each_other) {
   for (int& a : net.adhesion_id) a = 0;
   net.adhesion_id.front() = 1;
   net.adhesion_id.back() = 2;
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   const std::vector<double> tensions(cables.fibre_ids().size(), 1);
-  const Equilibrium equilibrium = solved(cables, tensions);
+  const cables::Equilibrium equilibrium = solved(cables, tensions);
   const Eigen::VectorXd f = cables.adhesion_forces_nN(tensions, equilibrium);
   const Vec2 between = net.vertices_um.back() - net.vertices_um.front();
   EXPECT_NEAR(cross({f[0], f[1]}, between), 0, 1e-6 * norm({f[0], f[1]}) * norm(between));
@@ -108,9 +108,9 @@ TEST(HardCables, adhesions_on_a_line_collapse_the_network_onto_it) {
   Network net = test::lattice({.columns = 8, .rows = 8});
   for (std::size_t v = 0; v < net.adhesion_id.size(); ++v)
     net.adhesion_id[v] = v % 8 == 0 || v % 8 == 5 ? 0 : v < 8 ? static_cast<int>(v) : 0;
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   const std::vector<double> tensions(cables.fibre_ids().size(), 1);
-  const Equilibrium equilibrium = solved(cables, tensions);
+  const cables::Equilibrium equilibrium = solved(cables, tensions);
   // y = 0 is the line. Force t d / sqrt(d² + eps²) falls below any tension within some eps = 1.5e-5 um.
   for (const Vec2 x : equilibrium.positions_um) EXPECT_NEAR(x.y, 0, 1e-3);
 }
@@ -127,9 +127,9 @@ TEST(HardCables, a_part_that_nothing_holds_collapses_to_a_point_and_pulls_nothin
     link.vertex_b += offset;
     net.links.push_back(link);
   }
-  const CableNetwork cables(net);
+  const cables::CableNetwork cables(net);
   const std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), 1);
-  const Equilibrium equilibrium = solved(cables, tensions);
+  const cables::Equilibrium equilibrium = solved(cables, tensions);
   for (std::size_t v = offset; v < net.vertices_um.size(); ++v)
     EXPECT_LE(norm(equilibrium.positions_um[v] - equilibrium.positions_um[offset]), 1e-6);
   for (std::size_t k = net.links.size() - loose.links.size(); k < net.links.size(); ++k)
@@ -145,7 +145,7 @@ TEST(HardCables, needle_triangles_and_fibres_close_together) {
     for (Vec2& x : net.vertices_um) x.y /= 15;
     for (Link& link : net.links)
       link.rest_length_um = norm(net.vertices_um[link.vertex_b] - net.vertices_um[link.vertex_a]);
-    const CableNetwork cables(net);
+    const cables::CableNetwork cables(net);
     solved(cables, test::random_tensions_nN(cables.fibre_ids().size(), seed));
   }
 }
@@ -156,11 +156,12 @@ TEST(HardCables, two_hundred_random_networks_converge_within_a_hundred_steps) {
   for (unsigned seed = 1; seed <= 200; ++seed) {
     SCOPED_TRACE(seed);
     const int size = 5 + static_cast<int>(seed % 9);
-    const CableNetwork cables(test::lattice({.columns = size, .rows = size, .n_fibres = size / 2, .seed = seed}));
+    const cables::CableNetwork cables(
+        test::lattice({.columns = size, .rows = size, .n_fibres = size / 2, .seed = seed}));
     std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), seed);
     std::mt19937 random(seed);
     for (double& t : tensions) t *= std::pow(10, static_cast<int>(random() % 7) - 4);  // 6e-6 to 1000 nN
-    const Equilibrium equilibrium = cables.equilibrium(tensions);
+    const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
     test::expect_equilibrium(cables, tensions, equilibrium);
     most = std::max(most, equilibrium.report.iterations);
   }
@@ -178,8 +179,8 @@ class HardScene : public ::testing::TestWithParam<int> {
 TEST_P(HardScene, converges_balances_and_stays_among_its_adhesions) {
   test::hard_case("the scene in the picture below",
                   "residual to 1e-9, no net force and torque, no vertex outside the adhesions' convex hull");
-  const CableNetwork cables(scene.network, scene.parameters);
-  const Equilibrium equilibrium = solved(cables, scene.tensions_nN);
+  const cables::CableNetwork cables(scene.network, scene.parameters);
+  const cables::Equilibrium equilibrium = solved(cables, scene.tensions_nN);
   const double largest_tension = *std::ranges::max_element(scene.tensions_nN);
   EXPECT_LE(equilibrium.report.last_change,
             std::max(1e-9 * largest_tension, 2e-15 * scene.parameters.axial_stiffness_nN));
@@ -203,12 +204,12 @@ TEST_P(HardScene, converges_balances_and_stays_among_its_adhesions) {
 
 TEST_P(HardScene, comes_to_the_same_forces_from_anywhere) {
   test::hard_case("convexity: one minimum, from any start", "forces from shuffled positions equal to 1e-8");
-  const CableNetwork cables(scene.network, scene.parameters);
+  const cables::CableNetwork cables(scene.network, scene.parameters);
   const Eigen::VectorXd forces = cables.adhesion_forces_nN(scene.tensions_nN, solved(cables, scene.tensions_nN));
   std::vector<Vec2> start = scene.network.vertices_um;
   std::shuffle(start.begin(), start.end(), std::mt19937(1));
   if (*std::ranges::max_element(scene.tensions_nN) == 0) return;  // then any network that is not stretched is at rest
-  const Equilibrium other = cables.equilibrium(scene.tensions_nN, start);
+  const cables::Equilibrium other = cables.equilibrium(scene.tensions_nN, start);
   test::expect_equilibrium(cables, scene.tensions_nN, other);
   const double difference = (cables.adhesion_forces_nN(scene.tensions_nN, other) - forces).norm() / forces.norm();
   EXPECT_LE(difference, 1e-8);
@@ -224,8 +225,8 @@ TEST(HardCables, a_part_without_adhesions_collapses_onto_a_line_that_pulls) {
   // Thesis 3.2.3: the right half of the cell is drawn onto the arc between the outermost adhesions of the left half.
   for (const test::HardCables& scene : test::hard_cables()) {
     if (scene.name != "half_without") continue;
-    const CableNetwork cables(scene.network);
-    const Equilibrium equilibrium = solved(cables, scene.tensions_nN);
+    const cables::CableNetwork cables(scene.network);
+    const cables::Equilibrium equilibrium = solved(cables, scene.tensions_nN);
     const auto n_collapsed = std::ranges::count(equilibrium.link_states, CableState::collapsed);
     EXPECT_GT(n_collapsed, 50);
     test::came_out(std::to_string(n_collapsed) + " collapsed cables, none right of the adhesions");
@@ -241,11 +242,11 @@ TEST(HardCables, two_hundred_random_cells_converge_within_a_hundred_steps) {
     SCOPED_TRACE(seed);
     const Cell cell = mbtfm::testing::random_cell(
         seed, {.radius_um = 12, .n_adhesions = 20, .n_fibres = 6, .roughness = 0.15, .least_distance_um = 2});
-    const CableNetwork cables(network::generate_network(cell, {.edge_length_um = 2.5, .seed = seed}).network);
+    const cables::CableNetwork cables(mesh::generate_network(cell, {.edge_length_um = 2.5, .seed = seed}).network);
     std::vector<double> tensions = test::random_tensions_nN(cables.fibre_ids().size(), seed);
     std::mt19937 random(seed);
     for (double& t : tensions) t *= std::pow(10, static_cast<int>(random() % 7) - 4);  // 6e-6 to 1000 nN
-    const Equilibrium equilibrium = cables.equilibrium(tensions);
+    const cables::Equilibrium equilibrium = cables.equilibrium(tensions);
     test::expect_equilibrium(cables, tensions, equilibrium);
     EXPECT_LE(equilibrium.report.last_change, std::max(1e-9 * *std::ranges::max_element(tensions), 2e-15 * 50));
     most = std::max(most, equilibrium.report.iterations);
@@ -256,7 +257,7 @@ TEST(HardCables, two_hundred_random_cells_converge_within_a_hundred_steps) {
 
 TEST(HardCables, wrong_tensions_are_named) {
   test::hard_case("a tension below zero; too few tensions", "an error that names it");
-  const CableNetwork cables(test::lattice({}));
+  const cables::CableNetwork cables(test::lattice({}));
   std::vector<double> tensions(cables.fibre_ids().size(), 1);
   tensions[1] = -1;
   EXPECT_THROW(cables.equilibrium(tensions), InvalidData);

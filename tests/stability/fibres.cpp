@@ -3,17 +3,17 @@
 
 #include <opencv2/core.hpp>
 
-#include "segment/fibres.h"
+#include "segment/cells/fibres.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/segmentation_accuracy.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
 
-std::vector<Fibre> fibres_of(const Image& image, double pixel_um = 0.1) {
+std::vector<Fibre> fibres_of(const images::Image& image, double pixel_um = 0.1) {
   return find_fibres(image, {}, {}, pixel_um, FibreParameters{});
 }
 
@@ -27,7 +27,7 @@ TEST(Fibres, of_noise_alone_are_none) {
   for (const std::uint64_t seed : {1, 2, 3})
     for (const double pixel_um : {0.05, 0.1, 0.2}) {
       SCOPED_TRACE(std::to_string(seed) + " " + std::to_string(pixel_um));
-      Image image = even_image(512, 384, 200);
+      images::Image image = even_image(512, 384, 200);
       add_noise(image, 15, seed);
       EXPECT_TRUE(fibres_of(image, pixel_um).empty());
     }
@@ -35,7 +35,7 @@ TEST(Fibres, of_noise_alone_are_none) {
 
 TEST(Fibres, of_a_saturated_image_are_none) {
   test::hard_case("the camera saturates everywhere", "none");
-  Image image = even_image(300, 300, 70000);
+  images::Image image = even_image(300, 300, 70000);
   add_noise(image, 3000, 1);
   for (float& value : image.pixels) value = std::min(value, 65535.0f);
   EXPECT_TRUE(fibres_of(image).empty());
@@ -64,7 +64,7 @@ TEST(Fibres, of_a_cell_with_meshwork_alone_are_two_at_most) {
 
 TEST(Fibres, of_a_step_are_none) {
   test::hard_case("an edge of brightness, as at the cell's rim", "none");
-  Image image = even_image(256, 256, 100);
+  images::Image image = even_image(256, 256, 100);
   for (int row = 0; row < 256; ++row)
     for (int column = 0; column < 256; ++column)
       if (column + row / 4 > 150) image.at(column, row) = 400;
@@ -94,4 +94,4 @@ TEST(Fibres, are_the_same_for_any_number_of_threads) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -4,15 +4,15 @@
 
 #include <gtest/gtest.h>
 
-#include "network/adhesions.h"
-#include "network/frame.h"
+#include "network/mesh/adhesions.h"
+#include "network/mesh/frame.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/hard_cells.h"
 #include "tests/support/random_cell.h"
 #include "tests/support/valid_network.h"
 
-namespace mbtfm::network {
+namespace mbtfm::mesh {
 namespace {
 
 using testing::adhesion_at;
@@ -388,4 +388,4 @@ TEST(HardMesh, hole_smaller_than_a_triangle_is_filled) {
 }
 
 }  // namespace
-}  // namespace mbtfm::network
+}  // namespace mbtfm::mesh

@@ -5,11 +5,11 @@
 #include <map>
 #include <string>
 
-#include "segment/segment_cell.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/segmentation_score.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::images {
 namespace {
 
 using namespace mbtfm::test;
@@ -31,8 +31,8 @@ const DiscCell kDiscCells[] = {{"Control/0001_20Feb20_siNT.tif", 0},  {"Control/
 
 Image image_of(const DiscCell& cell) { return read_image(kActin / "micropattern_chirality" / cell.file, cell.page); }
 
-Cell segmented(const Image& image, const SegmentParameters& p = {}) {
-  return segment_cell(std::nullopt, Channel{"actin", image}, p).cell;
+Cell segmented(const Image& image, const cells::SegmentParameters& p = {}) {
+  return cells::segment_cell(std::nullopt, Channel{"actin", image}, p).cell;
 }
 
 double length_um(const std::vector<Fibre>& fibres) {
@@ -122,13 +122,13 @@ TEST(RealFibres, of_a_carpet_of_sticks_lie_on_the_sticks) {
   constexpr double kAssumedPixel_um = 0.3;
   const Image image = read_image(kActin / "synthetic_segmentfibers/SBXIQ_gauss.tif");
   const Image truth = read_image(kActin / "synthetic_segmentfibers/SBXIQ_binary.tif");
-  FibreParameters p;
+  cells::FibreParameters p;
   p.fibre_false_per_cell = 1e12;
   p.fibre_shortest_um = 2;
   p.fibre_gap_um = 0.5;
   Image lines = truth;
   std::fill(lines.pixels.begin(), lines.pixels.end(), 0.0f);
-  for (const Fibre& f : find_fibres(image, {}, {}, kAssumedPixel_um, p))
+  for (const Fibre& f : cells::find_fibres(image, {}, {}, kAssumedPixel_um, p))
     for (const Vec2 u : densely(f.points_um))
       lines.at(std::min(image.width - 1, static_cast<int>(u.x / kAssumedPixel_um)),
                std::min(image.height - 1, static_cast<int>(u.y / kAssumedPixel_um))) = 1;
@@ -140,10 +140,10 @@ TEST(RealFibres, of_a_layer_of_many_cells_are_found_without_an_outline) {
   test::hard_case("a closed layer of cells", "fibres of at least the least length");
   REQUIRE_DATA();
   const Image image = read_image(kActin / "bronchial_monolayer/U13_72_P1_5_SF.tif");
-  const auto fibres = find_fibres(image, {}, {}, *image.pixel_size_um, FibreParameters{});
+  const auto fibres = cells::find_fibres(image, {}, {}, *image.pixel_size_um, cells::FibreParameters{});
   EXPECT_GT(fibres.size(), 20u);
-  for (const Fibre& f : fibres) EXPECT_GE(mbtfm::length_um(f.points_um), FibreParameters{}.fibre_shortest_um);
+  for (const Fibre& f : fibres) EXPECT_GE(mbtfm::length_um(f.points_um), cells::FibreParameters{}.fibre_shortest_um);
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::images

@@ -2,16 +2,16 @@
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
-#include "segment/segment_cell.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 #include "tests/support/hard_case.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 using namespace mbtfm::test;
 
-void expect_nothing(const Image& image) {
+void expect_nothing(const images::Image& image) {
   EXPECT_TRUE(find_adhesions(image, 0.1, AdhesionParameters{}).empty());
   EXPECT_TRUE(find_fibres(image, {}, {}, 0.1, FibreParameters{}).empty());
   EXPECT_TRUE(find_outline(image, {}, 0.1, OutlineParameters{}).empty());
@@ -26,7 +26,7 @@ TEST(Segmentation, finds_nothing_in_noise_alone) {
   test::hard_case("noise without a cell", "no adhesion, fibre or outline");
   for (const std::uint64_t seed : {1, 2, 3}) {
     SCOPED_TRACE(seed);
-    Image image = even_image(512, 512, 200);
+    images::Image image = even_image(512, 512, 200);
     add_noise(image, 15, seed);
     expect_nothing(image);
   }
@@ -40,7 +40,7 @@ TEST(Segmentation, takes_images_of_few_pixels) {
 TEST(Segmentation, says_what_is_missing) {
   test::hard_case("no image, no pixel size, two sizes, empty channels", "an error that names each");
   SegmentParameters p;
-  const Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
+  const images::Channel flat{"flat.tif", even_image(64, 64, 5)}, wide{"wide.tif", even_image(80, 64, 5)};
   EXPECT_THROW(segment_cell({}, {}, p), UsageError);
   try {
     segment_cell(flat, {}, p);
@@ -57,11 +57,11 @@ TEST(Segmentation, says_what_is_missing) {
     EXPECT_EQ(error.found, "every pixel is 5");
   }
   EXPECT_THROW(segment_cell(flat, wide, p), InputError);
-  Channel one = flat, two = flat;
+  images::Channel one = flat, two = flat;
   one.image.pixel_size_um = 0.1;
   two.image.pixel_size_um = 0.2;
-  EXPECT_THROW(common_pixel_size_um(one, two, std::nullopt), InputError);
+  EXPECT_THROW(images::common_pixel_size_um(one, two, std::nullopt), InputError);
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

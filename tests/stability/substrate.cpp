@@ -6,9 +6,12 @@
 #include <fstream>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/parallel.h"
+#include "substrate/choice/decide.h"
+#include "substrate/choice/factory.h"
 #include "substrate/effects.h"
 #include "substrate/gel_vtu.h"
+#include "substrate/greens/models.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/temporary_folder.h"
@@ -22,7 +25,7 @@ const Gel kGel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_u
 
 Eigen::MatrixXd compliance(const std::string& model, const Gel& gel, const std::vector<Vec2>& points,
                            const std::vector<Ellipse>& ellipses) {
-  return make_substrate(gel, test::model_named(model), 2)->compliance_um_per_nN(points, ellipses);
+  return choice::make_substrate(gel, test::model_named(model), 2)->compliance_um_per_nN(points, ellipses);
 }
 
 class Model : public testing::TestWithParam<const char*> {};
@@ -104,9 +107,9 @@ TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
   const SubstrateParameters parameters = test::model_named(GetParam());
   for (const Gel& gel : {Gel{8.4, 0.51, 20}, Gel{8.4, 0.6, 20}, Gel{8.4, -0.1, 20}, Gel{0, 0.4, 20}, Gel{-1, 0.4, 20},
                          Gel{8.4, 0.4, 0}, Gel{NAN, 0.4, 20}, Gel{8.4, NAN, 20}}) {
-    EXPECT_THROW(make_substrate(gel, parameters, 1), InvalidData);
+    EXPECT_THROW(choice::make_substrate(gel, parameters, 1), InvalidData);
   }
-  const auto model = make_substrate(kGel, parameters, 1);
+  const auto model = choice::make_substrate(kGel, parameters, 1);
   const Ellipse good = {{0, 0}, 1, 0.5, 0};
   EXPECT_THROW(model->compliance_um_per_nN({{NAN, 0}}, {good}), InvalidData);
   EXPECT_THROW(model->compliance_um_per_nN({{0, INFINITY}}, {good}), InvalidData);
@@ -120,7 +123,7 @@ TEST_P(Model, rejects_what_is_no_gel_no_ellipse_no_point_and_no_force) {
 
 TEST_P(Model, takes_empty_scenes) {
   test::hard_case("no beads, no adhesions", "empty matrices, no displacement");
-  const auto model = make_substrate(kGel, test::model_named(GetParam()), 1);
+  const auto model = choice::make_substrate(kGel, test::model_named(GetParam()), 1);
   EXPECT_EQ(model->compliance_um_per_nN({}, {}).size(), 0);
   EXPECT_EQ(model->compliance_um_per_nN({{0, 0}}, {}).rows(), 2);
   EXPECT_EQ(model->compliance_um_per_nN({}, {{{0, 0}, 1, 0.5, 0}}).cols(), 2);
@@ -132,13 +135,13 @@ TEST_P(Model, takes_empty_scenes) {
 TEST(Substrate, names_the_models_it_knows) {
   test::hard_case("a misspelt model", "an error that lists the models");
   try {
-    make_substrate(kGel, test::model_named("layr"), 1);
+    choice::make_substrate(kGel, test::model_named("layr"), 1);
     FAIL();
   } catch (const UsageError& error) {
     EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, auto"), std::string::npos)
         << error.what();
   }
-  EXPECT_THROW(make_greens(kGel, test::model_named("split"), 1), UsageError);
+  EXPECT_THROW(greens::make_greens(kGel, test::model_named("split"), 1), UsageError);
 }
 
 TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
@@ -146,7 +149,7 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
   for (const char* name : {"split", "refined"}) {
     SubstrateParameters parameters = test::model_named(name);
     parameters.memory_limit_GB = 0.005;
-    const auto model = make_substrate(kGel, parameters, 1);
+    const auto model = choice::make_substrate(kGel, parameters, 1);
     try {
       model->compliance_um_per_nN(test::scattered_points(10, 40), test::scattered_ellipses(5, 30));
       FAIL() << name;
@@ -160,7 +163,7 @@ TEST(Substrate, refuses_before_it_takes_more_memory_than_allowed) {
   thin.thickness_um = 1;
   SubstrateParameters parameters = test::model_named("split");
   parameters.memory_limit_GB = 4;
-  EXPECT_THROW(make_substrate(thin, parameters, 1)
+  EXPECT_THROW(choice::make_substrate(thin, parameters, 1)
                    ->compliance_um_per_nN(test::scattered_points(10, 500), test::scattered_ellipses(5, 30)),
                NotSolved);
 }
@@ -173,7 +176,7 @@ TEST(Substrate, says_which_mesh_would_fit_the_memory) {
   for (const auto& [limit_GB, fitting] : {std::pair{0.2, "elements; one of"}, std::pair{0.5, "unknowns would fit"}}) {
     parameters.memory_limit_GB = limit_GB;
     try {
-      make_substrate(kGel, parameters, 1)
+      choice::make_substrate(kGel, parameters, 1)
           ->compliance_um_per_nN(test::scattered_points(10, 45), test::scattered_ellipses(40, 35));
       FAIL();
     } catch (const NotSolved& error) {
@@ -204,7 +207,7 @@ TEST(Substrate, refuses_a_thousand_adhesions_that_refined_has_no_memory_for) {
   for (const double limit_GB : {0.5, 1.0}) {
     parameters.memory_limit_GB = limit_GB;
     try {
-      make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
+      choice::make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
       FAIL();
     } catch (const NotSolved& error) {
       const std::string& reason = error.report.reason;
@@ -225,7 +228,7 @@ TEST(Substrate, takes_adhesions_that_touch_a_side) {
   parameters.side_distance_um = 1e-6;
   const auto points = test::scattered_points(200, 6);
   const std::vector<Ellipse> ellipses = {{{9, 0}, 1, 0.5, 0}, {{0, 0}, 1, 0.5, 0}};
-  const Eigen::MatrixXd g = make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd g = choice::make_substrate(kGel, parameters, 2)->compliance_um_per_nN(points, ellipses);
   ASSERT_TRUE(g.allFinite());
   // a block cut close gives more than an endless layer
   EXPECT_GT(g.norm(), compliance("layer", kGel, points, ellipses).norm());
@@ -233,7 +236,7 @@ TEST(Substrate, takes_adhesions_that_touch_a_side) {
 
 std::string choice(const Gel& gel, const SubstrateParameters& parameters, const std::vector<Vec2>& points,
                    const std::vector<Ellipse>& ellipses) {
-  const auto model = make_substrate(gel, parameters, 2);
+  const auto model = choice::make_substrate(gel, parameters, 2);
   const Eigen::MatrixXd matrix = model->compliance_um_per_nN(points, ellipses);
   EXPECT_TRUE(matrix.allFinite());
   const std::string name = std::get<std::string>(model->figures().front().second);
@@ -280,16 +283,17 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
     sides.side_distance_um = kGel.thickness_um * -std::log(tolerance) / 1.48 * 1.001;
     ASSERT_EQ(choice(kGel, sides, points, ellipses), "layer");
     sides.model = "split";
-    EXPECT_LT(test::mean_column_difference(make_substrate(kGel, sides, 2)->compliance_um_per_nN(points, ellipses),
-                                           compliance("layer", kGel, points, ellipses)),
-              tolerance);
+    EXPECT_LT(
+        test::mean_column_difference(choice::make_substrate(kGel, sides, 2)->compliance_um_per_nN(points, ellipses),
+                                     compliance("layer", kGel, points, ellipses)),
+        tolerance);
   }
 }
 
 GelEffects effects_for(double thickness_um, const SubstrateParameters& parameters) {
   Gel gel = kGel;
   gel.thickness_um = thickness_um;
-  return decide(gel, parameters, {.width_um = 50, .adhesion_radius_um = 0.5});
+  return choice::decide(gel, parameters, {.width_um = 50, .adhesion_radius_um = 0.5});
 }
 
 TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_that_does_not) {
@@ -347,19 +351,19 @@ TEST(Automatic, obeys_its_switches) {
 
 TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) {
   test::hard_case("sides without a distance, a model without what is on", "an error that names both");
-  const auto refused = [](const std::string& model, std::string EffectSwitches::*member, const std::string& setting,
-                          std::optional<double> side_distance_um = {}) {
+  const auto refused = [](const std::string& model, std::string stage::EffectSwitches::*member,
+                          const std::string& setting, std::optional<double> side_distance_um = {}) {
     SubstrateParameters p = test::model_named(model);
     p.effects.*member = setting;
     p.side_distance_um = side_distance_um;
     try {
-      make_substrate(kGel, p, 1);
+      choice::make_substrate(kGel, p, 1);
     } catch (const UsageError& error) {
       return std::string(error.what()).find("effects.") != std::string::npos;
     }
     return false;
   };
-  using S = EffectSwitches;
+  using S = stage::EffectSwitches;
   EXPECT_TRUE(refused("auto", &S::finite_sides, "on"));
   EXPECT_TRUE(refused("auto", &S::depth_graded_gel, "on"));
   EXPECT_TRUE(refused("auto", &S::finite_thickness, "off", 5));  // sides so near are on, and have a base
@@ -374,14 +378,14 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
   SubstrateParameters parameters = test::model_named("refined");
   for (const char* text : {"0", "0:", "0:8, -1:4", "0:0", "5:8, 2:4", "0:8 4:4", "a:8", "0:8, 4:4x", "0:-3"}) {
     parameters.modulus_profile = text;
-    EXPECT_THROW(make_substrate(kGel, parameters, 1), UsageError) << text;
+    EXPECT_THROW(choice::make_substrate(kGel, parameters, 1), UsageError) << text;
   }
   for (const char* model : {"half-space", "layer", "split"}) {
     parameters.model = model;
     parameters.modulus_profile = "0:8, 4:8, 4:16";
-    EXPECT_THROW(make_substrate(kGel, parameters, 1), UsageError) << model;
+    EXPECT_THROW(choice::make_substrate(kGel, parameters, 1), UsageError) << model;
   }
-  EXPECT_THROW(make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
+  EXPECT_THROW(choice::make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
                UsageError);
 }
 
@@ -399,17 +403,17 @@ TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
   const auto points = test::scattered_points(50, 20);
   const auto ellipses = test::scattered_ellipses(5, 15);
   SubstrateParameters parameters = test::model_named("split");
-  const Eigen::MatrixXd without = make_substrate(kGel, parameters, 1)->compliance_um_per_nN(points, ellipses);
+  const Eigen::MatrixXd without = choice::make_substrate(kGel, parameters, 1)->compliance_um_per_nN(points, ellipses);
   parameters.cache_folder = (folder / "cache").string();
   const auto note = [&] {
-    const auto model = make_substrate(kGel, parameters, 1);
+    const auto model = choice::make_substrate(kGel, parameters, 1);
     EXPECT_TRUE(without == model->compliance_um_per_nN(points, ellipses));
     for (const auto& [name, value] : model->figures()) {
       if (name == "substrate_cache") return std::get<std::string>(value);
     }
     return std::string("none");
   };
-  parallel_for(4, 4, [&](int) { note(); });  // at once: none sees half a file, and no temporary one is left
+  numerics::parallel_for(4, 4, [&](int) { note(); });  // at once: none sees half a file, and no temporary one is left
   const auto file = only_file(parameters.cache_folder);
   EXPECT_EQ(note(), "used");
   std::filesystem::resize_file(file, std::filesystem::file_size(file) / 2);
@@ -425,7 +429,7 @@ TEST(Cache, gives_the_same_bits_survives_damage_and_many_writers) {
   // another gel, another file
   Gel other = kGel;
   other.youngs_modulus_kPa *= 1 + 1e-12;
-  make_substrate(other, parameters, 1)->compliance_um_per_nN(points, ellipses);
+  choice::make_substrate(other, parameters, 1)->compliance_um_per_nN(points, ellipses);
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(parameters.cache_folder), {}), 2);
   // a folder that cannot be
   parameters.cache_folder = (file / "below").string();
@@ -436,7 +440,7 @@ TEST(Substrate, writes_its_surface_for_paraview) {
   test::hard_case("the surface as VTU", "complete, compressed, without NaN");
   const test::TemporaryFolder folder;
   const std::vector<Ellipse> ellipses = {{{0, 0}, 2, 0.5, 0.3}, {{8, 3}, 1, 0.5, 1}};
-  const auto model = make_substrate(kGel, test::model_named("layer"), 2);
+  const auto model = choice::make_substrate(kGel, test::model_named("layer"), 2);
   write_substrate_vtu(folder / "substrate.vtu", *model, ellipses, {{1, 0}, {0, -1}});
   std::ifstream file(folder / "substrate.vtu");
   const std::string text(std::istreambuf_iterator<char>(file), {});

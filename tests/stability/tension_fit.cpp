@@ -1,15 +1,15 @@
 /// Cells and data that make the tension fit hard: the right answer, a wide interval or a clear refusal.
-#include "mbtfm/tension_fit.h"
+#include "mbtfm/tensions/tension_fit.h"
 
 #include <gtest/gtest.h>
 
-#include "mbtfm/fit_results.h"
-#include "mbtfm/model_checks.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/model_checks.h"
 #include "pipeline/contract/errors.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/tension_scene.h"
 
-namespace mbtfm::inverse {
+namespace mbtfm::tensions {
 namespace {
 
 using test::fit_own_network;
@@ -222,4 +222,4 @@ TEST(TensionFitHard, noise_as_large_as_the_signal_widens_the_intervals) {
 }
 
 }  // namespace
-}  // namespace mbtfm::inverse
+}  // namespace mbtfm::tensions

@@ -5,13 +5,13 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
-#include "segment/given_field.h"
-#include "segment/plane.h"
-#include "segment/track.h"
+#include "segment/beads/given_field.h"
+#include "segment/beads/plane.h"
+#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/hard_case.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 /// Share of the good beads that are more than `limit` px off.
@@ -187,7 +187,8 @@ TEST(TrackStability, faint_beads_are_tracked_with_larger_errors) {
   EXPECT_LE(share_wrong(of_faint, peaks, 1.0), 0.01);
 }
 
-std::string what_is_wrong(const Image& relaxed, const Image& stressed, const TrackParameters& parameters = {}) {
+std::string what_is_wrong(const images::Image& relaxed, const images::Image& stressed,
+                          const TrackParameters& parameters = {}) {
   try {
     track_beads(relaxed, stressed, 1.0, parameters);
   } catch (const InvalidData& error) {
@@ -200,7 +201,7 @@ TEST(TrackStability, images_without_beads_are_refused) {
   test::hard_case("no beads, constant images", "an error that names the image");
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
   const auto noise = test::draw_bead_pair({}, {.width = 128, .n_beads = 0});
-  Image constant = pair.relaxed;
+  images::Image constant = pair.relaxed;
   std::fill(constant.pixels.begin(), constant.pixels.end(), 7.0f);
   const std::string relaxed = "the relaxed image: expected bright beads on a darker ground, found none";
   const std::string stressed = "the stressed image: expected bright beads on a darker ground, found none";
@@ -246,11 +247,11 @@ TEST(TrackStability, few_beads_of_another_place_are_not_taken_for_the_same) {
 TEST(TrackStability, one_bead_and_a_pixel_without_a_number_are_refused) {
   test::hard_case("a single bead; a NaN", "an error that names it");
   const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 300});
-  Image one = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
+  images::Image one = test::draw_bead_pair({}, {.width = 128, .n_beads = 0}).relaxed;
   test::add_bead(one, {60.3, 50.8}, 3000, 1.3);
   EXPECT_NE(what_is_wrong(pair.relaxed, one), "nothing");
   EXPECT_NE(what_is_wrong(one, one), "nothing");
-  Image broken = pair.stressed;
+  images::Image broken = pair.stressed;
   broken.at(6, 11) = std::numeric_limits<float>::quiet_NaN();
   EXPECT_EQ(what_is_wrong(pair.relaxed, broken),
             "the stressed image: expected a number in every pixel, found none at column 7, row 12");
@@ -267,8 +268,8 @@ TEST(TrackStability, exchanged_images_are_refused_unless_a_cell_may_push) {
   EXPECT_GT(outwardness(track_beads(pair.stressed, pair.relaxed, 1.0, parameters, 2).field), 0.5);
 }
 
-Image cropped(const Image& image, int left, int top, int width, int height) {
-  Image result = image;
+images::Image cropped(const images::Image& image, int left, int top, int width, int height) {
+  images::Image result = image;
   result.width = width, result.height = height;
   result.pixels.clear();
   for (int j = top; j < top + height; ++j) {
@@ -286,8 +287,8 @@ TEST(TrackStability, a_cell_that_the_border_cuts_is_never_called_exchanged) {
   for (const auto& [left, top, width, height] :
        {std::array{256, 0, 256, 512}, {256, 256, 256, 256}, {140, 300, 230, 212}}) {
     SCOPED_TRACE(left);
-    const Image relaxed = cropped(pair.relaxed, left, top, width, height);
-    const Image stressed = cropped(pair.stressed, left, top, width, height);
+    const images::Image relaxed = cropped(pair.relaxed, left, top, width, height);
+    const images::Image stressed = cropped(pair.stressed, left, top, width, height);
     EXPECT_EQ(what_is_wrong(relaxed, stressed), "nothing");
     EXPECT_EQ(what_is_wrong(stressed, relaxed), "nothing");
   }
@@ -305,4 +306,4 @@ TEST(TrackStability, images_of_different_sizes_are_refused) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

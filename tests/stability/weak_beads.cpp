@@ -5,10 +5,10 @@
 
 #include <cmath>
 
-#include "segment/track.h"
+#include "segment/beads/track.h"
 #include "tests/support/hard_case.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 TrackParameters by(TrackMethod method) { return {.method = word_of(method)}; }
@@ -89,7 +89,7 @@ TEST(WeakBeads, the_hint_of_what_cannot_be_followed_names_what_helps) {
   const auto one = test::draw_bead_pair({}, {.width = 256, .n_beads = 1000, .seed = 1});
   const auto weak =
       test::weakened(test::draw_bead_pair(wide_adhesions(), {.brightness = 25, .seed = 1}), {.levels = 40}, 1);
-  const auto hint = [&](const Image& relaxed, const Image& stressed) -> std::string {
+  const auto hint = [&](const images::Image& relaxed, const images::Image& stressed) -> std::string {
     try {
       track_beads(relaxed, stressed, 1.0, by(TrackMethod::beads), 2);
     } catch (const NotFollowed& error) {
@@ -128,4 +128,4 @@ TEST(Focus, of_equal_images_is_equal_and_a_blurred_one_is_found) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

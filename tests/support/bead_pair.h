@@ -7,8 +7,8 @@
 #include <random>
 #include <vector>
 
-#include "pipeline/contract/types.h"
-#include "segment/image.h"
+#include "pipeline/contract/geometry.h"
+#include "segment/images/image.h"
 
 namespace mbtfm::test {
 
@@ -75,12 +75,12 @@ struct BeadScene {
 };
 
 struct BeadPair {
-  segment::Image relaxed, stressed;
+  images::Image relaxed, stressed;
   std::vector<Vec2> positions;      ///< of the beads in the relaxed state: px, 0 at the centre of the first pixel
   std::vector<Vec2> displacements;  ///< stressed minus relaxed, without drift
 };
 
-inline void add_bead(segment::Image& image, Vec2 at, double peak, double sigma) {
+inline void add_bead(images::Image& image, Vec2 at, double peak, double sigma) {
   const int reach = static_cast<int>(std::ceil(5 * sigma));
   const int i0 = static_cast<int>(std::lround(at.x)), j0 = static_cast<int>(std::lround(at.y));
   for (int j = std::max(0, j0 - reach); j <= std::min(image.height - 1, j0 + reach); ++j) {
@@ -97,7 +97,7 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
   std::uniform_real_distribution<double> uniform(0, 1);
   std::normal_distribution<double> normal;
   BeadPair pair;
-  for (segment::Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
     image->width = image->height = scene.width;
     image->pixels.assign(static_cast<std::size_t>(scene.width) * scene.width, 0.0f);
     image->full_scale = 65535;
@@ -125,7 +125,7 @@ inline BeadPair draw_bead_pair(const std::vector<Peak>& peaks, const BeadScene& 
     pair.positions.push_back(at);
     pair.displacements.push_back(moved);
   }
-  for (segment::Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
     const bool is_stressed = image == &pair.stressed;
     for (int j = 0; j < scene.width; ++j) {
       for (int i = 0; i < scene.width; ++i) {

@@ -7,12 +7,13 @@
 #include <optional>
 #include <utility>
 
-#include "mbtfm/beyond_cut.h"
-#include "mbtfm/common_motion.h"
-#include "mbtfm/fit_results.h"
-#include "network/mesh.h"
-#include "samples/experiment.h"
-#include "segment/hand_drawn.h"
+#include "mbtfm/tensions/beyond_cut.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "network/mesh/mesh.h"
+#include "samples/experiment/experiment.h"
+#include "segment/cells/hand_drawn.h"
+#include "substrate/greens/models.h"
 
 namespace mbtfm::test {
 
@@ -76,7 +77,7 @@ inline CutCell cut_cell(const Cell& whole, const std::vector<AdhesionForce>& for
   // the border is the image's where the window's is: shifted, so that it begins at the origin
   Polygon shifted;
   for (const Vec2 p : ring) shifted.push_back(p - window.low_um);
-  const segment::CutRing marked = segment::cut_by_border(shifted, window.high_um - window.low_um, 1e-6);
+  const cells::CutRing marked = cells::cut_by_border(shifted, window.high_um - window.low_um, 1e-6);
   for (const Vec2 p : marked.points_um) cut.cell.outline_um.push_back(p + window.low_um);
   cut.cell.is_cut = marked.is_cut;
   for (const Adhesion& a : whole.adhesions) {
@@ -86,7 +87,7 @@ inline CutCell cut_cell(const Cell& whole, const std::vector<AdhesionForce>& for
     const auto force = std::ranges::find(forces, a.adhesion_id, &AdhesionForce::adhesion_id);
     cut.outside_nN += (1 - (area_um2 >= kSmallest_um2 ? share : 0)) * force->force_nN;
     if (area_um2 < kSmallest_um2) continue;
-    Adhesion seen = share < 1 ? segment::ellipse_of_polygon(part) : a;
+    Adhesion seen = share < 1 ? cells::ellipse_of_polygon(part) : a;
     seen.adhesion_id = a.adhesion_id;
     cut.share_inside[a.adhesion_id] = share;
     cut.cell.adhesions.push_back(seen);
@@ -115,15 +116,15 @@ inline DisplacementField beads_in(const DisplacementField& beads, const Window& 
 }
 
 struct CutFit {
-  inverse::EnsembleFit fit;
-  std::optional<inverse::ForcesBeyond> beyond;
-  std::optional<inverse::FoundMotion> motion;
+  tensions::EnsembleFit fit;
+  std::optional<tensions::ForcesBeyond> beyond;
+  std::optional<tensions::FoundMotion> motion;
 };
 
 enum class Beyond { allowed, ignored };
 
 inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Gel& gel, int n_meshes,
-                      Beyond allow = Beyond::allowed, const inverse::BeyondSpacing& spacing = {}) {
+                      Beyond allow = Beyond::allowed, const tensions::BeyondSpacing& spacing = {}) {
   std::vector<Vec2> points;
   for (const Bead& bead : beads) points.push_back(bead.position_um);
   std::vector<substrate::Ellipse> ellipses;
@@ -132,22 +133,22 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
     ellipses.push_back(substrate::ellipse_of(a));
     ids.push_back(a.adhesion_id);
   }
-  inverse::LinearData data =
-      inverse::reduce(beads, substrate::make_greens(gel, {.model = "layer"}, 2)->response(points, ellipses), {}, 2,
-                      inverse::affine_motions(beads));
+  tensions::LinearData data =
+      tensions::reduce(beads, greens::make_greens(gel, {.model = "layer"}, 2)->response(points, ellipses), {}, 2,
+                       tensions::affine_motions(beads));
   CutFit result;
   if (allow == Beyond::allowed && !cuts_of(cell).empty())
-    result.beyond = inverse::allow_forces_beyond(data, cell, gel, spacing);
-  std::vector<network::CableNetwork> networks;
-  network::NetworkParameters p;
+    result.beyond = tensions::allow_forces_beyond(data, cell, gel, spacing);
+  std::vector<cables::CableNetwork> networks;
+  mesh::NetworkParameters p;
   for (int m = 0; m < n_meshes; ++m) {
     p.seed = static_cast<std::uint64_t>(m) + 1;
-    networks.emplace_back(network::generate_network(cell, p).network);
+    networks.emplace_back(mesh::generate_network(cell, p).network);
   }
-  inverse::FitParameters parameters;
+  tensions::FitParameters parameters;
   parameters.n_meshes = n_meshes;
-  result.fit = inverse::fit_ensemble(networks, data, ids, parameters, 2, {});
-  result.motion = inverse::common_motion_among(inverse::motions_beside(data, result.fit), data.position_um);
+  result.fit = tensions::fit_ensemble(networks, data, ids, parameters, 2, {});
+  result.motion = tensions::common_motion_among(tensions::motions_beside(data, result.fit), data.position_um);
   return result;
 }
 

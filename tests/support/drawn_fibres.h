@@ -8,8 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
+#include "pipeline/files/csv.h"
 
 namespace mbtfm::test {
 
@@ -21,7 +22,7 @@ struct LinePoint {
 };
 
 inline std::vector<LinePoint> read_drawn_fibres(const std::filesystem::path& file, double pixel_um) {
-  const CsvTable table(file);
+  const files::CsvTable table(file);
   std::vector<LinePoint> points;
   for (int i = 0; i < table.n_rows(); ++i)
     points.push_back({pixel_um * Vec2{table.number(i, "x_px") + 0.5, table.number(i, "y_px") + 0.5},

@@ -6,14 +6,16 @@
 #include <numbers>
 #include <random>
 
-#include "pipeline/contract/types.h"
-#include "segment/image.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
+#include "pipeline/contract/polyline.h"
+#include "segment/images/image.h"
 #include "tests/support/segmentation_score.h"
 
 namespace mbtfm::test {
 
-inline segment::Image even_image(int width, int height, float level) {
-  segment::Image image;
+inline images::Image even_image(int width, int height, float level) {
+  images::Image image;
   image.width = width;
   image.height = height;
   image.pixels.assign(static_cast<std::size_t>(width) * static_cast<std::size_t>(height), level);
@@ -25,7 +27,7 @@ inline Vec2 centre_of_pixel_um(int column, int row, double pixel_um) {
 }
 
 /// An ellipse whose rim is a blurred step: half of `height` lies on the rim.
-inline void draw_ellipse(segment::Image& image, const Adhesion& e, double height, double blur_um, double pixel_um) {
+inline void draw_ellipse(images::Image& image, const Adhesion& e, double height, double blur_um, double pixel_um) {
   const double a = e.major_axis_um / 2, b = e.minor_axis_um / 2;
   const Vec2 axis{std::cos(e.angle_rad), std::sin(e.angle_rad)};
   for (int row = 0; row < image.height; ++row)
@@ -38,7 +40,7 @@ inline void draw_ellipse(segment::Image& image, const Adhesion& e, double height
 }
 
 /// A line of Gaussian profile with this full width at half maximum, its ends cut straight across or round.
-inline void draw_line(segment::Image& image, const Polyline& line, double height, double width_um, double pixel_um) {
+inline void draw_line(images::Image& image, const Polyline& line, double height, double width_um, double pixel_um) {
   const double sigma = width_um / 2.3548;
   for (int row = 0; row < image.height; ++row)
     for (int column = 0; column < image.width; ++column) {
@@ -47,7 +49,7 @@ inline void draw_line(segment::Image& image, const Polyline& line, double height
     }
 }
 
-inline void add_noise(segment::Image& image, double sigma, std::uint64_t seed) {
+inline void add_noise(images::Image& image, double sigma, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal;  // of its own sigma none may be 0
   for (float& value : image.pixels) value += static_cast<float>(sigma * normal(random));
@@ -70,7 +72,7 @@ struct DrawnScene {
   static constexpr double kPixel_um = 0.1;
   std::vector<Adhesion> adhesions;
   std::vector<Polyline> fibres;
-  segment::Image adhesion_image, actin_image;
+  images::Image adhesion_image, actin_image;
 };
 
 inline DrawnScene drawn_scene(double noise, std::uint64_t seed) {
@@ -93,8 +95,8 @@ inline DrawnScene drawn_scene(double noise, std::uint64_t seed) {
 
 /// The image with each pixel (column, row) at `map` of them; for maps of a field onto itself.
 template <class Map>
-segment::Image mapped(const segment::Image& image, Map map) {
-  segment::Image result = image;
+images::Image mapped(const images::Image& image, Map map) {
+  images::Image result = image;
   for (int row = 0; row < image.height; ++row)
     for (int column = 0; column < image.width; ++column) {
       const auto [c, r] = map(column, row);

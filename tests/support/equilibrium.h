@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "network/cables.h"
+#include "network/cables/cables.h"
 
 namespace mbtfm::test {
 
@@ -30,8 +30,8 @@ inline double largest(const std::vector<Vec2>& values) {
 
 /// Converged, and what holds the network feels no net force and no net torque. What is left of either is the sum of
 /// the free vertices' net forces, each below `report.last_change`, and the rounding of the sums.
-inline void expect_equilibrium(const network::CableNetwork& cables, const std::vector<double>& tensions_nN,
-                               const network::Equilibrium& equilibrium) {
+inline void expect_equilibrium(const cables::CableNetwork& cables, const std::vector<double>& tensions_nN,
+                               const cables::Equilibrium& equilibrium) {
   EXPECT_TRUE(equilibrium.report.converged) << equilibrium.report.reason;
   const std::vector<Vec2> reactions = cables.reactions_nN(tensions_nN, equilibrium);
   const double n = static_cast<double>(reactions.size());

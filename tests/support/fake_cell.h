@@ -7,8 +7,11 @@
 #include <numbers>
 #include <random>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
 
 namespace mbtfm::test {
 
@@ -101,10 +104,10 @@ inline Network web_over(const Cell& cell) {
 inline void write_given_stages(const fs::path& folder, const Cell& cell) {
   fs::create_directories(folder / "1_segment");
   fs::create_directories(folder / "2_track");
-  write_text(folder / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n");
-  write_adhesions(folder / "1_segment/adhesions.csv", cell.adhesions);
-  write_fibres(folder / "1_segment/fibres.csv", folder / "1_segment/fibre_points.csv", cell.fibres);
-  write_outline(folder / "1_segment/outline.csv", cell.outline_um);
+  files::write_text(folder / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n");
+  files::write_adhesions(folder / "1_segment/adhesions.csv", cell.adhesions);
+  files::write_fibres(folder / "1_segment/fibres.csv", folder / "1_segment/fibre_points.csv", cell.fibres);
+  files::write_outline(folder / "1_segment/outline.csv", cell.outline_um);
   std::mt19937 random(1);
   std::uniform_real_distribution<double> place(5, 55);
   std::normal_distribution<double> noise(0, 0.01);
@@ -118,7 +121,7 @@ inline void write_given_stages(const fs::path& folder, const Cell& cell) {
                      .sigma_um = 0.01,
                      .flag = {}});
   }
-  write_displacement(folder / "2_track/displacement.csv", field);
+  files::write_displacement(folder / "2_track/displacement.csv", field);
 }
 
 /// 3_network and 4_fit with invented tensions; a force towards the cell's centre of gravity on each adhesion, the sum
@@ -126,9 +129,9 @@ inline void write_given_stages(const fs::path& folder, const Cell& cell) {
 inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
   fs::create_directories(folder / "3_network");
   fs::create_directories(folder / "4_fit");
-  const Cell cell = read_cell(folder / "1_segment");
+  const Cell cell = files::read_cell(folder / "1_segment");
   const Network network = web_over(cell);
-  write_network(folder / "3_network/network.vtu", network);
+  files::write_network(folder / "3_network/network.vtu", network);
 
   std::mt19937 random(seed);
   std::lognormal_distribution<double> strength(0.5, 0.7);
@@ -141,7 +144,7 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
                         .high_nN = t + 0.4,
                         .identifiable = fibre.fibre_id % 7 != 0});
   }
-  write_tensions(folder / "4_fit/tensions.csv", tensions, cell.fibres);
+  files::write_tensions(folder / "4_fit/tensions.csv", tensions, cell.fibres);
 
   Vec2 centre, net;
   for (const Adhesion& a : cell.adhesions) centre += (1.0 / static_cast<double>(cell.adhesions.size())) * a.position_um;
@@ -170,8 +173,8 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
     summary.total_force_nN += norm(force.force_nN);
   }
   summary.fibre_force_nN = summary.total_force_nN - summary.network_force_nN;
-  write_adhesion_forces(folder / "4_fit/adhesion_forces.csv", forces, cell.adhesions);
-  write_fit_summary(folder / "4_fit/fit.json", summary);
+  files::write_adhesion_forces(folder / "4_fit/adhesion_forces.csv", forces, cell.adhesions);
+  files::write_fit_summary(folder / "4_fit/fit.json", summary);
 
   std::vector<Vec2> drawn = network.vertices_um;
   for (std::size_t v = 0; v < drawn.size(); ++v) {
@@ -180,12 +183,12 @@ inline void write_invented_fit(const fs::path& folder, unsigned seed = 1) {
   std::vector<double> carried;
   for (const Link& link : network.links)
     carried.push_back(link.fibre_id == 0 ? 0.06 : tensions[link.fibre_id].tension_nN);
-  write_contracted_network(folder / "4_fit/contracted.vtu", network, drawn, carried,
-                           std::vector<CableState>(network.links.size(), CableState::slack));
+  files::write_contracted_network(folder / "4_fit/contracted.vtu", network, drawn, carried,
+                                  std::vector<CableState>(network.links.size(), CableState::slack));
 
-  DisplacementField fitted = read_displacement(folder / "2_track/displacement.csv");
+  DisplacementField fitted = files::read_displacement(folder / "2_track/displacement.csv");
   for (Bead& bead : fitted) bead.displacement_um = 0.9 * bead.displacement_um;
-  write_displacement(folder / "4_fit/fitted_displacement.csv", fitted);
+  files::write_displacement(folder / "4_fit/fitted_displacement.csv", fitted);
 }
 
 }  // namespace mbtfm::test

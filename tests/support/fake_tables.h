@@ -4,7 +4,8 @@
 #include <filesystem>
 #include <vector>
 
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/network.h"
+#include "pipeline/files/csv_files.h"
 
 namespace mbtfm::test {
 
@@ -63,9 +64,9 @@ inline Network small_network() {
 inline void write_cell(const std::filesystem::path& folder) {
   std::filesystem::create_directories(folder);
   const Cell cell = small_cell();
-  write_adhesions(folder / "adhesions.csv", cell.adhesions);
-  write_fibres(folder / "fibres.csv", folder / "fibre_points.csv", cell.fibres);
-  write_outline(folder / "outline.csv", cell.outline_um, cell.holes_um);
+  files::write_adhesions(folder / "adhesions.csv", cell.adhesions);
+  files::write_fibres(folder / "fibres.csv", folder / "fibre_points.csv", cell.fibres);
+  files::write_outline(folder / "outline.csv", cell.outline_um, cell.holes_um);
 }
 
 /// The other tables. @returns their paths
@@ -78,12 +79,12 @@ inline std::vector<std::filesystem::path> write_tables(const std::filesystem::pa
                      .sigma_um = 0.02,
                      .flag = i == 3 ? "neighbours disagree" : ""});
   }
-  write_displacement(folder / "displacement.csv", field);
-  write_tensions(folder / "tensions.csv",
-                 {{.fibre_id = 0, .tension_nN = 0.06, .low_nN = 0.03, .high_nN = 0.09},
-                  {.fibre_id = 1, .tension_nN = 4.2, .low_nN = {}, .high_nN = {}, .identifiable = false}},
-                 small_cell().fibres);
-  write_adhesion_forces(
+  files::write_displacement(folder / "displacement.csv", field);
+  files::write_tensions(folder / "tensions.csv",
+                        {{.fibre_id = 0, .tension_nN = 0.06, .low_nN = 0.03, .high_nN = 0.09},
+                         {.fibre_id = 1, .tension_nN = 4.2, .low_nN = {}, .high_nN = {}, .identifiable = false}},
+                        small_cell().fibres);
+  files::write_adhesion_forces(
       folder / "adhesion_forces.csv",
       {{.adhesion_id = 1, .force_nN = {-2.9, 0.1}, .sigma_nN = 0.3, .connected = true, .moment_nN_um = 0.02},
        {.adhesion_id = 7, .force_nN = {2.9, -0.1}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}}},

@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 
+#include "pipeline/contract/polyline.h"
 #include "tests/support/segmentation_accuracy.h"
 
 namespace mbtfm::test {

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "network/cables.h"
-#include "network/mesh.h"
+#include "network/cables/cables.h"
+#include "network/mesh/mesh.h"
 
 namespace mbtfm::test {
 
@@ -15,7 +15,7 @@ struct HardCables {
   std::string title;  ///< what is hard about it
   Network network;
   std::vector<double> tensions_nN;  ///< by group
-  network::CableParameters parameters{};
+  cables::CableParameters parameters{};
 };
 
 /// The round cell of all scenes: its radius, and where its adhesions are.
@@ -55,7 +55,7 @@ inline Network mesh_of(const RoundCell& round) {
     f.points_um = points;
     cell.fibres.push_back(f);
   }
-  return network::generate_network(cell, {}).network;
+  return mesh::generate_network(cell, {}).network;
 }
 
 inline void scale_lengths(Network& network, double x, double y) {

@@ -7,7 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::testing {
 

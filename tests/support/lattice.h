@@ -6,7 +6,8 @@
 #include <utility>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/geometry.h"
+#include "pipeline/contract/network.h"
 
 namespace mbtfm::test {
 

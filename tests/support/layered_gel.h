@@ -9,7 +9,8 @@
 #include <cmath>
 #include <numbers>
 
-#include "substrate/half_space.h"
+#include "pipeline/numerics/quadrature.h"
+#include "substrate/greens/half_space.h"
 
 namespace mbtfm::test {
 
@@ -22,7 +23,7 @@ class LayeredGel {
   LayeredGel(std::vector<EvenLayer> layers, double poisson_ratio) : layers_(std::move(layers)), nu_(poisson_ratio) {
     // what the half-space of the first layer leaves falls as exp(-2 k d): below 1e-12 at k = 14/d
     const double most = 14 / layers_[0].thickness_um;
-    const substrate::GaussRule gauss = substrate::gauss_legendre(12);
+    const numerics::GaussRule gauss = numerics::gauss_legendre(12);
     constexpr int kPanels = 40;
     for (int panel = 0; panel < kPanels; ++panel) {
       for (std::size_t g = 0; g < gauss.nodes.size(); ++g) {
@@ -38,9 +39,9 @@ class LayeredGel {
   }
 
   /// Displacement by a unit force on an ellipse: the half-space of the first layer, plus the rest averaged.
-  substrate::Sym2 compliance_um_per_nN(const substrate::Ellipse& ellipse, Vec2 point) const {
+  greens::Sym2 compliance_um_per_nN(const substrate::Ellipse& ellipse, Vec2 point) const {
     const Gel top = {.youngs_modulus_kPa = layers_[0].youngs_modulus_kPa, .poisson_ratio = nu_, .thickness_um = 1};
-    substrate::Sym2 sum = substrate::HalfSpaceEllipse(top, ellipse).compliance_um_per_nN(point);
+    greens::Sym2 sum = greens::HalfSpaceEllipse(top, ellipse).compliance_um_per_nN(point);
     for (const substrate::DiscPoint& p : substrate::ellipse_rule(ellipse, 5)) {
       sum += p.weight * rest(point - ellipse.centre_um - p.position);
     }
@@ -50,7 +51,7 @@ class LayeredGel {
  private:
   double shear_modulus(std::size_t layer) const { return layers_[layer].youngs_modulus_kPa / (2 * (1 + nu_)); }
 
-  substrate::Sym2 rest(Vec2 offset) const {
+  greens::Sym2 rest(Vec2 offset) const {
     const double r = norm(offset);
     double s = 0, d = 0;
     for (std::size_t i = 0; i < k_.size(); ++i) {

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::test {
 

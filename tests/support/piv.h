@@ -6,8 +6,8 @@
 #include <random>
 #include <vector>
 
-#include "segment/coarse_field.h"
-#include "segment/track.h"
+#include "segment/beads/coarse_field.h"
+#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
 namespace mbtfm::test {
@@ -57,9 +57,9 @@ constexpr double kPivOrigin_px = 1.5;
 /// Where a published PIV has its vectors: rows of a square grid, one after the other.
 struct PivGrid {
   std::vector<Vec2> middles;  ///< of its windows, px, 0 at the centre of the first pixel
-  segment::GridField field(std::vector<Vec2> u) const {
+  beads::GridField field(std::vector<Vec2> u) const {
     const auto in_first_row = [&](Vec2 p) { return p.y == middles[0].y; };
-    segment::GridField grid;
+    beads::GridField grid;
     grid.nx = static_cast<int>(std::count_if(middles.begin(), middles.end(), in_first_row));
     grid.ny = static_cast<int>(middles.size()) / grid.nx;
     grid.spacing = middles[1].x - middles[0].x;
@@ -70,8 +70,8 @@ struct PivGrid {
 };
 
 /// Weighed 1 : 2 : 1 with the neighbours along both axes.
-inline segment::GridField smoothed(const segment::GridField& field) {
-  segment::GridField result = field;
+inline beads::GridField smoothed(const beads::GridField& field) {
+  beads::GridField result = field;
   for (int j = 0; j < field.ny; ++j) {
     for (int i = 0; i < field.nx; ++i) {
       Vec2 sum;
@@ -88,7 +88,7 @@ inline segment::GridField smoothed(const segment::GridField& field) {
 }
 
 /// Of a tracking with pixels of 1 um: its good beads, drift included.
-inline std::vector<Moved> moved_beads(const segment::Tracking& tracking) {
+inline std::vector<Moved> moved_beads(const beads::Tracking& tracking) {
   std::vector<Moved> result;
   for (const Bead& bead : tracking.field) {
     if (!bead.flag.empty()) continue;
@@ -99,18 +99,18 @@ inline std::vector<Moved> moved_beads(const segment::Tracking& tracking) {
 
 /// The beads of the relaxed image, moved as tracked, on the image's own background, with its noise: what image
 /// correlation makes of it is what it would see of the tracked field, bright beads before dim ones.
-inline BeadPair redrawn(const segment::Image& relaxed, const segment::Tracking& tracking) {
-  const auto beads = segment::detect_beads(relaxed);
+inline BeadPair redrawn(const images::Image& relaxed, const beads::Tracking& tracking) {
+  const auto beads = beads::detect_beads(relaxed);
   BeadPair pair;
   std::vector<float> sorted = relaxed.pixels;
   std::nth_element(sorted.begin(), sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 4), sorted.end());
   const float background = sorted[sorted.size() / 4];
-  for (segment::Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
     *image = relaxed;
     std::fill(image->pixels.begin(), image->pixels.end(), background);
   }
   const std::vector<Moved> moved = moved_beads(tracking);
-  for (const segment::DetectedBead& bead : beads) {
+  for (const beads::DetectedBead& bead : beads) {
     const auto nearest = std::min_element(moved.begin(), moved.end(), [&](const auto& a, const auto& b) {
       return norm(a.place - bead.position_px) < norm(b.place - bead.position_px);
     });
@@ -121,14 +121,14 @@ inline BeadPair redrawn(const segment::Image& relaxed, const segment::Tracking& 
   }
   std::mt19937_64 random(101);
   std::normal_distribution<float> noise(0, 0.02f * background);
-  for (segment::Image* image : {&pair.relaxed, &pair.stressed}) {
+  for (images::Image* image : {&pair.relaxed, &pair.stressed}) {
     for (float& value : image->pixels) value += noise(random);
   }
   return pair;
 }
 
 /// A square of an image less its mean; beyond the border it is blank.
-inline std::vector<double> window_of(const segment::Image& image, int left, int top, int side) {
+inline std::vector<double> window_of(const images::Image& image, int left, int top, int side) {
   std::vector<double> values(static_cast<std::size_t>(side) * side, 0);
   double sum = 0;
   int n = 0;
@@ -146,7 +146,7 @@ inline std::vector<double> window_of(const segment::Image& image, int left, int 
 
 /// Highest correlation of two windows, shifted by up to 8 px in a circle as by Fourier transforms, with a Gaussian
 /// through the peak's neighbours.
-inline Vec2 piv_displacement(const segment::Image& relaxed, const segment::Image& stressed, Vec2 middle, int side) {
+inline Vec2 piv_displacement(const images::Image& relaxed, const images::Image& stressed, Vec2 middle, int side) {
   constexpr int kReach = 8;
   const int left = static_cast<int>(std::lround(middle.x + 0.5)) - side / 2;
   const int top = static_cast<int>(std::lround(middle.y + 0.5)) - side / 2;
@@ -187,13 +187,13 @@ inline Vec2 piv_displacement(const segment::Image& relaxed, const segment::Image
 }
 
 /// image(x + u(x)), by its cubic spline.
-inline segment::Image deformed_back(const segment::Image& image, const segment::GridField& u) {
-  const segment::Spline spline = segment::spline_through({image.width, image.height, image.pixels}, 1);
-  segment::Image result = image;
+inline images::Image deformed_back(const images::Image& image, const beads::GridField& u) {
+  const beads::Spline spline = beads::spline_through({image.width, image.height, image.pixels}, 1);
+  images::Image result = image;
   for (int j = 0; j < image.height; ++j) {
     for (int i = 0; i < image.width; ++i) {
       const Vec2 place{1.0 * i, 1.0 * j};
-      result.pixels[static_cast<std::size_t>(j) * image.width + i] = segment::value_at(spline, place + u.at(place).u);
+      result.pixels[static_cast<std::size_t>(j) * image.width + i] = beads::value_at(spline, place + u.at(place).u);
     }
   }
   return result;
@@ -201,14 +201,14 @@ inline segment::Image deformed_back(const segment::Image& image, const segment::
 
 /// Image correlation as PIV programs do it by default (PIVlab: Thielicke & Stamhuis, J Open Res Softw 2:e30, 2014):
 /// first in windows of 2 `side`, then, that smoothed, in windows of `side` of the image deformed back by it.
-inline std::vector<Vec2> piv_in_two_passes(const segment::Image& relaxed, const segment::Image& stressed,
+inline std::vector<Vec2> piv_in_two_passes(const images::Image& relaxed, const images::Image& stressed,
                                            const PivGrid& grid, int side) {
-  const auto correlated = [&](const segment::Image& moved, int window) {
+  const auto correlated = [&](const images::Image& moved, int window) {
     std::vector<Vec2> u;
     for (const Vec2 middle : grid.middles) u.push_back(piv_displacement(relaxed, moved, middle, window));
     return u;
   };
-  const segment::GridField first = smoothed(grid.field(correlated(stressed, 2 * side)));
+  const beads::GridField first = smoothed(grid.field(correlated(stressed, 2 * side)));
   std::vector<Vec2> u = correlated(deformed_back(stressed, first), side);
   for (std::size_t k = 0; k < u.size(); ++k) u[k] = u[k] + first.u[k];
   return u;

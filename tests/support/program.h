@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <string>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::test {
@@ -25,7 +25,7 @@ inline Outcome run_program(const std::string& command, const std::string& before
   const std::string whole =
       before + std::string(MBTFM_BINARY_DIR) + "/bin/" + command + " > '" + log.string() + "' 2>&1";
   const int status = std::system(whole.c_str());
-  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), read_text(log)};
+  return {WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status), files::read_text(log)};
 }
 
 }  // namespace mbtfm::test

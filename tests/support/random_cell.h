@@ -8,7 +8,8 @@
 #include <random>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::testing {
 

@@ -12,7 +12,9 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
 #include "pipeline/report/compare.h"
 #include "tests/support/program.h"
 
@@ -106,10 +108,10 @@ inline void check_answer(const std::filesystem::path& cell, SceneOutcome& outcom
     if (!holds) outcome.faults.push_back(what);
   };
   // the readers refuse what is not finite
-  const auto adhesions = read_adhesions(cell / "1_segment/adhesions.csv");
-  const auto forces = read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
-  const FitSummary summary = read_fit_summary(cell / "4_fit/fit.json");
-  read_displacement(cell / "4_fit/fitted_displacement.csv");
+  const auto adhesions = files::read_adhesions(cell / "1_segment/adhesions.csv");
+  const auto forces = files::read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
+  const FitSummary summary = files::read_fit_summary(cell / "4_fit/fit.json");
+  files::read_displacement(cell / "4_fit/fitted_displacement.csv");
   fault(adhesions.size() == forces.size(), "one force an adhesion");
   Vec2 net_nN;
   double total_nN = 0, torque_nN_um = 0, torques_nN_um = 0;
@@ -124,7 +126,7 @@ inline void check_answer(const std::filesystem::path& cell, SceneOutcome& outcom
   fault(norm(net_nN) <= 1e-6 * total_nN, "no net force");
   fault(std::abs(torque_nN_um) <= 1e-6 * torques_nN_um, "no net torque");
   fault(summary.relative_l2 >= 0 && summary.relative_l2 <= 1.5, "a fit no worse than none");
-  for (const Tension& t : read_tensions(cell / "4_fit/tensions.csv")) {
+  for (const Tension& t : files::read_tensions(cell / "4_fit/tensions.csv")) {
     fault(t.tension_nN >= 0, "tensions that pull");
     fault(t.low_nN && t.high_nN && *t.low_nN <= t.tension_nN && t.tension_nN <= *t.high_nN, "an interval around each");
   }
@@ -143,7 +145,7 @@ inline SceneOutcome run_scene(const RandomScene& scene, const std::filesystem::p
                               const std::string& before = {}) {
   SceneOutcome outcome;
   const std::filesystem::path file = cell.string() + ".toml";
-  write_text(file, scene.scenario);
+  files::write_text(file, scene.scenario);
   const Outcome made =
       run_program("mbtfm-simulate --quiet --scenario " + file.string() + " --seed " + std::to_string(scene.seed) +
                       (scene.has_images ? " --images" : "") + " --out " + cell.string(),
@@ -151,7 +153,7 @@ inline SceneOutcome run_scene(const RandomScene& scene, const std::filesystem::p
   if (made.code == exit_code::kUsage)
     return {.kind = SceneOutcome::Kind::cannot_be_drawn, .faults = {}, .message = made.output};
   if (made.code != 0) return {.faults = {"a simulation"}, .message = made.output};
-  write_text(cell / "cell.toml", read_text(cell / "cell.toml") + scene.settings);
+  files::write_text(cell / "cell.toml", files::read_text(cell / "cell.toml") + scene.settings);
   const Outcome run = run_program("mbtfm run " + cell.string(), before);
   if (run.code == exit_code::kInput || run.code == exit_code::kNotSolved || run.code == exit_code::kNoAnswer) {
     // poor images may be refused; adhesions, fibres and displacements of a cell as it was drawn may not

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "segment/segment_cell.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_score.h"
 
 namespace mbtfm::test {
@@ -43,9 +43,9 @@ inline std::vector<std::vector<double>> numbers_of(const std::filesystem::path& 
 }
 
 /// Pixels by label.
-using Labels = std::map<int, std::vector<segment::CoveredPixel>>;
+using Labels = std::map<int, std::vector<cells::CoveredPixel>>;
 
-inline Labels labels_of(const segment::Image& image) {
+inline Labels labels_of(const images::Image& image) {
   Labels labels;
   for (int row = 0; row < image.height; ++row)
     for (int column = 0; column < image.width; ++column)
@@ -54,10 +54,10 @@ inline Labels labels_of(const segment::Image& image) {
 }
 
 /// The connected pixels of a mask (4 neighbours), by label.
-inline Labels components_of(const segment::Image& mask) {
+inline Labels components_of(const images::Image& mask) {
   Labels labels;
   std::vector<bool> is_done(mask.pixels.size(), false);
-  const auto take = [&](std::vector<segment::CoveredPixel>& part, int column, int row) {
+  const auto take = [&](std::vector<cells::CoveredPixel>& part, int column, int row) {
     if (column < 0 || row < 0 || column >= mask.width || row >= mask.height || mask.at(column, row) == 0) return;
     if (const std::size_t i = static_cast<std::size_t>(row) * mask.width + column; !is_done[i]) {
       is_done[i] = true;
@@ -66,7 +66,7 @@ inline Labels components_of(const segment::Image& mask) {
   };
   for (int row = 0; row < mask.height; ++row)
     for (int column = 0; column < mask.width; ++column) {
-      std::vector<segment::CoveredPixel> part;
+      std::vector<cells::CoveredPixel> part;
       take(part, column, row);
       for (std::size_t k = 0; k < part.size(); ++k)
         for (const auto& [dx, dy] : {std::pair{1, 0}, {-1, 0}, {0, 1}, {0, -1}})
@@ -81,12 +81,12 @@ struct FoundLabels {
   Labels pixels, ellipses;
 };
 
-inline FoundLabels found_labels(const std::vector<segment::AdhesionRegion>& regions, const segment::Image& image,
+inline FoundLabels found_labels(const std::vector<cells::AdhesionRegion>& regions, const images::Image& image,
                                 double pixel_um) {
   FoundLabels found;
-  for (const segment::AdhesionRegion& region : regions) {
+  for (const cells::AdhesionRegion& region : regions) {
     const Adhesion& a = region.adhesion;
-    for (const segment::CoveredPixel& p : region.pixels)
+    for (const cells::CoveredPixel& p : region.pixels)
       if (p.share >= 0.5) found.pixels[a.adhesion_id].push_back(p);
     const auto range = [&](double centre_um, int n) {
       return std::pair(std::max(0, static_cast<int>((centre_um - a.major_axis_um) / pixel_um)),
@@ -97,7 +97,7 @@ inline FoundLabels found_labels(const std::vector<segment::AdhesionRegion>& regi
     for (int row = top; row < bottom; ++row)
       for (int column = left; column < right; ++column)
         if (const Vec2 at{(column + 0.5) * pixel_um, (row + 0.5) * pixel_um};
-            norm(at - a.position_um) <= a.major_axis_um && segment::distance_to_ellipse_um(a, at) < 0)
+            norm(at - a.position_um) <= a.major_axis_um && cells::distance_to_ellipse_um(a, at) < 0)
           found.ellipses[a.adhesion_id].push_back({column, row, 1, 0});
   }
   return found;
@@ -142,24 +142,24 @@ struct Overlaps {
   Overlap pixels, ellipses;
 };
 
-inline Overlaps overlaps_of(const Labels& truth, const segment::Image& image, double pixel_um) {
-  const FoundLabels found = found_labels(segment::find_adhesion_regions(image, pixel_um, {}), image, pixel_um);
+inline Overlaps overlaps_of(const Labels& truth, const images::Image& image, double pixel_um) {
+  const FoundLabels found = found_labels(cells::find_adhesion_regions(image, pixel_um, {}), image, pixel_um);
   return {overlap_of(truth, found.pixels), overlap_of(truth, found.ellipses)};
 }
 
 inline Overlaps hand_mask_overlaps(int image) {
   const std::string name = std::to_string(image) + ".tif";
-  return overlaps_of(components_of(segment::read_image(kHandMasks / "masks" / name)),
-                     segment::read_image(kHandMasks / "images" / name), kHandMasksPixel_um);
+  return overlaps_of(components_of(images::read_image(kHandMasks / "masks" / name)),
+                     images::read_image(kHandMasks / "images" / name), kHandMasksPixel_um);
 }
 
 inline Overlaps fibroblast_overlaps() {
-  return overlaps_of(labels_of(segment::read_image(kFibroblast / "adhesions.png")),
-                     segment::read_image(kFibroblast / "focal_image.png"), kFibroblastPixel_um);
+  return overlaps_of(labels_of(images::read_image(kFibroblast / "adhesions.png")),
+                     images::read_image(kFibroblast / "focal_image.png"), kFibroblastPixel_um);
 }
 
 /// Intersection over union of a mask's pixels and an outline.
-inline double mask_overlap(const segment::Image& mask, const Polygon& outline_um, double pixel_um) {
+inline double mask_overlap(const images::Image& mask, const Polygon& outline_um, double pixel_um) {
   int n_both = 0, n_either = 0;
   for (int row = 0; row < mask.height; ++row)
     for (int column = 0; column < mask.width; ++column) {
@@ -171,8 +171,8 @@ inline double mask_overlap(const segment::Image& mask, const Polygon& outline_um
 }
 
 inline double doublet_overlap() {
-  const Polygon outline = segment::find_outline(segment::read_image(kDoublet / "actin.tif"), {}, kDoubletPixel_um, {});
-  return mask_overlap(segment::read_image(kDoublet / "mask.tif"), outline, kDoubletPixel_um);
+  const Polygon outline = cells::find_outline(images::read_image(kDoublet / "actin.tif"), {}, kDoubletPixel_um, {});
+  return mask_overlap(images::read_image(kDoublet / "mask.tif"), outline, kDoubletPixel_um);
 }
 
 }  // namespace mbtfm::test

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/network.h"
+#include "pipeline/files/csv.h"
 
 namespace mbtfm::test {
 
@@ -19,7 +19,8 @@ struct ReferenceNetwork {
 /// @param name  case_21 or case_22
 inline ReferenceNetwork reference_network(const std::string& name) {
   const std::filesystem::path folder = std::filesystem::path(MBTFM_SOURCE_DIR) / "tests/data/reference/network" / name;
-  const CsvTable vertices(folder / "vertices.csv"), links(folder / "links.csv"), tensions(folder / "tensions.csv");
+  const files::CsvTable vertices(folder / "vertices.csv"), links(folder / "links.csv"),
+      tensions(folder / "tensions.csv");
   ReferenceNetwork reference;
   for (int v = 0; v < vertices.n_rows(); ++v) {
     reference.network.vertices_um.push_back({vertices.number(v, "x_um"), vertices.number(v, "y_um")});

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json.hpp>
 
-#include "pipeline/contract/hash.h"
+#include "pipeline/files/hash.h"
 #include "pipeline/runner/record.h"
 #include "tests/support/fake_cell.h"
 
@@ -31,7 +31,7 @@ esac
 inline nlohmann::ordered_json record_of_folder(const fs::path& folder, const std::string& stage) {
   nlohmann::ordered_json outputs = nlohmann::ordered_json::array();
   for (const auto& entry : fs::directory_iterator(folder))
-    outputs.push_back({{"file", entry.path().filename()}, {"sha256", sha256_of_file(entry.path())}});
+    outputs.push_back({{"file", entry.path().filename()}, {"sha256", files::sha256_of_file(entry.path())}});
   return {{"stage", stage},
           {"version", "1"},
           {"parameters", {{"pixel_size_um", 0.1}, {stage, {{"seed", 1}, {"is_fast", false}, {"method", "auto"}}}}},
@@ -61,16 +61,16 @@ inline fs::path make_script_stages(const fs::path& folder, unsigned seed = 1) {
   const fs::path made = folder / "made", bin = folder / "bin";
   write_given_stages(made, round_cell());
   write_invented_fit(made, seed);
-  FitSummary fit = read_fit_summary(made / "4_fit/fit.json");
+  FitSummary fit = files::read_fit_summary(made / "4_fit/fit.json");
   const ErrorParts parts{.beads = 0.1, .segmentation = 0.2, .mesh = 0.1, .substrate = 0.01, .solver = 0, .model = 0.1};
   fit.error_budget = ErrorBudget{.tensions = {{0, 0.06, parts}, {1, 2, parts}, {2, 3, parts}},
                                  .total_force_nN = fit.total_force_nN,
                                  .total_force_parts_nN = parts};
-  write_fit_summary(made / "4_fit/fit.json", fit, round_cell().fibres);
+  files::write_fit_summary(made / "4_fit/fit.json", fit, round_cell().fibres);
   fs::create_directories(bin);
   for (const runner::Stage& stage : runner::stages()) {
-    write_text(made / stage.folder / "record.json", record_of_folder(made / stage.folder, stage.name).dump());
-    write_text(bin / ("mbtfm-" + stage.name), kCopyingStage);
+    files::write_text(made / stage.folder / "record.json", record_of_folder(made / stage.folder, stage.name).dump());
+    files::write_text(bin / ("mbtfm-" + stage.name), kCopyingStage);
     fs::permissions(bin / ("mbtfm-" + stage.name), fs::perms::owner_all);
   }
   return bin;
@@ -79,9 +79,9 @@ inline fs::path make_script_stages(const fs::path& folder, unsigned seed = 1) {
 /// cell.toml and images, which the scripts do not look at.
 inline void make_unfinished_cell(const fs::path& cell) {
   fs::create_directories(cell);
-  write_text(cell / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n");
+  files::write_text(cell / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n");
   for (const char* image : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"})
-    write_text(cell / image, image);
+    files::write_text(cell / image, image);
 }
 
 }  // namespace mbtfm::test

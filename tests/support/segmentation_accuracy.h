@@ -4,39 +4,39 @@
 #include <map>
 #include <string>
 
-#include "samples/draw.h"
-#include "samples/render.h"
-#include "samples/scenario.h"
-#include "segment/segment_cell.h"
+#include "samples/drawing/draw.h"
+#include "samples/drawing/render.h"
+#include "samples/drawing/scenario.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/segmentation_score.h"
 
 namespace mbtfm::test {
 
 struct SimulatedCell {
   Cell truth;
-  segment::Channel adhesion, actin;
-  samples::Nucleus nucleus;
+  images::Channel adhesion, actin;
+  drawing::Nucleus nucleus;
 };
 
 /// The images that `mbtfm-simulate --scenario … --image_quality … --seed … --images` writes, without the mechanics.
 inline SimulatedCell simulated_cell(const std::string& scenario, const std::string& quality, std::uint64_t seed,
                                     int image_size_px = 1024) {
-  samples::ScenarioParameters p;
-  ParameterList list;
+  drawing::ScenarioParameters p;
+  stage::ParameterList list;
   declare(list, p);
-  read_toml(list, samples::scenario_file(scenario));
+  stage::read_toml(list, drawing::scenario_file(scenario));
   p.microscope.image_quality = quality;
   p.microscope.image_size_px = image_size_px;
-  const samples::MicroscopeParameters m = at_quality(p.microscope);
+  const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
   constexpr int kThreads = 2;
-  SimulatedCell cell{draw_cell(p.cell, p.tension, samples::field_um(m), seed).cell, {}, {}, {}};
-  const auto image = [&](const samples::Image& specimen, int exposure) {
-    return samples::recorded(photons_of(specimen, m, kThreads), m, seed, exposure, kThreads);
+  SimulatedCell cell{drawing::draw_cell(p.cell, p.tension, drawing::field_um(m), seed).cell, {}, {}, {}};
+  const auto image = [&](const images::Image& specimen, int exposure) {
+    return drawing::recorded(drawing::photons_of(specimen, m, kThreads), m, seed, exposure, kThreads);
   };
-  cell.adhesion = {"paxillin.tif", image(paxillin_specimen(cell.truth, m, seed, kThreads), 0)};
-  cell.actin = {"actin.tif", image(actin_specimen(cell.truth, p.actin, m, seed, kThreads), 1)};
-  cell.nucleus = nucleus_of(cell.truth, p.actin, seed);
-  for (segment::Channel* channel : {&cell.adhesion, &cell.actin}) channel->image.pixel_size_um = m.pixel_size_um;
+  cell.adhesion = {"paxillin.tif", image(drawing::paxillin_specimen(cell.truth, m, seed, kThreads), 0)};
+  cell.actin = {"actin.tif", image(drawing::actin_specimen(cell.truth, p.actin, m, seed, kThreads), 1)};
+  cell.nucleus = drawing::nucleus_of(cell.truth, p.actin, seed);
+  for (images::Channel* channel : {&cell.adhesion, &cell.actin}) channel->image.pixel_size_um = m.pixel_size_um;
   return cell;
 }
 

@@ -6,7 +6,8 @@
 #include <limits>
 #include <vector>
 
-#include "pipeline/contract/types.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
 
 namespace mbtfm::test {
 

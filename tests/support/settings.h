@@ -4,16 +4,16 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/parameters.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm::test {
 
 /// @param settings  NAME=VALUE each
 /// @throws UsageError for a name that is not declared and for a value out of range
-inline void set_all(ParameterList& list, const std::vector<std::string>& settings) {
+inline void set_all(stage::ParameterList& list, const std::vector<std::string>& settings) {
   for (const std::string& setting : settings) {
     const auto split = setting.find('=');
-    set_from_text(parameter_named(list, setting.substr(0, split)),
+    stage::set_from_text(stage::parameter_named(list, setting.substr(0, split)),
                   split == std::string::npos ? "" : setting.substr(split + 1));
   }
 }

@@ -125,13 +125,13 @@ inline statistics::Study small_study(const Lack& lack, std::uint64_t seed) {
 inline void write_finished_cell(const fs::path& folder, const statistics::StudyCell& cell) {
   fs::create_directories(folder / "1_segment");
   fs::create_directories(folder / "4_fit");
-  write_text(folder / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n");
-  write_adhesions(folder / "1_segment/adhesions.csv", cell.cell.adhesions);
-  write_fibres(folder / "1_segment/fibres.csv", folder / "1_segment/fibre_points.csv", cell.cell.fibres);
-  write_outline(folder / "1_segment/outline.csv", cell.cell.outline_um);
-  write_tensions(folder / "4_fit/tensions.csv", cell.tensions, cell.cell.fibres);
-  write_adhesion_forces(folder / "4_fit/adhesion_forces.csv", cell.forces, cell.cell.adhesions);
-  write_fit_summary(folder / "4_fit/fit.json", cell.fit);
+  files::write_text(folder / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8.4\n");
+  files::write_adhesions(folder / "1_segment/adhesions.csv", cell.cell.adhesions);
+  files::write_fibres(folder / "1_segment/fibres.csv", folder / "1_segment/fibre_points.csv", cell.cell.fibres);
+  files::write_outline(folder / "1_segment/outline.csv", cell.cell.outline_um);
+  files::write_tensions(folder / "4_fit/tensions.csv", cell.tensions, cell.cell.fibres);
+  files::write_adhesion_forces(folder / "4_fit/adhesion_forces.csv", cell.forces, cell.cell.adhesions);
+  files::write_fit_summary(folder / "4_fit/fit.json", cell.fit);
 }
 
 }  // namespace mbtfm::test

@@ -26,10 +26,10 @@ inline std::vector<Vec2> scattered_points(int n, double half_side_um, Vec2 centr
 }
 
 /// Ellipses of 0.5 to 5 um² and aspect 1.5 to 4 in a disc.
-inline std::vector<Ellipse> scattered_ellipses(int n, double radius_um, std::uint64_t seed = 1) {
+inline std::vector<substrate::Ellipse> scattered_ellipses(int n, double radius_um, std::uint64_t seed = 1) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> unit(0, 1);
-  std::vector<Ellipse> ellipses;
+  std::vector<substrate::Ellipse> ellipses;
   for (int j = 0; j < n; ++j) {
     const double r = radius_um * std::sqrt(unit(random));
     const double direction = 2 * std::numbers::pi * unit(random);
@@ -58,7 +58,7 @@ struct ColumnErrors {
   double worst_outside = 0;
 };
 
-inline bool is_inside(const Ellipse& e, Vec2 point) {
+inline bool is_inside(const substrate::Ellipse& e, Vec2 point) {
   const Vec2 along = {std::cos(e.angle_rad), std::sin(e.angle_rad)};
   const Vec2 offset = point - e.centre_um;
   return std::hypot(dot(offset, along) / e.semi_major_um, cross(along, offset) / e.semi_minor_um) <= 1;
@@ -66,7 +66,7 @@ inline bool is_inside(const Ellipse& e, Vec2 point) {
 
 /// Errors of each ellipse's pair of columns, at the points beside the ellipse itself and at those on it.
 inline ColumnErrors column_errors(const Eigen::MatrixXd& matrix, const Eigen::MatrixXd& reference,
-                                  const std::vector<Vec2>& points, const std::vector<Ellipse>& ellipses) {
+                                  const std::vector<Vec2>& points, const std::vector<substrate::Ellipse>& ellipses) {
   ColumnErrors errors;
   int n_inside = 0;
   for (std::size_t j = 0; j < ellipses.size(); ++j) {

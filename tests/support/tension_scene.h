@@ -8,15 +8,16 @@
 #include <numbers>
 #include <random>
 
-#include "mbtfm/ensemble.h"
-#include "network/mesh.h"
+#include "mbtfm/tensions/ensemble.h"
+#include "network/mesh/mesh.h"
 #include "substrate/compliance.h"
+#include "substrate/greens/models.h"
 #include "tests/support/reference_network.h"
 
 namespace mbtfm::test {
 
 struct TensionScene {
-  network::CableNetwork cables;
+  cables::CableNetwork cables;
   Eigen::VectorXd tensions_nN;
   std::vector<int> adhesion_ids;
   std::vector<substrate::Ellipse> ellipses;
@@ -25,7 +26,7 @@ struct TensionScene {
   Eigen::VectorXd forces_nN, displacement_um;  ///< true
   double largest_um = 0;                       ///< displacement
   DisplacementField beads;                     ///< measured
-  inverse::LinearData data;
+  tensions::LinearData data;
 };
 
 /// Measure again: Gaussian noise of `noise` largest displacements, and these are stated as the beads' errors.
@@ -43,14 +44,14 @@ inline void measure(TensionScene& scene, double noise, unsigned seed) {
          .sigma_um = sigma_um,
          .flag = {}});
   }
-  scene.data = inverse::reduce(scene.beads, scene.compliance_um_per_nN);
+  scene.data = tensions::reduce(scene.beads, scene.compliance_um_per_nN);
 }
 
 /// The exact displacements for other tensions.
 inline void contract(TensionScene& scene, const Eigen::VectorXd& tensions_nN) {
   scene.tensions_nN = tensions_nN;
   const std::vector<double> tensions(tensions_nN.data(), tensions_nN.data() + tensions_nN.size());
-  const network::Equilibrium equilibrium = scene.cables.equilibrium(tensions);
+  const cables::Equilibrium equilibrium = scene.cables.equilibrium(tensions);
   const Eigen::VectorXd held = scene.cables.adhesion_forces_nN(tensions, equilibrium);
   scene.forces_nN = Eigen::VectorXd::Zero(scene.compliance_um_per_nN.cols());
   for (std::size_t i = 0; i < scene.cables.adhesion_ids().size(); ++i) {
@@ -68,7 +69,7 @@ inline void contract(TensionScene& scene, const Eigen::VectorXd& tensions_nN) {
 /// On an 8.4 kPa layer; beads evenly at random up to 15 um beyond the adhesions.
 inline TensionScene scene_of(const Network& network, const Eigen::VectorXd& tensions_nN,
                              const std::map<int, substrate::Ellipse>& ellipses, int n_beads, unsigned seed) {
-  TensionScene scene{.cables = network::CableNetwork(network),
+  TensionScene scene{.cables = cables::CableNetwork(network),
                      .tensions_nN = {},
                      .adhesion_ids = {},
                      .ellipses = {},
@@ -92,7 +93,7 @@ inline TensionScene scene_of(const Network& network, const Eigen::VectorXd& tens
   }
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
   scene.compliance_um_per_nN =
-      substrate::make_greens(gel, {.model = "layer"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
+      greens::make_greens(gel, {.model = "layer"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
   contract(scene, tensions_nN);
   return scene;
 }
@@ -150,8 +151,8 @@ inline void add_ventral(Cell& cell, int start_id, int end_id) {
 }
 
 /// As the thesis has it: link values along edges only, adhesions at points.
-inline network::NetworkParameters thesis_network() {
-  network::NetworkParameters p;
+inline mesh::NetworkParameters thesis_network() {
+  mesh::NetworkParameters p;
   p.link_weights = "equal";
   p.link_reach = "neighbours";
   p.adhesion_anchor = "centre";
@@ -160,23 +161,23 @@ inline network::NetworkParameters thesis_network() {
 
 /// @param tensions_nN  the network's, then the fibres'
 inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_nN, int n_beads, double noise,
-                             unsigned seed, const network::NetworkParameters& network = {}) {
+                             unsigned seed, const mesh::NetworkParameters& network = {}) {
   std::map<int, substrate::Ellipse> ellipses;
   for (const Adhesion& a : cell.adhesions) ellipses[a.adhesion_id] = substrate::ellipse_of(a);
-  TensionScene scene = scene_of(network::generate_network(cell, network).network, tensions_nN, ellipses, n_beads, seed);
+  TensionScene scene = scene_of(mesh::generate_network(cell, network).network, tensions_nN, ellipses, n_beads, seed);
   measure(scene, noise, seed);
   return scene;
 }
 
 /// The fit on the scene's own network.
-inline inverse::EnsembleFit fit_own_network(TensionScene& scene, inverse::FitParameters parameters = {}) {
+inline tensions::EnsembleFit fit_own_network(TensionScene& scene, tensions::FitParameters parameters = {}) {
   parameters.n_meshes = 1;
-  std::vector<network::CableNetwork> networks;
+  std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network());
-  return inverse::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
+  return tensions::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
 }
 
-using inverse::values_of;
+using tensions::values_of;
 
 /// Thesis 3.3: 0.06 nN in the network, uniform in [0, 10] nN in the fibres.
 inline Eigen::VectorXd thesis_tensions_nN(std::size_t n_fibres, std::uint64_t seed) {
@@ -189,8 +190,8 @@ inline Eigen::VectorXd thesis_tensions_nN(std::size_t n_fibres, std::uint64_t se
 
 /// Cramér–Rao limit of each tension's standard error at the truth, for the data's noise; the bound t >= 0 aside.
 inline Eigen::VectorXd cramer_rao_nN(const TensionScene& scene) {
-  const inverse::TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
-  const inverse::Trial truth = problem.evaluate(scene.tensions_nN);
+  const tensions::TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
+  const tensions::Trial truth = problem.evaluate(scene.tensions_nN);
   const Eigen::MatrixXd J = problem.jacobian(truth);
   return (J.transpose() * J).inverse().diagonal().cwiseSqrt();
 }

@@ -4,7 +4,7 @@
 #include <cstdio>
 #include <string>
 
-#include "segment/track.h"
+#include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
 namespace mbtfm::test {
@@ -46,7 +46,7 @@ inline double steepness(const std::vector<Peak>& peaks, Vec2 at) {
 }
 
 /// Of a tracking with pixels of 1 um.
-inline TrackingErrors errors_of(const segment::Tracking& tracking, const std::vector<Peak>& peaks, Vec2 drift = {}) {
+inline TrackingErrors errors_of(const beads::Tracking& tracking, const std::vector<Peak>& peaks, Vec2 drift = {}) {
   TrackingErrors e;
   e.n_beads = static_cast<int>(tracking.field.size());
   const Vec2 missed = tracking.common.drift_um - drift;

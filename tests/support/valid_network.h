@@ -9,7 +9,7 @@
 #include <tuple>
 #include <vector>
 
-#include "network/mesh.h"
+#include "network/mesh/mesh.h"
 
 namespace mbtfm::testing {
 
@@ -32,7 +32,7 @@ inline int n_ends_of_fibre(const Network& network, int fibre_id) {
 }
 
 /// The finest wanted edge length, but for lines of the frame that are close together.
-inline double finest_edge_um(const Cell& cell, const network::NetworkParameters& parameters) {
+inline double finest_edge_um(const Cell& cell, const mesh::NetworkParameters& parameters) {
   double finest = parameters.edge_length_um;
   for (const Adhesion& a : cell.adhesions) {
     Polygon rim = ellipse_corners(a, 64);
@@ -47,7 +47,7 @@ inline double finest_edge_um(const Cell& cell, const network::NetworkParameters&
 }
 
 /// @param edge_length_um  the finest wanted
-inline void expect_valid(const network::GeneratedNetwork& generated, const Cell& cell, double edge_length_um) {
+inline void expect_valid(const mesh::GeneratedNetwork& generated, const Cell& cell, double edge_length_um) {
   const Network& net = generated.network;
   ASSERT_NO_THROW(check(net));
   EXPECT_EQ(generated.n_parts, 1);

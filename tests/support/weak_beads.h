@@ -6,7 +6,7 @@
 #include <random>
 #include <vector>
 
-#include "segment/plane.h"
+#include "segment/beads/plane.h"
 #include "tests/support/bead_pair.h"
 
 namespace mbtfm::test {
@@ -18,19 +18,19 @@ struct Weakness {
 };
 
 /// Spots of light that are no beads.
-inline std::vector<float> mottled_ground(const segment::Image& image, const Weakness& weakness, std::uint64_t seed) {
+inline std::vector<float> mottled_ground(const images::Image& image, const Weakness& weakness, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::normal_distribution<float> normal;
-  segment::Plane ground{image.width, image.height, std::vector<float>(image.pixels.size())};
+  beads::Plane ground{image.width, image.height, std::vector<float>(image.pixels.size())};
   for (float& value : ground.values) value = normal(random);
-  ground = segment::blurred(ground, weakness.mottle_sigma);
+  ground = beads::blurred(ground, weakness.mottle_sigma);
   // white noise of 1 that is averaged over a Gaussian keeps 1/(2 sqrt(pi) sigma) of its standard deviation
   const double scale = weakness.mottle * 2 * std::sqrt(std::numbers::pi) * weakness.mottle_sigma;
   for (float& value : ground.values) value *= static_cast<float>(scale);
   return ground.values;
 }
 
-inline void weaken(segment::Image& image, const Weakness& weakness, std::uint64_t seed) {
+inline void weaken(images::Image& image, const Weakness& weakness, std::uint64_t seed) {
   const std::vector<float> ground = mottled_ground(image, weakness, seed);
   for (std::size_t k = 0; k < ground.size(); ++k) image.pixels[k] = std::max(0.0f, image.pixels[k] + ground[k]);
   if (!(weakness.levels > 0)) return;

@@ -1,8 +1,9 @@
 /// Images by file-name patterns, and the table of a batch.
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/run_cell.h"
@@ -19,14 +20,14 @@ struct ImageFolder {
   explicit ImageFolder(const std::vector<std::string>& files) {
     for (const std::string& file : files) {
       fs::create_directories((folder / file).parent_path());
-      write_text(folder / file, "x");
+      files::write_text(folder / file, "x");
     }
   }
   std::vector<std::string> make(const std::vector<std::string>& patterns, const std::string& settings = {}) {
     std::vector<ImagePattern> parsed;
     for (const std::string& p : patterns) parsed.push_back(parse_pattern(p));
     fs::path file;
-    if (!settings.empty()) write_text(file = folder / "settings.toml", settings);
+    if (!settings.empty()) files::write_text(file = folder / "settings.toml", settings);
     return make_cell_folders(folder / ".", parsed, file);
   }
 };
@@ -38,7 +39,7 @@ TEST(ImageSets, files_that_share_a_name_become_a_cell) {
   const ImageNames names = read_image_names(f.folder / "wt 1");
   EXPECT_TRUE(fs::equivalent(resolve_image(f.folder / "wt 1", names, "adhesion"), f.folder / "wt 1_pax.tif"));
   EXPECT_TRUE(fs::equivalent(resolve_image(f.folder / "wt 1", names, "actin"), f.folder / "wt 1_act.tif"));
-  EXPECT_TRUE(read_text(f.folder / "ko(2)/cell.toml").starts_with("pixel_size_um = 0.1\n"));
+  EXPECT_TRUE(files::read_text(f.folder / "ko(2)/cell.toml").starts_with("pixel_size_um = 0.1\n"));
 }
 
 TEST(ImageSets, a_cell_may_be_a_folder) {
@@ -57,9 +58,9 @@ TEST(ImageSets, names_may_hold_quotes) {
 TEST(ImageSets, settings_that_are_there_stay) {
   ImageFolder f({"a_pax.tif"});
   f.make({"adhesion={cell}_pax.tif"});
-  write_text(f.folder / "a/cell.toml", "mine");
+  files::write_text(f.folder / "a/cell.toml", "mine");
   f.make({"adhesion={cell}_pax.tif"});
-  EXPECT_EQ(read_text(f.folder / "a/cell.toml"), "mine");
+  EXPECT_EQ(files::read_text(f.folder / "a/cell.toml"), "mine");
 }
 
 TEST(ImageSets, a_dot_of_a_pattern_is_a_dot) {
@@ -81,7 +82,7 @@ TEST(BatchTable, has_a_column_for_every_figure_and_a_row_for_every_cell) {
   TemporaryFolder folder;
   const auto record = [&](const std::string& cell, const std::string& text) {
     fs::create_directories(folder / cell / "1_segment");
-    write_text(folder / cell / "1_segment/record.json", text);
+    files::write_text(folder / cell / "1_segment/record.json", text);
   };
   record("a", R"({"summary": "two", "figures": {"n_adhesions": 2}})");
   record("b", R"({"summary": "none", "figures": {"n_adhesions": 0, "why": "a, b"}})");
@@ -95,7 +96,7 @@ TEST(BatchTable, has_a_column_for_every_figure_and_a_row_for_every_cell) {
   EXPECT_EQ(last_summary(cells[0].cell, {"track"}), "");
   EXPECT_EQ(last_summary(cells[3].cell, {}), "");
   write_batch_table(folder / "batch.csv", folder / ".", cells, {});
-  const CsvTable table(folder / "batch.csv");
+  const files::CsvTable table(folder / "batch.csv");
   ASSERT_EQ(table.n_rows(), 4);
   EXPECT_EQ(table.integer(0, "segment.n_adhesions", 0), 2);
   EXPECT_EQ(table.text(1, "segment.why"), "a, b");

@@ -1,4 +1,4 @@
-#include "segment/candidates.h"
+#include "segment/cells/candidates.h"
 
 #include <gtest/gtest.h>
 
@@ -8,12 +8,12 @@
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
-#include "segment/fibre_ends.h"
-#include "segment/mask.h"
-#include "segment/segment_cell.h"
+#include "segment/cells/fibre_ends.h"
+#include "segment/cells/mask.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 double nearest_um(const std::vector<Vec2>& points, Vec2 point) {
@@ -92,7 +92,7 @@ TEST(Candidates, are_taken_where_nothing_shows_the_adhesions_and_as_the_paramete
 
 struct Scene {
   test::DrawnScene drawn = test::drawn_scene(10, 1);
-  Channel adhesion{"paxillin.tif", drawn.adhesion_image}, actin{"actin.tif", drawn.actin_image};
+  images::Channel adhesion{"paxillin.tif", drawn.adhesion_image}, actin{"actin.tif", drawn.actin_image};
   SegmentParameters parameters;
   explicit Scene(const char* adhesions) {
     parameters.pixel_size_um = test::DrawnScene::kPixel_um;
@@ -155,7 +155,7 @@ TEST(Candidates, at_fibre_ends_alone_have_no_other_place) {
 
 TEST(Candidates, of_a_pattern_lie_on_it_and_in_the_cell) {
   Scene scene("pattern");
-  Image half = test::even_image(256, 256, 0);
+  images::Image half = test::even_image(256, 256, 0);
   for (int j = 0; j < 256; ++j)
     for (int i = 0; i < 128; ++i) half.at(i, j) = 255;
   HandDrawn drawn;
@@ -177,7 +177,7 @@ TEST(Candidates, of_a_pattern_lie_on_it_and_in_the_cell) {
 TEST(Candidates, of_a_pattern_stand_where_fibres_end_on_it) {
   Scene scene("pattern");
   HandDrawn drawn;
-  Image disc = test::even_image(256, 256, 255);
+  images::Image disc = test::even_image(256, 256, 255);
   for (int j = 0; j < 256; ++j) disc.at(0, j) = 0;
   drawn.adhesion_mask = std::make_shared<const LabelMask>(mask_of(disc, "pattern.tif"));
   const Segmentation without = segment_cell(std::nullopt, scene.actin, scene.parameters, drawn);
@@ -198,7 +198,7 @@ TEST(Candidates, of_a_pattern_stand_where_fibres_end_on_it) {
 TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
   const Scene scene("pattern");
   const auto beneath = [&](Vec2 shift_um) {
-    Image image = test::even_image(256, 256, 0);
+    images::Image image = test::even_image(256, 256, 0);
     for (int j = 0; j < 256; ++j)
       for (int i = 0; i < 256; ++i)
         if (norm(0.1 * Vec2{i + 0.5, j + 0.5} - Vec2{12.8, 12.8} - shift_um) < 6) image.at(i, j) = 255;
@@ -219,4 +219,4 @@ TEST(Candidates, are_not_asked_for_where_an_image_shows_the_adhesions) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -1,15 +1,15 @@
-#include "segment/contact_sheet.h"
+#include "segment/cells/contact_sheet.h"
 
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::images {
 namespace {
 
 TEST(ContactSheet, has_the_first_parameter_in_columns_and_the_second_in_rows) {
-  const auto axes = parse_axes("adhesion_seed_noise=3,4.5  fibre_false_per_cell=0.1");
+  const auto axes = cells::parse_axes("adhesion_seed_noise=3,4.5  fibre_false_per_cell=0.1");
   ASSERT_EQ(axes.size(), 2u);
   EXPECT_EQ(axes[0].parameter, "adhesion_seed_noise");
   EXPECT_EQ(axes[0].values, (std::vector<std::string>{"3", "4.5"}));
@@ -18,19 +18,19 @@ TEST(ContactSheet, has_the_first_parameter_in_columns_and_the_second_in_rows) {
 
 TEST(ContactSheet, refuses_what_is_no_list_of_values) {
   for (const char* text : {"", "  ", "a", "a=", "=1,2", "a=1,,2", "a=1 b=2 c=3", "a=1 a=2"})
-    EXPECT_THROW(parse_axes(text), UsageError) << text;
+    EXPECT_THROW(cells::parse_axes(text), UsageError) << text;
   std::string many = "a=0";
   for (int i = 1; i < 65; ++i) many += "," + std::to_string(i);
-  EXPECT_THROW(parse_axes(many), UsageError);
+  EXPECT_THROW(cells::parse_axes(many), UsageError);
 }
 
 struct Sheet {
   test::DrawnScene scene = test::drawn_scene(10, 1);
   Picture draw(const std::string& axes) const {
-    SegmentParameters p;
+    cells::SegmentParameters p;
     p.pixel_size_um = scene.kPixel_um;
     p.contact_sheet = axes;
-    return draw_contact_sheet(Channel{"adhesion", scene.adhesion_image}, Channel{"actin", scene.actin_image}, p);
+    return cells::draw_contact_sheet(Channel{"adhesion", scene.adhesion_image}, Channel{"actin", scene.actin_image}, p);
   }
 };
 
@@ -60,4 +60,4 @@ TEST(ContactSheet, names_the_parameter_that_was_meant) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::images

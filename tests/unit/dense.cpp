@@ -23,12 +23,12 @@ class Dense : public testing::TestWithParam<int> {};
 TEST_P(Dense, products_are_those_of_the_textbook) {
   const int n = GetParam();
   const MatrixXd A = numbers(n, 7, 1), B = numbers(7, n, 2), C = numbers(n, 5, 3);
-  EXPECT_LE((product(A, B) - A.lazyProduct(B)).norm(), kRounding * (1 + n));
-  EXPECT_LE((transposed_product(A, C) - A.transpose().lazyProduct(C)).norm(), kRounding * (1 + n));
-  EXPECT_LE((gram(B) - B.transpose().lazyProduct(B)).norm(), kRounding * (1 + n));
+  EXPECT_LE((numerics::product(A, B) - A.lazyProduct(B)).norm(), kRounding * (1 + n));
+  EXPECT_LE((numerics::transposed_product(A, C) - A.transpose().lazyProduct(C)).norm(), kRounding * (1 + n));
+  EXPECT_LE((numerics::gram(B) - B.transpose().lazyProduct(B)).norm(), kRounding * (1 + n));
   MatrixXd outer = MatrixXd::Identity(n, n);
-  add_upper_outer(A, outer);
-  mirror_upper(outer);
+  numerics::add_upper_outer(A, outer);
+  numerics::mirror_upper(outer);
   EXPECT_LE((outer - MatrixXd::Identity(n, n) - A.lazyProduct(A.transpose())).norm(), kRounding * (1 + n));
 }
 
@@ -36,7 +36,7 @@ TEST_P(Dense, gram_adds_to_the_upper_half_alone_and_may_take_away) {
   const int n = GetParam();
   const MatrixXd A = numbers(6, n, 4), before = numbers(n, n, 5);
   MatrixXd square = before;
-  add_upper_gram(A, square, 2, -2.0);
+  numerics::add_upper_gram(A, square, 2, -2.0);
   const MatrixXd wanted = before - 2 * A.transpose().lazyProduct(A);
   for (int j = 0; j < n; ++j) {
     for (int i = 0; i < n; ++i) {
@@ -47,34 +47,34 @@ TEST_P(Dense, gram_adds_to_the_upper_half_alone_and_may_take_away) {
 
 TEST_P(Dense, cholesky_s_factor_squares_to_the_matrix_and_solves_with_it) {
   const int n = GetParam();
-  MatrixXd A = gram(numbers(n + 3, n, 6));
+  MatrixXd A = numerics::gram(numbers(n + 3, n, 6));
   A.diagonal().array() += n;  // well conditioned
   MatrixXd U = A;
-  ASSERT_TRUE(upper_cholesky(U));
+  ASSERT_TRUE(numerics::upper_cholesky(U));
   EXPECT_EQ(MatrixXd(U.triangularView<Eigen::StrictlyLower>()), MatrixXd(A.triangularView<Eigen::StrictlyLower>()));
-  clear_below_diagonal(U);
+  numerics::clear_below_diagonal(U);
   EXPECT_LE((U.transpose() * U - A).norm(), kRounding * (1 + A.norm()));
   const MatrixXd B = numbers(n, 3, 7);
   MatrixXd X = B;
-  solve_upper_transposed(U, X);
-  solve_upper(U, X);
+  numerics::solve_upper_transposed(U, X);
+  numerics::solve_upper(U, X);
   EXPECT_LE((A * X - B).norm(), kRounding * (1 + n));
   MatrixXd Y = B;
-  multiply_upper(U, Y);
+  numerics::multiply_upper(U, Y);
   EXPECT_LE((Y - U.lazyProduct(B)).norm(), kRounding * (1 + n) * U.norm());
 }
 
 TEST_P(Dense, the_bits_are_the_same_for_any_number_of_threads) {
   const int n = GetParam();
   const MatrixXd A = numbers(9, n, 8), B = numbers(n, n, 9);
-  const MatrixXd one_gram = gram(A, 1), one_product = product(A, B, 1);
+  const MatrixXd one_gram = numerics::gram(A, 1), one_product = numerics::product(A, B, 1);
   for (const int threads : {2, 4}) {
-    EXPECT_TRUE(one_gram == gram(A, threads));
-    EXPECT_TRUE(one_product == product(A, B, threads));
-    MatrixXd one_factor = gram(B), factor = one_factor;
+    EXPECT_TRUE(one_gram == numerics::gram(A, threads));
+    EXPECT_TRUE(one_product == numerics::product(A, B, threads));
+    MatrixXd one_factor = numerics::gram(B), factor = one_factor;
     one_factor.diagonal().array() += 1;
     factor.diagonal().array() += 1;
-    EXPECT_TRUE(upper_cholesky(one_factor, 1) && upper_cholesky(factor, threads));
+    EXPECT_TRUE(numerics::upper_cholesky(one_factor, 1) && numerics::upper_cholesky(factor, threads));
     EXPECT_TRUE(one_factor == factor);
   }
 }
@@ -84,7 +84,7 @@ INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 3
 TEST(DenseCholesky, a_matrix_that_is_not_positive_is_told_and_its_lower_half_kept) {
   MatrixXd A(2, 2);
   A << 1, 2, 2, 1;
-  EXPECT_FALSE(upper_cholesky(A));
+  EXPECT_FALSE(numerics::upper_cholesky(A));
   EXPECT_EQ(A(1, 0), 2);
 }
 

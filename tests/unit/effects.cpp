@@ -1,27 +1,27 @@
 /// The switches of the effects: how they are read, decided, recorded, and whose result depends on which.
-#include "pipeline/contract/effects.h"
+#include "pipeline/stage/effects.h"
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/text.h"
 #include "pipeline/runner/record.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
 namespace {
 
-EffectSwitches read(std::string_view toml, const std::vector<std::string>& names) {
-  EffectSwitches switches;
-  ParameterList list;
+stage::EffectSwitches read(std::string_view toml, const std::vector<std::string>& names) {
+  stage::EffectSwitches switches;
+  stage::ParameterList list;
   declare(list, switches, names);
-  read_toml(list, toml, "cell.toml");
+  stage::read_toml(list, toml, "cell.toml");
   return switches;
 }
 
 TEST(Effects, a_stage_reads_its_own_switches_and_leaves_the_others_to_their_stages) {
   const std::string toml = "[effects]\nfinite_sides = 'off'\ndrift_affine = 'on'\neffect_tolerance = 0.05\n";
-  const EffectSwitches fit = read(toml, {"finite_sides", "effect_tolerance"});
+  const stage::EffectSwitches fit = read(toml, {"finite_sides", "effect_tolerance"});
   EXPECT_EQ(fit.finite_sides, "off");
   EXPECT_EQ(fit.drift_affine, "auto");
   EXPECT_EQ(fit.effect_tolerance, 0.05);
@@ -40,18 +40,18 @@ TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
 
 TEST(Effects, auto_follows_the_number_and_a_switch_overrules_it) {
   for (const double number : {0.02, 0.01, 0.0}) {
-    EXPECT_EQ(decided("sides", "auto", number, 0.01, "they change").is_on, number > 0.01);
-    EXPECT_TRUE(decided("sides", "on", number, 0.01, "they change").is_on);
-    EXPECT_FALSE(decided("sides", "off", number, 0.01, "they change").is_on);
+    EXPECT_EQ(stage::decided("sides", "auto", number, 0.01, "they change").is_on, number > 0.01);
+    EXPECT_TRUE(stage::decided("sides", "on", number, 0.01, "they change").is_on);
+    EXPECT_FALSE(stage::decided("sides", "off", number, 0.01, "they change").is_on);
   }
-  EXPECT_EQ(line_of(decided("sides", "auto", 0.02, 0.01, "they change the field by")),
+  EXPECT_EQ(stage::line_of(stage::decided("sides", "auto", 0.02, 0.01, "they change the field by")),
             "sides: on (auto): they change the field by 0.02, above 0.01");
 }
 
 TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {
   const test::TemporaryFolder folder;
   const auto settings = [&](const std::string& toml) {
-    write_text(folder / "cell.toml", toml);
+    files::write_text(folder / "cell.toml", toml);
     return runner::read_settings(folder / "cell.toml");
   };
   const auto changed = [&](const std::string& toml) {

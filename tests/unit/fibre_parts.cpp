@@ -5,12 +5,12 @@
 #include <cmath>
 #include <random>
 
-#include "segment/bright_actin.h"
-#include "segment/fibre_ends.h"
-#include "segment/fibre_significance.h"
-#include "segment/ridge.h"
+#include "segment/cells/bright_actin.h"
+#include "segment/cells/fibre_ends.h"
+#include "segment/cells/fibre_significance.h"
+#include "segment/cells/ridge.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 Polyline straight(Vec2 from, Vec2 to, double step_um = 0.2) {
@@ -200,4 +200,4 @@ TEST(FibreParts, texture_is_the_deviation_of_what_is_free) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

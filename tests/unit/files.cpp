@@ -1,9 +1,10 @@
-#include "pipeline/contract/files.h"
-
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -53,15 +54,15 @@ std::string message_of(const std::function<void()>& action) {
 
 TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
   const TemporaryFolder folder;
-  write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(9)});
-  const auto adhesions = read_adhesions(folder / "adhesions.csv");
+  files::write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(9)});
+  const auto adhesions = files::read_adhesions(folder / "adhesions.csv");
   ASSERT_EQ(adhesions.size(), 2u);
   EXPECT_EQ(adhesions[1].adhesion_id, 9);
   EXPECT_EQ(adhesions[0].position_um.x, 1.0 / 3) << "shortest round-trip numbers lose nothing";
   EXPECT_NEAR(adhesions[0].angle_rad, 0.25, 1e-15) << "one rounding each way through degrees";
 
-  write_fibres(folder / "fibres.csv", folder / "fibre_points.csv", {fibre(1), fibre(4)});
-  const auto fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv");
+  files::write_fibres(folder / "fibres.csv", folder / "fibre_points.csv", {fibre(1), fibre(4)});
+  const auto fibres = files::read_fibres(folder / "fibres.csv", folder / "fibre_points.csv");
   ASSERT_EQ(fibres.size(), 2u);
   EXPECT_EQ(fibres[1].type, FibreType::dorsal);
   EXPECT_EQ(fibres[1].start_adhesion_id, 7);
@@ -73,11 +74,11 @@ TEST(Files, adhesions_and_fibres_come_back_as_they_were_written) {
 
 TEST(Files, fibres_drawn_elsewhere_need_no_reasons) {
   const TemporaryFolder folder;
-  write_text(folder / "fibres.csv",
-             "fibre_id,type,length_um,width_um,start_adhesion_id,end_adhesion_id,mean_intensity,confidence\n"
-             "1,arc,5,0.6,,,3,1\n");
-  write_text(folder / "fibre_points.csv", "fibre_id,point,x_um,y_um\n1,0,0,0\n1,1,3,4\n");
-  const auto fibres = read_fibres(folder / "fibres.csv", folder / "fibre_points.csv");
+  files::write_text(folder / "fibres.csv",
+                    "fibre_id,type,length_um,width_um,start_adhesion_id,end_adhesion_id,mean_intensity,confidence\n"
+                    "1,arc,5,0.6,,,3,1\n");
+  files::write_text(folder / "fibre_points.csv", "fibre_id,point,x_um,y_um\n1,0,0,0\n1,1,3,4\n");
+  const auto fibres = files::read_fibres(folder / "fibres.csv", folder / "fibre_points.csv");
   ASSERT_EQ(fibres.size(), 1u);
   EXPECT_TRUE(fibres[0].type_reason.empty());
 }
@@ -85,12 +86,12 @@ TEST(Files, fibres_drawn_elsewhere_need_no_reasons) {
 TEST(Files, an_outline_comes_back_with_its_holes_and_without_the_column_is_one_ring) {
   const TemporaryFolder folder;
   const Polygon outer = {{0, 0}, {10, 0}, {10, 10}, {0, 10}}, hole = {{4, 4}, {6, 4}, {5, 6}};
-  write_outline(folder / "outline.csv", outer, {hole});
-  EXPECT_EQ(read_outline(folder / "outline.csv"), (std::vector<Polygon>{outer, hole}));
-  write_text(folder / "plain.csv", "x_um,y_um\n0,0\n1,0\n0,1\n");
-  EXPECT_EQ(read_outline(folder / "plain.csv"), (std::vector<Polygon>{{{0, 0}, {1, 0}, {0, 1}}}));
-  write_text(folder / "gap.csv", "x_um,y_um,ring\n0,0,0\n1,0,0\n0,1,0\n0,0,2\n");
-  EXPECT_NE(message_of([&] { read_outline(folder / "gap.csv"); }).find("rings in order"), std::string::npos);
+  files::write_outline(folder / "outline.csv", outer, {hole});
+  EXPECT_EQ(files::read_outline(folder / "outline.csv"), (std::vector<Polygon>{outer, hole}));
+  files::write_text(folder / "plain.csv", "x_um,y_um\n0,0\n1,0\n0,1\n");
+  EXPECT_EQ(files::read_outline(folder / "plain.csv"), (std::vector<Polygon>{{{0, 0}, {1, 0}, {0, 1}}}));
+  files::write_text(folder / "gap.csv", "x_um,y_um,ring\n0,0,0\n1,0,0\n0,1,0\n0,0,2\n");
+  EXPECT_NE(message_of([&] { files::read_outline(folder / "gap.csv"); }).find("rings in order"), std::string::npos);
 }
 
 TEST(Files, a_hole_lies_inside_its_outline) {
@@ -104,8 +105,8 @@ TEST(Files, a_hole_lies_inside_its_outline) {
 
 TEST(Files, a_network_comes_back_as_it_was_written) {
   const TemporaryFolder folder;
-  write_network(folder / "network.vtu", network());
-  const Network read = read_network(folder / "network.vtu");
+  files::write_network(folder / "network.vtu", network());
+  const Network read = files::read_network(folder / "network.vtu");
   EXPECT_TRUE(read.vertices_um == network().vertices_um);
   EXPECT_EQ(read.adhesion_id, network().adhesion_id);
   ASSERT_EQ(read.links.size(), 2u);
@@ -113,30 +114,30 @@ TEST(Files, a_network_comes_back_as_it_was_written) {
   EXPECT_EQ(read.links[1].rest_length_um, 1.25);
   EXPECT_EQ(read.links[0].share, 0.75);
 
-  write_contracted_network(folder / "contracted.vtu", network(), {{0, 0}, {0.5, 0.5}, {0, 1}}, {0.1, 2},
-                           {CableState::collapsed, CableState::slack});
-  const ContractedNetwork contracted = read_contracted_network(folder / "contracted.vtu");
+  files::write_contracted_network(folder / "contracted.vtu", network(), {{0, 0}, {0.5, 0.5}, {0, 1}}, {0.1, 2},
+                                  {CableState::collapsed, CableState::slack});
+  const ContractedNetwork contracted = files::read_contracted_network(folder / "contracted.vtu");
   EXPECT_EQ(contracted.network.vertices_um[1].y, 0.5);
   EXPECT_EQ(contracted.link_force_nN[1], 2);
 }
 
 TEST(Files, a_vtk_file_cut_anywhere_is_an_input_error) {
   const TemporaryFolder folder;
-  write_network(folder / "network.vtu", network());
-  const std::string whole = read_text(folder / "network.vtu");
+  files::write_network(folder / "network.vtu", network());
+  const std::string whole = files::read_text(folder / "network.vtu");
   for (std::size_t n = 0; n < whole.size() - 1; n += 7) {
-    write_text(folder / "cut.vtu", whole.substr(0, n));
-    EXPECT_THROW(read_network(folder / "cut.vtu"), InputError) << "cut after " << n << " bytes";
+    files::write_text(folder / "cut.vtu", whole.substr(0, n));
+    EXPECT_THROW(files::read_network(folder / "cut.vtu"), InputError) << "cut after " << n << " bytes";
   }
 }
 
 TEST(Files, an_error_names_file_line_column_label_expectation_and_finding) {
   const TemporaryFolder folder;
-  write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(11)});
-  std::string text = read_text(folder / "adhesions.csv");
+  files::write_adhesions(folder / "adhesions.csv", {adhesion(7), adhesion(11)});
+  std::string text = files::read_text(folder / "adhesions.csv");
   text.replace(text.rfind(",0.5,1.2"), 4, ",-3.2");
-  write_text(folder / "adhesions.csv", text);
-  EXPECT_EQ(message_of([&] { read_adhesions(folder / "adhesions.csv"); }),
+  files::write_text(folder / "adhesions.csv", text);
+  EXPECT_EQ(message_of([&] { files::read_adhesions(folder / "adhesions.csv"); }),
             (folder / "adhesions.csv").string() +
                 ":3: column 'area_um2' of adhesion 11: expected a number > 0, found '-3.2'");
 }
@@ -144,8 +145,9 @@ TEST(Files, an_error_names_file_line_column_label_expectation_and_finding) {
 TEST(Files, not_a_number_is_refused_where_a_number_is_due) {
   const TemporaryFolder folder;
   for (const char* bad : {"nan", "inf", "", "1e", "1.5x", " 1"}) {
-    write_text(folder / "displacement.csv", std::string("x_um,y_um,ux_um,uy_um,sigma_um\n1,2,") + bad + ",0,0.02\n");
-    const std::string message = message_of([&] { read_displacement(folder / "displacement.csv"); });
+    files::write_text(folder / "displacement.csv",
+                      std::string("x_um,y_um,ux_um,uy_um,sigma_um\n1,2,") + bad + ",0,0.02\n");
+    const std::string message = message_of([&] { files::read_displacement(folder / "displacement.csv"); });
     EXPECT_NE(message.find(":2: column 'ux_um': expected a number, found '" + std::string(bad) + "'"),
               std::string::npos)
         << message;
@@ -153,41 +155,41 @@ TEST(Files, not_a_number_is_refused_where_a_number_is_due) {
 }
 
 TEST(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused) {
-  EXPECT_THROW(CsvTable("a,b\n1,2,3\n", "t"), InputError);
-  EXPECT_THROW(CsvTable("a,b\n1\n", "t"), InputError);
-  EXPECT_THROW(CsvTable("a,b\n1,2", "t"), InputError);
-  EXPECT_THROW(CsvTable("a,b\n\"1,2\n", "t"), InputError);
-  EXPECT_THROW(CsvTable("a,a\n1,2\n", "t"), InputError);
-  EXPECT_THROW(CsvTable("", "t"), InputError);
-  EXPECT_THROW(CsvTable("a\n1\n", "t").require({"b"}), InputError);
+  EXPECT_THROW(files::CsvTable("a,b\n1,2,3\n", "t"), InputError);
+  EXPECT_THROW(files::CsvTable("a,b\n1\n", "t"), InputError);
+  EXPECT_THROW(files::CsvTable("a,b\n1,2", "t"), InputError);
+  EXPECT_THROW(files::CsvTable("a,b\n\"1,2\n", "t"), InputError);
+  EXPECT_THROW(files::CsvTable("a,a\n1,2\n", "t"), InputError);
+  EXPECT_THROW(files::CsvTable("", "t"), InputError);
+  EXPECT_THROW(files::CsvTable("a\n1\n", "t").require({"b"}), InputError);
 }
 
 TEST(Files, quoted_fields_and_carriage_returns_are_read) {
-  const CsvTable table(
+  const files::CsvTable table(
       "\xEF\xBB\xBF"
       "a,b\r\n\"x, \"\"y\"\"\",2\r\n",
       "t");
   EXPECT_EQ(table.text(0, "a"), "x, \"y\"");
   EXPECT_EQ(table.integer(0, "b", 0), 2);
-  CsvText text({"a"});
+  files::CsvText text({"a"});
   text.add("x, \"y\"").end_row();
-  EXPECT_EQ(CsvTable(text.str(), "t").text(0, "a"), "x, \"y\"");
+  EXPECT_EQ(files::CsvTable(text.str(), "t").text(0, "a"), "x, \"y\"");
 }
 
 TEST(Files, a_full_disk_is_an_output_error) {
   if (!std::filesystem::exists("/dev/full")) GTEST_SKIP() << "no /dev/full here";
-  EXPECT_THROW(write_text("/dev/full", std::string(100000, 'x')), OutputError);
-  EXPECT_THROW(write_network("/dev/full", network()), OutputError);
+  EXPECT_THROW(files::write_text("/dev/full", std::string(100000, 'x')), OutputError);
+  EXPECT_THROW(files::write_network("/dev/full", network()), OutputError);
 }
 
 TEST(Files, writers_check_what_they_write) {
   const TemporaryFolder folder;
   Adhesion bad = adhesion(1);
   bad.area_um2 = -1;
-  EXPECT_THROW(write_adhesions(folder / "a.csv", {bad}), InvalidData);
+  EXPECT_THROW(files::write_adhesions(folder / "a.csv", {bad}), InvalidData);
   Network torn = network();
   torn.links[0].vertex_b = 17;
-  EXPECT_THROW(write_network(folder / "n.vtu", torn), InvalidData);
+  EXPECT_THROW(files::write_network(folder / "n.vtu", torn), InvalidData);
 }
 
 TEST(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
@@ -202,8 +204,8 @@ TEST(Files, an_adhesions_origin_and_its_distance_from_the_edge_are_kept) {
                          .origin = origin});
   }
   adhesions[1].edge_distance_um = 0.25;
-  write_adhesions(folder / "adhesions.csv", adhesions);
-  const auto read = read_adhesions(folder / "adhesions.csv");
+  files::write_adhesions(folder / "adhesions.csv", adhesions);
+  const auto read = files::read_adhesions(folder / "adhesions.csv");
   ASSERT_EQ(read.size(), adhesions.size());
   for (std::size_t i = 0; i < read.size(); ++i) EXPECT_EQ(read[i].origin, adhesions[i].origin);
   EXPECT_FALSE(read[0].edge_distance_um);
@@ -214,12 +216,12 @@ TEST(Files, adhesions_of_an_older_version_are_read_as_seen_in_the_image) {
   const test::TemporaryFolder folder;
   const std::string columns =
       "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity";
-  write_text(folder / "adhesions.csv", columns + "\n1,1,2,1,1.2,1.1,0,0.4,100\n");
-  const auto read = read_adhesions(folder / "adhesions.csv");
+  files::write_text(folder / "adhesions.csv", columns + "\n1,1,2,1,1.2,1.1,0,0.4,100\n");
+  const auto read = files::read_adhesions(folder / "adhesions.csv");
   EXPECT_EQ(read.at(0).origin, AdhesionOrigin::image);
   EXPECT_FALSE(read[0].edge_distance_um);
-  write_text(folder / "adhesions.csv", columns + ",origin\n1,1,2,1,1.2,1.1,0,0.4,100,seen\n");
-  EXPECT_THROW(read_adhesions(folder / "adhesions.csv"), InputError);
+  files::write_text(folder / "adhesions.csv", columns + ",origin\n1,1,2,1,1.2,1.1,0,0.4,100,seen\n");
+  EXPECT_THROW(files::read_adhesions(folder / "adhesions.csv"), InputError);
 }
 
 TEST(Files, a_candidate_stands_for_the_cell_of_its_lattice) {

@@ -5,9 +5,9 @@
 #include <limits>
 #include <set>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -46,15 +46,15 @@ TEST(Findings, pass_through_a_record_unchanged) {
   const test::TemporaryFolder folder;
   const Finding there = *noticed(FindingKind::not_identifiable, 2, "of \"two\"\n");
   nlohmann::ordered_json json;
-  json["findings"] = {json_of(there)};
-  write_text(folder / "a.json", json_text(json));
-  const std::vector<Finding> back = findings_of(JsonRecord(folder / "a.json", "a record"));
+  json["findings"] = {files::json_of(there)};
+  files::write_text(folder / "a.json", files::json_text(json));
+  const std::vector<Finding> back = files::findings_of(files::JsonRecord(folder / "a.json", "a record"));
   ASSERT_EQ(back.size(), 1u);
-  EXPECT_EQ(json_of(back.front()), json_of(there));
-  write_text(folder / "b.json", R"({"findings": [{"id": "a", "severity": "loud", "text": "b"}]})");
-  EXPECT_THROW(findings_of(JsonRecord(folder / "b.json", "a record")), InputError);
-  write_text(folder / "c.json", "{}");  // as older versions wrote it
-  EXPECT_TRUE(findings_of(JsonRecord(folder / "c.json", "a record")).empty());
+  EXPECT_EQ(files::json_of(back.front()), files::json_of(there));
+  files::write_text(folder / "b.json", R"({"findings": [{"id": "a", "severity": "loud", "text": "b"}]})");
+  EXPECT_THROW(files::findings_of(files::JsonRecord(folder / "b.json", "a record")), InputError);
+  files::write_text(folder / "c.json", "{}");  // as older versions wrote it
+  EXPECT_TRUE(files::findings_of(files::JsonRecord(folder / "c.json", "a record")).empty());
 }
 
 }  // namespace

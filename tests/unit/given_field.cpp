@@ -1,17 +1,18 @@
-#include "segment/given_field.h"
+#include "segment/beads/given_field.h"
 
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
 #include "tests/support/bead_pair.h"
 #include "tests/support/temporary_folder.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::beads {
 namespace {
 
 std::filesystem::path write(const test::TemporaryFolder& folder, const std::string& text) {
-  write_text(folder / "field.csv", text);
+  files::write_text(folder / "field.csv", text);
   return folder / "field.csv";
 }
 
@@ -38,7 +39,7 @@ TEST(GivenField, a_grid_of_a_known_field_keeps_its_peaks_and_tells_its_noise) {
   const auto peaks = test::ring_of_adhesions(512, 8.3);
   std::mt19937_64 random(3);
   std::normal_distribution<double> normal(0, 0.05);
-  CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
+  files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
   for (int j = 0; j < 64; ++j) {
     for (int i = 0; i < 64; ++i) {
       const Vec2 place{8 * i + 4.0, 8 * j + 4.0}, u = test::displacement(peaks, place);
@@ -88,7 +89,7 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
 
 TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
   const test::TemporaryFolder folder;
-  CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});
+  files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um", "sigma_um"});
   for (int j = 0; j < 8; ++j) {
     for (int i = 0; i < 8; ++i) {
       const bool is_outlier = i == 4 && j == 4;
@@ -111,7 +112,7 @@ TEST(GivenField, what_cannot_be_used_is_flagged_and_kept) {
 TEST(GivenField, points_on_a_line_and_points_astray_are_read) {
   const test::TemporaryFolder folder;
   for (const bool is_line : {true, false}) {
-    CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
+    files::CsvText csv({"x_um", "y_um", "ux_um", "uy_um"});
     for (int i = 0; i < 40; ++i) csv.add(1.0 * (i % 20)).add(is_line ? 0.0 : i / 20).add(0.1).add(0.01 * i).end_row();
     csv.add(9e5).add(is_line ? 0.0 : 9e5).add(0.1).add(0.1).end_row();
     EXPECT_EQ(read_given_field(write(folder, csv.str()), {}).size(), 41u);
@@ -131,4 +132,4 @@ TEST(GivenField, what_is_wrong_with_a_file_is_said) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::beads

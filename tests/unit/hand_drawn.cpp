@@ -1,44 +1,44 @@
-#include "segment/hand_drawn.h"
+#include "segment/cells/hand_drawn.h"
 
 #include <gtest/gtest.h>
 
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
-#include "segment/cell_rois.h"
-#include "segment/ellipse.h"
-#include "segment/segment_cell.h"
+#include "segment/cells/cell_rois.h"
+#include "segment/cells/ellipse.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 constexpr Field kField{256, 256, 0.1};
 
-Roi area(std::vector<Vec2> points_px, const std::string& name = "area") {
-  Roi roi;
+rois::Roi area(std::vector<Vec2> points_px, const std::string& name = "area") {
+  rois::Roi roi;
   roi.name = name;
   roi.points_px = std::move(points_px);
   return roi;
 }
 
-Roi line(std::vector<Vec2> points_px, const std::string& name = "line", int group = 0) {
-  Roi roi = area(std::move(points_px), name);
-  roi.shape = RoiShape::polyline;
+rois::Roi line(std::vector<Vec2> points_px, const std::string& name = "line", int group = 0) {
+  rois::Roi roi = area(std::move(points_px), name);
+  roi.shape = rois::RoiShape::polyline;
   roi.group = group;
   return roi;
 }
 
-Roi oval(Vec2 corner_px, Vec2 size_px) {
-  Roi roi;
-  roi.shape = RoiShape::oval;
+rois::Roi oval(Vec2 corner_px, Vec2 size_px) {
+  rois::Roi roi;
+  roi.shape = rois::RoiShape::oval;
   roi.name = "oval";
   roi.corner_px = corner_px;
   roi.size_px = size_px;
   return roi;
 }
 
-RoiSet set_of(std::vector<Roi> rois) { return {"rois.zip", std::move(rois)}; }
+RoiSet set_of(std::vector<rois::Roi> rois) { return {"rois.zip", std::move(rois)}; }
 
 constexpr double kAnchor_um2 = 1;
 HeldFibres held(const RoiSet& set, const std::vector<Adhesion>& adhesions, const CellOutline& cell = {}) {
@@ -69,8 +69,8 @@ TEST(HandDrawn, a_polygon_around_an_ellipse_has_this_ellipse) {
 }
 
 TEST(HandDrawn, ovals_and_ellipses_are_known_exactly) {
-  Roi ellipse = area({{100, 60}, {140, 90}}, "ellipse");
-  ellipse.shape = RoiShape::ellipse;
+  rois::Roi ellipse = area({{100, 60}, {140, 90}}, "ellipse");
+  ellipse.shape = rois::RoiShape::ellipse;
   ellipse.aspect_ratio = 0.4;
   const auto found = hand_drawn_adhesions(set_of({oval({10, 20}, {8, 30}), ellipse}), std::nullopt, kField);
   ASSERT_EQ(found.size(), 2u);
@@ -85,28 +85,28 @@ TEST(HandDrawn, ovals_and_ellipses_are_known_exactly) {
 }
 
 TEST(HandDrawn, an_adhesions_intensity_is_its_height_above_its_surroundings) {
-  Image image = test::even_image(256, 256, 100);
+  images::Image image = test::even_image(256, 256, 100);
   for (int j = 40; j < 46; ++j)
     for (int i = 50; i < 70; ++i) image.at(i, j) = 400;
-  const Channel channel{"paxillin.tif", image};
+  const images::Channel channel{"paxillin.tif", image};
   const auto found = hand_drawn_adhesions(set_of({area({{50, 40}, {70, 40}, {70, 46}, {50, 46}})}), channel, kField);
   EXPECT_NEAR(found.front().mean_intensity, 300, 1e-9);
 }
 
 TEST(HandDrawn, pixels_within_an_area_are_those_whose_centres_are) {
-  Image image = test::even_image(256, 256, 100);
+  images::Image image = test::even_image(256, 256, 100);
   for (int j = 40; j < 46; ++j)
     for (int i = 50; i < 70; ++i) image.at(i, j) = 400;
   // a third of a pixel larger on each side: still no further centre is in it
-  const Roi drawn = area({{49.7, 39.7}, {70.3, 39.7}, {70.3, 46.3}, {49.7, 46.3}});
-  const auto found = hand_drawn_adhesions(set_of({drawn}), Channel{"paxillin.tif", image}, kField);
+  const rois::Roi drawn = area({{49.7, 39.7}, {70.3, 39.7}, {70.3, 46.3}, {49.7, 46.3}});
+  const auto found = hand_drawn_adhesions(set_of({drawn}), images::Channel{"paxillin.tif", image}, kField);
   EXPECT_NEAR(found.front().mean_intensity, 300, 1e-9);
 }
 
 TEST(HandDrawn, a_fibres_type_is_that_of_its_name_then_of_its_group_then_of_its_ends) {
   const std::vector<Adhesion> adhesions = {test::ellipse(1, {5, 5}, 1, 0.5, 0), test::ellipse(2, {15, 5}, 1, 0.5, 0)};
   const std::vector<Vec2> tied = {{50, 50}, {150, 50}}, loose = {{80, 200}, {180, 200}};
-  const auto type_of = [&](const Roi& roi) { return held(set_of({roi}), adhesions).fibres.front().type; };
+  const auto type_of = [&](const rois::Roi& roi) { return held(set_of({roi}), adhesions).fibres.front().type; };
   EXPECT_EQ(type_of(line(tied)), FibreType::ventral);
   EXPECT_EQ(type_of(line(loose)), FibreType::arc);
   EXPECT_EQ(type_of(line(tied, "dorsal 3")), FibreType::dorsal);
@@ -202,10 +202,10 @@ TEST(HandDrawn, no_anchor_is_made_where_a_fibre_leaves_the_image) {
 }
 
 TEST(HandDrawn, a_fibres_width_is_measured_in_the_image) {
-  Image image = test::even_image(256, 256, 100);
+  images::Image image = test::even_image(256, 256, 100);
   test::draw_line(image, {{5, 12.8}, {20, 12.8}}, 500, 0.8, 0.1);
   const RoiSet set = set_of({line({{60, 127.5}, {190, 127.5}})});
-  const Fibre f = drawn_lines(set, Channel{"actin.tif", image}, kField, {}).front().fibre;
+  const Fibre f = drawn_lines(set, images::Channel{"actin.tif", image}, kField, {}).front().fibre;
   EXPECT_NEAR(f.width_um, 0.8, 0.1);  // a pixel
   EXPECT_NEAR(f.mean_intensity, 500, 25);
 }
@@ -213,8 +213,8 @@ TEST(HandDrawn, a_fibres_width_is_measured_in_the_image) {
 TEST(HandDrawn, areas_within_the_outline_are_its_holes) {
   const std::vector<Vec2> outer = {{10, 10}, {110, 10}, {110, 60}, {10, 60}},
                           hole = {{20, 20}, {20, 30}, {40, 30}, {40, 20}};
-  Roi composite = area({}, "cell");
-  composite.shape = RoiShape::composite;
+  rois::Roi composite = area({}, "cell");
+  composite.shape = rois::RoiShape::composite;
   composite.paths_px = {hole, outer};
   for (const RoiSet& set : {set_of({area(hole), area(outer)}), set_of({composite})}) {
     const CellOutline cell = hand_drawn_outline(set, kField);
@@ -237,20 +237,20 @@ std::string error_of(const auto& body) {
 }
 
 TEST(HandDrawn, what_cannot_be_used_is_named) {
-  const auto adhesion = [](const Roi& roi) {
+  const auto adhesion = [](const rois::Roi& roi) {
     return error_of([&] { hand_drawn_adhesions(set_of({roi}), std::nullopt, kField); });
   };
-  const auto fibre = [](const Roi& roi) { return error_of([&] { held(set_of({roi}), {}); }); };
-  const Roi square = area({{10, 10}, {20, 10}, {20, 20}, {10, 20}}, "a 1");
+  const auto fibre = [](const rois::Roi& roi) { return error_of([&] { held(set_of({roi}), {}); }); };
+  const rois::Roi square = area({{10, 10}, {20, 10}, {20, 20}, {10, 20}}, "a 1");
   EXPECT_EQ(adhesion(square), "no error");
   EXPECT_EQ(adhesion(line({{10, 10}, {20, 20}}, "a 1")), "rois.zip: 'a 1': a segmented line");
   EXPECT_EQ(adhesion(area({{10, 10}, {20, 10}}, "a 1")), "rois.zip: 'a 1': 2 different ones");
   EXPECT_EQ(adhesion(area({{10, 10}, {20, 10}, {30, 10}}, "a 1")), "rois.zip: 'a 1': none between its points");
   EXPECT_EQ(adhesion(area({{10, 10}, {300, 10}, {30, 30}}, "a 1")), "rois.zip: 'a 1': a point at 300, 10");
   EXPECT_EQ(adhesion(area({{0, 0}, {20, 20}, {20, 0}, {0, 19}}, "a 1")), "rois.zip: 'a 1': negative second moments");
-  Roi point = square, composite = square;
-  point.shape = RoiShape::point;
-  composite.shape = RoiShape::composite;
+  rois::Roi point = square, composite = square;
+  point.shape = rois::RoiShape::point;
+  composite.shape = rois::RoiShape::composite;
   composite.paths_px = {square.points_px, {{50, 50}, {70, 50}, {70, 70}, {50, 70}}};
   EXPECT_EQ(adhesion(point), "rois.zip: 'a 1': a point selection");
   EXPECT_EQ(error_of([&] { hand_drawn_outline(set_of({composite}), kField); }), "rois.zip: areas beside each other");
@@ -268,17 +268,17 @@ TEST(HandDrawn, what_cannot_be_used_is_named) {
 
 TEST(HandDrawn, what_the_program_found_given_back_by_hand_gives_the_same_cell) {
   const test::DrawnScene scene = test::drawn_scene(10, 1);
-  const Channel adhesion{"paxillin.tif", scene.adhesion_image}, actin{"actin.tif", scene.actin_image};
+  const images::Channel adhesion{"paxillin.tif", scene.adhesion_image}, actin{"actin.tif", scene.actin_image};
   SegmentParameters parameters;
   parameters.pixel_size_um = scene.kPixel_um;
   const Segmentation found = segment_cell(adhesion, actin, parameters);
   HandDrawn drawn;
-  for (const Roi& roi : rois_of(found.cell, found.pixel_size_um)) {
-    auto& set = roi.shape == RoiShape::polygon   ? drawn.outline
-                : roi.shape == RoiShape::ellipse ? drawn.adhesions
-                                                 : drawn.fibres;
+  for (const rois::Roi& roi : rois_of(found.cell, found.pixel_size_um)) {
+    auto& set = roi.shape == rois::RoiShape::polygon   ? drawn.outline
+                : roi.shape == rois::RoiShape::ellipse ? drawn.adhesions
+                                                       : drawn.fibres;
     if (!set) set = RoiSet{"rois.zip", {}};
-    set->rois.push_back(decode_roi(encode_roi(roi), "rois.zip"));
+    set->rois.push_back(rois::decode_roi(rois::encode_roi(roi), "rois.zip"));
   }
   const Segmentation again = segment_cell(adhesion, actin, parameters, drawn);
   constexpr double kFloat_um = 1e-5;  // rounding of coordinates to float: 1e-5 px of 256
@@ -305,4 +305,4 @@ TEST(HandDrawn, what_the_program_found_given_back_by_hand_gives_the_same_cell) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -1,4 +1,4 @@
-#include "segment/image.h"
+#include "segment/images/image.h"
 
 #include <gtest/gtest.h>
 #include <tiffio.h>
@@ -9,12 +9,12 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
-#include "segment/channels.h"
-#include "segment/image_file.h"
-#include "segment/png.h"
+#include "segment/images/channels.h"
+#include "segment/images/image_file.h"
+#include "segment/images/png.h"
 #include "tests/support/temporary_folder.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::images {
 namespace {
 
 namespace fs = std::filesystem;
@@ -330,8 +330,8 @@ TEST(Channels, a_pixel_size_given_is_compared_with_each_images_own_binned_or_not
   EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, std::nullopt)) << "nothing is given";
   EXPECT_FALSE(doubt_about_calibration({"a.tif", image}, 0.1));
   EXPECT_FALSE(doubt_about_calibration({"a.tif", binned(image, 2)}, 0.2)) << "of binned pixels both";
-  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.105)->level, DoubtLevel::caution);
-  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.2)->level, DoubtLevel::refused);
+  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.105)->level, stage::DoubtLevel::caution);
+  EXPECT_EQ(doubt_about_calibration({"a.tif", image}, 0.2)->level, stage::DoubtLevel::refused);
 }
 
 TEST(Channels, a_saturated_image_is_noticed_by_the_share_of_its_pixels_at_the_largest_value) {
@@ -346,4 +346,4 @@ TEST(Channels, a_saturated_image_is_noticed_by_the_share_of_its_pixels_at_the_la
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::images

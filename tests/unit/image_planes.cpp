@@ -5,10 +5,10 @@
 #include <fstream>
 
 #include "pipeline/contract/errors.h"
-#include "segment/image.h"
+#include "segment/images/image.h"
 #include "tests/support/temporary_folder.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::images {
 namespace {
 
 namespace fs = std::filesystem;
@@ -263,4 +263,4 @@ TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::images

@@ -1,4 +1,4 @@
-#include "segment/mask.h"
+#include "segment/cells/mask.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
-#include "segment/ellipse.h"
-#include "segment/segment_cell.h"
+#include "segment/cells/ellipse.h"
+#include "segment/cells/segment_cell.h"
 #include "tests/support/drawn_image.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::cells {
 namespace {
 
 constexpr int kSide = 256;
@@ -18,19 +18,19 @@ constexpr double kPixel_um = 0.1;
 constexpr Field kField{kSide, kSide, kPixel_um};
 
 template <class IsIn>
-void paint(Image& image, float value, const IsIn& is_in) {
+void paint(images::Image& image, float value, const IsIn& is_in) {
   for (int j = 0; j < image.height; ++j)
     for (int i = 0; i < image.width; ++i)
       if (is_in(i + 0.5, j + 0.5)) image.at(i, j) = value;
 }
 
-Image empty() { return test::even_image(kSide, kSide, 0); }
+images::Image empty() { return test::even_image(kSide, kSide, 0); }
 
-void paint_disc(Image& image, float value, Vec2 centre_px, double radius_px) {
+void paint_disc(images::Image& image, float value, Vec2 centre_px, double radius_px) {
   paint(image, value, [&](double x, double y) { return norm(Vec2{x, y} - centre_px) < radius_px; });
 }
 
-LabelMask mask(const Image& image) { return mask_of(image, "mask.tif"); }
+LabelMask mask(const images::Image& image) { return mask_of(image, "mask.tif"); }
 
 int n_pixels(const LabelMask& m) {
   return static_cast<int>(m.labels.size() - static_cast<std::size_t>(std::ranges::count(m.labels, 0)));
@@ -56,7 +56,7 @@ std::string hint_of(const auto& body) {
 
 TEST(Mask, an_outline_goes_round_its_pixels_without_bias) {
   for (const double radius_px : {60.0, 83.7, 110.2}) {
-    Image image = empty();
+    images::Image image = empty();
     paint_disc(image, 255, {128.3, 127.1}, radius_px);
     const LabelMask m = mask(image);
     const auto cells = mask_outlines(m, 1, kField, {});
@@ -71,7 +71,7 @@ TEST(Mask, an_outline_goes_round_its_pixels_without_bias) {
 }
 
 TEST(Mask, a_ring_around_n_pixels_has_an_area_of_half_a_pixel_less) {
-  Image image = empty();
+  images::Image image = empty();
   paint(image, 1, [](double x, double y) { return (x < 20 && y < 9) || (x > 4 && x < 7 && y < 30); });
   const auto rings = rings_px(mask(image), 1);
   ASSERT_EQ(rings.size(), 1u);
@@ -79,7 +79,7 @@ TEST(Mask, a_ring_around_n_pixels_has_an_area_of_half_a_pixel_less) {
 }
 
 TEST(Mask, pixels_that_touch_by_a_corner_are_parts_and_rings_of_their_own) {
-  Image image = empty();
+  images::Image image = empty();
   for (const int k : {10, 11, 12}) image.at(k, k) = 1;
   const LabelMask parts = with_parts_labelled(mask(image));
   EXPECT_EQ(*std::ranges::max_element(parts.labels), 3);
@@ -87,7 +87,7 @@ TEST(Mask, pixels_that_touch_by_a_corner_are_parts_and_rings_of_their_own) {
 }
 
 TEST(Mask, holes_are_kept_and_pinholes_are_not) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 255, {128, 128}, 100);
   paint_disc(image, 0, {110, 128}, 25);  // 19.6 um²
   image.at(160, 128) = 0;
@@ -98,7 +98,7 @@ TEST(Mask, holes_are_kept_and_pinholes_are_not) {
 }
 
 TEST(Mask, of_a_binary_mask_the_largest_part_is_the_cell_and_the_others_follow) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 255, {60, 60}, 45);
   paint_disc(image, 255, {180, 180}, 60);
   paint_disc(image, 255, {200, 40}, 5);  // a speck
@@ -110,7 +110,7 @@ TEST(Mask, of_a_binary_mask_the_largest_part_is_the_cell_and_the_others_follow) 
 }
 
 TEST(Mask, of_a_label_image_the_parameter_names_the_label) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 7, {60, 60}, 45);
   paint_disc(image, 1200, {150, 150}, 60);
   const auto area = [&](int cell) { return mask_outlines(mask(image), cell, kField, {}).front().area_um2; };
@@ -120,7 +120,7 @@ TEST(Mask, of_a_label_image_the_parameter_names_the_label) {
 }
 
 TEST(Mask, a_cell_at_the_border_is_cut_there_and_nowhere_else) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 1, {20, 128}, 70);
   const auto cell = mask_outlines(mask(image), 1, kField, {}).front();
   ASSERT_TRUE(cell.is_cut_by_border());
@@ -137,7 +137,7 @@ TEST(Mask, a_cell_at_the_border_is_cut_there_and_nowhere_else) {
 }
 
 TEST(Mask, an_adhesion_has_the_moments_of_its_pixels) {
-  Image image = empty();
+  images::Image image = empty();
   const Adhesion truth = test::ellipse(1, {12, 9}, 4, 2, 0.7);
   paint(image, 3, [&](double x, double y) { return contains(ellipse_polygon(truth, 200), kPixel_um * Vec2{x, y}); });
   paint_disc(image, 9, {50, 200}, 6);
@@ -154,7 +154,7 @@ TEST(Mask, an_adhesion_has_the_moments_of_its_pixels) {
 }
 
 TEST(Mask, each_part_of_a_binary_mask_is_an_adhesion_and_each_label_of_a_label_image) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 255, {50, 50}, 6);
   paint_disc(image, 255, {90, 50}, 6);
   EXPECT_EQ(mask_adhesions(mask(image), std::nullopt, kField).size(), 2u);
@@ -163,15 +163,15 @@ TEST(Mask, each_part_of_a_binary_mask_is_an_adhesion_and_each_label_of_a_label_i
 }
 
 TEST(Mask, an_adhesions_intensity_is_its_height_above_its_surroundings) {
-  Image image = empty(), light = test::even_image(kSide, kSide, 100);
+  images::Image image = empty(), light = test::even_image(kSide, kSide, 100);
   paint_disc(image, 1, {80, 80}, 8);
   paint_disc(light, 400, {80, 80}, 8);
-  const auto found = mask_adhesions(mask(image), Channel{"paxillin.tif", light}, kField);
+  const auto found = mask_adhesions(mask(image), images::Channel{"paxillin.tif", light}, kField);
   EXPECT_NEAR(found.front().mean_intensity, 300, 1e-4);
 }
 
 TEST(Mask, binning_the_images_leaves_the_mask_as_fine_as_it_is) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 1, {101, 97}, 50);
   LabelMask m = mask(image);
   const auto fine = mask_outlines(m, 1, kField, {}).front();
@@ -183,7 +183,7 @@ TEST(Mask, binning_the_images_leaves_the_mask_as_fine_as_it_is) {
 }
 
 TEST(Mask, what_is_no_mask_is_told) {
-  Image image = empty();
+  images::Image image = empty();
   EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: pixels above 0 for what the mask covers; 0 everywhere");
   image.at(3, 5) = 0.25f;
   EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: pixel 3, 5: a whole number, 0 for the background; 0.25");
@@ -192,14 +192,14 @@ TEST(Mask, what_is_no_mask_is_told) {
   image.at(3, 5) = 1;
   image.is_lossy = true;
   EXPECT_EQ(error_of([&] { mask(image); }), "mask.tif: a mask as TIFF or PNG; a JPEG, which changes labels and rims");
-  Image inverted = test::even_image(kSide, kSide, 255);
+  images::Image inverted = test::even_image(kSide, kSide, 255);
   paint_disc(inverted, 0, {128, 128}, 80);
   EXPECT_EQ(error_of([&] { mask_outlines(mask(inverted), 1, kField, {}); }),
             "mask.tif: a cell on a background of 0; values above 0 in all four corners of the image");
 }
 
 TEST(Mask, of_a_cell_or_a_pattern_is_not_taken_for_adhesions) {
-  Image image = empty();
+  images::Image image = empty();
   paint_disc(image, 255, {40, 40}, 5);
   paint_disc(image, 255, {150, 150}, 60);
   const auto measure = [&] { mask_adhesions(mask(image), std::nullopt, kField); };
@@ -209,10 +209,10 @@ TEST(Mask, of_a_cell_or_a_pattern_is_not_taken_for_adhesions) {
 }
 
 TEST(Mask, of_a_pattern_may_reach_the_corners_but_not_go_all_round) {
-  Image lines = empty();
+  images::Image lines = empty();
   paint(lines, 255, [](double x, double) { return x < 50 || x > 200; });
   EXPECT_NO_THROW(require_upright_pattern(mask(lines)));
-  Image inverted = test::even_image(kSide, kSide, 255);
+  images::Image inverted = test::even_image(kSide, kSide, 255);
   paint_disc(inverted, 0, {128, 128}, 60);
   const auto look = [&] { require_upright_pattern(mask(inverted)); };
   EXPECT_EQ(error_of(look),
@@ -221,25 +221,26 @@ TEST(Mask, of_a_pattern_may_reach_the_corners_but_not_go_all_round) {
 }
 
 TEST(Mask, of_a_pattern_lies_beneath_the_cell_by_the_share_of_the_parts_that_it_touches) {
-  Image image = empty();
+  images::Image image = empty();
   paint(image, 255, [](double x, double y) { return x > 60 && x < 160 && y > 60 && y < 160; });  // the cell's pattern
   paint_disc(image, 255, {210, 210}, 20);                                                        // another cell's
   const LabelMask pattern = mask(image);
   const auto share = [&](double x_um) {
-    const CellOutline cell{.outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .holes_um = {}, .area_um2 = 144};
+    const CellOutline cell{
+        .outer_um = {{x_um, 5}, {x_um + 12, 5}, {x_um + 12, 17}, {x_um, 17}}, .holes_um = {}, .area_um2 = 144};
     return share_beneath(pattern, cell, kField);
   };
   // by columns of points 0.2 um apart, over 10 um
   EXPECT_NEAR(share(5).value(), 1, 0.02);
   EXPECT_NEAR(share(13).value(), 0.3, 0.02);
   EXPECT_FALSE(share(-20));
-  Image whole = test::even_image(kSide, kSide, 255);  // cut by the image
+  images::Image whole = test::even_image(kSide, kSide, 255);  // cut by the image
   const CellOutline cell{.outer_um = {{5, 5}, {17, 5}, {17, 17}, {5, 17}}, .holes_um = {}, .area_um2 = 144};
   EXPECT_FALSE(share_beneath(mask(whole), cell, kField));
 }
 
 TEST(Mask, a_mask_of_another_size_is_refused_with_both_sizes) {
-  Image image = test::even_image(250, 256, 0);
+  images::Image image = test::even_image(250, 256, 0);
   paint_disc(image, 1, {100, 100}, 60);
   const std::string sizes = "mask.tif: a mask of the size of the images, 256 x 256 pixels; 250 x 256 pixels";
   EXPECT_EQ(error_of([&] { mask_outlines(mask(image), 1, kField, {}); }), sizes);
@@ -248,8 +249,8 @@ TEST(Mask, a_mask_of_another_size_is_refused_with_both_sizes) {
 
 TEST(Mask, a_cell_is_segmented_by_masks_and_selections_count_more) {
   const test::DrawnScene scene = test::drawn_scene(10, 1);
-  const Channel adhesion{"paxillin.tif", scene.adhesion_image}, actin{"actin.tif", scene.actin_image};
-  Image outline = empty(), spots = empty();
+  const images::Channel adhesion{"paxillin.tif", scene.adhesion_image}, actin{"actin.tif", scene.actin_image};
+  images::Image outline = empty(), spots = empty();
   paint_disc(outline, 255, {128, 128}, 105);
   for (const Adhesion& a : scene.adhesions)
     paint(spots, static_cast<float>(a.adhesion_id), [&](double x, double y) {
@@ -270,7 +271,7 @@ TEST(Mask, a_cell_is_segmented_by_masks_and_selections_count_more) {
   }
   EXPECT_TRUE(s.unused.empty());
   EXPECT_FALSE(segment_cell(std::nullopt, actin, p, drawn).second) << "a mask shows the adhesions";
-  Roi square;
+  rois::Roi square;
   square.name = "cell";
   square.points_px = {{30, 30}, {226, 30}, {226, 226}, {30, 226}};
   drawn.outline = RoiSet{"outline.roi", {square}};
@@ -281,4 +282,4 @@ TEST(Mask, a_cell_is_segmented_by_masks_and_selections_count_more) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::cells

@@ -1,13 +1,14 @@
-#include "pipeline/contract/names.h"
+#include "pipeline/files/names.h"
 
 #include <gtest/gtest.h>
 
 #include <random>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json.h"
-#include "pipeline/contract/memory.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/memory.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -31,52 +32,53 @@ TEST(Names, characters_of_utf8_have_their_lengths_and_nothing_else_has_one) {
                                                                                      {"\xF4\x90\x80\x80", 0},
                                                                                      {"\xF5\x80\x80\x80", 0},
                                                                                      {"\xFF", 0}}) {
-    EXPECT_EQ(utf8_length(text), length) << shown_name(text);
+    EXPECT_EQ(files::utf8_length(text), length) << files::shown_name(text);
   }
 }
 
 TEST(Names, a_name_of_any_bytes_is_shown_as_utf8_and_shown_again_stays_as_it_is) {
-  EXPECT_EQ(shown_name("Zelle 3, caf\xC3\xA9"), "Zelle 3, caf\xC3\xA9");
-  EXPECT_EQ(shown_name("caf\xE9.tif"), "caf\\xE9.tif");
+  EXPECT_EQ(files::shown_name("Zelle 3, caf\xC3\xA9"), "Zelle 3, caf\xC3\xA9");
+  EXPECT_EQ(files::shown_name("caf\xE9.tif"), "caf\\xE9.tif");
   std::mt19937_64 random(5);
   for (int round = 0; round < 1000; ++round) {
     std::string bytes;
     for (int i = 0; i < 12; ++i) bytes += static_cast<char>(1 + random() % 255);
-    const std::string shown = shown_name(bytes);
-    EXPECT_TRUE(is_utf8(shown));
-    EXPECT_EQ(shown_name(shown), shown);
-    EXPECT_EQ(file_shown_as("", shown).string().size(), bytes.size()) << shown;
+    const std::string shown = files::shown_name(bytes);
+    EXPECT_TRUE(files::is_utf8(shown));
+    EXPECT_EQ(files::shown_name(shown), shown);
+    EXPECT_EQ(files::file_shown_as("", shown).string().size(), bytes.size()) << shown;
   }
 }
 
 TEST(Names, the_file_shown_by_a_name_is_found) {
   const test::TemporaryFolder folder;
-  write_text(folder / "caf\xE9", "");
-  EXPECT_EQ(file_shown_as(folder.path(), "caf\\xE9"), folder / "caf\xE9");
-  write_text(folder / "caf\\xE9", "");
-  EXPECT_EQ(file_shown_as(folder.path(), "caf\\xE9"), folder / "caf\\xE9") << "one of just that name comes first";
+  files::write_text(folder / "caf\xE9", "");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "caf\\xE9"), folder / "caf\xE9");
+  files::write_text(folder / "caf\\xE9", "");
+  EXPECT_EQ(files::file_shown_as(folder.path(), "caf\\xE9"), folder / "caf\\xE9")
+      << "one of just that name comes first";
 }
 
 TEST(Names, no_shown_name_leads_out_of_its_folder) {
-  EXPECT_EQ(file_shown_as("cell", "\\x2E\\x2E\\x2Fetc"), "cell/\\x2E\\x2E\\x2Fetc");
+  EXPECT_EQ(files::file_shown_as("cell", "\\x2E\\x2E\\x2Fetc"), "cell/\\x2E\\x2E\\x2Fetc");
 }
 
 TEST(Names, json_and_tables_are_utf8_whatever_a_name_is) {
   const nlohmann::ordered_json json = {{"caf\xE9", {"a\xFF", 3, nullptr, {{"k", "\xC3\xA9"}}}}};
-  EXPECT_EQ(json_text(json), "{\"caf\\\\xE9\":[\"a\\\\xFF\",3,null,{\"k\":\"\xC3\xA9\"}]}");
-  CsvText csv({"cell"});
+  EXPECT_EQ(files::json_text(json), "{\"caf\\\\xE9\":[\"a\\\\xFF\",3,null,{\"k\":\"\xC3\xA9\"}]}");
+  files::CsvText csv({"cell"});
   csv.add("caf\xE9").end_row();
   EXPECT_EQ(csv.str(), "cell\ncaf\\xE9\n");
 }
 
 TEST(Memory, what_does_not_fit_is_refused_with_its_count_and_memory_before_it_is_made) {
-  const Demand small = {
+  const numerics::Demand small = {
       .what = "the mesh", .count = 1000, .parts = "vertices", .bytes_each = 100, .remedy = "choose a larger edge"};
-  EXPECT_NO_THROW(expect_room_for(small));
-  Demand large = small;
+  EXPECT_NO_THROW(numerics::expect_room_for(small));
+  numerics::Demand large = small;
   large.count = 1e15;
   try {
-    expect_room_for(large);
+    numerics::expect_room_for(large);
     FAIL() << "no error";
   } catch (const OutOfMemory& error) {
     EXPECT_EQ(error.report.reason.find("the mesh would have 1e+15 vertices, which take 1e+08 GB of memory"), 0u)

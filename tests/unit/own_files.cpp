@@ -1,13 +1,13 @@
-#include "pipeline/contract/own_files.h"
+#include "pipeline/files/own_files.h"
 
 #include <gtest/gtest.h>
 #include <sys/stat.h>
 
 #include <functional>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/json_record.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -20,47 +20,47 @@ class OwnFiles : public testing::Test {
  protected:
   void SetUp() override {
     fs::create_directories(cell_ / "4_fit/deep");
-    write_text(folder_ / "outside", "precious");
+    files::write_text(folder_ / "outside", "precious");
   }
   TemporaryFolder folder_;
   const fs::path cell_ = folder_ / "cell";
 };
 
 TEST_F(OwnFiles, a_name_stays_inside_of_its_folder) {
-  EXPECT_EQ(inside(cell_, "4_fit/a.csv", "x"), cell_ / "4_fit/a.csv");
-  EXPECT_EQ(inside(cell_, "not/there/yet", "x"), cell_ / "not/there/yet");
-  EXPECT_EQ(inside(cell_, "..hidden", "x"), cell_ / "..hidden");
+  EXPECT_EQ(files::inside(cell_, "4_fit/a.csv", "x"), cell_ / "4_fit/a.csv");
+  EXPECT_EQ(files::inside(cell_, "not/there/yet", "x"), cell_ / "not/there/yet");
+  EXPECT_EQ(files::inside(cell_, "..hidden", "x"), cell_ / "..hidden");
   for (const std::string& name :
        {std::string(), std::string("/etc/passwd"), std::string(".."), std::string("../a"),
         std::string("4_fit/../../outside"), std::string("4_fit/deep/.."), std::string("4_fit/a\0.csv", 12)})
-    EXPECT_THROW(inside(cell_, name, "x"), InputError) << name;
+    EXPECT_THROW(files::inside(cell_, name, "x"), InputError) << name;
 }
 
 TEST_F(OwnFiles, a_name_leads_through_no_link) {
   fs::create_symlink(folder_.path(), cell_ / "4_fit/link");
   fs::create_symlink("nowhere", cell_ / "dangling");
   for (const char* name : {"4_fit/link", "4_fit/link/outside", "dangling", "dangling/a"})
-    EXPECT_THROW(inside(cell_, name, "x"), InputError) << name;
+    EXPECT_THROW(files::inside(cell_, name, "x"), InputError) << name;
   fs::create_symlink("cell", folder_ / "alias");
-  EXPECT_EQ(inside(folder_ / "alias", "4_fit/deep", "x"),
+  EXPECT_EQ(files::inside(folder_ / "alias", "4_fit/deep", "x"),
             folder_ / "alias/4_fit/deep");  // the folder itself may be one
 }
 
 TEST_F(OwnFiles, what_stages_write_is_files_in_folders) {
-  EXPECT_NO_THROW(check_cell_folder(cell_));
+  EXPECT_NO_THROW(files::check_cell_folder(cell_));
   fs::create_symlink(folder_ / "outside", cell_ / "4_fit/tensions.csv");
-  EXPECT_THROW(check_cell_folder(cell_), InputError);
+  EXPECT_THROW(files::check_cell_folder(cell_), InputError);
   fs::remove(cell_ / "4_fit/tensions.csv");
   ASSERT_EQ(mkfifo((cell_ / "4_fit/tensions.csv").c_str(), 0600), 0);
-  EXPECT_THROW(check_cell_folder(cell_), InputError);
+  EXPECT_THROW(files::check_cell_folder(cell_), InputError);
   fs::remove_all(cell_ / "4_fit");
-  write_text(cell_ / "4_fit", "");
-  EXPECT_THROW(check_cell_folder(cell_), InputError);
+  files::write_text(cell_ / "4_fit", "");
+  EXPECT_THROW(files::check_cell_folder(cell_), InputError);
   fs::remove(cell_ / "4_fit");
   fs::create_symlink("loop", cell_ / "loop");
-  EXPECT_NO_THROW(check_cell_folder(cell_));  // no folder of a stage
+  EXPECT_NO_THROW(files::check_cell_folder(cell_));  // no folder of a stage
   fs::create_symlink("truth", cell_ / "truth");
-  EXPECT_THROW(check_cell_folder(cell_), InputError);
+  EXPECT_THROW(files::check_cell_folder(cell_), InputError);
 }
 
 TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
@@ -69,56 +69,56 @@ TEST_F(OwnFiles, writing_replaces_a_link_and_a_second_name_and_a_pipe) {
       [&] { fs::create_symlink("../outside", file); }, [&] { fs::create_hard_link(folder_ / "outside", file); },
       [&] { fs::create_symlink("../new", file); }, [&] { ASSERT_EQ(mkfifo(file.c_str(), 0600), 0); }};
   for (const auto& put : others) {
-    for (const auto& write : {write_text, write_whole}) {
+    for (const auto& write : {files::write_text, files::write_whole}) {
       fs::remove(file);
       put();
       write(file, "ours");
-      EXPECT_TRUE(is_own_file(file));
-      EXPECT_EQ(read_text(file), "ours");
-      EXPECT_EQ(read_text(folder_ / "outside"), "precious");
+      EXPECT_TRUE(files::is_own_file(file));
+      EXPECT_EQ(files::read_text(file), "ours");
+      EXPECT_EQ(files::read_text(folder_ / "outside"), "precious");
       EXPECT_FALSE(fs::exists(folder_ / "new"));
     }
   }
-  EXPECT_THROW(write_text(cell_ / "4_fit", ""), OutputError);
+  EXPECT_THROW(files::write_text(cell_ / "4_fit", ""), OutputError);
 }
 
 TEST_F(OwnFiles, a_link_under_the_temporary_name_is_not_followed) {
-  fs::create_symlink("../outside", temporary_name(cell_ / "run.json"));
-  write_whole(cell_ / "run.json", "ours");
-  EXPECT_EQ(read_text(folder_ / "outside"), "precious");
-  EXPECT_TRUE(is_own_file(cell_ / "run.json"));
+  fs::create_symlink("../outside", files::temporary_name(cell_ / "run.json"));
+  files::write_whole(cell_ / "run.json", "ours");
+  EXPECT_EQ(files::read_text(folder_ / "outside"), "precious");
+  EXPECT_TRUE(files::is_own_file(cell_ / "run.json"));
 }
 
 TEST_F(OwnFiles, looking_at_a_loop_or_a_name_too_long_is_no_error) {
   fs::create_symlink("loop", cell_ / "loop");
   for (const fs::path& name : {cell_ / "loop", cell_ / std::string(5000, 'a')}) {
-    EXPECT_FALSE(is_file(name));
-    EXPECT_FALSE(is_folder(name));
-    EXPECT_FALSE(is_own_file(name));
-    EXPECT_THROW(read_text(name), InputError);
+    EXPECT_FALSE(files::is_file(name));
+    EXPECT_FALSE(files::is_folder(name));
+    EXPECT_FALSE(files::is_own_file(name));
+    EXPECT_THROW(files::read_text(name), InputError);
   }
 }
 
 TEST_F(OwnFiles, a_hole_is_not_read) {
-  write_text(cell_ / "hole", "x");
-  EXPECT_NO_THROW(expect_no_hole(cell_ / "hole"));
+  files::write_text(cell_ / "hole", "x");
+  EXPECT_NO_THROW(files::expect_no_hole(cell_ / "hole"));
   fs::resize_file(cell_ / "hole", std::uintmax_t{1} << 40);
-  EXPECT_THROW(read_text(cell_ / "hole"), InputError);
-  EXPECT_FALSE(is_own_text(cell_ / "hole"));
+  EXPECT_THROW(files::read_text(cell_ / "hole"), InputError);
+  EXPECT_FALSE(files::is_own_text(cell_ / "hole"));
 }
 
 class Records : public testing::Test {
  protected:
-  JsonRecord record(const std::string& text) {
-    write_text(folder_ / "a.json", text);
+  files::JsonRecord record(const std::string& text) {
+    files::write_text(folder_ / "a.json", text);
     return {folder_ / "a.json", "a record"};
   }
   TemporaryFolder folder_;
 };
 
 TEST_F(Records, answer_what_they_hold) {
-  const JsonRecord r = record(R"({"a": {"b": [1, 2.5, true, "x", null]}, "none": null})");
-  const std::vector<JsonRecord> list = r.at("a").at("b").list();
+  const files::JsonRecord r = record(R"({"a": {"b": [1, 2.5, true, "x", null]}, "none": null})");
+  const std::vector<files::JsonRecord> list = r.at("a").at("b").list();
   EXPECT_EQ(list[0].integer(), 1);
   EXPECT_EQ(list[1].number(), 2.5);
   EXPECT_TRUE(list[2].is_true());
@@ -128,7 +128,7 @@ TEST_F(Records, answer_what_they_hold) {
 }
 
 TEST_F(Records, tell_place_and_finding_of_what_is_otherwise) {
-  const JsonRecord r = record(R"({"a": {"b": [1, "x"]}})");
+  const files::JsonRecord r = record(R"({"a": {"b": [1, "x"]}})");
   try {
     r.at("a").at("b").list()[1].number();
     FAIL() << "no error";
@@ -142,8 +142,9 @@ TEST_F(Records, tell_place_and_finding_of_what_is_otherwise) {
 }
 
 TEST_F(Records, hold_no_integer_beyond_the_range) {
-  const JsonRecord r = record(R"({"list": [2147483648, -2147483649, 18446744073709551615, 1e300, 1.5, 2147483647]})");
-  const std::vector<JsonRecord> list = r.at("list").list();
+  const files::JsonRecord r =
+      record(R"({"list": [2147483648, -2147483649, 18446744073709551615, 1e300, 1.5, 2147483647]})");
+  const std::vector<files::JsonRecord> list = r.at("list").list();
   for (std::size_t i = 0; i + 1 < list.size(); ++i) EXPECT_THROW(list[i].integer(), InputError) << i;
   EXPECT_EQ(list.back().integer(), 2147483647);
   EXPECT_EQ(std::get<double>(list[2].figure()), 18446744073709551615.0);
@@ -155,13 +156,13 @@ TEST_F(Records, that_are_none_are_refused) {
         std::string("{\"a\": \"\xff\"}"), "{\"a\": " + std::string(1000000, '[') + std::string(1000000, ']') + "}",
         std::string("{\"a\": \"\\ud800\"}"), std::string("{} {}"), std::string("{\0}", 3)})
     EXPECT_THROW(record(text), InputError) << text.substr(0, 40);
-  EXPECT_THROW(JsonRecord(folder_ / "nothing.json", "a record"), InputError);
+  EXPECT_THROW(files::JsonRecord(folder_ / "nothing.json", "a record"), InputError);
 }
 
 TEST_F(Records, of_any_size_are_refused_unread) {
-  write_text(folder_ / "a.json", "{}");
+  files::write_text(folder_ / "a.json", "{}");
   fs::resize_file(folder_ / "a.json", std::uintmax_t{1} << 40);
-  EXPECT_THROW(JsonRecord(folder_ / "a.json", "a record"), InputError);
+  EXPECT_THROW(files::JsonRecord(folder_ / "a.json", "a record"), InputError);
 }
 
 }  // namespace

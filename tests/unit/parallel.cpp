@@ -1,4 +1,4 @@
-#include "pipeline/contract/parallel.h"
+#include "pipeline/numerics/parallel.h"
 
 #include <gtest/gtest.h>
 #include <sys/resource.h>
@@ -18,17 +18,17 @@ namespace {
 TEST(ParallelFor, every_index_is_visited_once_for_any_number_of_threads) {
   for (const int threads : {1, 2, 4, 50}) {
     std::vector<int> visits(37, 0);
-    parallel_for(37, threads, [&](int i) { ++visits[i]; });
+    numerics::parallel_for(37, threads, [&](int i) { ++visits[i]; });
     EXPECT_EQ(std::accumulate(visits.begin(), visits.end(), 0), 37);
     EXPECT_EQ(*std::min_element(visits.begin(), visits.end()), 1);
   }
-  parallel_for(0, 4, [](int) { FAIL() << "there is no index"; });
+  numerics::parallel_for(0, 4, [](int) { FAIL() << "there is no index"; });
 }
 
 TEST(ParallelFor, the_exception_of_the_lowest_index_is_rethrown) {
   for (const int threads : {1, 2, 4}) {
     try {
-      parallel_for(20, threads, [](int i) {
+      numerics::parallel_for(20, threads, [](int i) {
         if (i == 3 || i == 17) throw std::runtime_error(std::to_string(i));
       });
       FAIL() << "nothing was thrown";
@@ -43,7 +43,7 @@ TEST(ParallelFor, the_exception_of_the_lowest_index_is_rethrown) {
   const rlimit limit{.rlim_cur = 400'000'000, .rlim_max = 400'000'000};  // a thread's stack takes 8 MB
   setrlimit(RLIMIT_AS, &limit);
   std::vector<int> visits(2000, 0);
-  parallel_for(2000, 1000, [&](int i) {
+  numerics::parallel_for(2000, 1000, [&](int i) {
     std::this_thread::sleep_for(std::chrono::milliseconds(1));  // so that they are there together
     ++visits[i];
   });

@@ -1,8 +1,8 @@
-#include "pipeline/contract/parameters.h"
-
 #include <gtest/gtest.h>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/range.h"
+#include "pipeline/stage/parameters.h"
 
 namespace mbtfm {
 namespace {
@@ -17,7 +17,7 @@ struct Example {
   std::uint64_t seed = 1;
 };
 
-void declare(ParameterList& list, Example& e) {
+void declare(stage::ParameterList& list, Example& e) {
   list.table("");
   list.add("pixel_size_um", e.pixel_size_um, Range::positive(), "pixel size (um)");
   list.table("network");
@@ -31,10 +31,10 @@ void declare(ParameterList& list, Example& e) {
 
 std::string message_of(std::string_view toml) {
   Example e;
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, e);
   try {
-    read_toml(list, toml, "cell.toml");
+    stage::read_toml(list, toml, "cell.toml");
   } catch (const InputError& error) {
     return std::string(error.what()) + " | " + error.hint;
   }
@@ -43,16 +43,17 @@ std::string message_of(std::string_view toml) {
 
 TEST(Parameters, values_are_read_from_their_table) {
   Example e;
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, e);
-  read_toml(list, "pixel_size_um = 0.1\n[network]\nlength_um = 2\nmethod = 'exact'\nis_on = true\nseed = 7\n", "t");
+  stage::read_toml(list, "pixel_size_um = 0.1\n[network]\nlength_um = 2\nmethod = 'exact'\nis_on = true\nseed = 7\n",
+                   "t");
   EXPECT_EQ(e.pixel_size_um, 0.1);
   EXPECT_EQ(e.length_um, 2);
   EXPECT_EQ(e.method, "exact");
   EXPECT_TRUE(e.is_on);
   EXPECT_EQ(e.seed, 7u);
   EXPECT_FALSE(e.page);
-  read_toml(list, "[network]\npage = 4\n", "t");
+  stage::read_toml(list, "[network]\npage = 4\n", "t");
   EXPECT_EQ(e.page, 4);
   EXPECT_EQ(e.count, 3) << "what is not given keeps its default";
 }
@@ -61,14 +62,14 @@ TEST(Parameters, a_length_in_nanometres_is_recognised) {
   struct {
     double edge_length_um = 1.5, stiffness_nN = 1, ratio = 1;
   } e;
-  ParameterList list;
+  stage::ParameterList list;
   list.table("network");
   list.add("edge_length_um", e.edge_length_um, Range::mesh_um(), "mean cable length (um)");
   list.add("stiffness_nN", e.stiffness_nN, Range::force_nN(), "stiffness (nN)");
   list.add("ratio", e.ratio, Range::between(0, 1), "a ratio");
   const auto hint_on = [&](const std::string& line) {
     try {
-      read_toml(list, "[network]\n" + line, "cell.toml");
+      stage::read_toml(list, "[network]\n" + line, "cell.toml");
     } catch (const InputError& error) {
       return error.hint;
     }
@@ -81,7 +82,7 @@ TEST(Parameters, a_length_in_nanometres_is_recognised) {
   EXPECT_EQ(hint_on("ratio = 500\n"), "a ratio") << "has no unit";
   EXPECT_EQ(hint_on("edge_length_um = 1.5\n"), "read");
   try {
-    set_from_text(parameter_named(list, "edge_length_um"), "1500");
+    stage::set_from_text(stage::parameter_named(list, "edge_length_um"), "1500");
     FAIL() << "no error";
   } catch (const UsageError& error) {
     EXPECT_NE(std::string(error.what()).find("1500 nm is 1.5 um"), std::string::npos) << error.what();
@@ -137,13 +138,13 @@ TEST(Parameters, a_key_of_very_many_parts_is_refused_before_it_is_taken_apart) {
 
 TEST(Parameters, a_gel_needs_its_modulus_and_a_poisson_ratio_below_one_half) {
   Gel gel;
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, gel);
-  EXPECT_THROW(check_complete(list), UsageError);
-  EXPECT_THROW(read_toml(list, "[gel]\nyoungs_modulus_kPa = -8\n", "t"), InputError);
-  EXPECT_THROW(read_toml(list, "[gel]\npoisson_ratio = 0.51\n", "t"), InputError);
-  read_toml(list, "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.4999\n", "t");
-  EXPECT_NO_THROW(check_complete(list));
+  EXPECT_THROW(stage::check_complete(list), UsageError);
+  EXPECT_THROW(stage::read_toml(list, "[gel]\nyoungs_modulus_kPa = -8\n", "t"), InputError);
+  EXPECT_THROW(stage::read_toml(list, "[gel]\npoisson_ratio = 0.51\n", "t"), InputError);
+  stage::read_toml(list, "[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.4999\n", "t");
+  EXPECT_NO_THROW(stage::check_complete(list));
 }
 
 }  // namespace

@@ -1,4 +1,4 @@
-#include "pipeline/contract/plausible.h"
+#include "pipeline/stage/plausible.h"
 
 #include <gtest/gtest.h>
 
@@ -18,18 +18,18 @@ InputError refusal_of(const std::function<void()>& ask) {
   return {"", "", "nothing was refused"};
 }
 
-std::vector<Doubt> doubts_about_gel(Gel gel, const std::string& allow = "") {
-  ParameterList list;
+std::vector<stage::Doubt> doubts_about_gel(Gel gel, const std::string& allow = "") {
+  stage::ParameterList list;
   declare(list, gel);
-  return doubts_about(list, allowed_quantities({.allow = allow}));
+  return stage::doubts_about(list, stage::allowed_quantities({.allow = allow}));
 }
 
 TEST(Plausible, every_quantity_has_a_source_a_remedy_and_a_usual_range_within_the_possible_one) {
-  for (const PlausibleQuantity& q : plausible_quantities()) {
+  for (const stage::PlausibleQuantity& q : stage::plausible_quantities()) {
     EXPECT_FALSE(std::string(q.source).empty() || std::string(q.remedy).empty()) << q.id;
     EXPECT_LT(q.usual.low, q.usual.high) << q.id;
     EXPECT_TRUE(is_inside(q.possible, q.usual.low) && is_inside(q.possible, q.usual.high)) << q.id;
-    EXPECT_FALSE(doubt_about(q.id, 0.5 * (q.usual.low + q.usual.high))) << q.id;
+    EXPECT_FALSE(stage::doubt_about(q.id, 0.5 * (q.usual.low + q.usual.high))) << q.id;
   }
 }
 
@@ -49,7 +49,7 @@ TEST(Plausible, what_published_experiments_used_and_found_is_not_doubted) {
                                                                                        {"total_force_nN", 920},
                                                                                        {"fibre_tension_nN", 103},
                                                                                        {"traction_kPa", 5.5}}) {
-    EXPECT_FALSE(doubt_about(id, value)) << id << " = " << value;
+    EXPECT_FALSE(stage::doubt_about(id, value)) << id << " = " << value;
   }
 }
 
@@ -65,47 +65,47 @@ TEST(Plausible, a_modulus_in_pascal_is_refused_and_the_unit_named) {
 }
 
 TEST(Plausible, what_is_allowed_is_doubted_and_no_longer_refused) {
-  const std::vector<Doubt> doubts = doubts_about_gel({.youngs_modulus_kPa = 8400}, "youngs_modulus_kPa");
+  const std::vector<stage::Doubt> doubts = doubts_about_gel({.youngs_modulus_kPa = 8400}, "youngs_modulus_kPa");
   ASSERT_EQ(doubts.size(), 1u);
-  EXPECT_EQ(doubts.front().level, DoubtLevel::refused);
+  EXPECT_EQ(doubts.front().level, stage::DoubtLevel::refused);
   EXPECT_EQ(doubts.front().value, 8400);
   EXPECT_EQ(doubts.front().limit, 1000);
   EXPECT_NE(refusal_of([] { doubts_about_gel({.youngs_modulus_kPa = 8400}, "thickness_um"); }).where, "")
       << "what is allowed is one quantity, not all";
-  EXPECT_THROW(allowed_quantities({.allow = "youngs_modulus"}), UsageError);
-  EXPECT_EQ(allowed_quantities({.allow = "traction_kPa, total_force_nN"}),
+  EXPECT_THROW(stage::allowed_quantities({.allow = "youngs_modulus"}), UsageError);
+  EXPECT_EQ(stage::allowed_quantities({.allow = "traction_kPa, total_force_nN"}),
             (std::vector<std::string>{"traction_kPa", "total_force_nN"}));
 }
 
 TEST(Plausible, an_unusual_value_is_a_caution_that_says_what_is_usual) {
-  const std::vector<Doubt> doubts =
+  const std::vector<stage::Doubt> doubts =
       doubts_about_gel({.youngs_modulus_kPa = 300, .poisson_ratio = 0.2, .thickness_um = 5});
   ASSERT_EQ(doubts.size(), 3u);
-  for (const Doubt& doubt : doubts) EXPECT_EQ(doubt.level, DoubtLevel::caution) << doubt.id;
-  EXPECT_EQ(sentence_of(doubts.front()), "the Young's modulus of the gel is 300 kPa, above 100: unusual");
+  for (const stage::Doubt& doubt : doubts) EXPECT_EQ(doubt.level, stage::DoubtLevel::caution) << doubt.id;
+  EXPECT_EQ(stage::sentence_of(doubts.front()), "the Young's modulus of the gel is 300 kPa, above 100: unusual");
 }
 
 TEST(Plausible, names_to_allow_may_stand_in_an_array) {
-  CheckParameters checks;
-  ParameterList list;
+  stage::CheckParameters checks;
+  stage::ParameterList list;
   declare(list, checks);
-  read_toml(list, "[checks]\nallow = [\"pixel_size_um\", \"traction_kPa\"]\n", "cell.toml");
-  EXPECT_EQ(allowed_quantities(checks), (std::vector<std::string>{"pixel_size_um", "traction_kPa"}));
-  EXPECT_THROW(read_toml(list, "[checks]\nallow = [1, 2]\n", "cell.toml"), InputError);
+  stage::read_toml(list, "[checks]\nallow = [\"pixel_size_um\", \"traction_kPa\"]\n", "cell.toml");
+  EXPECT_EQ(stage::allowed_quantities(checks), (std::vector<std::string>{"pixel_size_um", "traction_kPa"}));
+  EXPECT_THROW(stage::read_toml(list, "[checks]\nallow = [1, 2]\n", "cell.toml"), InputError);
 }
 
 TEST(Plausible, a_pixel_size_is_doubted_from_one_per_cent_off_the_images_own_and_refused_from_a_fifth) {
-  EXPECT_FALSE(doubt_about_pixel_size(0.1, 0.1));
-  EXPECT_FALSE(doubt_about_pixel_size(0.1009, 0.1));
-  EXPECT_EQ(doubt_about_pixel_size(0.102, 0.1)->level, DoubtLevel::caution);
-  EXPECT_EQ(doubt_about_pixel_size(0.1, 0.102)->level, DoubtLevel::caution);
-  EXPECT_EQ(doubt_about_pixel_size(0.119, 0.1)->level, DoubtLevel::caution);
-  EXPECT_EQ(doubt_about_pixel_size(0.121, 0.1)->level, DoubtLevel::refused);
-  const Doubt halved = *doubt_about_pixel_size(0.1, 0.2);
-  EXPECT_EQ(halved.level, DoubtLevel::refused);
+  EXPECT_FALSE(stage::doubt_about_pixel_size(0.1, 0.1));
+  EXPECT_FALSE(stage::doubt_about_pixel_size(0.1009, 0.1));
+  EXPECT_EQ(stage::doubt_about_pixel_size(0.102, 0.1)->level, stage::DoubtLevel::caution);
+  EXPECT_EQ(stage::doubt_about_pixel_size(0.1, 0.102)->level, stage::DoubtLevel::caution);
+  EXPECT_EQ(stage::doubt_about_pixel_size(0.119, 0.1)->level, stage::DoubtLevel::caution);
+  EXPECT_EQ(stage::doubt_about_pixel_size(0.121, 0.1)->level, stage::DoubtLevel::refused);
+  const stage::Doubt halved = *stage::doubt_about_pixel_size(0.1, 0.2);
+  EXPECT_EQ(halved.level, stage::DoubtLevel::refused);
   EXPECT_NE(halved.remedy.find("binning"), std::string::npos);
-  EXPECT_NO_THROW(require_possible(halved, {"pixel_size_um"}, "actin.tif"));
-  const InputError error = refusal_of([&] { require_possible(halved, {}, "actin.tif"); });
+  EXPECT_NO_THROW(stage::require_possible(halved, {"pixel_size_um"}, "actin.tif"));
+  const InputError error = refusal_of([&] { stage::require_possible(halved, {}, "actin.tif"); });
   EXPECT_EQ(error.where, "actin.tif");
   EXPECT_EQ(error.expected, "about 0.2 um, the image's own calibration");
   EXPECT_EQ(error.found, "0.1 um");
@@ -113,14 +113,14 @@ TEST(Plausible, a_pixel_size_is_doubted_from_one_per_cent_off_the_images_own_and
 
 TEST(Plausible, inputs_that_nobody_gave_are_listed_as_assumed) {
   Gel gel;
-  ParameterList list;
+  stage::ParameterList list;
   declare(list, gel);
-  read_toml(list, "[gel]\nyoungs_modulus_kPa = 8.4\n", "cell.toml");
-  const std::vector<AssumedInput> both = assumed_inputs(list);
+  stage::read_toml(list, "[gel]\nyoungs_modulus_kPa = 8.4\n", "cell.toml");
+  const std::vector<stage::AssumedInput> both = stage::assumed_inputs(list);
   ASSERT_EQ(both.size(), 2u);
-  EXPECT_EQ(sentence_of(both[1]), "thickness_um = 60 um (assumed: the thickness of the gel was not given)");
-  read_toml(list, "[gel]\nthickness_um = 60\npoisson_ratio = 0.49\n", "cell.toml");
-  EXPECT_TRUE(assumed_inputs(list).empty()) << "given is given, also where it is the default";
+  EXPECT_EQ(stage::sentence_of(both[1]), "thickness_um = 60 um (assumed: the thickness of the gel was not given)");
+  stage::read_toml(list, "[gel]\nthickness_um = 60\npoisson_ratio = 0.49\n", "cell.toml");
+  EXPECT_TRUE(stage::assumed_inputs(list).empty()) << "given is given, also where it is the default";
 }
 
 TEST(Plausible, one_adhesion_that_was_drawn_too_small_makes_no_traction_unusual) {
@@ -131,8 +131,8 @@ TEST(Plausible, one_adhesion_that_was_drawn_too_small_makes_no_traction_unusual)
     forces.push_back(
         {.adhesion_id = 1, .force_nN = {force_nN, 0}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}});
   }
-  EXPECT_DOUBLE_EQ(traction_of_half_the_force_kPa(forces, adhesions), 5) << "200 kPa on a seventh of the force";
-  EXPECT_DOUBLE_EQ(traction_of_half_the_force_kPa({}, {}), 0);
+  EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa(forces, adhesions), 5) << "200 kPa on a seventh of the force";
+  EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa({}, {}), 0);
 }
 
 TEST(Plausible, a_traction_or_a_tension_counts_as_far_as_its_error_leaves_it_sure) {
@@ -144,12 +144,12 @@ TEST(Plausible, a_traction_or_a_tension_counts_as_far_as_its_error_leaves_it_sur
                .connected = false,
                .moment_nN_um = {}};  // 50 kPa, all of it noise
   forces[1] = {.adhesion_id = 2, .force_nN = {0, 1}, .sigma_nN = 0.25, .connected = false, .moment_nN_um = {}};
-  EXPECT_DOUBLE_EQ(traction_of_half_the_force_kPa(forces, adhesions), 5);
+  EXPECT_DOUBLE_EQ(stage::traction_of_half_the_force_kPa(forces, adhesions), 5);
   const std::vector<Tension> tensions = {
       {.fibre_id = 0, .tension_nN = 99, .low_nN = {}, .high_nN = {}},  // the network's is no fibre's
       {.fibre_id = 1, .tension_nN = 50, .low_nN = 2, .high_nN = 98},
       {.fibre_id = 2, .tension_nN = 7, .low_nN = {}, .high_nN = {}}};
-  EXPECT_EQ(surest_fibre_tension_nN(tensions), 7);
+  EXPECT_EQ(stage::surest_fibre_tension_nN(tensions), 7);
 }
 
 }  // namespace

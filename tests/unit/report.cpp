@@ -5,6 +5,7 @@
 #include <regex>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/report/arrows.h"
 #include "pipeline/report/base64.h"
 #include "pipeline/report/colours.h"
@@ -50,7 +51,7 @@ TEST(Report, asks_for_nothing_from_anywhere) {
 }
 
 TEST(Report, is_well_formed_where_names_hold_markup) {
-  EXPECT_EQ(html_escaped("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
+  EXPECT_EQ(charts::html_escaped("a<b & \"c\""), "a&lt;b &amp; &quot;c&quot;");
 }
 
 TEST(Report, writes_the_same_bytes_twice) {
@@ -66,17 +67,17 @@ TEST(Report, is_written_again_only_where_something_has_changed) {
   update_report(cell.folder.path());
   EXPECT_EQ(std::filesystem::last_write_time(file), first);
   test::write_invented_fit(cell.folder.path(), 2);
-  const std::string before = read_text(file);
+  const std::string before = files::read_text(file);
   update_report(cell.folder.path());
-  EXPECT_NE(read_text(file), before);
+  EXPECT_NE(files::read_text(file), before);
 }
 
 TEST(Report, rejects_a_fitted_field_of_other_beads) {
   const FakeCell cell;
   const auto file = cell.folder / "4_fit/fitted_displacement.csv";
-  DisplacementField field = read_displacement(file);
+  DisplacementField field = files::read_displacement(file);
   field.front().position_um.x += 1;
-  write_displacement(file, field);
+  files::write_displacement(file, field);
   EXPECT_THROW(report_html(cell.folder.path()), InputError);
 }
 
@@ -145,8 +146,8 @@ TEST(Report, an_open_finding_shows_its_text_number_threshold_and_remedy) {
   const FakeCell cell;
   const Finding finding = *noticed(FindingKind::missing_fibre, 3, "three <fibres>");
   const std::string html = findings_section(read_results(cell.folder.path()), fitted_here({finding}));
-  for (const std::string& part : {std::string("three &lt;fibres&gt;"), html_escaped(finding.remedy),
-                                  html_escaped(finding.reason), std::string(": 3. Threshold: 0;")})
+  for (const std::string& part : {std::string("three &lt;fibres&gt;"), charts::html_escaped(finding.remedy),
+                                  charts::html_escaped(finding.reason), std::string(": 3. Threshold: 0;")})
     EXPECT_NE(html.find(part), std::string::npos) << part;
 }
 
@@ -194,14 +195,14 @@ TEST(Compare, without_true_fibres_ids_are_the_same) {
   std::filesystem::create_directories(cell.folder / "truth");
   std::string truth = "fibre_id,type,tension_nN\n0,network,0.05\n";
   double error2 = 0, truth2 = 0;
-  for (const Tension& t : read_tensions(cell.folder / "4_fit/tensions.csv")) {
+  for (const Tension& t : files::read_tensions(cell.folder / "4_fit/tensions.csv")) {
     if (t.fibre_id == 0) continue;
     const double value = t.tension_nN + 0.1 * t.fibre_id;
     truth += std::to_string(t.fibre_id) + ",arc," + shortest(value) + "\n";
     error2 += std::pow(0.1 * t.fibre_id, 2);
     truth2 += value * value;
   }
-  write_text(cell.folder / "truth/tensions.csv", truth);
+  files::write_text(cell.folder / "truth/tensions.csv", truth);
   const Comparison comparison = compare_with_truth(cell.folder.path());
   EXPECT_EQ(comparison.n_matched, 4);
   EXPECT_NEAR(comparison.relative_error, std::sqrt(error2 / truth2), 1e-12);  // rounding in differences
@@ -220,10 +221,10 @@ TEST(Compare, counts_a_missed_and_a_mistyped_fibre) {
   truth.back().start_adhesion_id = 12;
   truth.back().end_adhesion_id = 7;
   for (Vec2& p : truth.back().points_um) p += Vec2{0, -8};
-  write_fibres(cell.folder / "truth/fibres.csv", cell.folder / "truth/fibre_points.csv", truth);
-  write_text(cell.folder / "truth/tensions.csv",
-             "fibre_id,type,tension_nN\n0,network,0.06\n11,ventral,1\n12,ventral,1\n13,dorsal,1\n14,dorsal,1\n"
-             "99,ventral,1\n");
+  files::write_fibres(cell.folder / "truth/fibres.csv", cell.folder / "truth/fibre_points.csv", truth);
+  files::write_text(cell.folder / "truth/tensions.csv",
+                    "fibre_id,type,tension_nN\n0,network,0.06\n11,ventral,1\n12,ventral,1\n13,dorsal,1\n14,dorsal,1\n"
+                    "99,ventral,1\n");
   const Comparison comparison = compare_with_truth(cell.folder.path());
   EXPECT_EQ(comparison.n_matched, 4);
   EXPECT_EQ(comparison.n_long, 5);

@@ -1,4 +1,4 @@
-#include "segment/roi.h"
+#include "segment/rois/roi.h"
 
 #include <gtest/gtest.h>
 
@@ -6,11 +6,11 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 
-namespace mbtfm::segment {
+namespace mbtfm::rois {
 namespace {
 
 namespace fs = std::filesystem;
@@ -63,7 +63,7 @@ TEST(Roi, a_set_comes_back_in_its_order_and_its_bytes_depend_on_the_rois_alone) 
                                  polygon("a 1", {{4, 4}, {5, 4}, {5, 5}})};
   write_roi_set(folder / "1.zip", rois);
   write_roi_set(folder / "2.zip", rois);
-  EXPECT_EQ(read_text(folder / "1.zip"), read_text(folder / "2.zip"));
+  EXPECT_EQ(files::read_text(folder / "1.zip"), files::read_text(folder / "2.zip"));
   const std::vector<Roi> back = read_rois(folder / "1.zip");
   ASSERT_EQ(back.size(), rois.size());
   for (std::size_t i = 0; i < rois.size(); ++i) {
@@ -199,7 +199,7 @@ TEST(Roi, files_of_imagej_are_read_as_another_reader_does) {
   for (const auto& entry : fs::directory_iterator(kShared / "read_roi")) {
     if (entry.path().extension() != ".json") continue;
     SCOPED_TRACE(entry.path().stem().string());
-    const json whole = json::parse(read_text(entry.path()));
+    const json whole = json::parse(files::read_text(entry.path()));
     const json& answer = whole.begin().value();
     const std::vector<Roi> rois = read_rois(fs::path(entry.path()).replace_extension(".roi"));
     ASSERT_EQ(rois.size(), 1u);
@@ -235,4 +235,4 @@ TEST(Roi, files_of_a_third_program_are_read_as_imagej_does) {
 }
 
 }  // namespace
-}  // namespace mbtfm::segment
+}  // namespace mbtfm::rois

@@ -7,14 +7,14 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 
-#include "pipeline/contract/csv.h"
-#include "pipeline/contract/effects.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/text.h"
 #include "pipeline/runner/batch.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/stages.h"
+#include "pipeline/stage/effects.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::runner {
@@ -24,7 +24,7 @@ namespace fs = std::filesystem;
 using test::TemporaryFolder;
 
 void make_executable(const fs::path& file, const std::string& text) {
-  write_text(file, text);
+  files::write_text(file, text);
   fs::permissions(file, fs::perms::owner_all);
 }
 
@@ -87,12 +87,12 @@ class Runner : public testing::Test {
     for (const Stage& stage : stages()) make_executable(bin_ / ("mbtfm-" + stage.name), kStageScript);
     write_parameters("");
     for (const char* image : {"paxillin.tif", "actin.tif", "beads_stressed.tif", "beads_relaxed.tif"}) {
-      write_text(cell_ / image, image);
+      files::write_text(cell_ / image, image);
     }
   }
 
   void write_parameters(const std::string& further) {
-    write_text(cell_ / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\n" + further);
+    files::write_text(cell_ / "cell.toml", "pixel_size_um = 0.1\n[gel]\nyoungs_modulus_kPa = 8\n" + further);
   }
 
   /// Names of the stages that a run starts, sorted: two of them start at the same time.
@@ -103,7 +103,7 @@ class Runner : public testing::Test {
   }
   std::string calls() {
     if (!fs::exists(bin_ / "calls")) return "";
-    std::istringstream lines(read_text(bin_ / "calls"));
+    std::istringstream lines(files::read_text(bin_ / "calls"));
     std::vector<std::string> names;
     for (std::string name; lines >> name;) names.push_back(name);
     std::sort(names.begin(), names.end());
@@ -137,33 +137,33 @@ TEST_F(Runner, runs_again_exactly_what_depends_on_a_changed_table) {
 }
 
 TEST_F(Runner, a_single_frame_of_a_series_that_is_lost_or_changed_is_made_anew_and_the_others_kept) {
-  write_text(bin_ / "series", "");
+  files::write_text(bin_ / "series", "");
   EXPECT_EQ(started(), "fit network segment track");
   EXPECT_EQ(started(), "");
   fs::remove(cell_ / "2_track/displacement_0003.csv");
   EXPECT_EQ(started(), "track-keeping");  // it comes out as it was: the fit holds
   EXPECT_TRUE(fs::exists(cell_ / "2_track/displacement_0003.csv"));
   EXPECT_EQ(started(), "");
-  write_text(cell_ / "2_track/displacement_0001.csv", "by hand");
+  files::write_text(cell_ / "2_track/displacement_0001.csv", "by hand");
   EXPECT_EQ(started(), "fit-keeping");
   EXPECT_EQ(state_of("track"), StageState::replaced);
   EXPECT_EQ(started(), "");
   fs::remove(cell_ / "2_track/displacement_0003.csv");
   EXPECT_EQ(started(), "track-keeping");
-  EXPECT_EQ(read_text(cell_ / "2_track/displacement_0001.csv"), "by hand");
+  EXPECT_EQ(files::read_text(cell_ / "2_track/displacement_0001.csv"), "by hand");
   EXPECT_EQ(started(), "");
   EXPECT_EQ(state_of("track"), StageState::replaced);  // still the user's
   fs::remove(cell_ / "2_track/displacement_0003.csv");
   write_parameters("[track]\nx = 1\n");
   EXPECT_EQ(started(), "fit track");  // nothing that other parameters gave is kept
-  EXPECT_EQ(read_text(cell_ / "2_track/displacement_0001.csv"), "1\n");
+  EXPECT_EQ(files::read_text(cell_ / "2_track/displacement_0001.csv"), "1\n");
 }
 
 TEST_F(Runner, what_is_left_of_a_series_does_not_outlive_it) {
-  write_text(bin_ / "series", "");
+  files::write_text(bin_ / "series", "");
   started();
   fs::remove(bin_ / "series");
-  write_text(cell_ / "beads_stressed.tif", "a single image");
+  files::write_text(cell_ / "beads_stressed.tif", "a single image");
   EXPECT_EQ(started(), "fit track");
   EXPECT_FALSE(fs::exists(cell_ / "2_track/frames.csv"));
   EXPECT_FALSE(fs::exists(cell_ / "2_track/displacement_0003.csv"));
@@ -173,18 +173,19 @@ TEST_F(Runner, what_is_left_of_a_series_does_not_outlive_it) {
 TEST(Stages, every_effect_belongs_to_a_stage_that_runs_again_for_it) {
   std::vector<std::string> of_stages;
   for (const Stage& stage : stages()) of_stages.insert(of_stages.end(), stage.effects.begin(), stage.effects.end());
-  for (const std::string& key : effect_keys()) EXPECT_NE(std::ranges::find(of_stages, key), of_stages.end()) << key;
+  for (const std::string& key : stage::effect_keys())
+    EXPECT_NE(std::ranges::find(of_stages, key), of_stages.end()) << key;
 }
 
 TEST_F(Runner, order_and_comments_of_the_parameter_file_do_not_matter) {
   started();
-  write_text(cell_ / "cell.toml", "pixel_size_um = 0.1 # calibrated\n\n[gel]\nyoungs_modulus_kPa = 8 # kPa\n");
+  files::write_text(cell_ / "cell.toml", "pixel_size_um = 0.1 # calibrated\n\n[gel]\nyoungs_modulus_kPa = 8 # kPa\n");
   EXPECT_EQ(started(), "");
 }
 
 TEST_F(Runner, runs_again_for_a_changed_image_or_another_version) {
   started();
-  write_text(cell_ / "beads_relaxed.tif", "another");
+  files::write_text(cell_ / "beads_relaxed.tif", "another");
   EXPECT_EQ(started(), "fit track");
   options_.version = "2";
   EXPECT_EQ(started(), "fit network segment track");
@@ -192,11 +193,11 @@ TEST_F(Runner, runs_again_for_a_changed_image_or_another_version) {
 
 TEST_F(Runner, keeps_an_output_that_was_changed_by_hand) {
   started();
-  write_text(cell_ / "1_segment/fibres.csv", "drawn by hand");
+  files::write_text(cell_ / "1_segment/fibres.csv", "drawn by hand");
   EXPECT_EQ(started(), "fit network");
   EXPECT_EQ(state_of("segment"), StageState::replaced);
-  EXPECT_EQ(read_text(cell_ / "1_segment/fibres.csv"), "drawn by hand");
-  EXPECT_NE(read_text(cell_ / "run.json").find("\"replaced\""), std::string::npos);
+  EXPECT_EQ(files::read_text(cell_ / "1_segment/fibres.csv"), "drawn by hand");
+  EXPECT_NE(files::read_text(cell_ / "run.json").find("\"replaced\""), std::string::npos);
   EXPECT_EQ(started(), "");
   options_.redo = {"segment"};
   EXPECT_EQ(started(), "fit network segment");
@@ -204,9 +205,9 @@ TEST_F(Runner, keeps_an_output_that_was_changed_by_hand) {
 
 TEST_F(Runner, a_cell_is_not_done_before_the_run_record_tells_what_was_changed_by_hand) {
   started();
-  write_text(cell_ / "report.html", "");
+  files::write_text(cell_ / "report.html", "");
   EXPECT_TRUE(is_done(cell_, options_, look_at_cell(cell_, options_)));
-  write_text(cell_ / "4_fit/tensions.csv", "by hand");
+  files::write_text(cell_ / "4_fit/tensions.csv", "by hand");
   EXPECT_FALSE(is_done(cell_, options_, look_at_cell(cell_, options_)));
   started();
   EXPECT_TRUE(is_done(cell_, options_, look_at_cell(cell_, options_)));
@@ -215,7 +216,7 @@ TEST_F(Runner, a_cell_is_not_done_before_the_run_record_tells_what_was_changed_b
 TEST_F(Runner, takes_given_outputs_without_images) {
   for (const char* file : {"adhesions.csv", "fibres.csv", "fibre_points.csv", "outline.csv"}) {
     fs::create_directories(cell_ / "1_segment");
-    write_text(cell_ / "1_segment" / file, file);
+    files::write_text(cell_ / "1_segment" / file, file);
   }
   fs::remove(cell_ / "paxillin.tif");
   fs::remove(cell_ / "actin.tif");
@@ -232,19 +233,19 @@ TEST_F(Runner, keeps_outputs_whose_images_were_moved_away) {
 
 TEST_F(Runner, takes_a_displacement_field_instead_of_the_beads_images) {
   for (const char* image : {"beads_stressed.tif", "beads_relaxed.tif"}) fs::remove(cell_ / image);
-  write_text(cell_ / "piv.csv", "x");
+  files::write_text(cell_ / "piv.csv", "x");
   write_parameters("[images]\ndisplacement = \"piv.csv\"\n");
   EXPECT_EQ(started(), "fit network segment track");
   EXPECT_EQ(started(), "");
-  write_text(cell_ / "piv.csv", "y");
+  files::write_text(cell_ / "piv.csv", "y");
   EXPECT_EQ(started(), "fit track");
 }
 
 TEST_F(Runner, rejects_a_half_given_stage) {
   fs::create_directories(cell_ / "1_segment");
-  write_text(cell_ / "1_segment/adhesions.csv", "given");
+  files::write_text(cell_ / "1_segment/adhesions.csv", "given");
   EXPECT_THROW(started(), InputError);
-  EXPECT_EQ(read_text(cell_ / "1_segment/adhesions.csv"), "given");
+  EXPECT_EQ(files::read_text(cell_ / "1_segment/adhesions.csv"), "given");
 }
 
 TEST_F(Runner, starts_nothing_where_an_image_lacks) {
@@ -271,7 +272,7 @@ TEST_F(Runner, runs_a_stage_again_that_was_interrupted) {
 }
 
 TEST_F(Runner, passes_on_the_exit_code_and_resumes) {
-  write_text(bin_ / "exit-network", "3");
+  files::write_text(bin_ / "exit-network", "3");
   try {
     started();
     FAIL() << "no error";
@@ -284,7 +285,7 @@ TEST_F(Runner, passes_on_the_exit_code_and_resumes) {
 }
 
 TEST_F(Runner, goes_on_after_a_stage_that_did_not_converge_and_never_forgets_it) {
-  write_text(bin_ / "exit-network", "4");
+  files::write_text(bin_ / "exit-network", "4");
   EXPECT_EQ(started(), "fit network segment track");
   EXPECT_FALSE(last_.converged());
   EXPECT_EQ(started(), "");
@@ -313,10 +314,10 @@ TEST_F(Runner, works_on_a_stage_while_another_run_holds_other_stages) {
   EXPECT_THROW(started(), CellBusy);
 }
 
-nlohmann::json run_record(const fs::path& cell) { return nlohmann::json::parse(read_text(cell / "run.json")); }
+nlohmann::json run_record(const fs::path& cell) { return nlohmann::json::parse(files::read_text(cell / "run.json")); }
 
 TEST_F(Runner, tells_in_run_json_which_stage_failed_and_why) {
-  write_text(bin_ / "exit-network", "3");
+  files::write_text(bin_ / "exit-network", "3");
   EXPECT_THROW(started(), StageFailed);
   const auto run = run_record(cell_);
   EXPECT_EQ(run["outcome"], "failed");
@@ -332,7 +333,7 @@ TEST_F(Runner, tells_in_run_json_which_stage_failed_and_why) {
 }
 
 TEST_F(Runner, tells_in_run_json_of_a_crash_and_of_refused_parameters) {
-  write_text(bin_ / "shell-track", "kill -SEGV $$");
+  files::write_text(bin_ / "shell-track", "kill -SEGV $$");
   EXPECT_THROW(started(), StageFailed);
   EXPECT_EQ(run_record(cell_)["stages"]["track"]["failure"]["exit_code"], 128 + 11);
   write_parameters("[fit]\nrefuse_fit = 1\n");
@@ -352,7 +353,8 @@ TEST_F(Runner, stages_that_are_run_one_by_one_leave_the_same_record) {
 
 TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
   // The stage waits for a child that would write a file later; neither may be left.
-  write_text(bin_ / "shell-segment", "(trap '' TERM; sleep 3; touch " + (folder_ / "survived").string() + ") & wait");
+  files::write_text(bin_ / "shell-segment",
+                    "(trap '' TERM; sleep 3; touch " + (folder_ / "survived").string() + ") & wait");
   options_.limits.seconds = 0.2;
   try {
     started();
@@ -366,7 +368,7 @@ TEST_F(Runner, kills_a_stage_and_what_it_started_when_its_time_is_over) {
 }
 
 TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
-  write_text(
+  files::write_text(
       bin_ / "shell-segment",
       "head -c 200000000 /dev/zero | tail -c 1 > /dev/null; x=$(head -c 200000000 /dev/zero | tr '\\0' x); sleep 60");
   options_.limits.memory_bytes = 100'000'000;
@@ -380,7 +382,7 @@ TEST_F(Runner, kills_a_stage_that_takes_too_much_memory) {
 }
 
 TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
-  write_text(bin_ / "check-network", "sleep 60");
+  files::write_text(bin_ / "check-network", "sleep 60");
   options_.limits.seconds = 0.5;
   try {
     started();
@@ -394,7 +396,7 @@ TEST_F(Runner, limits_hold_while_a_stage_reads_its_parameters) {
 }
 
 TEST_F(Runner, a_stage_that_crashes_while_it_reads_its_parameters_is_told_as_that) {
-  write_text(bin_ / "check-fit", "kill -SEGV $$");
+  files::write_text(bin_ / "check-fit", "kill -SEGV $$");
   try {
     started();
     FAIL() << "no error";
@@ -405,7 +407,7 @@ TEST_F(Runner, a_stage_that_crashes_while_it_reads_its_parameters_is_told_as_tha
 }
 
 TEST_F(Runner, a_stage_that_found_no_answer_and_wrote_nothing_did_not_merely_fail_to_converge) {
-  write_text(bin_ / "shell-network", "exit 4");
+  files::write_text(bin_ / "shell-network", "exit 4");
   try {
     started();
     FAIL() << "no error";
@@ -431,7 +433,7 @@ TEST_F(Runner, a_file_that_was_changed_and_given_its_old_times_again_is_noticed)
   fs::last_write_time(cell_ / "beads_relaxed.tif", old);
   started();
   EXPECT_EQ(started(), "");
-  write_text(cell_ / "beads_relaxed.tif", "baeds_relaxed.tif");  // the same size
+  files::write_text(cell_ / "beads_relaxed.tif", "baeds_relaxed.tif");  // the same size
   fs::last_write_time(cell_ / "beads_relaxed.tif", old);
   EXPECT_EQ(started(), "fit track");
 }
@@ -439,15 +441,15 @@ TEST_F(Runner, a_file_that_was_changed_and_given_its_old_times_again_is_noticed)
 TEST_F(Runner, a_damaged_list_of_hashes_does_no_harm) {
   started();
   for (const char* text : {"", "x", "0 1 2 3 4 5 cell.toml\n", "\xff\n\n"}) {
-    write_text(cell_ / ".mbtfm.hashes", text);
+    files::write_text(cell_ / ".mbtfm.hashes", text);
     EXPECT_EQ(started(), "");
   }
 }
 
 TEST_F(Runner, removes_what_a_killed_run_left_half_written) {
   started();
-  write_text(cell_ / "2_track/.partial-1-displacement.csv", "half");
-  write_text(cell_ / ".partial-1-run.json", "half");
+  files::write_text(cell_ / "2_track/.partial-1-displacement.csv", "half");
+  files::write_text(cell_ / ".partial-1-run.json", "half");
   options_.redo = {"track"};
   started();
   EXPECT_FALSE(fs::exists(cell_ / "2_track/.partial-1-displacement.csv"));
@@ -455,8 +457,8 @@ TEST_F(Runner, removes_what_a_killed_run_left_half_written) {
 }
 
 TEST_F(Runner, names_of_images_are_globs_that_fit_one_file) {
-  write_text(cell_ / "c1_pax.tif", "");
-  write_text(cell_ / "c2_pax.tif", "");
+  files::write_text(cell_ / "c1_pax.tif", "");
+  files::write_text(cell_ / "c2_pax.tif", "");
   ImageNames names;
   names.adhesion = "c1_*.tif";
   EXPECT_EQ(resolve_image(cell_, names, "adhesion"), cell_ / "c1_pax.tif");
@@ -470,7 +472,7 @@ TEST_F(Runner, names_of_images_are_globs_that_fit_one_file) {
 }
 
 TEST_F(Runner, a_file_whose_name_looks_like_a_glob_is_found) {
-  write_text(cell_ / "cell[1].tif", "");
+  files::write_text(cell_ / "cell[1].tif", "");
   ImageNames names;
   names.actin = "cell[1].tif";
   EXPECT_EQ(resolve_image(cell_, names, "actin"), cell_ / "cell[1].tif");
@@ -478,14 +480,14 @@ TEST_F(Runner, a_file_whose_name_looks_like_a_glob_is_found) {
 
 TEST_F(Runner, hand_drawn_rois_are_used_where_they_are_and_a_changed_one_runs_the_segmentation_again) {
   started();
-  write_text(cell_ / "fibres.zip", "drawn");
+  files::write_text(cell_ / "fibres.zip", "drawn");
   EXPECT_EQ(started(), "segment");
   EXPECT_EQ(started(), "");
-  write_text(cell_ / "fibres.zip", "drawn better");
+  files::write_text(cell_ / "fibres.zip", "drawn better");
   EXPECT_EQ(started(), "segment");
   fs::remove(cell_ / "fibres.zip");
   EXPECT_EQ(started(), "segment");
-  write_text(cell_ / "outline.roi", "drawn");
+  files::write_text(cell_ / "outline.roi", "drawn");
   EXPECT_EQ(started(), "segment");
   for (const char* image : {"paxillin.tif", "actin.tif"}) fs::remove(cell_ / image);
   EXPECT_EQ(started(), "");  // its images are gone: outputs kept
@@ -495,35 +497,35 @@ TEST_F(Runner, hand_drawn_rois_that_are_asked_for_by_name_must_be_there) {
   write_parameters("[images]\nfibre_rois = \"drawn.zip\"\n");
   EXPECT_THROW(run_cell(cell_, options_), InputError);
   EXPECT_EQ(calls(), "");
-  write_text(cell_ / "drawn.zip", "");
+  files::write_text(cell_ / "drawn.zip", "");
   EXPECT_EQ(resolve_optional_image(cell_, read_image_names(cell_), "fibre_rois"), cell_ / "drawn.zip");
   ImageNames names;
   EXPECT_EQ(resolve_optional_image(cell_, names, "fibre_rois"), std::nullopt);
-  write_text(cell_ / "fibres.roi", "");
+  files::write_text(cell_ / "fibres.roi", "");
   EXPECT_EQ(resolve_optional_image(cell_, names, "fibre_rois"), cell_ / "fibres.roi");
-  write_text(cell_ / "fibres.zip", "");
+  files::write_text(cell_ / "fibres.zip", "");
   EXPECT_THROW(resolve_optional_image(cell_, names, "fibre_rois"), InputError);  // which of them?
 }
 
 TEST_F(Runner, a_cell_without_an_adhesion_image_is_run_and_one_that_names_its_image_must_have_it) {
   fs::remove(cell_ / "paxillin.tif");
   EXPECT_EQ(started(), "fit network segment track");
-  EXPECT_EQ(read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
-  write_text(cell_ / "adhesion_mask.png", "mask");
-  write_text(cell_ / "outline_mask.tif", "mask");
+  EXPECT_EQ(files::read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
+  files::write_text(cell_ / "adhesion_mask.png", "mask");
+  files::write_text(cell_ / "outline_mask.tif", "mask");
   EXPECT_EQ(started(), "segment");
   for (const char* flag : {"--adhesion-mask", "--outline-mask"})
-    EXPECT_NE(read_text(cell_ / "1_segment/record.json").find(flag), std::string::npos) << flag;
-  write_text(cell_ / "paxillin.tif", "it was elsewhere");
+    EXPECT_NE(files::read_text(cell_ / "1_segment/record.json").find(flag), std::string::npos) << flag;
+  files::write_text(cell_ / "paxillin.tif", "it was elsewhere");
   EXPECT_EQ(started(), "segment");
-  EXPECT_NE(read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
+  EXPECT_NE(files::read_text(cell_ / "1_segment/record.json").find("--adhesion-image"), std::string::npos);
   write_parameters("[images]\nadhesion = \"vinculin.tif\"\n");
   EXPECT_THROW(run_cell(cell_, options_), InputError);
 }
 
 TEST_F(Runner, a_second_placement_of_the_adhesions_that_comes_or_goes_is_fitted_again) {
   started();
-  write_text(cell_ / "1_segment/adhesions_2.csv", "at other places");
+  files::write_text(cell_ / "1_segment/adhesions_2.csv", "at other places");
   EXPECT_EQ(started(), "fit");
   EXPECT_EQ(started(), "");
   fs::remove(cell_ / "1_segment/adhesions_2.csv");
@@ -536,10 +538,10 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
   for (const Stage& stage : stages()) make_executable(folder / ("bin/mbtfm-" + stage.name), "#!/bin/sh\n");
   for (const char* name : {"a", "b", "deeper/c"}) {
     fs::create_directories(folder / name);
-    write_text(folder / (std::string(name) + "/cell.toml"), "");
+    files::write_text(folder / (std::string(name) + "/cell.toml"), "");
   }
   fs::create_directories(folder / "a/inner");
-  write_text(folder / "a/inner/cell.toml", "");  // part of a, not a cell
+  files::write_text(folder / "a/inner/cell.toml", "");  // part of a, not a cell
   make_executable(folder / "mbtfm",
                   "#!/bin/sh\ncase $2 in */b) echo 'mbtfm: error: broken' >&2; exit 3;; */c) kill -9 $$;; esac\n");
   const auto cells = find_cells(folder.path()).cells;

@@ -1,4 +1,4 @@
-#include "pipeline/contract/stage.h"
+#include "pipeline/stage/stage.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 #include <stdexcept>
 #include <system_error>
 
-#include "pipeline/contract/csv.h"
+#include "pipeline/files/text.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -19,20 +19,22 @@ struct Example {
   double length_um = 1.5;
   bool is_fast = false;
 };
-void declare(ParameterList& list, Example& e) {
+void declare(stage::ParameterList& list, Example& e) {
   list.table("network");
   list.add("length_um", e.length_um, Range::positive(), "length (um)");
   list.add("is_fast", e.is_fast, "whether to be fast");
 }
 
-const StageDescription kDescription = {.name = "example",
-                                       .purpose = "an example",
-                                       .files = {{"in", FileArgument::Kind::input, "what is read"},
-                                                 {"out", FileArgument::Kind::output_folder, "what is written"}}};
+const stage::StageDescription kDescription = {
+    .name = "example",
+    .purpose = "an example",
+    .files = {{"in", stage::FileArgument::Kind::input, "what is read"},
+              {"out", stage::FileArgument::Kind::output_folder, "what is written"}}};
 
 class Stage : public ::testing::Test {
  protected:
-  int run(std::vector<std::string> arguments, const std::function<StageReport(const Example&, StageContext&)>& body) {
+  int run(std::vector<std::string> arguments,
+          const std::function<StageReport(const Example&, stage::StageContext&)>& body) {
     arguments.insert(arguments.begin(), "mbtfm-example");
     std::vector<char*> argv;
     for (std::string& a : arguments) argv.push_back(a.data());
@@ -46,28 +48,28 @@ class Stage : public ::testing::Test {
     all.insert(all.end(), more.begin(), more.end());
     return all;
   }
-  void SetUp() override { write_text(folder_ / "in.txt", "in"); }
+  void SetUp() override { files::write_text(folder_ / "in.txt", "in"); }
   TemporaryFolder folder_;
 };
 
-StageReport write_two(const Example&, StageContext& context) {
+StageReport write_two(const Example&, stage::StageContext& context) {
   context.input("in");
-  write_text(context.output("out", "a.csv"), "a");
-  write_text(context.output("out", "deep/b.csv"), "b");
+  files::write_text(context.output("out", "a.csv"), "a");
+  files::write_text(context.output("out", "deep/b.csv"), "b");
   return {.summary = "two files", .figures = {{"n", std::int64_t{2}}}, .effects = {}, .findings = {}};
 }
 
 TEST_F(Stage, outputs_and_the_record_are_in_place_when_it_is_done) {
   EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string(), "--length_um", "2.5", "--is_fast"}),
-                [](const Example& e, StageContext& context) {
+                [](const Example& e, stage::StageContext& context) {
                   EXPECT_EQ(e.length_um, 2.5);
                   EXPECT_TRUE(e.is_fast);
                   return write_two(e, context);
                 }),
             0);
-  EXPECT_EQ(read_text(folder_ / "out/a.csv"), "a");
-  EXPECT_EQ(read_text(folder_ / "out/deep/b.csv"), "b");
-  const std::string record = read_text(folder_ / "record.json");
+  EXPECT_EQ(files::read_text(folder_ / "out/a.csv"), "a");
+  EXPECT_EQ(files::read_text(folder_ / "out/deep/b.csv"), "b");
+  const std::string record = files::read_text(folder_ / "record.json");
   for (const char* word : {"\"stage\": \"example\"", "\"length_um\": 2.5", "\"in.txt\"", "\"out/deep/b.csv\"",
                            "\"n\": 2", "\"summary\": \"two files\""}) {
     EXPECT_NE(record.find(word), std::string::npos) << word << " is not in " << record;
@@ -91,7 +93,7 @@ TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
   };
   for (const auto& [code, fail] : failures) {
     EXPECT_EQ(run(files(),
-                  [&](const Example& e, StageContext& context) {
+                  [&](const Example& e, stage::StageContext& context) {
                     write_two(e, context);
                     fail();
                     return StageReport{};
@@ -102,15 +104,15 @@ TEST_F(Stage, a_failure_leaves_no_file_and_no_folder_and_tells_by_its_code) {
 }
 
 TEST_F(Stage, links_in_the_place_of_outputs_are_replaced_not_followed) {
-  write_text(folder_ / "precious", "precious");
+  files::write_text(folder_ / "precious", "precious");
   fs::create_directories(folder_ / "out/deep");
   const fs::path record = folder_ / "record.json";
   for (const fs::path& output : {folder_ / "out/a.csv", folder_ / "out/deep/b.csv", record}) {
     fs::create_symlink(folder_ / "precious", output);
-    fs::create_symlink(folder_ / "precious", temporary_name(output));
+    fs::create_symlink(folder_ / "precious", files::temporary_name(output));
   }
   EXPECT_EQ(run(files_and({"--record", record.string()}), write_two), 0);
-  EXPECT_EQ(read_text(folder_ / "precious"), "precious");
+  EXPECT_EQ(files::read_text(folder_ / "precious"), "precious");
   for (const fs::path& output : {folder_ / "out/a.csv", folder_ / "out/deep/b.csv", record})
     EXPECT_TRUE(fs::is_regular_file(fs::symlink_status(output))) << output;
 }
@@ -126,26 +128,26 @@ TEST_F(Stage, a_folder_among_the_outputs_that_is_a_link_is_refused) {
   fs::remove(folder_ / "real/deep");
   fs::create_symlink("real", folder_ / "out");  // the folder that --out names may be one
   EXPECT_EQ(run(files(), write_two), 0);
-  EXPECT_EQ(read_text(folder_ / "real/deep/b.csv"), "b");
+  EXPECT_EQ(files::read_text(folder_ / "real/deep/b.csv"), "b");
 }
 
 TEST_F(Stage, what_has_not_converged_is_written_and_marked) {
   EXPECT_EQ(run(files_and({"--record", (folder_ / "record.json").string()}),
-                [](const Example& e, StageContext& context) {
+                [](const Example& e, stage::StageContext& context) {
                   StageReport report = write_two(e, context);
                   report.converged = false;
                   return report;
                 }),
             4);
   EXPECT_TRUE(fs::exists(folder_ / "out/a.csv"));
-  EXPECT_NE(read_text(folder_ / "record.json").find("\"converged\": false"), std::string::npos);
+  EXPECT_NE(files::read_text(folder_ / "record.json").find("\"converged\": false"), std::string::npos);
 }
 
 TEST_F(Stage, flags_win_over_the_file_and_the_file_over_the_default) {
-  write_text(folder_ / "cell.toml", "[network]\nlength_um = 3\nis_fast = true\n");
+  files::write_text(folder_ / "cell.toml", "[network]\nlength_um = 3\nis_fast = true\n");
   const std::string config = (folder_ / "cell.toml").string();
   const auto expect_length = [](double length_um) {
-    return [length_um](const Example& e, StageContext& context) {
+    return [length_um](const Example& e, stage::StageContext& context) {
       EXPECT_EQ(e.length_um, length_um);
       return write_two(e, context);
     };
@@ -160,7 +162,7 @@ TEST_F(Stage, wrong_flags_and_values_are_usage_errors_and_a_wrong_file_an_input_
   EXPECT_EQ(run(files_and({"--length_um", "-2"}), write_two), 2);
   EXPECT_EQ(run({"--out", "x"}, write_two), 2) << "an input is missing";
   EXPECT_EQ(run(files_and({"--config", (folder_ / "none.toml").string()}), write_two), 3);
-  write_text(folder_ / "bad.toml", "[network]\nlength = 3\n");
+  files::write_text(folder_ / "bad.toml", "[network]\nlength = 3\n");
   EXPECT_EQ(run(files_and({"--check", "--config", (folder_ / "bad.toml").string()}), write_two), 3);
   EXPECT_FALSE(fs::exists(folder_ / "out")) << "--check runs nothing";
 }

@@ -6,8 +6,9 @@
 #include <map>
 #include <set>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
 #include "pipeline/statistics/conditions.h"
 #include "pipeline/statistics/png.h"
 #include "pipeline/statistics/relations.h"
@@ -29,9 +30,9 @@ struct FakeStudy {
       test::write_given_stages(cell, test::round_cell());
       test::write_invented_fit(cell, seed);
     }
-    FitSummary fit = read_fit_summary(folder / "control/cell_5/4_fit/fit.json");
+    FitSummary fit = files::read_fit_summary(folder / "control/cell_5/4_fit/fit.json");
     fit.converged = false;
-    write_fit_summary(folder / "control/cell_5/4_fit/fit.json", fit);
+    files::write_fit_summary(folder / "control/cell_5/4_fit/fit.json", fit);
     test::write_given_stages(folder / "treated/cell_6", test::round_cell());
   }
   Study read(const StudyParameters& parameters = {}, const std::optional<Path>& table = {}) const {
@@ -53,7 +54,7 @@ TEST(Study, leaves_out_cells_with_a_reason_that_the_table_keeps) {
   EXPECT_EQ(reason_of(study, "treated/cell_6").substr(0, 6), "no fit");
   EXPECT_EQ(reason_of(study, "control/cell_5"), "the fit did not converge");
   EXPECT_EQ(fake.read({.condition_from = {}, .with_not_converged = true}).cells.size(), 5u);
-  const CsvTable cells(tables_of(study, analyse(study, {}))[0].second, "cells.csv");
+  const files::CsvTable cells(tables_of(study, analyse(study, {}))[0].second, "cells.csv");
   ASSERT_EQ(cells.n_rows(), 6);
   EXPECT_EQ(cells.text(4, "cell"), "control/cell_5");
   EXPECT_EQ(cells.text(4, "included"), "0");
@@ -65,8 +66,9 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
   const Study by_folder = fake.read({.condition_from = "folder"});
   EXPECT_EQ(by_folder.conditions, (std::vector<std::string>{"control", "treated"}));
   EXPECT_EQ(by_folder.cells[3].condition, 1);
-  write_text(fake.folder / "study.csv",
-             "cell,drug,exclude\ncell_1,none,\ncontrol/cell_3,none,dividing\ncell_2,blebbistatin,\ncell_5,none,\n");
+  files::write_text(
+      fake.folder / "study.csv",
+      "cell,drug,exclude\ncell_1,none,\ncontrol/cell_3,none,dividing\ncell_2,blebbistatin,\ncell_5,none,\n");
   const Study by_table = fake.read({.condition_from = "drug"}, fake.folder / "study.csv");
   EXPECT_EQ(by_table.conditions, (std::vector<std::string>{"blebbistatin", "none"}));
   EXPECT_EQ(reason_of(by_table, "control/cell_3"), "dividing");
@@ -78,7 +80,7 @@ TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   EXPECT_THROW(fake.read({.condition_from = "drug"}), UsageError);
   EXPECT_THROW(fake.read({.condition_from = "folder2"}), InputError);
   const auto table = [&](const std::string& text) {
-    write_text(fake.folder / "study.csv", text);
+    files::write_text(fake.folder / "study.csv", text);
     return std::optional<Path>(fake.folder / "study.csv");
   };
   EXPECT_THROW(fake.read({.condition_from = "drug"}, table("cell,dose\ncell_1,2\n")), InputError);
@@ -119,7 +121,7 @@ TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
     EXPECT_EQ(values_of(sample.of_group(0, 2)).size(), before.size() - (n_types == 4 ? 1 : 0));
     EXPECT_EQ(n_types == 4 ? sample.of_group(0, 3).size() : 1u, 1u);
     const auto tables = tables_of(study, analyse(study, {}));
-    const CsvTable cells(tables[0].second, "cells.csv");
+    const files::CsvTable cells(tables[0].second, "cells.csv");
     EXPECT_EQ(cells.integer(0, "n_edge", 0), 1);
     const StudyParameters parameters{.fibre_types = n_types};
     const Analysis analysis = analyse(study, parameters);
@@ -155,7 +157,7 @@ TEST(Study, forces_of_a_network_that_cannot_be_identified_do_not_enter) {
     EXPECT_EQ(m.sample.values.size(), m.sample.column == "total_force_nN" ? 4u : 3u) << m.sample.column;
   for (const Correlation& c : analysis.correlations)
     EXPECT_EQ(c.line.n, c.force == "total_force_nN" ? 4 : 3) << c.force;
-  const CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
+  const files::CsvTable cells(tables_of(study, analysis)[0].second, "cells.csv");
   EXPECT_FALSE(cells.optional_number(0, "network_force_nN"));
   EXPECT_TRUE(cells.optional_number(1, "network_force_nN"));
   EXPECT_TRUE(std::any_of(analysis.warnings.begin(), analysis.warnings.end(),
@@ -327,7 +329,7 @@ void expect_whole(const Study& study) {
   const StudyParameters parameters{.bootstrap_draws = 100};
   const Analysis analysis = analyse(study, parameters);
   for (const auto& [name, text] : tables_of(study, analysis)) {
-    EXPECT_NO_THROW(CsvTable(text, name)) << name;
+    EXPECT_NO_THROW(files::CsvTable(text, name)) << name;
     EXPECT_EQ(text.find("nan"), text.npos) << name;
     EXPECT_EQ(text.find("inf"), text.npos) << name;
   }
@@ -378,7 +380,7 @@ TEST(Figures, are_drawn_into_pixels) {
   const StudyParameters parameters{.bootstrap_draws = 100};
   const Figure figure = figures_of(study, analyse(study, parameters), parameters).front();
   write_png(folder / "figure.png", svg_of(figure), 2);
-  const std::string bytes = read_text(folder / "figure.png");
+  const std::string bytes = files::read_text(folder / "figure.png");
   EXPECT_EQ(bytes.substr(1, 3), "PNG");
   const auto big_endian = [&](std::size_t at) {
     return (static_cast<unsigned char>(bytes[at + 2]) << 8) + static_cast<unsigned char>(bytes[at + 3]);

@@ -1,9 +1,9 @@
 /// network.vtu as others write it, and damaged.
 #include <gtest/gtest.h>
 
-#include "pipeline/contract/csv.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
 #include "tests/support/fake_tables.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vtu_variants.h"
@@ -14,13 +14,13 @@ namespace {
 using test::TemporaryFolder;
 
 std::string written(const TemporaryFolder& folder) {
-  write_network(folder / "written.vtu", test::small_network());
-  return read_text(folder / "written.vtu");
+  files::write_network(folder / "written.vtu", test::small_network());
+  return files::read_text(folder / "written.vtu");
 }
 
 Network read_back(const TemporaryFolder& folder, const std::string& text) {
-  write_text(folder / "read.vtu", text);
-  return read_network(folder / "read.vtu");
+  files::write_text(folder / "read.vtu", text);
+  return files::read_network(folder / "read.vtu");
 }
 
 std::string refusal(const TemporaryFolder& folder, const std::string& text) {

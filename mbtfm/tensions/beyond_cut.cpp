@@ -1,0 +1,302 @@
+#include "mbtfm/tensions/beyond_cut.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mbtfm/tensions/common_motion.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/dense.h"
+#include "substrate/greens/models.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+struct Square {
+  Vec2 low_um;
+  double side_um = 0;
+  Vec2 centre() const { return low_um + 0.5 * Vec2{side_um, side_um}; }
+  Square quarter(int i) const {
+    const double half = 0.5 * side_um;
+    return {low_um + half * Vec2{double(i % 2), double(i / 2)}, half};
+  }
+};
+
+/// A side of the image where it cuts the cell, and the direction out of the image there.
+struct CutSide {
+  Vec2 at_um, outward;
+};
+
+class Tiling {
+ public:
+  Tiling(const Cell& cell, double finest_um, double growth) : cell_(cell), finest_um_(finest_um), growth_(growth) {
+    const double turn = signed_area_um2(cell.outline_um) > 0 ? 1 : -1;
+    for (const auto& [a, b] : cuts_of(cell)) {
+      const Vec2 along = (turn / norm(b - a)) * (b - a);
+      sides_.push_back({a, {along.y, -along.x}});
+    }
+    Vec2 low = cell.outline_um.front(), high = low;
+    for (const Vec2 p : cell.outline_um) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+    }
+    constexpr double kSpreadCell_um = 60;
+    reach_um_ = std::max({high.x - low.x, high.y - low.y, kSpreadCell_um});
+    // a corner of the squares lies on the first side, so that none of them reaches over it
+    double half = finest_um;
+    while (half < 2 * reach_um_) half *= 2;
+    for (int i = 0; i < 4; ++i) divide(Square{sides_.front().at_um - Vec2{half, half}, 2 * half}.quarter(i));
+  }
+  const std::vector<Square>& squares() const { return squares_; }
+
+ private:
+  bool is_outside(Vec2 p) const {
+    return std::ranges::any_of(sides_, [&](const CutSide& s) { return dot(p - s.at_um, s.outward) > 0; });
+  }
+  bool is_all_outside(const Square& s) const {
+    constexpr double kInner = 0.4999;  // of the side: rounding apart
+    for (const Vec2 corner : {Vec2{-1, -1}, Vec2{1, -1}, Vec2{1, 1}, Vec2{-1, 1}}) {
+      if (!is_outside(s.centre() + kInner * s.side_um * corner)) return false;
+    }
+    return true;
+  }
+  void divide(const Square& square) {
+    const double distance_um = distance_to_cut_um(cell_, square.centre());
+    if (distance_um - square.side_um > reach_um_) return;
+    const bool is_small = square.side_um <= std::max(finest_um_, growth_ * distance_um);
+    if (is_small && is_all_outside(square)) {
+      if (distance_um <= reach_um_) squares_.push_back(square);
+    } else if (square.side_um > 1.5 * finest_um_) {
+      for (int i = 0; i < 4; ++i) divide(square.quarter(i));
+    } else if (is_outside(square.centre())) {
+      squares_.push_back(square);
+    }
+  }
+
+  const Cell& cell_;
+  double finest_um_, growth_;
+  std::vector<CutSide> sides_;
+  double reach_um_ = 0;
+  std::vector<Square> squares_;
+};
+
+/// Of data with noise of variance s² and random effects of variance κ s²: those along which they do not mix.
+struct Spectrum {
+  Eigen::VectorXd information;  ///< d: signal over noise, in squares, at κ = 1
+  Eigen::VectorXd found;        ///< c² / s²: its mean is d (1 + κ d)
+  double variance = 0;          ///< s²
+};
+
+/// −2 log likelihood of κ, but for a constant.
+double surprise(const Spectrum& s, double kappa) {
+  double sum = 0;
+  for (Eigen::Index i = 0; i < s.information.size(); ++i) {
+    const double total = 1 + kappa * s.information[i];
+    sum += std::log(total) - kappa * s.found[i] / total;
+  }
+  return sum;
+}
+
+/// Of least surprise, to a quarter: what is allowed for hangs on it weakly.
+double likeliest_kappa(const Spectrum& s) {
+  constexpr double kStep = 1.25, kLeast = 1e-6, kMost = 1e12;  // relative to what stands out of the noise just so
+  const double unit = 1 / std::max(s.information.maxCoeff(), 1e-300);
+  double best = 0, least = 0;
+  for (double kappa = kLeast; kappa < kMost; kappa *= kStep) {
+    const double here = surprise(s, kappa * unit);
+    if (here >= least) continue;
+    least = here;
+    best = kappa * unit;
+  }
+  return best;
+}
+
+/// What the forces inside and the motions leave of the data tells of the random effects Z.
+Spectrum spectrum_of(const LinearData& data, const Eigen::MatrixXd& Z) {
+  const Eigen::VectorXd weight = squared_weights(data);
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * less_motion(data, Z);
+  const Eigen::MatrixXd pulled = data.response->pull_back(weighted);  // Gᵀ W² P Z
+  const Eigen::MatrixXd left = numerics::transposed_product(Z, weighted) -
+                               numerics::transposed_product(pulled, solve_normal(data.reduced, pulled));
+  const Eigen::VectorXd residual = residual_um(data, free_forces_nN(data.reduced));
+  const Eigen::VectorXd b = Z.transpose() * weight.cwiseProduct(residual);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(0.5 * (left + left.transpose()));
+  const double rounding = 1e-10 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);
+  Spectrum s{eigen.eigenvalues(), (eigen.eigenvectors().transpose() * b).cwiseAbs2(), 0};
+  double explained = 0;
+  auto n_left = static_cast<double>(data.n_used - data.reduced.n_felt);
+  for (Eigen::Index i = 0; i < s.information.size(); ++i) {
+    if (s.information[i] <= rounding) {
+      s.information[i] = s.found[i] = 0;
+    } else {
+      explained += s.found[i] / s.information[i];
+      n_left -= 1;
+    }
+  }
+  s.variance = std::max((data.reduced.floor_squared - explained) / std::max(1.0, n_left),
+                        data.has_errors ? 1.0 : 1e-300);  // not below the stated errors'
+  s.found /= s.variance;
+  return s;
+}
+
+/// Of a component of the adhesions' forces, as forces independent of each other have it: less their noise, and each by
+/// what the beads tell of it. @param variance  of the beads' weighted components
+double mean_square_force(const LinearData& data, double variance) {
+  const Eigen::Index n = data.response->cols();
+  const Eigen::VectorXd noise = variance * solve_normal(data.reduced, Eigen::MatrixXd::Identity(n, n)).diagonal();
+  const Eigen::VectorXd squares = free_forces_nN(data.reduced).cwiseAbs2();
+  return std::max(0.0, (squares - noise).cwiseQuotient(noise).sum() / std::max(noise.cwiseInverse().sum(), 1e-300));
+}
+
+/// These motions, and those by an even traction along x and along y: out there the cell pulls inwards as a whole, which
+/// is no chance, so nothing is expected of its size.
+Eigen::MatrixXd with_even_traction(const Eigen::MatrixXd& motions, const std::vector<substrate::Ellipse>& places,
+                                   const Eigen::MatrixXd& compliance_um_per_nN) {
+  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(compliance_um_per_nN.rows(), motions.cols() + 2);
+  if (motions.cols() > 0) result.leftCols(motions.cols()) = motions;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double area_um2 = std::numbers::pi * places[i].semi_major_um * places[i].semi_minor_um;
+    result.rightCols<2>() += area_um2 * compliance_um_per_nN.middleCols<2>(2 * static_cast<Eigen::Index>(i));
+  }
+  return result;
+}
+
+double length_um(const Cuts& cuts) {
+  double sum = 0;
+  for (const auto& [a, b] : cuts) sum += norm(b - a);
+  return sum;
+}
+
+}  // namespace
+
+std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um, double growth) {
+  MBTFM_ASSERT(finest_um > 0);
+  std::vector<substrate::Ellipse> places;
+  const Tiling tiling(cell, finest_um, growth);
+  for (const Square& square : tiling.squares()) {
+    const double radius_um = square.side_um / std::sqrt(std::numbers::pi);
+    places.push_back(
+        {.centre_um = square.centre(), .semi_major_um = radius_um, .semi_minor_um = radius_um, .angle_rad = 0});
+  }
+  return places;
+}
+
+ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
+                                 const Eigen::MatrixXd& compliance_um_per_nN, double area_um2) {
+  MBTFM_ASSERT(data.motion_precision.size() == 0);
+  Eigen::MatrixXd Z = compliance_um_per_nN;  // of forces of 1 nN/um times the root of the area
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
+    Z.middleCols<2>(2 * static_cast<Eigen::Index>(i)) *= side_um;
+  }
+  const Eigen::Index n_affine = data.motions.cols();
+  const bool has_affine = n_affine > 0;
+  allow_motions(data, with_even_traction(data.motions, places, compliance_um_per_nN));
+  const Spectrum spectrum = spectrum_of(data, Z);
+  // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
+  const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());
+  const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
+  const double kappa = std::max(seen, likeliest_kappa(spectrum));
+  ForcesBeyond found;
+  found.n_places = static_cast<Eigen::Index>(places.size());
+  found.intensity_nN_per_um = std::sqrt(kappa * spectrum.variance);
+  // Of unit variance. What together stands out by a tenth of the noise of one component changes no weight by a per
+  // cent.
+  constexpr double kUnseen = 0.01;
+  const Eigen::MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(square);
+  found.n_motions = (eigen.eigenvalues().array() > kUnseen).count();
+  const Eigen::Index n_free = data.motions.cols();
+  Eigen::MatrixXd motions(Z.rows(), n_free + found.n_motions);
+  if (n_free > 0) motions.leftCols(n_free) = data.motions;
+  motions.rightCols(found.n_motions) = std::sqrt(kappa) * Z * eigen.eigenvectors().rightCols(found.n_motions);
+  // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
+  // motion twice, whose square no rounding leaves definite.
+  const Eigen::MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * even;
+  motions.rightCols(found.n_motions) -= even * (even.transpose() * weighted)
+                                                   .completeOrthogonalDecomposition()
+                                                   .solve(weighted.transpose() * motions.rightCols(found.n_motions));
+  Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
+  precision.head(n_free).setZero();
+  if (has_affine) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
+  allow_motions(data, std::move(motions), std::move(precision));
+  return found;
+}
+
+/// Standard deviation that a component of an adhesion's own force is expected to have at this distance from the cut, in
+/// that of the cell's adhesion forces. By unseen fibres as much as any adhesion has. By the network, whose own gave way
+/// at the cut: measured as forces of the cells 1 to 8 less those of their networks held at cuts (`cut_cells profile`).
+double expected_own(double distance_um) {
+  constexpr double kUnseen_um = 3, kOfNetwork = 0.23, kFade_um = 10;
+  return distance_um < kUnseen_um ? 1 : kOfNetwork * std::exp(-distance_um / kFade_um);
+}
+
+void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
+  constexpr double kLeast = 0.02;  // nothing beside the errors that forces have in whole cells, too (0.1)
+  std::vector<Eigen::Index> near;
+  std::vector<double> expected;
+  for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
+    const Adhesion& adhesion = cell.adhesions[a];
+    const double of_own = expected_own(distance_to_cut_um(cell, adhesion.position_um) - 0.5 * adhesion.major_axis_um);
+    if (of_own < kLeast) continue;
+    near.push_back(static_cast<Eigen::Index>(a));
+    expected.push_back(of_own);
+  }
+  const Eigen::Index n_forces = data.response->cols();
+  const double variance = noise_variance(data), mean_square = mean_square_force(data, variance);
+  if (near.empty() || mean_square <= 0) return;
+  found.n_own = static_cast<Eigen::Index>(near.size());
+  found.own_nN = std::sqrt(mean_square);
+  const Eigen::Index before = data.motions.cols(), n_own = 2 * found.n_own;
+  Eigen::MatrixXd forces = Eigen::MatrixXd::Zero(n_forces, before + n_own);
+  for (Eigen::Index k = 0; k < found.n_own; ++k) {
+    forces.block<2, 2>(2 * near[static_cast<std::size_t>(k)], before + 2 * k)
+        .diagonal()
+        .setConstant(std::sqrt(mean_square / variance));
+  }
+  Eigen::MatrixXd motions(data.motions.rows(), before + n_own);
+  motions << data.motions, data.response->displace(forces.rightCols(n_own));
+  Eigen::VectorXd precision = Eigen::VectorXd::Ones(before + n_own);
+  precision.head(before) = data.motion_precision;
+  allow_motions(data, std::move(motions), std::move(precision));
+  data.forces_by_motion = std::move(forces);
+}
+
+ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing) {
+  DisplacementField beads;
+  for (const Vec2 p : data.position_um) beads.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
+  const double density = beads_per_um2(beads);
+  if (density <= 0) return {};
+  const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
+  ForcesBeyond found = allow_forces_beyond(
+      data, places,
+      greens::make_greens(gel, {.model = "layer"}, data.threads)->compliance_um_per_nN(data.position_um, places),
+      std::abs(signed_area_um2(cell.outline_um)));
+  allow_own_forces(data, cell, found);
+  return found;
+}
+
+bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell) {
+  const bool has_cut = !cuts_of(cell).empty();
+  if (switches.beyond_cut == "on" && !has_cut)
+    throw UsageError("effects.beyond_cut = \"on\": the image's border does not cut this cell (outline.csv, is_cut)");
+  return has_cut && switches.beyond_cut != "off";
+}
+
+Effect beyond_cut_effect(const std::string& setting, const Cell& cell, const std::optional<ForcesBeyond>& found) {
+  const double cut_um = length_um(cuts_of(cell));
+  return stage::decided(kBeyondCut, setting, cut_um > 0,
+                        cut_um == 0 ? "the image shows the whole cell"
+                        : found     ? "the image cuts the cell along " + brief(cut_um) + " um; forces at " +
+                                      std::to_string(found->n_places) + " places beyond, of " +
+                                      brief(found->intensity_nN_per_um) +
+                                      " nN times the root of their area in um², and at " +
+                                      std::to_string(found->n_own) + " adhesions near the cut"
+                                : "the image cuts the cell along " + brief(cut_um) + " um");
+}
+
+}  // namespace mbtfm::tensions

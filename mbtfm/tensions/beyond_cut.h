@@ -1,0 +1,72 @@
+/// Forces beyond the cut of a cell that its image cuts. Adhesions that nobody sees pull on the gel, too, and their
+/// displacement reaches into the image. It is allowed for as motions of the beads: responses of the gel to forces at
+/// places outside of the image, which are not found one by one but expected to be of one size, which the beads tell.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/tensions/linear_data.h"
+#include "pipeline/stage/effects.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::tensions {
+
+/// How fine the places are. A finer choice of either changes the forces by less than a tenth of their standard errors
+/// (`property/cut_cells`).
+struct BeyondSpacing {
+  /// Of the squares at the cut, in mean distances of the beads: what varies within less does not reach the second row
+  /// of beads, as the field of a force pattern of wavelength p falls as exp(−2 pi x / p) into the image.
+  double finest = 1;
+  /// Side of a square over its distance from the cut: what varies within less than its distance has faded at the cut.
+  double growth = 1;
+};
+
+/// Squares that tile the surface outside of the image round the cut, as discs of the same area. They reach as far as
+/// the part of the cell that is seen is long, and no less than a spread cell (60 um): an image may show a small part.
+/// @param finest_um  side of the smallest, > 0
+std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um, double growth);
+
+/// What was allowed for.
+struct ForcesBeyond {
+  Eigen::Index n_places = 0;
+  Eigen::Index n_motions = 0;  ///< of the beads, that stand out of their noise
+  /// Standard deviation of a component of the forces by square root of the area that they act on (nN/um); forces
+  /// independent of each other over an area A have a sum of this times √A.
+  double intensity_nN_per_um = 0;
+  /// Adhesions so near to the cut that they may have forces beside the network's, and the standard deviation of a
+  /// component of the adhesions' forces in this cell, of which these may have all next to the cut.
+  Eigen::Index n_own = 0;
+  double own_nN = 0;
+};
+
+/// Add the motions to those that the data have. The forces are taken for random, independent of each other and of one
+/// intensity: the one that makes the data most likely, whatever the forces inside of the image are (restricted maximum
+/// likelihood; Patterson & Thompson, Biometrika 58 (1971) 545), but no less than that of the forces in view.
+/// An even traction of any size is allowed for beside them.
+/// What lies out there pulls the image's border outwards or inwards as a growth would: growth and shears are from here
+/// on expected to be of usual size (kUsualGrowth).
+/// @param data  whose motions are affine_motions(), of precision 0, or none
+/// @param compliance_um_per_nN  2·beads × 2·places
+/// @param area_um2  of the part of the cell that is in view
+ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
+                                 const Eigen::MatrixXd& compliance_um_per_nN, double area_um2);
+/// Let adhesions near the cut have forces of their own, beside the network's: a fibre of which less than 3 um is in
+/// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
+/// is, while the cell's own gave way, which fades over 10 um. They pass through the cut. Expected is a part of the size
+/// that adhesion forces of this cell have, as forces independent of each other tell it.
+/// @param cell  whose adhesions are those of the data
+void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found);
+/// Both, for the places of this cell, on a layer of this gel (of gels with sides or a graded modulus it differs by
+/// less than the intensity is known to).
+ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing = {});
+
+inline constexpr const char* kBeyondCut = "forces beyond the cut";
+/// @throws UsageError where it is switched on and the cell has no cut
+bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell);
+/// @param found  none where it is off
+Effect beyond_cut_effect(const std::string& setting, const Cell& cell, const std::optional<ForcesBeyond>& found);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,127 @@
+#include "mbtfm/tensions/common_motion.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+Vec2 centre_of(const std::vector<Vec2>& places) {
+  Vec2 sum;
+  for (const Vec2 place : places) sum += place;
+  return (1 / std::max(1.0, static_cast<double>(places.size()))) * sum;
+}
+
+std::string with_error(double value, double sigma, const std::string& unit) {
+  return brief(value) + " +- " + brief(sigma) + " " + unit;
+}
+
+}  // namespace
+
+Eigen::MatrixXd affine_motions(const DisplacementField& beads) {
+  std::vector<Vec2> places_um;
+  for (const Bead& bead : beads) places_um.push_back(bead.position_um);
+  const Vec2 centre = centre_of(places_um);
+  Eigen::MatrixXd motions(2 * static_cast<Eigen::Index>(beads.size()), 6);
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    const Vec2 d = places_um[i] - centre;
+    motions.middleRows<2>(2 * static_cast<Eigen::Index>(i)) << 1, 0, -d.y, d.x, d.x, d.y,  //
+        0, 1, d.x, d.y, -d.y, d.x;
+  }
+  return motions;
+}
+
+namespace {
+
+/// 2·beads × 14, about the beads' centre and of size 1 or so.
+Eigen::MatrixXd curved_motions(const DisplacementField& beads) {
+  constexpr int kPowers[7][2] = {{2, 0}, {1, 1}, {0, 2}, {3, 0}, {2, 1}, {1, 2}, {0, 3}};
+  std::vector<Vec2> places_um;
+  for (const Bead& bead : beads) places_um.push_back(bead.position_um);
+  const Vec2 centre = centre_of(places_um);
+  double squares = 0;
+  for (const Vec2 place : places_um) squares += dot(place - centre, place - centre);
+  const double unit_um = std::sqrt(squares / std::max(1.0, static_cast<double>(places_um.size())));
+  Eigen::MatrixXd motions = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(beads.size()), 14);
+  if (!(unit_um > 0)) return motions;
+  for (std::size_t i = 0; i < places_um.size(); ++i) {
+    const Vec2 d = (1 / unit_um) * (places_um[i] - centre);
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    for (int k = 0; k < 7; ++k) {
+      motions(row, 2 * k) = motions(row + 1, 2 * k + 1) = std::pow(d.x, kPowers[k][0]) * std::pow(d.y, kPowers[k][1]);
+    }
+  }
+  return motions;
+}
+
+}  // namespace
+
+MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit) {
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const Eigen::MatrixXd by_force = data.motion_inverse * data.response->pull_back(weighted).transpose();
+  return {.values = motion_in(data, data.displacement_um - data.response->displace(fit.forces_nN)),
+          .sigma = covariance_of_estimates(fit, data.motion_inverse, by_force).diagonal().cwiseMax(0).cwiseSqrt()};
+}
+
+FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um) {
+  const Eigen::VectorXd& a = motions.values;
+  return {.motion = {.shift = {a[0], a[1]},
+                     .turn_rad = a[2],
+                     .growth = a[3],
+                     .stretch = a[4],
+                     .skew = a[5],
+                     .centre = centre_of(beads_um)},
+          .sigma = motions.sigma.head(6)};
+}
+
+CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit) {
+  const Eigen::MatrixXd motions = less_motion(data, curved_motions(beads));
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * motions;
+  const Eigen::VectorXd scores = weighted.transpose() * residual_um(data, fit.forces_nN);
+  const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
+  const Eigen::MatrixXd of_noise = weighted.transpose() * motions;
+  const auto inverse = covariance_of_scores(fit, of_noise, by_force).completeOrthogonalDecomposition();
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd information =
+      of_noise - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.variance;
+  const Eigen::VectorXd moved = motions * information.completeOrthogonalDecomposition().solve(scores);
+  return {.chi_squared = scores.dot(inverse.solve(scores)),
+          .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
+}
+
+bool allows_common_motion(const stage::EffectSwitches& switches) { return switches.common_motion != "off"; }
+
+Effect common_motion_effect(const std::string& setting, const std::optional<FoundMotion>& found) {
+  return stage::decided(
+      kCommonMotion, setting, true,
+      found ? "found with the tensions: " + sentence_of(*found) : "as told: the beads at rest lie still");
+}
+
+Figures figures_of(const FoundMotion& found) {
+  const AffineMotion& m = found.motion;
+  constexpr double kDegree = 180 / std::numbers::pi;
+  return {{"common_shift_x_um", m.shift.x},
+          {"common_shift_y_um", m.shift.y},
+          {"common_turn_deg", kDegree * m.turn_rad},
+          {"common_turn_sigma_deg", kDegree * found.sigma[2]},
+          {"common_growth", m.growth},
+          {"common_growth_sigma", found.sigma[3]},
+          {"common_shear", m.shear()},
+          {"common_shear_sigma", std::max(found.sigma[4], found.sigma[5])}};
+}
+
+std::string sentence_of(const FoundMotion& found) {
+  const AffineMotion& m = found.motion;
+  constexpr double kDegree = 180 / std::numbers::pi;
+  return "growth " + with_error(100 * m.growth, 100 * found.sigma[3], "%") + ", turn " +
+         with_error(kDegree * m.turn_rad, kDegree * found.sigma[2], "degrees") + ", shear " +
+         with_error(100 * m.shear(), 100 * std::max(found.sigma[4], found.sigma[5]), "%");
+}
+
+}  // namespace mbtfm::tensions

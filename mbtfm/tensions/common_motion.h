@@ -1,0 +1,63 @@
+/// Motion that all beads share beside the displacement by forces: shift, turn, growth and shear of one picture against
+/// the other, as after a change of focus or of temperature. It is found beside the forces by least squares, so that
+/// none of it is taken for force, whatever its size, and what the beads cannot tell from it is in the error bars.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "pipeline/contract/affine_motion.h"
+#include "pipeline/stage/effects.h"
+
+namespace mbtfm::tensions {
+
+/// The six motions of unit size as displacements of the beads, 2·beads × 6: shift (um), then turn, growth and shears
+/// (relative).
+Eigen::MatrixXd affine_motions(const DisplacementField& beads);
+
+/// How much of each motion the fit finds besides, with standard errors; in the order of the data's motions.
+struct MotionsBeside {
+  Eigen::VectorXd values, sigma;
+};
+MotionsBeside motions_beside(const LinearData& data, const EnsembleFit& fit);
+
+/// Standard deviations that these motions have between two pictures of one dish, where forces beyond an image may look
+/// like them; none for shift and turn, which hang on how the dish was put back.
+///
+/// A change of focus or of temperature changes lengths by 0.1 to 0.3 %, and nothing by 1 %.
+inline constexpr double kUsualGrowth = 0.003;
+
+/// A common motion with the standard errors of its numbers, in the order of affine_motions().
+struct FoundMotion {
+  AffineMotion motion;  ///< um
+  Eigen::VectorXd sigma;
+};
+/// @param motions  the first six those of affine_motions()
+FoundMotion common_motion_among(const MotionsBeside& motions, const std::vector<Vec2>& beads_um);
+
+/// What all beads do together that is not affine, as stitched tiles, a rolling shutter or a lens make it: displacements
+/// of second and third degree in x and y, fourteen numbers. A score test (Rao, Math Proc Camb Phil Soc 44:50, 1948):
+/// what the fit leaves of the beads is compared with them, and with what noise and the model's error leave of them.
+struct CurvedMotion {
+  double chi_squared = 0;  ///< 14 degrees of freedom where there is none
+  double rms_um = 0;       ///< of the beads' displacement by the best of them, the tensions following
+};
+CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit);
+
+inline constexpr const char* kCommonMotion = "common motion";
+/// Always on but where it is switched off: a motion too small to be noticed still shifts the total force by some of its
+/// standard errors, and what it costs where there is none is little (docs/effects.md).
+bool allows_common_motion(const stage::EffectSwitches& switches);
+/// @param found  none where it is off
+Effect common_motion_effect(const std::string& setting, const std::optional<FoundMotion>& found);
+/// Of fit.json.
+Figures figures_of(const FoundMotion& found);
+
+/// "growth 0.12 +- 0.01 %, turn ..."
+std::string sentence_of(const FoundMotion& found);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,476 @@
+#include "mbtfm/tensions/ensemble.h"
+
+#include <algorithm>
+#include <boost/math/distributions/students_t.hpp>
+#include <cmath>
+#include <mutex>
+
+#include "mbtfm/tensions/robust.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/parallel.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+void check_suffice(Eigen::Index n_components, Eigen::Index n_tensions) {
+  if (n_components >= n_tensions) return;
+  throw InvalidData("displacement",
+                    "at least " + std::to_string((n_tensions + 1) / 2) + " good beads in the region of the fit for " +
+                        std::to_string(n_tensions) + " tensions",
+                    std::to_string(n_components / 2));
+}
+
+/// Forces with every fibre at the network's tension.
+Eigen::VectorXd network_forces_nN(const TensionProblem& problem, const Trial& trial) {
+  const double tension = trial.tensions_nN[0];
+  if (tension <= kNoTension * trial.tensions_nN.maxCoeff()) return Eigen::VectorXd::Zero(trial.forces_nN.size());
+  return problem.evaluate(Eigen::VectorXd::Constant(trial.tensions_nN.size(), tension), &trial).forces_nN;
+}
+
+MeshFit describe(const TensionProblem& problem, TensionFit fit) {
+  MeshFit mesh;
+  mesh.fit = std::move(fit);
+  const Trial& trial = mesh.fit.trial;
+  mesh.force_derivatives = problem.force_derivatives(trial);
+  mesh.local = local_misfit(trial, displace(problem.data(), mesh.force_derivatives));
+  mesh.network_forces_nN = network_forces_nN(problem, trial);
+  mesh.network_part_nN = problem.network_part_nN(trial);
+  mesh.torques_nN_um = problem.torques_nN_um(trial);
+  mesh.cut = problem.cut_reaction(trial);
+  return mesh;
+}
+
+void add_errors(MeshFit& mesh, const EnsembleFit& all) {
+  const Eigen::MatrixXd J = displace(all.data, mesh.force_derivatives);
+  const Eigen::MatrixXd by_slope = numerics::transposed_product(J, *all.data.compliance);
+  if (all.model_error)
+    mesh.local.model_variance = by_slope * all.model_error->force_variance_nN2.asDiagonal() * by_slope.transpose();
+  mesh.response = response_of(mesh.local, all.variance);
+  mesh.by_force = mesh.response * by_slope;
+  mesh.noise_covariance_nN2 = all.variance * mesh.response;
+  mesh.covariance_nN2 = covariance_nN2(mesh.local, all.variance);
+  mesh.past_bounds_nN = past_bounds_nN(mesh.local, all.variance);
+  mesh.intervals_95 = profiles_95(mesh.local, all.variance);
+}
+
+/// Forces are not linear in the tensions, which matters only where these are badly known: relative to the network's,
+/// the bias falls with the square of its standard error, and is 8 % where that is a half (docs/validation.md).
+double network_bias(const MeshFit& mesh, const TensionProblem& problem, int threads) {
+  constexpr double kWellKnown = 0.3, kBadlyKnown = 0.4;  // 3 % and 5 % there: not asked for below, in full above
+  const double tension = mesh.local.tensions_nN[0], standard_error = std::sqrt(mesh.covariance_nN2(0, 0));
+  if (tension <= 0 || standard_error <= kWellKnown * tension) return 0;
+  const double share = std::min(1.0, (standard_error / tension - kWellKnown) / (kBadlyKnown - kWellKnown));
+  const Eigen::MatrixXd J = displace(problem.data(), mesh.force_derivatives);
+  const Eigen::VectorXd bias_nN =
+      bending_bias_nN(problem, mesh.fit.trial, J, mesh.response, mesh.covariance_nN2, threads);
+  return share * std::clamp(bias_nN[0], -standard_error, standard_error) / tension;
+}
+
+/// Draws shared out over the meshes in turn; replaces the profile.
+void add_bootstrap(EnsembleFit& all, const std::vector<cables::CableNetwork>& networks,
+                   const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads) {
+  const std::size_t n_meshes = all.meshes.size();
+  std::vector<std::vector<double>> deviations(all.tensions_nN.size());
+  for (std::size_t m = 0; m < n_meshes; ++m) {
+    std::vector<std::uint64_t> draws;
+    for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
+    const TensionProblem problem(networks[m], all.data, adhesion_ids);
+    const Eigen::MatrixXd of_mesh = bootstrap_deviations_nN(
+        problem, parameters, all.meshes[m].fit.trial, all.variance,
+        all.model_error ? all.model_error->force_variance_nN2 : Eigen::VectorXd(), draws, threads);
+    for (std::size_t i = 0; i < deviations.size(); ++i) {
+      const auto row = of_mesh.row(static_cast<Eigen::Index>(i));
+      deviations[i].insert(deviations[i].end(), row.begin(), row.end());
+    }
+  }
+  for (std::size_t i = 0; i < deviations.size(); ++i) {
+    double sum = 0;
+    for (const double d : deviations[i]) sum += d * d;
+    all.tensions_nN[i].standard_error = std::sqrt(sum / parameters.bootstrap);
+    all.tensions_nN[i].sides_95 = percentiles_95(deviations[i]);
+  }
+}
+
+/// Quantities that are linear in the tensions about a mesh's solution.
+struct Quantities {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd gradients;  ///< tensions × quantities
+};
+
+/// Their means over the meshes, and errors.
+/// @param of_mesh  quantities of a mesh
+/// @param along  each by force (forces × quantities): its own error is the model's, beside that of the tensions; empty
+///               for tensions
+/// @param is_single  each quantity is of one adhesion
+/// @param more_noise  further variances by the beads' noise; empty: none
+template <class OfMesh>
+std::vector<Estimate> estimates_of(const EnsembleFit& all, const OfMesh& of_mesh, const Eigen::MatrixXd& along = {},
+                                   bool is_single = false, const Eigen::VectorXd& more_noise = {}) {
+  const auto n_meshes = static_cast<double>(all.meshes.size());
+  Eigen::VectorXd value, noise;
+  Eigen::MatrixXd model;  // variances by force
+  for (const MeshFit& mesh : all.meshes) {
+    const Quantities q = of_mesh(mesh);
+    const Eigen::VectorXd own_noise =
+        q.gradients.cwiseProduct(numerics::product(mesh.noise_covariance_nN2, q.gradients)).colwise().sum();
+    if (value.size() == 0) {
+      value = noise = Eigen::VectorXd::Zero(q.values.size());
+      model = Eigen::MatrixXd::Zero(all.model_error ? all.forces_nN.size() : 0, q.values.size());
+    }
+    value += q.values / n_meshes;
+    noise += own_noise / n_meshes;
+    if (model.size() == 0) continue;
+    Eigen::MatrixXd by_force = numerics::transposed_product(mesh.by_force, q.gradients);
+    if (along.size() > 0) by_force -= (is_single ? std::sqrt(all.model_error->of_single) : 1.0) * along;
+    model += all.model_error->force_variance_nN2.asDiagonal() * by_force.cwiseAbs2() / n_meshes;
+  }
+  if (more_noise.size() > 0) noise += more_noise;
+  std::vector<Estimate> estimates;
+  for (Eigen::Index i = 0; i < value.size(); ++i) {
+    const double from_noise = std::max(0.0, noise[i]);
+    const double variance = from_noise + (model.size() > 0 ? model.col(i).sum() : 0);
+    Estimate estimate{.value = value[i], .noise = std::sqrt(from_noise), .standard_error = std::sqrt(variance)};
+    double squares = 0;  // Welch–Satterthwaite, over the adhesions
+    for (Eigen::Index row = 0; row < model.rows(); row += 2) squares += std::pow(model(row, i) + model(row + 1, i), 2);
+    if (squares > 0) estimate.degrees = std::min(1e6, variance * variance / squares * kDegreesByAdhesion);
+    estimates.push_back(estimate);
+  }
+  return estimates;
+}
+
+/// The same for one quantity.
+template <class ValueOf, class GradientOf>
+Estimate estimate_of(const EnsembleFit& all, const ValueOf& value_of, const GradientOf& gradient_of,
+                     const Eigen::VectorXd& along = {}) {
+  const auto of_mesh = [&](const MeshFit& mesh) {
+    return Quantities{Eigen::VectorXd::Constant(1, value_of(mesh)), gradient_of(mesh)};
+  };
+  return estimates_of(all, of_mesh, Eigen::MatrixXd(along)).front();
+}
+
+/// Sums of the forces that adhesions exert, those of their own included. @param sums  weights by force × sums
+template <class ValueOf>
+std::vector<Estimate> with_own_forces(const EnsembleFit& all, const Eigen::MatrixXd& sums, const ValueOf& value_of,
+                                      bool is_single = false) {
+  const Eigen::MatrixXd along = by_network_force(all, sums);
+  const auto of_mesh = [&](const MeshFit& mesh) {
+    return Quantities{value_of(mesh), mesh.force_derivatives.transpose() * along};
+  };
+  return estimates_of(all, of_mesh, along, is_single, own_variances(all, sums));
+}
+
+/// R + E a, of one mesh.
+Eigen::VectorXd exerted_nN(const EnsembleFit& all, const Eigen::VectorXd& network_nN) {
+  return all.own ? Eigen::VectorXd(all.own->left * network_nN + all.own->found_nN) : network_nN;
+}
+
+/// Of the adhesions' forces, along the mean over meshes.
+std::vector<Estimate> force_magnitudes_of(const EnsembleFit& all) {
+  constexpr Eigen::Index kAtOnce = 256;  // adhesions: some MB of numbers
+  const Eigen::Index n = all.forces_nN.size() / 2;
+  const Eigen::VectorXd forces_nN = adhesion_forces_nN(all);
+  std::vector<Estimate> magnitudes;
+  for (Eigen::Index first = 0; first < n; first += kAtOnce) {
+    const Eigen::Index count = std::min(kAtOnce, n - first);
+    Eigen::MatrixXd along = Eigen::MatrixXd::Zero(all.forces_nN.size(), count);
+    for (Eigen::Index k = 0; k < count; ++k) {
+      const Eigen::Vector2d force = forces_nN.segment<2>(2 * (first + k));
+      along.col(k).segment<2>(2 * (first + k)) =
+          force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+    }
+    if (all.own) {
+      const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+        return along.transpose() * exerted_nN(all, mesh.fit.trial.forces_nN);
+      };
+      for (const Estimate& magnitude : with_own_forces(all, along, value_of, true)) magnitudes.push_back(magnitude);
+      continue;
+    }
+    const Eigen::MatrixXd own = along.middleRows(2 * first, 2 * count);  // the others are zero
+    const auto of_mesh = [&](const MeshFit& mesh) {
+      return Quantities{own.transpose() * mesh.fit.trial.forces_nN.segment(2 * first, 2 * count),
+                        numerics::transposed_product(mesh.force_derivatives.middleRows(2 * first, 2 * count), own)};
+    };
+    for (const Estimate& magnitude : estimates_of(all, of_mesh, along, true)) magnitudes.push_back(magnitude);
+  }
+  return magnitudes;
+}
+
+/// Its errors are those of the adhesions' forces, which it balances.
+CutForce cut_force_of(const EnsembleFit& all) {
+  CutForce cut;
+  for (const MeshFit& mesh : all.meshes) {
+    cut.reaction.force_nN += mesh.cut.force_nN / static_cast<double>(all.meshes.size());
+    cut.reaction.torque_nN_um += mesh.cut.torque_nN_um / static_cast<double>(all.meshes.size());
+  }
+  const auto along_of = [&](const Eigen::Vector2d& direction) -> Estimate {
+    const Eigen::VectorXd along = along_cut(direction, all.forces_nN.size());
+    const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+      const Eigen::VectorXd& network_nN = mesh.fit.trial.forces_nN;
+      return Eigen::VectorXd::Constant(
+          1, direction.dot(mesh.cut.force_nN) + along.dot(exerted_nN(all, network_nN) - network_nN));
+    };
+    return with_own_forces(all, along, value_of).front();
+  };
+  cut.x_nN = along_of({1, 0});
+  cut.y_nN = along_of({0, 1});
+  cut.magnitude_nN = along_of(cut.direction());
+  return cut;
+}
+
+/// A tension's interval: the mean of the meshes'.
+Sides mean_sides(const std::vector<MeshFit>& meshes, std::size_t i) {
+  Sides mean;
+  for (const MeshFit& mesh : meshes) {
+    mean.below += mesh.intervals_95[i].below / static_cast<double>(meshes.size());
+    mean.above += mesh.intervals_95[i].above / static_cast<double>(meshes.size());
+  }
+  return mean;
+}
+
+/// Errors by way of the forces' directions in the mean over meshes.
+Estimate total_force_of(const EnsembleFit& all) {
+  const Eigen::VectorXd forces_nN = adhesion_forces_nN(all), along = directions_of(forces_nN);
+  const auto value_of = [&](const MeshFit& mesh) -> Eigen::VectorXd {
+    const Eigen::MatrixXd derivatives =
+        all.own ? Eigen::MatrixXd(all.own->left * mesh.force_derivatives) : mesh.force_derivatives;
+    return Eigen::VectorXd::Constant(
+        1, along.dot(exerted_nN(all, mesh.fit.trial.forces_nN) + derivatives * mesh.past_bounds_nN) -
+               magnitude_bias_nN(forces_nN, derivatives, mesh.covariance_nN2));
+  };
+  Estimate total = with_own_forces(all, along, value_of).front();
+  if (!all.model_error) return total;
+  const RoughnessOfTotal roughness = roughness_of_total(forces_nN, *all.model_error);
+  total.value += roughness.lacking_nN;
+  total.standard_error = std::hypot(total.standard_error, roughness.sigma_nN);
+  return total;
+}
+
+/// Proportional to the network's tension.
+Estimate network_force_of(const EnsembleFit& all) {
+  const Eigen::VectorXd along = directions_of(all.network_forces_nN);
+  const auto per_tension = [&](const MeshFit& mesh) {
+    const double tension = mesh.local.tensions_nN[0];
+    return tension > 0 ? along.dot(mesh.network_forces_nN) / tension : 0;
+  };
+  return estimate_of(
+      all,
+      [&](const MeshFit& mesh) {
+        return per_tension(mesh) *
+               std::max(0.0, (1 - all.network_bias) * mesh.local.tensions_nN[0] + mesh.past_bounds_nN[0]);
+      },
+      [&](const MeshFit& mesh) -> Eigen::VectorXd {
+        return per_tension(mesh) * Eigen::VectorXd::Unit(mesh.local.g.size(), 0);
+      });
+}
+
+void add_means(EnsembleFit& all) {
+  const auto n_meshes = static_cast<double>(all.meshes.size());
+  const MeshFit& first = all.meshes.front();
+  all.forces_nN = all.network_forces_nN = Eigen::VectorXd::Zero(first.fit.trial.forces_nN.size());
+  all.torques_nN_um = Eigen::VectorXd::Zero(first.torques_nN_um.size());
+  all.report.converged = true;
+  for (const MeshFit& mesh : all.meshes) {
+    const Report& report = mesh.fit.report;
+    all.forces_nN += mesh.fit.trial.forces_nN / n_meshes;
+    all.network_forces_nN += mesh.network_forces_nN / n_meshes;
+    all.torques_nN_um += mesh.torques_nN_um / n_meshes;
+    all.report.iterations = std::max(all.report.iterations, report.iterations);
+    all.report.last_change = std::max(all.report.last_change, report.last_change);
+    if (all.report.reason.empty() || (all.report.converged && !report.converged)) all.report.reason = report.reason;
+    all.report.converged = all.report.converged && report.converged;
+  }
+}
+
+void add_estimates(EnsembleFit& all, bool is_cut) {
+  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
+  all.covariance_nN2 = Eigen::MatrixXd::Zero(n_tensions, n_tensions);
+  for (const MeshFit& mesh : all.meshes) {
+    all.covariance_nN2 += mesh.covariance_nN2 / static_cast<double>(all.meshes.size());
+  }
+  for (Eigen::Index i = 0; i < n_tensions; ++i) {
+    all.tensions_nN.push_back(sum_of(all, {static_cast<int>(i)}));
+    all.tensions_nN.back().sides_95 = mean_sides(all.meshes, static_cast<std::size_t>(i));
+  }
+  all.force_magnitudes_nN = force_magnitudes_of(all);
+  all.total_force_nN = total_force_of(all);
+  all.network_force_nN = network_force_of(all);
+  if (is_cut) all.cut = cut_force_of(all);
+}
+
+struct FirstFit {
+  TensionFit fit;
+  std::string loss;
+};
+
+FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
+                   const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
+                   const Trial* start) {
+  const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
+  TensionFit fit = fit_tensions(problem, parameters, threads,
+                                start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
+  const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
+  if (loss == "squares") return {std::move(fit), loss};
+  return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
+}
+
+/// What each mesh makes of the mean tensions, by its derivatives about its own.
+std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
+  Eigen::VectorXd mean_nN = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(all.fibre_ids.size()));
+  for (const MeshFit& mesh : all.meshes) mean_nN += mesh.fit.trial.tensions_nN / static_cast<double>(all.meshes.size());
+  std::vector<MeshForces> forces;
+  for (const MeshFit& mesh : all.meshes) {
+    const Trial& trial = mesh.fit.trial;
+    forces.push_back({trial.forces_nN + mesh.force_derivatives * (mean_nN - trial.tensions_nN), mesh.network_part_nN,
+                      mesh.force_derivatives});
+  }
+  return forces;
+}
+
+/// The beads' own variance, or the misfit's where the data are too few to tell it or the loss is a robust one.
+double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
+                                   const std::string& loss) {
+  constexpr Eigen::Index kEnough = 50;  // known to 20 %
+  const bool is_told = data.n_used - data.reduced.n_felt >= kEnough;
+  return loss == "squares" && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
+}
+
+}  // namespace
+
+Eigen::VectorXd values_of(const EnsembleFit& fit) {
+  Eigen::VectorXd values(static_cast<Eigen::Index>(fit.tensions_nN.size()));
+  for (Eigen::Index i = 0; i < values.size(); ++i) values[i] = fit.tensions_nN[static_cast<std::size_t>(i)].value;
+  return values;
+}
+
+Trial next_start(const EnsembleFit& fit) {
+  Trial start = fit.meshes.front().fit.trial;
+  start.tensions_nN = values_of(fit);
+  return start;
+}
+
+Eigen::VectorXd directions_of(const Eigen::VectorXd& forces_nN) {
+  Eigen::VectorXd along = Eigen::VectorXd::Zero(forces_nN.size());
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) {
+    const double size = forces_nN.segment<2>(row).norm();
+    if (size > 0) along.segment<2>(row) = forces_nN.segment<2>(row) / size;
+  }
+  return along;
+}
+
+namespace {
+/// @param sign  of what the tensions' answer to noise adds: + to estimates beside them, − to scores
+Eigen::MatrixXd covariance_beside(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                  const Eigen::MatrixXd& by_force, int sign) {
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  Eigen::MatrixXd covariance =
+      fit.variance * of_noise + sign * (by_tension * mesh.noise_covariance_nN2 * by_tension.transpose());
+  if (fit.model_error) {
+    const Eigen::MatrixXd left = by_force - by_tension * mesh.by_force;  // of errors of the forces, tensions following
+    covariance += left * fit.model_error->force_variance_nN2.asDiagonal() * left.transpose();
+  }
+  return covariance;
+}
+}  // namespace
+
+Eigen::MatrixXd covariance_of_estimates(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                        const Eigen::MatrixXd& by_force) {
+  return covariance_beside(fit, of_noise, by_force, +1);
+}
+
+Eigen::MatrixXd covariance_of_scores(const EnsembleFit& fit, const Eigen::MatrixXd& of_noise,
+                                     const Eigen::MatrixXd& by_force) {
+  return covariance_beside(fit, of_noise, by_force, -1);
+}
+
+Eigen::VectorXd adhesion_forces_nN(const EnsembleFit& fit) { return exerted_nN(fit, fit.forces_nN); }
+
+Eigen::MatrixXd by_network_force(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
+  return fit.own ? Eigen::MatrixXd(fit.own->left.transpose() * sums) : sums;
+}
+
+Eigen::VectorXd own_variances(const EnsembleFit& fit, const Eigen::MatrixXd& sums) {
+  if (!fit.own) return Eigen::VectorXd::Zero(sums.cols());
+  return fit.variance * sums.cwiseProduct(fit.own->covariance * sums).colwise().sum().transpose();
+}
+
+Eigen::Vector2d CutForce::direction() const {
+  const Eigen::Vector2d force(x_nN.value, y_nN.value);
+  return force.norm() > 0 ? Eigen::Vector2d(force.normalized()) : Eigen::Vector2d(1, 0);
+}
+
+Eigen::VectorXd along_cut(const Eigen::Vector2d& direction, Eigen::Index n_forces) {
+  return -direction.replicate(n_forces / 2, 1);
+}
+
+Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
+  Eigen::VectorXd ones = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(fit.fibre_ids.size()));
+  for (const int i : indices) ones[i] = 1;
+  return estimate_of(
+      fit, [&](const MeshFit& mesh) { return ones.dot(mesh.fit.trial.tensions_nN); },
+      [&](const MeshFit&) { return ones; });
+}
+
+EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData& data,
+                         const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
+                         const Progress& progress, const SolvedMisfit& solved_misfit, const Trial* start) {
+  const int n_meshes = static_cast<int>(networks.size());
+  MBTFM_ASSERT(n_meshes >= 1);
+  EnsembleFit all;
+  all.fibre_ids = networks.front().fibre_ids();
+  for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == all.fibre_ids);
+  check_suffice(data.n_used, static_cast<Eigen::Index>(all.fibre_ids.size()));
+  // another fit may have left its weights: bad beads are known by a fit in which all count
+  if ((data.bead_weight.array() != 1).any()) reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
+  all.meshes.resize(networks.size());
+  std::mutex mutex;
+  int n_done = 0;
+  const auto tell = [&] {
+    const std::lock_guard lock(mutex);
+    if (progress)
+      progress(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
+  };
+  FirstFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start);
+  all.loss = first.loss;
+  tell();
+  all.data = data.reduced;
+  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
+  const Eigen::VectorXd answer = first.fit.trial.tensions_nN;
+  const int inner = std::max(1, threads / std::max(1, n_meshes - 1));  // the first has only to be described
+  numerics::parallel_for(n_meshes, threads, [&](int m) {
+    const auto i = static_cast<std::size_t>(m);
+    const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit, inner);
+    all.meshes[i] =
+        describe(problem, m == 0 ? std::move(first.fit)
+                                 : fit_tensions(problem, parameters, inner, scaled_to_data(problem, answer)));
+    tell();
+  });
+  add_means(all);
+  all.own = own_forces_in(data);
+  all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
+                               static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
+  all.variance = misfit_variance(data, all.forces_nN, n_tensions, all.loss);
+  if (n_meshes > 1) {
+    all.model_error = model_error(forces_at_mean(all), data.reduced,
+                                  variance_beside_model_error(data, all.forces_nN, n_tensions, all.loss));
+    all.variance = all.model_error->noise_variance;
+  }
+  numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
+  all.network_bias =
+      network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data, adhesion_ids), threads);
+  add_estimates(all, !networks.front().network().held_by_cut.empty());
+  if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
+  return all;
+}
+
+Interval interval_95(const Estimate& estimate) {
+  const double student = boost::math::quantile(boost::math::students_t(estimate.degrees), 0.975);
+  const double half = kNormal95 * estimate.standard_error;
+  const Sides sides = estimate.sides_95.value_or(Sides{half, half});
+  return {.low = std::max(0.0, estimate.value - student / kNormal95 * sides.below),
+          .high = estimate.value + student / kNormal95 * sides.above};
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,422 @@
+#include "mbtfm/tensions/error_budget.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "pipeline/numerics/parallel.h"
+#include "substrate/greens/layer.h"
+#include "substrate/greens/models.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using substrate::Ellipse;
+
+/// Sums of forces that have a budget of their own beside the tensions, by force: the total; through the cut, if any.
+MatrixXd sums_of(const EnsembleFit& fit) {
+  MatrixXd sums = directions_of(adhesion_forces_nN(fit));
+  if (!fit.cut) return sums;
+  sums.conservativeResize(Eigen::NoChange, 2);
+  sums.col(1) = along_cut(fit.cut->direction(), sums.rows());
+  return sums;
+}
+
+/// Linear answers of the tensions and, in the last rows, of the sums of forces.
+struct Gain {
+  MatrixXd of_tensions;  ///< where the tensions change
+  MatrixXd of_forces;    ///< where the beads show these forces in excess of the model's, by adhesion
+  MatrixXd of_model;     ///< where the model's forces lack these, tensions being what they are, and the beads show them
+};
+
+/// dt = Cov Jᵀ C e / s² for an error e of the forces; total force: d|R| = eᵀ (dR/dt dt + dR).
+Gain gain_of(const EnsembleFit& fit, const MeshFit& mesh) {
+  const Index n = mesh.covariance_nN2.rows();
+  const MatrixXd sums = sums_of(fit);
+  Gain gain{MatrixXd::Identity(n + sums.cols(), n), {}, {}};
+  gain.of_tensions.bottomRows(sums.cols()) = by_network_force(fit, sums).transpose() * mesh.force_derivatives;
+  gain.of_forces = gain.of_tensions * mesh.by_force;
+  gain.of_forces.bottomRows(sums.cols()) += (sums - by_network_force(fit, sums)).transpose();  // as forces of their own
+  gain.of_model = gain.of_forces;
+  gain.of_model.bottomRows(sums.cols()) -= sums.transpose();
+  return gain;
+}
+
+VectorXd variances(const MatrixXd& gain, const VectorXd& variance) { return gain.cwiseAbs2() * variance; }
+
+/// The parts that each mesh tells, in squares, mean over the meshes.
+struct MeanVariances {
+  VectorXd beads, mesh, model, solver, place;
+};
+
+/// s² of the beads alone over the variance that the fit counts with: the rest is the model's where no model error is.
+double bead_share(const BudgetInputs& in) {
+  if (in.fit.model_error || !in.data.has_errors) return 1;
+  return std::min(1.0, noise_variance(in.data) / in.fit.variance);
+}
+
+/// How far the iterations stopped from the minimum, and the forces from balance.
+VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& gain) {
+  const cables::Equilibrium& equilibrium = mesh.fit.trial.equilibrium;
+  const double n = static_cast<double>(equilibrium.positions_um.size());
+  // net forces left on the free vertices, as if at random
+  const double imbalance = equilibrium.report.last_change * std::sqrt(n) / std::max(fit.forces_nN.norm(), 1e-300);
+  VectorXd slope = mesh.local.g;
+  for (Index i = 0; i < slope.size(); ++i) {
+    if (mesh.local.tensions_nN[i] <= 0) slope[i] = std::min(slope[i], 0.0);  // at its bound, where the minimum is
+  }
+  const VectorXd step = mesh.response * slope;
+  return (gain.of_tensions * step).cwiseAbs() + imbalance * (gain.of_tensions * mesh.local.tensions_nN).cwiseAbs();
+}
+
+/// Motions of the cell's place, pulled back to the forces: Gᵀ W² U with Uᵀ W² U = 1, the other motions taken off. With
+/// B = (MᵀW²M + Λ)⁻¹ and L Lᵀ its block of the place, U = M B_place L⁻ᵀ.
+MatrixXd pulled_place(const BudgetInputs& in) {
+  const Index n = in.n_of_place;
+  const MatrixXd columns = in.data.motion_inverse.rightCols(n);
+  const MatrixXd upper = columns.bottomRows(n).llt().matrixU();
+  return in.data.response->pull_back(squared_weights(in.data).asDiagonal() *
+                                     (in.data.motions * columns * upper.inverse()));
+}
+
+/// What the beads would tell more of the tensions if the place were known: Cov − (Cov⁻¹ + V Vᵀ/s²)⁻¹ with V = Jᵀ U.
+MatrixXd covariance_by_place(const EnsembleFit& fit, const MeshFit& mesh, const MatrixXd& pulled) {
+  const MatrixXd answered = mesh.noise_covariance_nN2 * (mesh.force_derivatives.transpose() * pulled);  // Cov V
+  MatrixXd middle = pulled.transpose() * mesh.force_derivatives * answered;
+  middle.diagonal().array() += fit.variance;
+  return answered * middle.ldlt().solve(answered.transpose());
+}
+
+MeanVariances mean_variances(const BudgetInputs& in) {
+  const Index n_rows = static_cast<Index>(in.fit.fibre_ids.size()) + (in.fit.cut ? 2 : 1);
+  const double n = static_cast<double>(in.fit.meshes.size());
+  const VectorXd none = VectorXd::Zero(n_rows);
+  MeanVariances mean{none, none, none, none, none};
+  const MatrixXd pulled = in.n_of_place > 0 ? pulled_place(in) : MatrixXd();
+  for (const MeshFit& mesh : in.fit.meshes) {
+    const Gain gain = gain_of(in.fit, mesh);
+    const VectorXd noise =
+        (gain.of_tensions * mesh.noise_covariance_nN2).cwiseProduct(gain.of_tensions).rowwise().sum();
+    mean.beads += bead_share(in) / n * noise;
+    if (in.n_of_place > 0) {
+      const MatrixXd by_place = covariance_by_place(in.fit, mesh, pulled);
+      mean.place += bead_share(in) / n * (gain.of_tensions * by_place).cwiseProduct(gain.of_tensions).rowwise().sum();
+    }
+    mean.solver += solver_error(in.fit, mesh, gain).cwiseAbs2() / n;
+    mean.model += (1 - bead_share(in)) / n * noise;
+    if (!in.fit.model_error) continue;
+    const double of_mesh = in.fit.model_error->least_phi_nN / std::max(in.fit.model_error->phi_nN, 1e-300);
+    const VectorXd both = variances(gain.of_model, in.fit.model_error->force_variance_nN2);
+    mean.mesh += of_mesh / n * both;
+    mean.model += (1 - of_mesh) / n * both;
+  }
+  return mean;
+}
+
+/// Answers to displacements of the beads: those of the forces that these displacements look like, (GᵀW²G)⁻¹ GᵀW² du.
+BeadAnswers answers_of(const BudgetInputs& in, const Gain& gain) {
+  return {in.data, solve_normal(in.data.reduced, gain.of_forces.transpose()).transpose()};
+}
+
+/// What an ellipse's standard errors make of it, and of the vertices that it holds.
+struct Variation {
+  substrate::Ellipse ellipse;
+  Vec2 shift_um;
+  double growth = 0, turn_rad = 0;
+};
+
+std::vector<Variation> variations_of(const substrate::Ellipse& ellipse, const SegmentationErrors& p) {
+  const double turn_rad = p.adhesion_angle_error_deg * std::numbers::pi / 180;
+  std::vector<Variation> all = {{ellipse, {p.adhesion_shift_error_um, 0}},
+                                {ellipse, {0, p.adhesion_shift_error_um}},
+                                {ellipse, {}, p.adhesion_area_error / 2},
+                                {ellipse, {}, 0, turn_rad}};
+  for (Variation& v : all) {
+    v.ellipse.centre_um += v.shift_um;
+    v.ellipse.semi_major_um *= 1 + v.growth;
+    v.ellipse.semi_minor_um *= 1 + v.growth;
+    v.ellipse.angle_rad += v.turn_rad;
+  }
+  return all;
+}
+
+// A shift's field falls as 1/r², so its effect on beads evenly spread as 1/r²: 3 % of its variance lies further than
+// this many semi-axes. There base and sides of the gel change nothing.
+constexpr double kReach = 6;
+
+/// Change of the displacement (um) of these beads, as the force of `before` comes from `after`: x, y in turn.
+VectorXd change_by_other_ellipse(const BudgetInputs& in, const std::vector<Index>& near,
+                                 const substrate::Ellipse& before, const substrate::Ellipse& after, Vec2 force_nN) {
+  const greens::HalfSpaceEllipse old(in.gel, before), other(in.gel, after);
+  VectorXd change(2 * static_cast<Index>(near.size()));
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    const Vec2 at = in.beads[static_cast<std::size_t>(near[i])].position_um;
+    const greens::Sym2 a = other.compliance_um_per_nN(at), c = old.compliance_um_per_nN(at);
+    const greens::Sym2 g{a.xx - c.xx, a.xy - c.xy, a.yy - c.yy};
+    change.segment<2>(2 * static_cast<Index>(i)) << g.xx * force_nN.x + g.xy * force_nN.y,
+        g.xy * force_nN.x + g.yy * force_nN.y;
+  }
+  return change;
+}
+
+std::vector<Index> beads_near(const DisplacementField& beads, const substrate::Ellipse& ellipse) {
+  std::vector<Index> near;
+  const double reach_um = kReach * ellipse.semi_major_um;
+  for (std::size_t b = 0; b < beads.size(); ++b) {
+    const Vec2 d = beads[b].position_um - ellipse.centre_um;
+    if (dot(d, d) < reach_um * reach_um) near.push_back(static_cast<Index>(b));
+  }
+  return near;
+}
+
+/// Forces of the first network by adhesion of the cell, as weights by adhesion of the network.
+MatrixXd by_network_adhesion(const BudgetInputs& in, const MatrixXd& by_cell_adhesion) {
+  const std::vector<int>& ids = in.networks.front().adhesion_ids();
+  MatrixXd weights(2 * static_cast<Index>(ids.size()), by_cell_adhesion.rows());
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const auto at = std::find_if(in.cell.adhesions.begin(), in.cell.adhesions.end(),
+                                 [&](const Adhesion& a) { return a.adhesion_id == ids[i]; });
+    weights.middleRows<2>(2 * static_cast<Index>(i)) =
+        by_cell_adhesion.middleCols<2>(2 * (at - in.cell.adhesions.begin())).transpose();
+  }
+  return weights;
+}
+
+/// The variance that free ends of fibres bring: an end further on is a bit more cable with the fibre's tension.
+VectorXd variance_of_ends(const BudgetInputs& in, const cables::GeometryGradient& gradient) {
+  const Network& network = in.networks.front().network();
+  const std::vector<int>& fibre_ids = in.fit.fibre_ids;
+  std::vector<std::vector<std::size_t>> links_of(network.vertices_um.size());
+  for (std::size_t k = 0; k < network.links.size(); ++k) {
+    if (network.links[k].fibre_id == 0) continue;
+    links_of[static_cast<std::size_t>(network.links[k].vertex_a)].push_back(k);
+    links_of[static_cast<std::size_t>(network.links[k].vertex_b)].push_back(k);
+  }
+  VectorXd variance = VectorXd::Zero(gradient.by_link.cols());
+  for (std::size_t v = 0; v < links_of.size(); ++v) {
+    if (links_of[v].size() != 1 || is_held(network, v)) continue;
+    const Link& link = network.links[links_of[v].front()];
+    const auto group = std::lower_bound(fibre_ids.begin(), fibre_ids.end(), link.fibre_id) - fibre_ids.begin();
+    const double tension_nN = link.share * in.fit.tensions_nN[static_cast<std::size_t>(group)].value;
+    const double longer_by = in.segmentation.fibre_end_error_um / link.rest_length_um;
+    variance += (longer_by * tension_nN * gradient.by_link.row(static_cast<Index>(links_of[v].front())))
+                    .cwiseAbs2()
+                    .transpose();
+  }
+  return variance;
+}
+
+/// What an adhesion's standard errors change, variation by variation.
+struct AdhesionChanges {
+  std::vector<Index> near;  ///< beads
+  MatrixXd displacement;    ///< theirs: 2·near × variations
+  MatrixXd by_vertices;     ///< answers to the vertices held otherwise: rows × variations
+};
+
+AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const cables::GeometryGradient& gradient) {
+  const cables::CableNetwork& cables = in.networks.front();
+  const Adhesion& a = in.cell.adhesions[adhesion];
+  const substrate::Ellipse ellipse = substrate::ellipse_of(a);
+  const auto row = 2 * static_cast<Index>(adhesion);
+  const Vec2 force_nN{in.fit.forces_nN[row], in.fit.forces_nN[row + 1]};
+  const std::vector<Variation> variations = variations_of(ellipse, in.segmentation);
+  AdhesionChanges changes{.near = beads_near(in.beads, ellipse), .displacement = {}, .by_vertices = {}};
+  const auto n = static_cast<Index>(variations.size());
+  changes.displacement.resize(2 * static_cast<Index>(changes.near.size()), n);
+  changes.by_vertices = MatrixXd::Zero(gradient.by_held_vertex.cols(), n);
+  for (Index v = 0; v < n; ++v) {
+    const Variation& variation = variations[static_cast<std::size_t>(v)];
+    changes.displacement.col(v) = change_by_other_ellipse(in, changes.near, ellipse, variation.ellipse, force_nN);
+    const std::vector<int>& held = cables.held_vertices();
+    for (std::size_t h = 0; h < held.size(); ++h) {
+      if (cables.network().adhesion_id[static_cast<std::size_t>(held[h])] != a.adhesion_id) continue;
+      const Vec2 arm = cables.network().vertices_um[static_cast<std::size_t>(held[h])] - a.position_um;
+      const Vec2 moved = variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
+      changes.by_vertices.col(v) += gradient.by_held_vertex.middleRows<2>(2 * static_cast<Index>(h)).transpose() *
+                                    Eigen::Vector2d(moved.x, moved.y);
+    }
+  }
+  return changes;
+}
+
+VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
+  const Trial& trial = in.fit.meshes.front().fit.trial;
+  const std::vector<double> tensions(trial.tensions_nN.begin(), trial.tensions_nN.end());
+  const cables::GeometryGradient gradient =
+      in.networks.front().geometry_gradient(tensions, trial.equilibrium, by_network_adhesion(in, gain.of_model));
+  std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
+  numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
+    changes[static_cast<std::size_t>(i)] = changes_of(in, static_cast<std::size_t>(i), gradient);
+  });
+  VectorXd variance = variance_of_ends(in, gradient);
+  answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
+    std::vector<VectorXd> by_adhesion(changes.size());
+    numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
+      const AdhesionChanges& c = changes[static_cast<std::size_t>(i)];
+      MatrixXd answer = c.by_vertices.middleRows(first, of_beads.rows());
+      for (std::size_t b = 0; b < c.near.size(); ++b) {
+        answer += of_beads.middleCols<2>(2 * c.near[b]) * c.displacement.middleRows<2>(2 * static_cast<Index>(b));
+      }
+      by_adhesion[static_cast<std::size_t>(i)] = answer.cwiseAbs2().rowwise().sum();
+    });
+    for (const VectorXd& v : by_adhesion) variance.segment(first, of_beads.rows()) += v;
+  });
+  return variance;
+}
+
+/// The displacement by which the base changes the field of these forces: smooth, so that of point forces.
+VectorXd field_of_base_um(const BudgetInputs& in) {
+  const greens::Layer layer(in.gel);
+  VectorXd field = VectorXd::Zero(2 * static_cast<Index>(in.beads.size()));
+  for (std::size_t b = 0; b < in.beads.size(); ++b) {
+    for (std::size_t a = 0; a < in.cell.adhesions.size(); ++a) {
+      const greens::Sym2 g =
+          layer.point_correction_um_per_nN(in.beads[b].position_um - in.cell.adhesions[a].position_um);
+      const Eigen::Vector2d f = in.fit.forces_nN.segment<2>(2 * static_cast<Index>(a));
+      field.segment<2>(2 * static_cast<Index>(b)) +=
+          Eigen::Vector2d(g.xx * f.x() + g.xy * f.y(), g.xy * f.x() + g.yy * f.y());
+    }
+  }
+  return field;
+}
+
+/// An error of all adhesions' fields alike changes the tensions in proportion; errors by adhesion add up in squares.
+/// Which of the two it is no model tells: both are counted.
+VectorXd substrate_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers) {
+  const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
+  VectorXd variance = (in.substrate_error * values).cwiseAbs2();
+  for (Index a = 0; a < in.fit.forces_nN.size(); a += 2) {
+    variance += (in.substrate_error * gain.of_forces.middleCols<2>(a) * in.fit.forces_nN.segment<2>(a)).cwiseAbs2();
+  }
+  if (!in.lacks_base) return variance;
+  const VectorXd field = field_of_base_um(in);
+  answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
+    variance.segment(first, of_beads.rows()) += (of_beads * field).cwiseAbs2();
+  });
+  return variance;
+}
+
+/// What the beads would show more if the gel were another.
+VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int threads) {
+  std::vector<Vec2> points;
+  for (const Bead& bead : in.beads) points.push_back(bead.position_um);
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : in.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  const auto field = [&](const Gel& gel) {
+    return greens::make_greens(gel, {.model = "layer"}, threads)
+        ->response(points, ellipses)
+        ->displace(in.fit.forces_nN);
+  };
+  return field(other) - field(in.gel);
+}
+
+/// Of what the user states of the gel; none where nothing is stated. Forces and tensions are proportional to the
+/// modulus (but for the stretch of cables); what another thickness or Poisson's ratio changes of the displacement is
+/// taken for force.
+std::optional<VectorXd> gel_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers,
+                                      int threads) {
+  const Gel& gel = in.gel;
+  if (!gel.youngs_modulus_sigma_kPa && !gel.thickness_sigma_um && !gel.poisson_ratio_sigma) return std::nullopt;
+  const VectorXd values = gain.of_tensions * in.fit.meshes.front().fit.trial.tensions_nN;
+  VectorXd variance = (gel.youngs_modulus_sigma_kPa.value_or(0) / gel.youngs_modulus_kPa * values).cwiseAbs2();
+  std::vector<Gel> others;
+  if (gel.thickness_sigma_um.value_or(0) > 0) {
+    others.push_back(gel);
+    others.back().thickness_um += *gel.thickness_sigma_um;
+  }
+  if (gel.poisson_ratio_sigma.value_or(0) > 0) {
+    others.push_back(gel);  // to the side where there is room
+    const double sigma = std::min(*gel.poisson_ratio_sigma, 0.25);
+    others.back().poisson_ratio += gel.poisson_ratio > 0.25 ? -sigma : sigma;
+  }
+  for (const Gel& other : others) {
+    const VectorXd change = change_by_other_gel_um(in, other, threads);
+    answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
+      variance.segment(first, of_beads.rows()) += (of_beads * change).cwiseAbs2();
+    });
+  }
+  return variance;
+}
+
+/// Of a tension at zero the part by noise and model is what its interval's upper half says: it could be that much, and
+/// linear propagation knows only that it is held.
+void add_room_above(const EnsembleFit& fit, MeanVariances& mean) {
+  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+    const Estimate& tension = fit.tensions_nN[i];
+    const auto at = static_cast<Index>(i);
+    if (!tension.sides_95 || !std::isfinite(tension.sides_95->above)) continue;
+    const double room = std::pow(tension.sides_95->above / kNormal95, 2);
+    if (tension.value > 0 || room <= mean.beads[at] + mean.mesh[at] + mean.model[at]) continue;
+    const LocalMisfit& local = fit.meshes.front().local;
+    const double by_noise = fit.variance * local.H(at, at);
+    const double by_model = local.model_variance.size() > 0 ? local.model_variance(at, at) : 0;
+    const double share = by_noise + by_model > 0 ? by_noise / (by_noise + by_model) : 1;
+    mean.place[at] = 0;
+    mean.beads[at] = share * room;
+    mean.mesh[at] = 0;
+    mean.model[at] = (1 - share) * room;
+  }
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, SegmentationErrors& p) {
+  list.table("fit");
+  list.add("adhesion_shift_error_um", p.adhesion_shift_error_um, Range::zero_or_size_um(),
+           "error budget: standard error of each coordinate of an adhesion's centre (um)");
+  list.add("adhesion_area_error", p.adhesion_area_error, Range::between(0, 1),
+           "error budget: relative standard error of an adhesion's area");
+  list.add("adhesion_angle_error_deg", p.adhesion_angle_error_deg, Range::between(0, 90),
+           "error budget: standard error of an adhesion's orientation (degrees)");
+  list.add("fibre_end_error_um", p.fibre_end_error_um, Range::zero_or_size_um(),
+           "error budget: standard error of a fibre's free end, along the fibre (um)");
+}
+
+ErrorBudget error_budget(const BudgetInputs& in, int threads) {
+  const Gain gain = gain_of(in.fit, in.fit.meshes.front());
+  const BeadAnswers answers = answers_of(in, gain);
+  MeanVariances mean = mean_variances(in);
+  const MatrixXd sums = sums_of(in.fit);
+  mean.beads.tail(sums.cols()) += own_variances(in.fit, sums);
+  add_room_above(in.fit, mean);
+  if (in.fit.model_error)
+    mean.mesh[static_cast<Index>(in.fit.fibre_ids.size())] +=
+        std::pow(roughness_of_total(adhesion_forces_nN(in.fit), *in.fit.model_error).sigma_nN, 2);
+  const VectorXd segmentation = segmentation_variances(in, gain, answers, threads);
+  const VectorXd substrate = substrate_variances(in, gain, answers);
+  const std::optional<VectorXd> gel = gel_variances(in, gain, answers, threads);
+  const auto parts = [&](Index i) {
+    ErrorParts p{.beads = std::sqrt(std::max(0.0, mean.beads[i] - mean.place[i])),
+                 .segmentation = std::sqrt(segmentation[i]),
+                 .mesh = {},
+                 .substrate = std::sqrt(substrate[i]),
+                 .solver = std::sqrt(mean.solver[i]),
+                 .model = std::sqrt(mean.model[i]),
+                 .gel = {},
+                 .place = {}};
+    if (in.n_of_place > 0) p.place = std::sqrt(mean.place[i]);
+    if (gel) p.gel = std::sqrt((*gel)[i]);
+    if (in.fit.meshes.size() > 1) p.mesh = std::sqrt(mean.mesh[i]);
+    return p;
+  };
+  ErrorBudget budget;
+  const auto n = static_cast<Index>(in.fit.fibre_ids.size());
+  for (Index i = 0; i < n; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    budget.tensions.push_back(
+        {.fibre_id = in.fit.fibre_ids[at], .tension_nN = in.fit.tensions_nN[at].value, .parts_nN = parts(i)});
+  }
+  budget.total_force_nN = total_nN(adhesion_forces_nN(in.fit));
+  budget.total_force_parts_nN = parts(n);
+  if (in.fit.cut) budget.cut_force = {.force_nN = in.fit.cut->magnitude_nN.value, .parts_nN = parts(n + 1)};
+  return budget;
+}
+
+}  // namespace mbtfm::tensions

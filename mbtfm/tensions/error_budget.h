@@ -1,0 +1,37 @@
+/// How much of each tension's standard error comes from what: docs/theory.md, section 3, "Error budget".
+#pragma once
+
+#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/results.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::tensions {
+
+/// Standard errors of what the segmentation measures. Found on simulated cells of ordinary image quality, outliers
+/// included (docs/accuracy-and-cost.md). For a segmentation that is known to be exact: zero.
+struct SegmentationErrors {
+  double adhesion_shift_error_um = 0.017;  ///< of each coordinate of a centre
+  double adhesion_area_error = 0.1;        ///< relative
+  double adhesion_angle_error_deg = 1.2;
+  double fibre_end_error_um = 0.2;  ///< of a free end, along the fibre
+};
+void declare(stage::ParameterList& list, SegmentationErrors& errors);
+
+/// What the budget is drawn up of. `substrate_error`: see stated_error.
+struct BudgetInputs {
+  const EnsembleFit& fit;
+  const LinearData& data;
+  const std::vector<cables::CableNetwork>& networks;
+  const Cell& cell;
+  const DisplacementField& beads;
+  Gel gel;
+  double substrate_error = 0;
+  bool lacks_base = false;  ///< the substrate is a half-space
+  SegmentationErrors segmentation;
+  Eigen::Index n_of_place = 0;  ///< of the data's motions, the last ones: they are the cell's place
+};
+
+/// By linear propagation about the solution: costs about as much as one step of the fit on one mesh.
+ErrorBudget error_budget(const BudgetInputs& inputs, int threads);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,45 @@
+#include "mbtfm/tensions/explain.h"
+
+#include <cmath>
+
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
+
+namespace mbtfm::tensions {
+
+Change change_between(const std::string& effect, const EnsembleFit& without, const EnsembleFit& with) {
+  const Eigen::VectorXd before = values_of(without);
+  return {effect, values_of(with).head(before.size()) - before};
+}
+
+double relative(const Change& change, const EnsembleFit& fit) {
+  if (change.at_most) return *change.at_most;
+  const Eigen::VectorXd tensions = values_of(fit);
+  const Eigen::Index n = tensions.size() > 1 ? tensions.size() - 1 : 1;
+  const double size = tensions.tail(n).norm();
+  return size > 0 ? change.by_tension_nN.tail(n).norm() / size : 0;
+}
+
+std::string sentence(const Change& change, const EnsembleFit& fit) {
+  const std::string percent = brief(100 * relative(change, fit)) + " %";
+  if (change.at_most) return "would change the tensions by at most " + percent;
+  Eigen::Index most = 0;
+  const double largest = change.by_tension_nN.cwiseAbs().maxCoeff(&most);
+  const int id = fit.fibre_ids[static_cast<std::size_t>(most)];
+  return "would change the tensions by " + percent + ", that of " +
+         (id == 0 ? "the network" : "fibre " + std::to_string(id)) + " by " + brief(largest) + " nN";
+}
+
+void write_changes(const std::filesystem::path& file, const std::vector<Change>& changes, const EnsembleFit& fit) {
+  files::CsvText csv({"effect", "fibre_id", "change_nN"});
+  for (const Change& change : changes) {
+    for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i) {
+      csv.add(change.effect).add(fit.fibre_ids[static_cast<std::size_t>(i)]).add(change.by_tension_nN[i]);
+      csv.end_row();
+    }
+  }
+  files::write_text(file, csv.str());
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,298 @@
+#include "mbtfm/tensions/findings.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+using Noticed = std::optional<Finding>;
+
+std::string counted(std::int64_t n, const std::string& one, const std::string& many) {
+  return std::to_string(n) + " " + (n == 1 ? one : many);
+}
+
+/// "3, 7 and 12"; of many the first ones.
+std::string listed(const std::vector<int>& ids) {
+  constexpr std::size_t kMost = 8;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(kMost, ids.size()); ++i) {
+    if (i > 0) text += i + 1 == ids.size() ? " and " : ", ";
+    text += std::to_string(ids[i]);
+  }
+  return ids.size() > kMost ? text + ", ..." : text;
+}
+
+double squared_ratio(const FitSummary& summary) {
+  return summary.expected_relative_l2 > 0 ? std::pow(summary.relative_l2 / summary.expected_relative_l2, 2) : 0;
+}
+
+Noticed explains_little(const FitOutcome& o) {
+  const double left = o.summary.relative_l2 * o.summary.relative_l2;
+  const double noise = o.summary.expected_relative_l2 * o.summary.expected_relative_l2;  // of the beads' own squares
+  if (noise <= 0 || noise >= 1) return {};
+  const double share = (left - noise) / (1 - noise);
+  // of the noise's squares, which far beads tell, and of what is left
+  const double sigma =
+      2 * noise / (1 - noise) / std::sqrt(static_cast<double>(std::max<Eigen::Index>(1, o.data.n_used)));
+  return noticed(FindingKind::explains_little, share - 3 * sigma,
+                 "The model explains " + brief(100 * (1 - share)) +
+                     " % of what the beads do beyond their noise. It is the wrong model of these beads.");
+}
+
+Noticed unexplained(const FitOutcome& o) {
+  const double ratio = squared_ratio(o.summary);
+  return noticed(FindingKind::unexplained_displacement, ratio,
+                 "The model leaves " + brief(ratio) + " times the sum of squares that the noise of the beads (" +
+                     brief(1000 * o.summary.noise_um) +
+                     " nm a component) would leave. The rest is an error of the model: mesh, segmentation or gel.");
+}
+
+Noticed noise_unknown(const FitOutcome& o) {
+  const bool is_known = o.summary.expected_relative_l2 > 0;
+  return noticed(FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.displacement_um.size() / 2),
+                 "The noise of the beads is not known.");
+}
+
+double stated_noise_um(const LinearData& data) {
+  double squares = 0, n = 0;
+  for (Eigen::Index i = 0; i < data.weight_per_um.size(); ++i) {
+    if (data.weight_per_um[i] <= 0) continue;
+    squares += 1 / (data.weight_per_um[i] * data.weight_per_um[i]);
+    n += 1;
+  }
+  return n > 0 ? std::sqrt(squares / n) : 0;
+}
+
+Noticed noise_disagrees(const FitOutcome& o) {
+  const double stated = stated_noise_um(o.data);
+  if (!o.data.has_errors || stated <= 0) return {};
+  const double ratio = o.summary.noise_um / stated;
+  return noticed(FindingKind::noise_disagrees, ratio,
+                 "Far from the cell the beads scatter by " + brief(1000 * o.summary.noise_um) +
+                     " nm about what the model says; their stated standard error is " + brief(1000 * stated) + " nm.");
+}
+
+/// A square of the picture with some sixty beads.
+struct Region {
+  Vec2 centre_um;
+  double side_um = 0, chi_squared = 0;  ///< by degree of freedom
+};
+
+/// The one whose beads the model explains worst.
+Region worst_region(const LinearData& data, const Eigen::VectorXd& forces_nN, double noise_um) {
+  constexpr double kBeads = 60, kFewest = 30;
+  const Eigen::VectorXd residual = residual_um(data, forces_nN);
+  Vec2 low{1e300, 1e300}, high{-1e300, -1e300};
+  for (const Vec2 p : data.position_um) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  const double n = static_cast<double>(data.position_um.size());
+  const double side_um = std::sqrt(kBeads / std::max(1.0, n) * (high.x - low.x) * (high.y - low.y));
+  if (!(side_um > 0) || noise_um <= 0) return {};
+  struct Sum {
+    double squares = 0, n = 0;
+  };
+  std::map<std::pair<int, int>, Sum> sums;
+  for (std::size_t b = 0; b < data.position_um.size(); ++b) {
+    const auto row = 2 * static_cast<Eigen::Index>(b);
+    if (data.weight_per_um[row] <= 0) continue;
+    const Vec2 at = (1 / side_um) * (data.position_um[b] - low);
+    Sum& sum = sums[{static_cast<int>(at.x), static_cast<int>(at.y)}];
+    sum.squares += residual.segment<2>(row).squaredNorm() / (2 * noise_um * noise_um);
+    sum.n += 1;
+  }
+  Region worst{.centre_um = {}, .side_um = side_um, .chi_squared = 0};
+  for (const auto& [at, sum] : sums) {
+    if (sum.n < kFewest || sum.squares / sum.n <= worst.chi_squared) continue;
+    worst.centre_um = low + side_um * Vec2{at.first + 0.5, at.second + 0.5};
+    worst.chi_squared = sum.squares / sum.n;
+  }
+  return worst;
+}
+
+Noticed beads_disagree(const FitOutcome& o) {
+  const Region worst = worst_region(o.data, o.fit.forces_nN, o.summary.noise_um);
+  return noticed(FindingKind::beads_disagree_by_region, worst.chi_squared,
+                 "In the square of " + brief(worst.side_um) + " um about (" + brief(worst.centre_um.x) + ", " +
+                     brief(worst.centre_um.y) + ") um the model leaves " + brief(worst.chi_squared) +
+                     " times the squares that the noise of the beads would leave.");
+}
+
+Noticed missing_fibres_noticed(const FitOutcome& o) {
+  std::string text = "The beads call for " +
+                     counted(static_cast<std::int64_t>(o.missing.size()), "fibre that was", "fibres that were") +
+                     " not segmented: ";
+  constexpr std::size_t kMost = 4;
+  for (std::size_t i = 0; i < std::min(kMost, o.missing.size()); ++i) {
+    const MissingFibre& f = o.missing[i];
+    text += (i > 0 ? "; " : "") + std::string("from adhesion ") + std::to_string(f.start_adhesion_id) + " to " +
+            std::to_string(f.end_adhesion_id) + " with " + brief(f.tension_nN) + " +- " +
+            brief(f.tension_nN / std::sqrt(f.chi_squared_gain)) + " nN";
+  }
+  if (o.missing.size() > kMost) text += "; ... (missing_fibres.csv)";
+  return noticed(FindingKind::missing_fibre, static_cast<double>(o.missing.size()), text + ".");
+}
+
+Noticed missing_adhesions_noticed(const FitOutcome& o) {
+  const std::vector<MissingAdhesion>& missing = o.missing_adhesions;
+  std::string text = "The beads call for " + counted(static_cast<std::int64_t>(missing.size()), "force", "forces") +
+                     " where no adhesion was found: ";
+  constexpr std::size_t kMost = 4;
+  for (std::size_t i = 0; i < std::min(kMost, missing.size()); ++i) {
+    const MissingAdhesion& a = missing[i];
+    text += (i > 0 ? "; " : "") + brief(norm(a.force_nN)) + " nN at (" + brief(a.position_um.x) + ", " +
+            brief(a.position_um.y) + ") um";
+  }
+  if (missing.size() > kMost) text += "; ... (missing_adhesions.csv)";
+  return noticed(FindingKind::missing_adhesion, static_cast<double>(missing.size()), text + ".");
+}
+
+Noticed fibres_without_tension(const FitOutcome& o) {
+  std::vector<int> ids;
+  for (const Fibre& fibre : o.cell.fibres) {
+    const auto has = [&](const Tension& t) { return t.fibre_id == fibre.fibre_id; };
+    if (std::ranges::none_of(o.tensions, has)) ids.push_back(fibre.fibre_id);
+  }
+  return noticed(FindingKind::fibre_without_tension, static_cast<double>(ids.size()),
+                 counted(static_cast<std::int64_t>(ids.size()), "segmented fibre has", "segmented fibres have") +
+                     " no tension: " + listed(ids) + ".");
+}
+
+/// Fibres whose tension is so.
+template <class Predicate>
+std::vector<int> fibres_whose(const std::vector<Tension>& tensions, const Predicate& is_so) {
+  std::vector<int> ids;
+  for (const Tension& t : tensions) {
+    if (t.fibre_id > 0 && is_so(t)) ids.push_back(t.fibre_id);
+  }
+  return ids;
+}
+
+Noticed noticed_of_fibres(FindingKind kind, const std::vector<int>& ids, const std::string& one,
+                          const std::string& many) {
+  return noticed(kind, static_cast<double>(ids.size()),
+                 counted(static_cast<std::int64_t>(ids.size()), one, many) +
+                     (ids.size() == 1 ? " (fibre " : " (fibres ") + listed(ids) + ").");
+}
+
+Noticed not_identifiable(const FitOutcome& o) {
+  return noticed_of_fibres(FindingKind::not_identifiable,
+                           fibres_whose(o.tensions, [](const Tension& t) { return !t.identifiable; }),
+                           "tension is not determined by these beads", "tensions are not determined by these beads");
+}
+
+Noticed network_not_identifiable(const FitOutcome& o) {
+  const bool is_unknown =
+      std::ranges::any_of(o.tensions, [](const Tension& t) { return t.fibre_id == 0 && !t.identifiable; });
+  return noticed(FindingKind::network_not_identifiable, is_unknown ? 1 : 0,
+                 "The tension of the actin network is not determined by these beads.");
+}
+
+Noticed wide_intervals(const FitOutcome& o) {
+  const auto is_wide = [](const Tension& t) {
+    return t.identifiable && t.tension_nN > 0 && t.low_nN && t.high_nN && *t.high_nN - *t.low_nN > 2 * t.tension_nN;
+  };
+  return noticed_of_fibres(FindingKind::wide_interval, fibres_whose(o.tensions, is_wide),
+                           "tension is uncertain by as much as itself",
+                           "tensions are uncertain by as much as themselves");
+}
+
+Noticed tensions_at_zero(const FitOutcome& o) {
+  return noticed_of_fibres(FindingKind::tension_at_zero,
+                           fibres_whose(o.tensions, [](const Tension& t) { return t.tension_nN == 0; }),
+                           "tension is zero, the least allowed", "tensions are zero, the least allowed");
+}
+
+Noticed single_mesh(const FitOutcome& o) {
+  return noticed(FindingKind::single_mesh, o.summary.n_meshes == 1 ? 1 : 0,
+                 "One mesh was fitted. The intervals hold the noise of the beads, and not the choice of the mesh.");
+}
+
+Noticed out_of_balance(FindingKind kind, double imbalance, const std::string& what) {
+  return noticed(kind, imbalance,
+                 "The " + what + " do not sum to zero: |sum| / sum of magnitudes = " + brief(imbalance) + ".");
+}
+
+Noticed cell_cut(const FitOutcome& o) {
+  if (!o.fit.cut) return {};
+  const Estimate& force = o.fit.cut->magnitude_nN;
+  return noticed(
+      FindingKind::cell_cut, 1,
+      "The image's border cuts the cell. The fit holds the network along the cut; " + brief(force.value) + " +- " +
+          brief(force.standard_error) + " nN pass through it. " +
+          (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
+                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
+                      "taken for forces of the adhesions near it."),
+      o.beyond ? Severity::note : Severity::caution);
+}
+
+Noticed common_motion(const FitOutcome& o) {
+  if (!o.motion) return {};
+  const AffineMotion& m = o.motion->motion;
+  double largest = 0;  // in standard errors
+  const double values[] = {m.turn_rad, m.growth, m.stretch, m.skew};
+  for (int i = 0; i < 4; ++i) largest = std::max(largest, std::abs(values[i]) / o.motion->sigma[i + 2]);
+  constexpr double kLarge = 0.01;  // of all lengths: no refocus and no warming does that
+  const bool is_large = std::max({std::abs(m.growth), std::abs(m.stretch), std::abs(m.skew)}) > kLarge;
+  return noticed(FindingKind::common_motion, largest,
+                 "All beads share a motion beside the cell's pull: " + sentence_of(*o.motion) + ". It was taken off." +
+                     (is_large ? " It is too large for a change of focus or of temperature: were both pictures taken "
+                                 "with the same objective?"
+                               : ""),
+                 is_large ? Severity::caution : Severity::note);
+}
+
+Noticed curved_motion(const FitOutcome& o) {
+  if (!o.curved) return {};
+  return noticed(FindingKind::curved_motion, o.curved->chi_squared,
+                 "Beside the cell's pull all beads share a motion that is not even: it moves them by " +
+                     brief(1000 * o.curved->rms_um) +
+                     " nm on average. It was not taken off, and the error bars do not hold it.");
+}
+
+Noticed channel_shift(const FitOutcome& o) {
+  if (!o.place) return {};
+  const Placement& place = o.place->placement;
+  const Eigen::Vector3d values(place.shift_um.x, place.shift_um.y, place.turn_rad);
+  constexpr double kLarge_um = 1;  // filters are off by less
+  const bool is_large = norm(place.shift_um) > kLarge_um;
+  return noticed(FindingKind::channel_shift, values.cwiseAbs().cwiseQuotient(o.place->sigma).maxCoeff(),
+                 "The cell does not lie on the beads where its images say: it is shifted by " + sentence_of(*o.place) +
+                     "." + (is_large ? " Filters are off by less: do all images show the same place?" : ""),
+                 is_large ? Severity::caution : Severity::note);
+}
+
+}  // namespace
+
+Imbalance imbalance_of(const EnsembleFit& fit) {
+  Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
+  for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
+  const CutReaction cut = fit.cut ? fit.cut->reaction : CutReaction{};
+  constexpr double kTiny = 1e-300;  // a cell without any force is balanced
+  return {.force = (net_nN + cut.force_nN).norm() / std::max(total_nN(fit.forces_nN), kTiny),
+          .torque = std::abs(fit.torques_nN_um.sum() + cut.torque_nN_um) /
+                    std::max(fit.torques_nN_um.cwiseAbs().sum(), kTiny)};
+}
+
+std::vector<Finding> findings_of(const FitOutcome& o) {
+  const Imbalance imbalance = imbalance_of(o.fit);
+  std::vector<Finding> findings;
+  for (Noticed found :
+       {cell_cut(o), common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o),
+        missing_adhesions_noticed(o), explains_little(o), unexplained(o), beads_disagree(o), noise_unknown(o),
+        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
+        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
+        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),
+        tensions_at_zero(o)}) {
+    if (found) findings.push_back(std::move(*found));
+  }
+  return findings;
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,42 @@
+/// What the fit noticed of its data and of its own answer.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mbtfm/tensions/beyond_cut.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/missing_adhesions.h"
+#include "mbtfm/tensions/model_checks.h"
+#include "mbtfm/tensions/placement.h"
+#include "pipeline/contract/findings.h"
+
+namespace mbtfm::tensions {
+
+/// What the findings are read off.
+struct FitOutcome {
+  const EnsembleFit& fit;
+  const LinearData& data;
+  const Cell& cell;  ///< with its fibres, whether in the network or not
+  const FitSummary& summary;
+  const std::vector<Tension>& tensions;
+  const std::vector<MissingFibre>& missing;
+  const std::vector<MissingAdhesion>& missing_adhesions;
+  const std::optional<FoundMotion>& motion;
+  const std::optional<CurvedMotion>& curved;
+  const std::optional<FoundPlacement>& place;
+  const std::optional<ForcesBeyond>& beyond;  ///< none: not allowed for
+};
+
+/// In the order in which a user should read them.
+std::vector<Finding> findings_of(const FitOutcome& outcome);
+
+/// |sum of forces| and |sum of torques| over the sums of the adhesions' magnitudes, what passes through a cut included:
+/// rounding only.
+struct Imbalance {
+  double force = 0, torque = 0;
+};
+Imbalance imbalance_of(const EnsembleFit& fit);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,216 @@
+#include "mbtfm/tensions/fit_results.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <string>
+
+#include "mbtfm/tensions/findings.h"
+#include "mbtfm/tensions/noise.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/vtk_files.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+/// Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
+/// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
+double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
+  double sum_um = 0;
+  for (const Link& link : network.links) {
+    if (link.fibre_id == 0) sum_um += link.share * link.rest_length_um;
+  }
+  return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
+}
+
+/// Along one axis.
+struct Reach {
+  double low_um = std::numeric_limits<double>::infinity(), high_um = -low_um;
+  void add(double at_um) { low_um = std::min(low_um, at_um), high_um = std::max(high_um, at_um); }
+  std::string in_words() const { return brief(low_um) + " to " + brief(high_um) + " um"; }
+};
+
+void check_along(const char* axis, const Reach& beads, const Reach& cell) {
+  if (beads.low_um <= cell.high_um && cell.low_um <= beads.high_um) return;
+  throw InvalidData("the displacement", std::string("beads about the cell, whose ") + axis + " is " + cell.in_words(),
+                    std::string("beads whose ") + axis + " is " + beads.in_words() +
+                        ": has this coordinate another sign, unit or origin?");
+}
+
+}  // namespace
+
+void check_place(const DisplacementField& beads, const Cell& cell) {
+  if (beads.empty() || cell.adhesions.empty()) return;
+  Reach beads_x, beads_y, cell_x, cell_y;
+  for (const Bead& bead : beads) beads_x.add(bead.position_um.x), beads_y.add(bead.position_um.y);
+  for (const Adhesion& a : cell.adhesions) cell_x.add(a.position_um.x), cell_y.add(a.position_um.y);
+  check_along("x", beads_x, cell_x);
+  check_along("y", beads_y, cell_y);
+}
+
+std::vector<int> adhesion_ids_of(const Cell& cell) {
+  std::vector<int> ids;
+  for (const Adhesion& a : cell.adhesions) ids.push_back(a.adhesion_id);
+  return ids;
+}
+
+std::vector<substrate::Ellipse> ellipses_of(const Cell& cell) {
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return ellipses;
+}
+
+std::vector<Vec2> points_of(const DisplacementField& beads) {
+  std::vector<Vec2> points;
+  for (const Bead& b : beads) points.push_back(b.position_um);
+  return points;
+}
+
+std::vector<Tension> tensions_of(const EnsembleFit& fit) {
+  double largest_nN = 0;
+  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
+  std::vector<Tension> tensions;
+  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
+    const Estimate& e = fit.tensions_nN[i];
+    const Interval interval = interval_95(e);
+    // A tension that could be anything that occurs in this cell was not measured.
+    const double scale = i == 0 ? e.value : largest_nN;
+    tensions.push_back({.fibre_id = fit.fibre_ids[i],
+                        .tension_nN = e.value,
+                        .low_nN = interval.low,
+                        .high_nN = std::isfinite(interval.high) ? std::optional(interval.high) : std::nullopt,
+                        .identifiable = e.standard_error < scale});
+  }
+  return tensions;
+}
+
+std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
+  std::set<int> connected;
+  for (const Fibre& f : cell.fibres) {
+    if (f.start_adhesion_id) connected.insert(*f.start_adhesion_id);
+    if (f.end_adhesion_id) connected.insert(*f.end_adhesion_id);
+  }
+  const Eigen::VectorXd exerted_nN = adhesion_forces_nN(fit);  // forces of their own act at the centres
+  std::vector<AdhesionForce> forces;
+  for (std::size_t a = 0; a < cell.adhesions.size(); ++a) {
+    const auto at = 2 * static_cast<Eigen::Index>(a);
+    const Vec2 network_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
+    const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
+    forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
+                      .force_nN = {exerted_nN[at], exerted_nN[at + 1]},
+                      .sigma_nN = fit.force_magnitudes_nN[a].standard_error,
+                      .connected = connected.contains(cell.adhesions[a].adhesion_id),
+                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, network_nN)});
+  }
+  return forces;
+}
+
+FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
+                      const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters) {
+  const NoiseLevel noise =
+      noise_level(inputs.beads, data, fit.forces_nN, inputs.cell.outline_um, parameters.far_distance_um);
+  const Eigen::VectorXd model = data.response->displace(fit.forces_nN);
+  const double measured_um = (less_motion(data, data.displacement_um - model) + model).norm();  // less the motion
+  FitSummary s;
+  s.relative_l2 = relative_l2(data, fit.forces_nN);
+  s.noise_um = noise.sigma_um;
+  s.expected_relative_l2 =
+      measured_um > 0 ? noise.sigma_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
+  s.total_force_nN = fit.total_force_nN.value;
+  s.network_force_nN = fit.network_force_nN.value;
+  s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
+  s.network_surface_tension_nN_per_um =
+      surface_tension_nN_per_um(networks.front().network(), inputs.cell.outline_um, fit.tensions_nN[0].value);
+  s.n_meshes = static_cast<int>(fit.meshes.size());
+  s.iterations = fit.report.iterations;
+  s.converged = fit.report.converged;
+  const Imbalance balance = imbalance_of(fit);
+  double mesh_part = 0, noise_part = 0;
+  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
+    mesh_part += std::pow(fit.tensions_nN[i].from_model(), 2);
+    noise_part += std::pow(fit.tensions_nN[i].noise, 2);
+  }
+  s.more = {{"noise_source", noise.source},
+            {"chi_squared_per_degree", fit.chi_squared_per_degree},
+            {"total_force_sigma_nN", fit.total_force_nN.standard_error},
+            {"network_force_sigma_nN", fit.network_force_nN.standard_error},
+            {"net_force_over_total", balance.force},
+            {"net_torque_over_total", balance.torque},
+            {"tension_error_from_noise_nN", std::sqrt(noise_part)},
+            {"tension_error_from_mesh_nN", std::sqrt(mesh_part)},
+            {"n_beads", std::int64_t(inputs.beads.size())},
+            {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
+            {"method", parameters.method},
+            {"loss", fit.loss},
+            {"reason", fit.report.reason}};
+  if (fit.cut) {
+    const Interval interval = interval_95(fit.cut->magnitude_nN);
+    double torque_nN_um = fit.cut->reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
+    const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces_nN;
+    for (std::size_t a = 0; a < inputs.cell.adhesions.size(); ++a) {
+      const auto at = 2 * static_cast<Eigen::Index>(a);
+      torque_nN_um -= cross(inputs.cell.adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
+    }
+    s.more.insert(s.more.end(), {{"cut_force_x_nN", fit.cut->x_nN.value},
+                                 {"cut_force_x_sigma_nN", fit.cut->x_nN.standard_error},
+                                 {"cut_force_y_nN", fit.cut->y_nN.value},
+                                 {"cut_force_y_sigma_nN", fit.cut->y_nN.standard_error},
+                                 {"cut_force_nN", fit.cut->magnitude_nN.value},
+                                 {"cut_force_sigma_nN", fit.cut->magnitude_nN.standard_error},
+                                 {"cut_force_low_nN", interval.low},
+                                 {"cut_force_high_nN", interval.high},
+                                 {"cut_torque_nN_um", torque_nN_um}});
+  }
+  return s;
+}
+
+DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data) {
+  Eigen::VectorXd model = data.response->displace(forces_nN);
+  if (data.motions.cols() > 0) model += data.motions * motion_in(data, data.displacement_um - model);
+  DisplacementField field = inputs.beads;
+  for (std::size_t i = 0; i < field.size(); ++i) {
+    const auto row = 2 * static_cast<Eigen::Index>(i);
+    field[i].displacement_um = {model[row], model[row + 1]};
+    field[i].sigma_um = 0;
+  }
+  return field;
+}
+
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
+                            const std::vector<files::PointArray>& more) {
+  std::vector<Vec2> points;
+  files::PointArray u{.name = "measured_um", .scalars = {}, .vectors = {}};
+  files::PointArray model{.name = "fitted_um", .scalars = {}, .vectors = {}};
+  files::PointArray residual{.name = "residual_um", .scalars = {}, .vectors = {}};
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    points.push_back(measured[i].position_um);
+    u.vectors.push_back(measured[i].displacement_um);
+    model.vectors.push_back(fitted[i].displacement_um);
+    residual.vectors.push_back(measured[i].displacement_um - fitted[i].displacement_um);
+  }
+  std::vector<files::PointArray> arrays = {std::move(u), std::move(model), std::move(residual)};
+  arrays.insert(arrays.end(), more.begin(), more.end());
+  files::write_points_vtp(file, points, arrays);
+}
+
+void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces) {
+  files::PointArray force{.name = "force_nN", .scalars = {}, .vectors = {}};
+  files::PointArray traction{.name = "traction_kPa", .scalars = {}, .vectors = {}};
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    force.vectors.push_back(forces[a].force_nN);
+    traction.vectors.push_back(1 / area_stood_for_um2(cell.adhesions[a]) * forces[a].force_nN);
+  }
+  files::write_ellipses_vtp(file, cell.adhesions, {force, traction});
+}
+
+void write_contracted(const Path& file, const cables::CableNetwork& network, const EnsembleFit& fit) {
+  std::vector<double> tensions;
+  for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
+  const cables::Equilibrium e = network.equilibrium(tensions, fit.meshes.front().fit.trial.equilibrium.positions_um);
+  files::write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN, e.link_states);
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,45 @@
+/// What the fit tells its user, from what the ensemble of meshes found.
+#pragma once
+
+#include <vector>
+
+#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/contract/path.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/named_array.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::tensions {
+
+struct FitInputs {
+  Cell cell;
+  Network network;
+  DisplacementField beads;  ///< without the flagged ones
+  int n_flagged = 0;
+};
+
+/// @throws InvalidData where all beads lie to one side of all adhesions: a coordinate has the wrong sign, unit or
+/// origin
+void check_place(const DisplacementField& beads, const Cell& cell);
+
+std::vector<int> adhesion_ids_of(const Cell& cell);
+std::vector<substrate::Ellipse> ellipses_of(const Cell& cell);
+std::vector<Vec2> points_of(const DisplacementField& beads);
+
+/// By group, with 95 % intervals.
+std::vector<Tension> tensions_of(const EnsembleFit& fit);
+/// By adhesion of the cell, with standard errors.
+std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell);
+FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
+                      const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters);
+/// The model's displacement at the beads.
+DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data);
+
+/// @param more  further arrays, by bead
+void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
+                            const std::vector<files::PointArray>& more = {});
+void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces);
+/// The first network, contracted by the mean tensions.
+void write_contracted(const Path& file, const cables::CableNetwork& network, const EnsembleFit& fit);
+
+}  // namespace mbtfm::tensions

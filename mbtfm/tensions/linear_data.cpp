@@ -1,0 +1,267 @@
+#include "mbtfm/tensions/linear_data.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+/// U with Uᵀ U = A, and how many of its pivots are more than rounding. What no bead feels gets a small stiffness: any
+/// force there explains as much as another.
+struct Root {
+  Eigen::MatrixXd U;
+  Eigen::Index n_felt = 0;
+};
+
+/// @param trace  of the normal matrix before anything was taken off it: its rounding stays
+Root root_of(Eigen::MatrixXd A, double trace, int threads) {
+  constexpr double kRounding = 1e-13;  // of a normal matrix
+  const Eigen::VectorXd diagonal = A.diagonal();
+  const double least = kRounding * std::max(trace, 1e-300);
+  numerics::mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
+  bool is_definite = numerics::upper_cholesky(A, threads);
+  if (!is_definite || A.diagonal().cwiseAbs2().minCoeff() <= least) {
+    numerics::mirror_lower(A);
+    A.diagonal() = diagonal.array() + least;
+    is_definite = numerics::upper_cholesky(A, threads);
+    MBTFM_ASSERT(is_definite);
+  }
+  const Eigen::Index n_felt = (A.diagonal().array().square() > 4 * least).count();
+  numerics::clear_below_diagonal(A);
+  return {std::move(A), n_felt};
+}
+
+/// (MᵀW²M + Λ)⁻¹, by rank. With Λ motions of different units go together: each counts as a multiple of itself.
+/// @param square  MᵀW²M
+Eigen::MatrixXd inverse_of_motions(Eigen::MatrixXd square, const Eigen::VectorXd& precision) {
+  if (square.cols() == 0) return square;
+  if (precision.size() == 0) return square.completeOrthogonalDecomposition().pseudoInverse();
+  square.diagonal() += precision;
+  const Eigen::VectorXd size = square.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  square = size.asDiagonal() * square * size.asDiagonal();
+  return size.asDiagonal() * square.completeOrthogonalDecomposition().pseudoInverse() * size.asDiagonal();
+}
+
+Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd& weight) {
+  return inverse_of_motions(data.motions.transpose() * (weight.asDiagonal() * data.motions), data.motion_precision);
+}
+
+/// Take off a Gram matrix Gᵀ W² P G, on and above its diagonal, what these motions explain of G.
+/// @param inverse  of their own square, Λ included
+void take_off(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
+              const Eigen::MatrixXd& inverse, Eigen::MatrixXd& gram) {
+  if (motions.cols() == 0) return;
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse);
+  const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
+  const Eigen::MatrixXd unit = motions * (eigen.eigenvectors() * root.asDiagonal());
+  const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
+  numerics::add_upper_gram(pulled.transpose(), gram, data.threads, -1);
+}
+
+struct Explained {
+  Eigen::VectorXd target;    ///< y = C⁻ᵀ Gᵀ W² P u
+  double floor_squared = 0;  ///< uᵀ W² P u − |y|², Λ included
+};
+
+/// @param root  C
+Explained explained(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& root,
+                    const Eigen::VectorXd& u) {
+  const Eigen::VectorXd weighted = weight.cwiseProduct(less_motion(data, u));
+  Eigen::MatrixXd target = data.response->pull_back(weighted);
+  numerics::solve_upper_transposed(root, target);
+  return {.target = target, .floor_squared = std::max(0.0, weighted.dot(u) - target.squaredNorm())};
+}
+
+/// From A = Gᵀ W² P G = Cᵀ C and y = C⁻ᵀ Gᵀ W² P u.
+/// @param trace  of A before anything was taken off it
+void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Eigen::MatrixXd A, double trace) {
+  auto [root, n_felt] = root_of(std::move(A), trace, data.threads);
+  auto [target, floor_squared] = explained(data, weight, root, data.displacement_um);
+  data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root)),
+                  .target = std::move(target),
+                  .floor_squared = floor_squared,
+                  .n_components = data.n_used,
+                  .n_felt = n_felt,
+                  .is_upper = true};
+}
+
+/// Motions that cost a component of the beads each, as nothing is known of their sizes.
+Eigen::Index n_unexpected(const Eigen::MatrixXd& motions, const Eigen::VectorXd& precision) {
+  return motions.cols() - (precision.array() > 0).count();
+}
+
+}  // namespace
+
+LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
+                  const std::vector<bool>& is_used) {
+  return reduce(beads, substrate::dense_response(std::move(compliance_um_per_nN)), is_used);
+}
+
+LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response, const std::vector<bool>& is_used,
+                  int threads, Eigen::MatrixXd motions) {
+  const Eigen::Index n_rows = 2 * static_cast<Eigen::Index>(beads.size());
+  MBTFM_ASSERT(response->rows() == n_rows);
+  LinearData data;
+  data.threads = threads;
+  data.motions = std::move(motions);
+  data.n_used = -data.motions.cols();
+  data.has_errors = std::all_of(beads.begin(), beads.end(), [](const Bead& b) { return b.sigma_um > 0; });
+  data.displacement_um.resize(n_rows);
+  data.weight_per_um = Eigen::VectorXd::Zero(n_rows);
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    const Eigen::Index row = 2 * static_cast<Eigen::Index>(i);
+    data.position_um.push_back(beads[i].position_um);
+    data.displacement_um.segment<2>(row) << beads[i].displacement_um.x, beads[i].displacement_um.y;
+    if (!is_used.empty() && !is_used[i]) continue;
+    data.weight_per_um.segment<2>(row).setConstant(data.has_errors ? 1 / beads[i].sigma_um : 1);
+    data.n_used += 2;
+  }
+  data.response = std::move(response);
+  reweight(data, Eigen::VectorXd::Ones(n_rows / 2));
+  return data;
+}
+
+void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
+  MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
+  data.n_used += n_unexpected(data.motions, data.motion_precision) - n_unexpected(motions, precision);
+  data.motions = std::move(motions);
+  data.motion_precision = std::move(precision);
+  reweight(data, Eigen::VectorXd(data.bead_weight));
+}
+
+void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
+  const Eigen::VectorXd weight = squared_weights(data);
+  const Eigen::MatrixXd beside = less_motion(data, motions);
+  const Eigen::MatrixXd& root = *data.reduced.compliance;
+  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(root.cols(), root.cols());
+  numerics::add_upper_gram(root, A, data.threads);
+  const double trace = A.diagonal().sum();
+  take_off(data, weight, beside, inverse_of_motions(motions.transpose() * (weight.asDiagonal() * beside), {}), A);
+  const Eigen::Index before = data.motions.cols(), n = motions.cols();
+  data.n_used -= n;
+  data.motions.conservativeResize(motions.rows(), before + n);
+  data.motions.rightCols(n) = motions;
+  if (data.motion_precision.size() > 0) {
+    data.motion_precision.conservativeResize(before + n);
+    data.motion_precision.tail(n).setZero();
+  }
+  if (data.forces_by_motion.size() > 0) {
+    data.forces_by_motion.conservativeResize(Eigen::NoChange, before + n);
+    data.forces_by_motion.rightCols(n).setZero();
+  }
+  data.motion_inverse = inverse_of_motions(data, weight);
+  set_reduced(data, weight, std::move(A), trace);
+}
+
+Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  return data.motion_inverse * (weighted.transpose() * displacements);
+}
+
+std::optional<OwnForces> own_forces_in(const LinearData& data) {
+  const Eigen::MatrixXd& E = data.forces_by_motion;
+  if (E.size() == 0) return std::nullopt;
+  const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * data.motions;
+  const Eigen::MatrixXd gain = E * data.motion_inverse;
+  return OwnForces{
+      .left = Eigen::MatrixXd::Identity(E.rows(), E.rows()) - gain * data.response->pull_back(weighted).transpose(),
+      .found_nN = gain * (weighted.transpose() * data.displacement_um),
+      .covariance = gain * E.transpose()};
+}
+
+Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements) {
+  if (data.motions.cols() > 0) displacements -= data.motions * motion_in(data, displacements);
+  return displacements;
+}
+
+Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+  return less_motion(data, data.displacement_um - data.response->displace(forces_nN));
+}
+
+void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
+  data.bead_weight = bead_weight;
+  data.reduced.compliance.reset();  // not two of them in memory
+  const Eigen::VectorXd weight = squared_weights(data);
+  data.motion_inverse = inverse_of_motions(data, weight);
+  Eigen::MatrixXd A = data.response->upper_gram(weight);
+  const double trace = A.diagonal().sum();
+  take_off(data, weight, data.motions, data.motion_inverse, A);
+  set_reduced(data, weight, std::move(A), trace);
+}
+
+Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {
+  if (!data.is_upper) return numerics::product(*data.compliance, forces_nN, threads);
+  Eigen::MatrixXd displaced = forces_nN;
+  numerics::multiply_upper(*data.compliance, displaced, threads);
+  return displaced;
+}
+
+Eigen::VectorXd squared_weights(const LinearData& data) {
+  Eigen::VectorXd weight = data.weight_per_um.cwiseAbs2();
+  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) weight.segment<2>(2 * b) *= data.bead_weight[b];
+  return weight;
+}
+
+Eigen::VectorXd free_forces_nN(const ReducedData& reduced) {
+  Eigen::MatrixXd forces = reduced.target;
+  numerics::solve_upper(*reduced.compliance, forces);
+  return forces;
+}
+
+Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X) {
+  numerics::solve_upper_transposed(*reduced.compliance, X);
+  numerics::solve_upper(*reduced.compliance, X);
+  return X;
+}
+
+BeadAnswers::BeadAnswers(const LinearData& data, Eigen::MatrixXd by_force)
+    : data_(data), by_force_(std::move(by_force)) {
+  MBTFM_ASSERT(by_force_.cols() == data.response->cols());
+}
+
+void BeadAnswers::for_each_block(const std::function<void(Eigen::Index, const Eigen::MatrixXd&)>& body) const {
+  constexpr Eigen::Index kNumbers = 16'000'000;  // of a block: 128 MB
+  const Eigen::Index at_once = std::max<Eigen::Index>(1, kNumbers / std::max<Eigen::Index>(1, data_.response->rows()));
+  const Eigen::VectorXd weight = squared_weights(data_);
+  for (Eigen::Index first = 0; first < n_rows(); first += at_once) {
+    const Eigen::Index count = std::min(at_once, n_rows() - first);
+    const Eigen::MatrixXd forces = by_force_.middleRows(first, count).transpose();
+    body(first, less_motion(data_, data_.response->displace(forces)).transpose() * weight.asDiagonal());
+  }
+}
+
+Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+  return data.weight_per_um.cwiseProduct(residual_um(data, forces_nN));
+}
+
+double total_nN(const Eigen::VectorXd& forces_nN) {
+  double sum = 0;
+  for (Eigen::Index row = 0; row < forces_nN.size(); row += 2) sum += forces_nN.segment<2>(row).norm();
+  return sum;
+}
+
+double floor_squared_of(const LinearData& data, const Eigen::VectorXd& displacement_um) {
+  return explained(data, squared_weights(data), *data.reduced.compliance, displacement_um).floor_squared;
+}
+
+double noise_variance(const LinearData& data) {
+  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - data.reduced.n_felt));
+  return std::max(data.has_errors ? 1.0 : 1e-300, data.reduced.floor_squared / n_free);
+}
+
+double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+  const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
+  const Eigen::VectorXd model = data.response->displace(forces_nN),
+                        residual = less_motion(data, data.displacement_um - model);
+  const double scale = is_used.cwiseProduct(model + residual).norm();  // u less the motion
+  const double misfit = is_used.cwiseProduct(residual).norm();
+  return scale > 0 ? misfit / scale : misfit;
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,124 @@
+/// The bead displacements as the fit sees them: linear in the adhesion forces, so all beads reduce to one small matrix.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/geometry.h"
+#include "substrate/response.h"
+
+namespace mbtfm::tensions {
+
+/// |W (G R − u)|² = |C R − y|² + floor² for every force vector R, where motions are allowed for at their best (and what
+/// is expected of their sizes counts: aᵀΛa is part of the left side).
+/// White noise of W u is white in y.
+struct ReducedData {
+  std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
+  Eigen::VectorXd target;                             ///< y
+  double floor_squared = 0;                           ///< what no force can explain
+  Eigen::Index n_components = 0;                      ///< of the beads' displacements that it stands for
+  Eigen::Index n_felt = 0;                            ///< directions of the forces that any bead feels
+  bool is_upper = false;                              ///< C is an upper triangle
+};
+/// C F
+Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads = 1);
+
+struct LinearData {
+  std::vector<Vec2> position_um;       ///< of the beads
+  substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
+  Eigen::VectorXd displacement_um;     ///< u, in the same order
+  Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
+  Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
+  Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
+  Eigen::VectorXd motion_precision;    ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its
+                                       ///< size, in units of the noise's; 0 where nothing is known of it; empty: all 0
+  Eigen::MatrixXd motion_inverse;  ///< (MᵀW²M + Λ)⁻¹, by rank: beads in one place tell no turn from a shift. The
+                                   ///< covariance of the motions' sizes by noise of variance 1
+  Eigen::MatrixXd forces_by_motion;  ///< E: by motion, the forces of adhesions that it comes of, beside those found as
+                                     ///< forces; 2·adhesions × motions; empty: none
+  Eigen::Index n_used = 0;           ///< components of the beads that are used, less one for each motion of precision 0
+  bool has_errors = false;           ///< the beads state their sigma; without, W is 1 and the misfit tells the error
+  int threads = 1;                   ///< to reduce it with
+  ReducedData reduced;               ///< of all that, bead_weight included
+};
+
+/// @param beads  all with sigma_um > 0, or weights are the same for all
+/// @param response  2·beads × 2·adhesions
+/// @param is_used  by bead; empty: all
+LinearData reduce(const DisplacementField& beads, substrate::SharedResponse response,
+                  const std::vector<bool>& is_used = {}, int threads = 1, Eigen::MatrixXd motions = {});
+/// The same with the matrix of the response.
+LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
+                  const std::vector<bool>& is_used = {});
+
+/// Let the beads move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
+/// @param precision  by motion, see LinearData::motion_precision
+void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
+/// Let them move by any sum of these too, of precision 0: quicker.
+void add_motions(LinearData& data, const Eigen::MatrixXd& motions);
+/// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
+/// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
+Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
+/// Forces that adhesions have of their own, E a beside R: the a that explain best what R leaves. Linear in R, so
+/// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
+struct OwnForces {
+  Eigen::MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G
+  Eigen::VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u
+  Eigen::MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ
+};
+/// None where no motion comes of them.
+std::optional<OwnForces> own_forces_in(const LinearData& data);
+
+/// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M + Λ)⁻¹ MᵀW². With Λ, W²P is the inverse of the
+/// covariance W⁻² + M Λ⁻¹ Mᵀ of noise and motions together.
+Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
+/// What forces and motions leave: P (u − G R), um.
+Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);
+
+/// Reduce again with these weights by bead.
+void reweight(LinearData& data, const Eigen::VectorXd& bead_weight);
+
+/// W² and the weights by bead, by component.
+Eigen::VectorXd squared_weights(const LinearData& data);
+
+/// Forces independent of each other that explain the beads best: C⁻¹ y.
+/// @param reduced  of reduce(), as for the next one
+Eigen::VectorXd free_forces_nN(const ReducedData& reduced);
+/// (CᵀC)⁻¹ X
+Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X);
+
+/// Answers to the displacements of the beads, M Gᵀ W², some rows at a time: a whole is too large for large scenes.
+class BeadAnswers {
+ public:
+  /// @param by_force  M: any number × 2·adhesions
+  BeadAnswers(const LinearData& data, Eigen::MatrixXd by_force);
+  Eigen::Index n_rows() const { return by_force_.rows(); }
+  /// Calls body(first, block) with rows first, first + 1, … of the answers: some × 2·beads.
+  void for_each_block(const std::function<void(Eigen::Index first, const Eigen::MatrixXd& block)>& body) const;
+
+ private:
+  const LinearData& data_;
+  Eigen::MatrixXd by_force_;
+};
+
+/// Sum of the magnitudes of forces (fx, fy by adhesion).
+double total_nN(const Eigen::VectorXd& forces_nN);
+
+/// residual_um, times W
+Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
+
+/// What no force explains of these displacements (um, 2·beads) in place of the data's: reduced.floor_squared of them.
+double floor_squared_of(const LinearData& data, const Eigen::VectorXd& displacement_um);
+
+/// Variance of a weighted component that is the beads' alone: what even forces independent of each other leave. Not
+/// below the stated errors'.
+double noise_variance(const LinearData& data);
+
+/// |residual| / |u less the common motion| over the beads that are used
+double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,219 @@
+#include "mbtfm/tensions/missing_adhesions.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/parallel.h"
+#include "substrate/greens/half_space.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+using Block = Eigen::Matrix<double, 2, 2>;
+
+constexpr double kStep_um = 1;    // of the places tried: adhesions are as long
+constexpr double kDisc_um = 0.5;  // radius of an ordinary adhesion
+constexpr double kReach_um = 6;   // of the beads asked: beyond, a force's field is that of many others
+constexpr double kApart_um = 1;   // from an adhesion's rim: nearer, the adhesion's own force explains it
+
+/// Displacement around a disc that is pulled, by distance: along the pull's component towards the bead, and across.
+class DiscField {
+ public:
+  explicit DiscField(const Gel& gel) {
+    const greens::HalfSpaceEllipse disc(
+        gel, {.centre_um = {}, .semi_major_um = kDisc_um, .semi_minor_um = kDisc_um, .angle_rad = 0});
+    for (std::size_t i = 0; i < table_.size(); ++i) {
+      const greens::Sym2 g = disc.compliance_um_per_nN({kReach_um * static_cast<double>(i) / kLast, 0});
+      table_[i] = {g.xx, g.yy};
+    }
+  }
+  Block at(Vec2 offset_um) const {
+    const double r = std::sqrt(dot(offset_um, offset_um)), place = std::min(r / kReach_um * kLast, kLast - 1e-9);
+    const auto i = static_cast<std::size_t>(place);
+    const double share = place - static_cast<double>(i);
+    const Vec2 along_across = (1 - share) * table_[i] + share * table_[i + 1];
+    if (r <= 0) return along_across.x * Block::Identity();
+    const Eigen::Vector2d e(offset_um.x / r, offset_um.y / r);
+    return along_across.y * Block::Identity() + (along_across.x - along_across.y) * e * e.transpose();
+  }
+
+ private:
+  static constexpr double kLast = 240;  // 25 nm apart
+  std::array<Vec2, 241> table_;
+};
+
+/// Beads by squares as wide as the reach.
+class BeadSquares {
+ public:
+  explicit BeadSquares(const LinearData& data) : data_(data) {
+    for (std::size_t b = 0; b < data.position_um.size(); ++b) {
+      if (data.weight_per_um[2 * static_cast<Eigen::Index>(b)] <= 0) continue;
+      squares_[square_of(data.position_um[b])].push_back(static_cast<Eigen::Index>(b));
+    }
+  }
+  std::vector<Eigen::Index> near(Vec2 place_um) const {
+    std::vector<Eigen::Index> found;
+    const auto [x, y] = square_of(place_um);
+    for (int j = y - 1; j <= y + 1; ++j) {
+      for (int i = x - 1; i <= x + 1; ++i) {
+        const auto square = squares_.find({i, j});
+        if (square == squares_.end()) continue;
+        for (const Eigen::Index b : square->second) {
+          const Vec2 d = data_.position_um[static_cast<std::size_t>(b)] - place_um;
+          if (dot(d, d) < kReach_um * kReach_um) found.push_back(b);
+        }
+      }
+    }
+    return found;
+  }
+
+ private:
+  static std::pair<int, int> square_of(Vec2 p) {
+    return {static_cast<int>(std::floor(p.x / kReach_um)), static_cast<int>(std::floor(p.y / kReach_um))};
+  }
+  const LinearData& data_;
+  std::map<std::pair<int, int>, std::vector<Eigen::Index>> squares_;
+};
+
+/// A place, asked.
+struct Question {
+  Vec2 place_um;
+  std::vector<Eigen::Index> beads;
+  std::vector<Block> fields;  ///< by bead, less their mean
+  Eigen::Vector2d score = Eigen::Vector2d::Zero();
+  Block square = Block::Zero();  ///< gᵀ W² g
+  double gain = 0;               ///< of noise alone
+};
+
+Question ask(Vec2 place_um, const BeadSquares& beads, const DiscField& disc, const LinearData& data,
+             const Eigen::VectorXd& weight, const Eigen::VectorXd& residual, double variance) {
+  Question q{.place_um = place_um, .beads = beads.near(place_um), .fields = {}};
+  constexpr std::size_t kFewest = 10;  // beads for two numbers and a mean
+  if (q.beads.size() < kFewest) return q;
+  Block mean = Block::Zero();
+  double all = 0;
+  for (const Eigen::Index b : q.beads) {
+    q.fields.push_back(disc.at(data.position_um[static_cast<std::size_t>(b)] - place_um));
+    mean += weight[2 * b] * q.fields.back();
+    all += weight[2 * b];
+  }
+  for (std::size_t k = 0; k < q.beads.size(); ++k) {
+    const Eigen::Index row = 2 * q.beads[k];
+    q.fields[k] -= mean / all;
+    q.score += weight[row] * q.fields[k] * residual.segment<2>(row);
+    q.square += weight[row] * q.fields[k] * q.fields[k];
+  }
+  q.gain = q.score.dot(q.square.ldlt().solve(q.score)) / variance;
+  return q;
+}
+
+/// The best place within a step of this one.
+template <class Ask>
+Question refined(Question best, const Ask& ask_at) {
+  constexpr int kFiner = 4;
+  const Vec2 middle = best.place_um;
+  for (int j = -kFiner; j <= kFiner; ++j) {
+    for (int i = -kFiner; i <= kFiner; ++i) {
+      Question q = ask_at(middle + kStep_um / kFiner * Vec2{double(i), double(j)});
+      if (q.gain > best.gain) best = std::move(q);
+    }
+  }
+  return best;
+}
+
+bool is_free(const Cell& cell, Vec2 place_um) {
+  if (!contains(cell.outline_um, place_um)) return false;
+  for (const Polygon& hole : cell.holes_um) {
+    if (contains(hole, place_um)) return false;
+  }
+  return std::ranges::none_of(cell.adhesions, [&](const Adhesion& a) {
+    const Vec2 d = a.position_um - place_um;
+    return dot(d, d) < std::pow(a.major_axis_um / 2 + kApart_um, 2);
+  });
+}
+
+std::vector<Vec2> free_places(const Cell& cell) {
+  constexpr double kInfinite = std::numeric_limits<double>::infinity();
+  Vec2 low{kInfinite, kInfinite}, high{-kInfinite, -kInfinite};
+  for (const Vec2 p : cell.outline_um) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  std::vector<Vec2> places;
+  for (double y = low.y; y <= high.y; y += kStep_um) {
+    for (double x = low.x; x <= high.x; x += kStep_um) {
+      if (is_free(cell, {x, y})) places.push_back({x, y});
+    }
+  }
+  return places;
+}
+
+/// With what noise and errors of the model's forces make of the score, the tensions following.
+MissingAdhesion answered(const Question& q, const EnsembleFit& fit, const LinearData& data,
+                         const Eigen::VectorXd& weight) {
+  Eigen::MatrixXd weighted = Eigen::MatrixXd::Zero(data.displacement_um.size(), 2);
+  for (std::size_t k = 0; k < q.beads.size(); ++k) {
+    weighted.middleRows<2>(2 * q.beads[k]) = weight[2 * q.beads[k]] * q.fields[k];
+  }
+  const Eigen::MatrixXd by_force = data.response->pull_back(weighted).transpose();
+  const Eigen::MatrixXd covariance = covariance_of_scores(fit, q.square, by_force);
+  const MeshFit& mesh = fit.meshes.front();
+  const Eigen::MatrixXd by_tension = by_force * mesh.force_derivatives;
+  const Eigen::MatrixXd information =
+      q.square - by_tension * mesh.noise_covariance_nN2 * by_tension.transpose() / fit.variance;
+  const Eigen::Vector2d force = information.ldlt().solve(q.score);
+  return {.position_um = q.place_um,
+          .force_nN = {force[0], force[1]},
+          .chi_squared_gain = q.score.dot(covariance.ldlt().solve(q.score))};
+}
+
+}  // namespace
+
+std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
+                                               const Gel& gel, int threads) {
+  const std::vector<Vec2> places = free_places(cell);
+  const BeadSquares beads(data);
+  const DiscField disc(gel);
+  const Eigen::VectorXd weight = squared_weights(data), residual = residual_um(data, fit.forces_nN);
+  const auto ask_at = [&](Vec2 place_um) { return ask(place_um, beads, disc, data, weight, residual, fit.variance); };
+  std::vector<Question> asked(places.size());
+  numerics::parallel_for(static_cast<int>(places.size()), threads, [&](int i) {
+    asked[static_cast<std::size_t>(i)] = ask_at(places[static_cast<std::size_t>(i)]);
+    if (asked[static_cast<std::size_t>(i)].gain < 1) asked[static_cast<std::size_t>(i)].fields = {};
+  });
+  // chi squared of two numbers exceeds x by chance exp(-x/2)
+  const double limit = 2 * std::log(std::max<double>(1, static_cast<double>(places.size())) / 0.05);
+  std::erase_if(asked, [&](const Question& q) { return q.gain < limit; });
+  std::ranges::sort(asked, std::greater(), &Question::gain);
+  std::vector<MissingAdhesion> found;
+  std::vector<Vec2> tried;
+  constexpr std::size_t kMost = 50;  // where so many fail, the model is wrong as a whole
+  for (const Question& q : asked) {
+    if (tried.size() >= kMost) break;
+    if (std::ranges::any_of(tried, [&](Vec2 p) { return norm(p - q.place_um) < 0.5 * kReach_um; })) continue;
+    tried.push_back(q.place_um);
+    if (const MissingAdhesion answer = answered(refined(q, ask_at), fit, data, weight);
+        answer.chi_squared_gain >= limit) {
+      found.push_back(answer);
+    }
+  }
+  std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
+  return found;
+}
+
+void write_missing_adhesions(const Path& file, const std::vector<MissingAdhesion>& adhesions) {
+  files::CsvText csv({"x_um", "y_um", "fx_nN", "fy_nN", "chi_squared_gain"});
+  for (const MissingAdhesion& a : adhesions) {
+    csv.add(a.position_um.x).add(a.position_um.y).add(a.force_nN.x).add(a.force_nN.y).add(a.chi_squared_gain).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,247 @@
+#include "mbtfm/tensions/model_checks.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <boost/math/distributions/normal.hpp>
+#include <cmath>
+#include <numeric>
+
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/dense.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+constexpr double kTradeOff = -0.95;  // see fibres_not_told_apart
+
+ModelScore score(const std::string& name, int n_parameters, double misfit, double variance, const LinearData& data) {
+  const double chi_squared = misfit / variance;
+  return {.name = name,
+          .n_parameters = n_parameters,
+          .chi_squared = chi_squared,
+          .relative_l2 = 0,
+          .aic = chi_squared + 2.0 * n_parameters,
+          .bic = chi_squared + n_parameters * std::log(static_cast<double>(data.n_used)),
+          .forces_nN = {}};
+}
+
+/// Forces of the one tension of all cables that fits best: Gauss–Newton in one variable. Zero where the beads want the
+/// cables to push: less tension is better then down to none, as forces are proportional to a small one.
+Eigen::VectorXd best_uniform_nN(const TensionProblem& problem) {
+  const Eigen::VectorXd ones = Eigen::VectorXd::Ones(problem.n_tensions());
+  Trial trial = scaled_to_data(problem, ones);
+  constexpr int kMaxSteps = 20;  // forces are all but proportional to the tension: three do
+  for (int i = 0; i < kMaxSteps; ++i) {
+    const double tension = trial.tensions_nN[0];
+    const Eigen::VectorXd slope = problem.jacobian(trial) * ones;
+    const double step = -slope.dot(trial.residual) / std::max(slope.squaredNorm(), 1e-300);
+    const bool is_pushed = tension + step <= 0 && 0.5 * problem.data().target.squaredNorm() <= trial.objective;
+    if (is_pushed) return Eigen::VectorXd::Zero(trial.forces_nN.size());
+    const double next = std::max(0.1 * tension, tension + step);
+    Trial moved = problem.evaluate(next * ones, &trial);
+    if (moved.objective >= trial.objective) break;
+    trial = std::move(moved);
+    if (std::abs(next - tension) < 1e-6 * tension) break;
+  }
+  return trial.forces_nN;
+}
+
+}  // namespace
+
+Eigen::MatrixXd correlation_of(const EnsembleFit& fit) {
+  Eigen::VectorXd scale = fit.covariance_nN2.diagonal().cwiseSqrt();
+  for (double& s : scale) s = s > 0 ? 1 / s : 0;
+  return scale.asDiagonal() * fit.covariance_nN2 * scale.asDiagonal();
+}
+
+std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit) {
+  const Eigen::MatrixXd correlation = correlation_of(fit);
+  const int n = static_cast<int>(correlation.rows());
+  std::vector<bool> is_placed(static_cast<std::size_t>(n), false);
+  std::vector<FibreGroup> groups;
+  for (int seed = 1; seed < n; ++seed) {
+    if (is_placed[static_cast<std::size_t>(seed)]) continue;
+    FibreGroup group{.indices = {seed}, .sum_nN = {}};
+    for (std::size_t next = 0; next < group.indices.size(); ++next) {
+      for (int j = seed + 1; j < n; ++j) {
+        const bool is_member = std::find(group.indices.begin(), group.indices.end(), j) != group.indices.end();
+        if (!is_member && correlation(group.indices[next], j) < kTradeOff) group.indices.push_back(j);
+      }
+    }
+    if (group.indices.size() < 2) continue;
+    std::sort(group.indices.begin(), group.indices.end());
+    for (const int i : group.indices) is_placed[static_cast<std::size_t>(i)] = true;
+    group.sum_nN = sum_of(fit, group.indices);
+    groups.push_back(std::move(group));
+  }
+  return groups;
+}
+
+Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
+  // With the reduced data y = C⁻ᵀ Gᵀ W² u the tensions change by K (C D)ᵀ dy = K (C D)ᵀ C (CᵀC)⁻¹ Gᵀ W² du, D = dR/dt;
+  // a component's own standard error is 1/w.
+  const MeshFit& mesh = fit.meshes.front();
+  const BeadAnswers answers(data, solve_normal(data.reduced, mesh.by_force.transpose()).transpose());
+  const Eigen::VectorXd own_error = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1 / w : 0; });
+  const Eigen::Index n_beads = data.bead_weight.size();
+  Influence influence{.variance = Eigen::VectorXd(answers.n_rows()),
+                      .n_informing_beads = Eigen::VectorXd(answers.n_rows()),
+                      .most_informed = std::vector<int>(static_cast<std::size_t>(n_beads), fit.fibre_ids.front())};
+  Eigen::VectorXd largest = Eigen::VectorXd::Zero(n_beads);
+  answers.for_each_block([&](Eigen::Index first, const Eigen::MatrixXd& block) {
+    for (Eigen::Index k = 0; k < block.rows(); ++k) {
+      const Eigen::Index i = first + k;
+      const double standard_error = std::max(std::sqrt(mesh.covariance_nN2(i, i)), 1e-300);
+      const Eigen::VectorXd row = block.row(k).transpose().cwiseProduct(own_error) / standard_error;
+      Eigen::VectorXd by_bead(n_beads);
+      for (Eigen::Index b = 0; b < n_beads; ++b) {
+        by_bead[b] = row.segment<2>(2 * b).squaredNorm();
+        if (by_bead[b] <= largest[b]) continue;
+        largest[b] = by_bead[b];
+        influence.most_informed[static_cast<std::size_t>(b)] = fit.fibre_ids[static_cast<std::size_t>(i)];
+      }
+      const double sum_of_squares = by_bead.squaredNorm();
+      influence.variance[i] = by_bead.sum();
+      influence.n_informing_beads[i] = sum_of_squares > 0 ? std::pow(by_bead.sum(), 2) / sum_of_squares : 0;
+    }
+  });
+  return influence;
+}
+
+std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
+                                       const cables::CableNetwork& first_network,
+                                       const std::vector<int>& adhesion_ids) {
+  const ReducedData& reduced = data.reduced;
+  const double variance = noise_variance(data);
+  const auto misfit = [&](const Eigen::VectorXd& forces) {
+    return (*reduced.compliance * forces - reduced.target).squaredNorm() + reduced.floor_squared;
+  };
+  const Eigen::VectorXd uniform = best_uniform_nN(TensionProblem(first_network, reduced, adhesion_ids));
+  std::vector<ModelScore> models = {
+      score("no-fibres", 1, misfit(uniform), variance, data),
+      score("full", static_cast<int>(fit.fibre_ids.size()), misfit(fit.forces_nN), variance, data),
+      score("adhesion-forces", static_cast<int>(reduced.n_felt), reduced.floor_squared, variance, data)};
+  models[0].forces_nN = uniform;
+  models[1].forces_nN = fit.forces_nN;
+  models[2].forces_nN = free_forces_nN(reduced);
+  for (ModelScore& model : models) model.relative_l2 = relative_l2(data, model.forces_nN);
+  return models;
+}
+
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence) {
+  std::vector<FibreLeftOut> fibres;
+  for (Eigen::Index i = 1; i < static_cast<Eigen::Index>(fit.fibre_ids.size()); ++i) {
+    FibreLeftOut left{.fibre_id = fit.fibre_ids[static_cast<std::size_t>(i)],
+                      .chi_squared_rise = 0,
+                      .aic_rise = 0,
+                      .n_informing_beads = 0};
+    for (const MeshFit& mesh : fit.meshes) {
+      // Where t_i is held to t_0, 2 Phi rises by (t_i − t_0)² / Var(t_i − t_0), Var in units of the noise.
+      const Eigen::MatrixXd& c = mesh.covariance_nN2;
+      const double difference = mesh.local.tensions_nN[i] - mesh.local.tensions_nN[0];
+      const double variance = c(i, i) + c(0, 0) - 2 * c(i, 0);
+      if (difference <= 0 || variance <= 0) continue;  // no stronger than the network: it costs nothing to leave it out
+      left.chi_squared_rise += difference * difference / variance / static_cast<double>(fit.meshes.size());
+    }
+    left.aic_rise = left.chi_squared_rise - 2;
+    left.n_informing_beads = influence.n_informing_beads[i];
+    fibres.push_back(left);
+  }
+  return fibres;
+}
+
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions, int threads) {
+  const MeshFit& mesh = fit.meshes.front();
+  const ReducedData data = fit.model_error ? whitened(fit.data, *fit.model_error, threads) : fit.data;
+  const Eigen::MatrixXd& C = *data.compliance;
+  const Eigen::VectorXd residual = data.target - C * fit.forces_nN;
+  // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
+  const Eigen::MatrixXd CJ = numerics::product(C, mesh.force_derivatives, threads);
+  const Eigen::MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
+  Eigen::MatrixXd H = CJ.transpose() * CJ;
+  H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
+  const Eigen::LLT<Eigen::MatrixXd> solver(H);
+  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(C.cols(), C.cols());
+  numerics::add_upper_gram(C, K, threads);
+  numerics::add_upper_gram(solver.matrixL().solve(cross_terms), K, threads, -1);
+  numerics::mirror_upper(K);
+  const Eigen::VectorXd q =
+      C.transpose() * residual - cross_terms.transpose() * solver.solve(CJ.transpose() * residual);
+
+  const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
+  if (n_pairs < 1) return {};
+  const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
+  std::vector<MissingFibre> found;
+  for (std::size_t a = 0; a < adhesions.size(); ++a) {
+    for (std::size_t b = a + 1; b < adhesions.size(); ++b) {
+      const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
+      const Vec2 unit = (1 / norm(chord)) * chord;
+      const Eigen::Vector2d e(unit.x, unit.y);  // the fibre pulls a towards b, and b towards a
+      const auto i = 2 * static_cast<Eigen::Index>(a), j = 2 * static_cast<Eigen::Index>(b);
+      const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
+      const double curvature =
+          e.dot((K.block<2, 2>(i, i) + K.block<2, 2>(j, j) - K.block<2, 2>(i, j) - K.block<2, 2>(j, i)) * e);
+      if (slope <= 0 || curvature <= 0) continue;
+      const double gain = slope * slope / curvature / fit.variance;
+      if (gain < limit * limit) continue;
+      found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
+                       .end_adhesion_id = adhesions[b].adhesion_id,
+                       .tension_nN = slope / curvature,
+                       .chi_squared_gain = gain});
+    }
+  }
+  std::stable_sort(found.begin(), found.end(), [](const MissingFibre& x, const MissingFibre& y) {
+    return x.chi_squared_gain > y.chi_squared_gain;
+  });
+  std::vector<MissingFibre> best;
+  for (const MissingFibre& f : found) {
+    const bool is_taken = std::any_of(best.begin(), best.end(), [&](const MissingFibre& other) {
+      return f.start_adhesion_id == other.start_adhesion_id || f.start_adhesion_id == other.end_adhesion_id ||
+             f.end_adhesion_id == other.start_adhesion_id || f.end_adhesion_id == other.end_adhesion_id;
+    });
+    if (!is_taken) best.push_back(f);
+  }
+  return best;
+}
+
+void write_correlations(const Path& file, const EnsembleFit& fit) {
+  const Eigen::MatrixXd correlation = correlation_of(fit);
+  files::CsvText csv({"fibre_id", "other_fibre_id", "correlation"});
+  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
+    for (std::size_t j = i + 1; j < fit.fibre_ids.size(); ++j) {
+      csv.add(fit.fibre_ids[i]).add(fit.fibre_ids[j]);
+      csv.add(correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))).end_row();
+    }
+  }
+  files::write_text(file, csv.str());
+}
+
+void write_models(const Path& file, const std::vector<ModelScore>& models) {
+  files::CsvText csv({"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"});
+  for (const ModelScore& m : models) {
+    csv.add(m.name).add(m.n_parameters).add(m.chi_squared).add(m.relative_l2).add(m.aic).add(m.bic).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+void write_fibres_left_out(const Path& file, const std::vector<FibreLeftOut>& fibres) {
+  files::CsvText csv({"fibre_id", "chi_squared_rise", "aic_rise", "supported", "n_informing_beads"});
+  for (const FibreLeftOut& f : fibres) {
+    csv.add(f.fibre_id).add(f.chi_squared_rise).add(f.aic_rise).add(f.aic_rise > 0 ? "true" : "false");
+    csv.add(f.n_informing_beads).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+void write_missing_fibres(const Path& file, const std::vector<MissingFibre>& fibres) {
+  files::CsvText csv({"start_adhesion_id", "end_adhesion_id", "tension_nN", "chi_squared_gain", "sigma_nN"});
+  for (const MissingFibre& f : fibres) {
+    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.tension_nN).add(f.chi_squared_gain);
+    csv.add(f.tension_nN / std::sqrt(f.chi_squared_gain)).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+}  // namespace mbtfm::tensions

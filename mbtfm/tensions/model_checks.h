@@ -1,0 +1,71 @@
+/// Does the scene call for this model? Compared with simpler and freer ones, with each fibre left out, and with one
+/// more.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "mbtfm/tensions/ensemble.h"
+#include "pipeline/files/csv_files.h"
+
+namespace mbtfm::tensions {
+
+/// Fibres whose tensions trade against each other without the beads noticing, while their sum is well determined.
+struct FibreGroup {
+  std::vector<int> indices;  ///< into EnsembleFit::fibre_ids
+  Estimate sum_nN;
+};
+/// Fibres joined by correlations beyond −0.95: the partner then takes nine tenths of what the beads tell of each.
+std::vector<FibreGroup> fibres_not_told_apart(const EnsembleFit& fit);
+/// Of the tensions, from the beads' noise.
+Eigen::MatrixXd correlation_of(const EnsembleFit& fit);
+
+/// A model and what speaks for it. chi² and the criteria are in units of the noise: the beads' stated errors, or larger
+/// ones where even independent adhesion forces leave more than these (Burnham & Anderson 2002, 2.5: QAIC).
+struct ModelScore {
+  std::string name;
+  int n_parameters = 0;
+  double chi_squared = 0, relative_l2 = 0;
+  double aic = 0;             ///< chi² + 2 k
+  double bic = 0;             ///< chi² + k ln n
+  Eigen::VectorXd forces_nN;  ///< by adhesion: fx, fy
+};
+/// no-fibres: a network of one tension; full: ours; adhesion-forces: every force for itself (thesis' null model).
+std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
+                                       const cables::CableNetwork& first_network, const std::vector<int>& adhesion_ids);
+
+/// What the beads tell of each tension. Influence: by how many of its standard errors a tension changes (on the first
+/// mesh) where a bead's displacement component changes by one of its own, as the fit weighs beads and meshes.
+struct Influence {
+  Eigen::VectorXd variance;           ///< by tension: sum of the squared influence over all components
+  Eigen::VectorXd n_informing_beads;  ///< by tension, over which it is spread: (sum q)² / sum q², q by bead
+  std::vector<int> most_informed;     ///< by bead: the fibre whose tension it moves most; 0: the network
+};
+Influence influence_of(const EnsembleFit& fit, const LinearData& data);
+
+/// What becomes of the fit where a fibre is taken for plain network, the other tensions following.
+struct FibreLeftOut {
+  int fibre_id = 0;
+  double chi_squared_rise = 0;   ///< from the local misfit, mean over the meshes, in units of the noise
+  double aic_rise = 0;           ///< less 2 for the parameter saved: positive where the beads call for the fibre
+  double n_informing_beads = 0;  ///< see Influence
+};
+std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
+
+/// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
+struct MissingFibre {
+  int start_adhesion_id = 0, end_adhesion_id = 0;
+  double tension_nN = 0;
+  double chi_squared_gain = 0;  ///< the other tensions following, in units of the noise
+};
+/// The best ones, no adhesion twice. A gain is kept where chance would reach it in one cell of twenty, all pairs tried
+/// (Bonferroni).
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
+                                         int threads = 1);
+
+void write_correlations(const Path& file, const EnsembleFit& fit);
+void write_models(const Path& file, const std::vector<ModelScore>& models);
+void write_fibres_left_out(const Path& file, const std::vector<FibreLeftOut>& fibres);
+void write_missing_fibres(const Path& file, const std::vector<MissingFibre>& fibres);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,60 @@
+/// The error of the model itself. The cell's own network is one of many that its outline, adhesions and fibres allow,
+/// and no mesh is it. Each adhesion's force therefore has an error e beside the beads' noise n,
+///
+///   y = C (R(t) + e) + n,   Var e_a = phi L_a,   L_a = |N_a| + 0.05 |R_a - N_a|,   Var n = s²:
+///
+/// in proportion to N_a, what the links of the actin network bring to the adhesion, as of a load that many links share
+/// at random, and to a twentieth of what its fibres bring, whose ends spread over it. (Measured on networks of four
+/// formulations, `other_network forces`: phi is the same within a half from loads of 0.03 to 2 nN.) It is not used to
+/// weigh the data (what meshes tell of it adds more noise than it takes away: docs/validation.md) but makes the
+/// tensions' error bars.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "mbtfm/tensions/linear_data.h"
+
+namespace mbtfm::tensions {
+
+struct ModelError {
+  double phi_nN = 0;           ///< as the misfit calls for, but not below
+  double least_phi_nN = 0;     ///< that of one further mesh about the mean of these
+  double measured_phi_nN = 0;  ///< as the misfit alone has it, of the cell's network and the mean's together;
+                               ///< the mean's where there are too few adhesions to tell it
+  double phi_of_mean_nN = 0;   ///< what the meshes tell of their mean's own
+  Eigen::VectorXd loads_nN;    ///< L_a, by component of the forces
+  /// Variance of a single adhesion's error over phi L_a. What one adhesion lacks its neighbours have, as a rule: beads
+  /// and tensions see less of that than of errors independent of each other. So do the meshes, and tell by how much.
+  double of_single = 1;
+  Eigen::VectorXd force_variance_nN2;  ///< phi L_a, by component of the forces
+  double noise_variance = 0;           ///< s²: 1 where the beads' errors are as stated
+};
+
+/// Of the variance of an adhesion's error: from cell to cell its logarithm scatters about the law's by 1.0 to 1.3, as
+/// does that of a variance with two degrees of freedom (sqrt(trigamma(1)) = 1.28).
+inline constexpr double kDegreesByAdhesion = 2;
+
+/// Forces that one mesh gives for the tensions common to all, and their derivatives.
+struct MeshForces {
+  Eigen::VectorXd forces_nN, network_part_nN;
+  Eigen::MatrixXd derivatives;
+};
+
+/// A rough network has larger adhesion forces than a smooth one of the same tensions: an error e across a force R makes
+/// it longer, on average by sqrt(R² + Var e) − R. What the cell's network has of this and the meshes' mean has not is
+/// lacking in the sum of the magnitudes.
+struct RoughnessOfTotal {
+  double lacking_nN = 0, sigma_nN = 0;
+};
+RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const ModelError& error);
+
+/// phi by moments: what the meshes' mean leaves of the data, the tensions following, is s² and C Var(e) Cᵀ together.
+/// @param meshes  at least two
+/// @param beads_variance  s²; a floor of (a thousandth of what beads move on average)² is put under it
+ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance);
+
+/// The data in coordinates in which both errors together have the variance s².
+ReducedData whitened(const ReducedData& data, const ModelError& error, int threads = 1);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,20 @@
+/// The noise of the bead displacements, from beads far from the cell (thesis 3.3).
+#pragma once
+
+#include <string>
+
+#include "mbtfm/tensions/linear_data.h"
+
+namespace mbtfm::tensions {
+
+struct NoiseLevel {
+  double sigma_um = 0;  ///< standard deviation of a component
+  std::string source;
+};
+
+/// From what the model leaves unexplained at beads further than `far_distance_um` outside the outline: 1.4826 × the
+/// median magnitude of a component, which outliers do not move. Where fewer than 30 beads are that far: of all beads.
+NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
+                       const Polygon& outline_um, double far_distance_um);
+
+}  // namespace mbtfm::tensions

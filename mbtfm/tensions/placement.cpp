@@ -1,0 +1,255 @@
+#include "mbtfm/tensions/placement.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "mbtfm/tensions/fit_results.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/effects.h"
+#include "substrate/greens/half_space.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+using substrate::Ellipse;
+
+constexpr double kDegree = 180 / std::numbers::pi;
+
+/// d/dx and d/dy of a displacement.
+struct Slopes {
+  Vec2 by_x, by_y;
+};
+
+/// Of Cerruti's point force u = k/r [(1 − nu) F + nu (e·F) e], k = (1 + nu)/(pi E).
+Slopes slopes_of_point(const Gel& gel, Vec2 offset_um, Vec2 F) {
+  const double r = std::sqrt(dot(offset_um, offset_um)), nu = gel.poisson_ratio;  // hypot is slow
+  const double scale = (1 + nu) / (std::numbers::pi * gel.youngs_modulus_kPa * r * r);
+  const Vec2 e = (1 / r) * offset_um;
+  const double along = dot(e, F);
+  const Vec2 fall = (1 - nu) * F + 3 * nu * along * e;
+  return {scale * (-e.x * fall + nu * F.x * e + Vec2{nu * along, 0}),
+          scale * (-e.y * fall + nu * F.y * e + Vec2{0, nu * along})};
+}
+
+/// Of the force spread over the ellipse, by differences of the exact field.
+Slopes slopes_of_ellipse(const greens::HalfSpaceEllipse& field, double step_um, Vec2 at, Vec2 F) {
+  const auto difference = [&](Vec2 h) {
+    const greens::Sym2 a = field.compliance_um_per_nN(at + h), b = field.compliance_um_per_nN(at - h);
+    const greens::Sym2 d = 1 / (2 * step_um) * greens::Sym2{a.xx - b.xx, a.xy - b.xy, a.yy - b.yy};
+    return Vec2{d.xx * F.x + d.xy * F.y, d.xy * F.x + d.yy * F.y};
+  };
+  return {difference({step_um, 0}), difference({0, step_um})};
+}
+
+constexpr double kPoint = 4;  // semi-axes: from there on the field is a point force's within (1/4)² / 2
+
+bool is_far(const Ellipse& ellipse, Vec2 offset) {
+  const double reach = kPoint * ellipse.semi_major_um;
+  return dot(offset, offset) > reach * reach;
+}
+
+Vec2 force_on(const Eigen::VectorXd& forces_nN, std::size_t ellipse) {
+  const auto row = 2 * static_cast<Eigen::Index>(ellipse);
+  return {forces_nN[row], forces_nN[row + 1]};
+}
+
+/// Shift x, y and turn with standard errors, of what the fit leaves of the beads, tensions and common motion following.
+struct Step {
+  Eigen::Vector3d value, sigma;
+};
+
+Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& derivatives,
+             const Eigen::MatrixXd& placement) {
+  const Eigen::VectorXd weight = squared_weights(data);
+  Eigen::MatrixXd B(data.displacement_um.size(), 3 + derivatives.cols());
+  B << placement, data.response->displace(derivatives);
+  for (Eigen::Index i = 0; i < derivatives.cols(); ++i) {
+    if (trial.tensions_nN[i] <= 0) B.col(3 + i).setZero();  // at its bound
+  }
+  B = less_motion(data, std::move(B));
+  const Eigen::MatrixXd weighted = weight.asDiagonal() * B;
+  const Eigen::MatrixXd inverse = (weighted.transpose() * B).completeOrthogonalDecomposition().pseudoInverse();
+  const Eigen::VectorXd found = inverse * (weighted.transpose() * residual_um(data, trial.forces_nN));
+  return {.value = found.head<3>(), .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
+}
+
+double mean_semi_minor_um(const Cell& cell) {
+  double sum = 0;
+  for (const Adhesion& a : cell.adhesions) sum += substrate::ellipse_of(a).semi_minor_um;
+  return sum / std::max<double>(1, static_cast<double>(cell.adhesions.size()));
+}
+
+std::string in_words(Vec2 shift_um, const Eigen::Vector3d& sigma) {
+  return "(" + brief(shift_um.x) + ", " + brief(shift_um.y) + ") +- (" + brief(sigma[0]) + ", " + brief(sigma[1]) +
+         ") um";
+}
+
+/// The placement, then a small step in the cell's frame.
+Placement moved(Placement placement, const Eigen::Vector3d& step) {
+  placement.shift_um += placement.turned({step[0], step[1]});
+  placement.turn_rad += step[2];
+  return placement;
+}
+
+Vec2 centre_of(const Cell& cell) {
+  Vec2 sum;
+  for (const Adhesion& a : cell.adhesions) sum += a.position_um;
+  return (1 / std::max<double>(1, static_cast<double>(cell.adhesions.size()))) * sum;
+}
+
+}  // namespace
+
+Vec2 Placement::turned(Vec2 v) const {
+  const double c = std::cos(turn_rad), s = std::sin(turn_rad);
+  return {c * v.x - s * v.y, s * v.x + c * v.y};
+}
+
+Vec2 Placement::of(Vec2 place_um) const { return centre_um + shift_um + turned(place_um - centre_um); }
+
+DisplacementField in_cell_frame(DisplacementField beads, const Placement& p) {
+  const Placement back{.centre_um = {}, .shift_um = {}, .turn_rad = -p.turn_rad};
+  for (Bead& bead : beads) {
+    bead.position_um = p.centre_um + back.turned(bead.position_um - p.centre_um - p.shift_um);
+    bead.displacement_um = back.turned(bead.displacement_um);
+  }
+  return beads;
+}
+
+DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementField& beads, const Placement& p) {
+  for (std::size_t i = 0; i < fitted.size(); ++i) {
+    fitted[i].position_um = beads[i].position_um;
+    fitted[i].displacement_um = p.turned(fitted[i].displacement_um);
+  }
+  return fitted;
+}
+
+Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
+                                  const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
+                                  const Eigen::VectorXd& model_um, Vec2 centre_um, int threads) {
+  constexpr double kStep = 0.05;  // of the semi-minor axis, over which differences are taken
+  std::vector<greens::HalfSpaceEllipse> fields;
+  for (const substrate::Ellipse& e : ellipses) fields.emplace_back(gel, e);
+  Eigen::MatrixXd motions(model_um.size(), 3);
+  numerics::parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
+    const Vec2 at = beads_um[static_cast<std::size_t>(b)];
+    Slopes sum;
+    for (std::size_t k = 0; k < ellipses.size(); ++k) {
+      const substrate::Ellipse& e = ellipses[k];
+      const Vec2 offset = at - e.centre_um;
+      const Vec2 F = force_on(forces_nN, k);
+      const Slopes one = is_far(e, offset) ? slopes_of_point(gel, offset, F)
+                                           : slopes_of_ellipse(fields[k], kStep * e.semi_minor_um, at, F);
+      sum.by_x += one.by_x;
+      sum.by_y += one.by_y;
+    }
+    // a cell that goes forth leaves the beads behind; a turn carries the displacement along
+    const Vec2 d = at - centre_um;
+    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const Vec2 turned = Vec2{-model_um[row + 1], model_um[row]} + d.y * sum.by_x - d.x * sum.by_y;
+    motions.middleRows<2>(row) << -sum.by_x.x, -sum.by_y.x, turned.x, -sum.by_x.y, -sum.by_y.y, turned.y;
+  });
+  return motions;
+}
+
+Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses, const Eigen::VectorXd& forces_nN,
+                           const std::vector<Vec2>& beads_um, const Eigen::VectorXd& by_um, int threads) {
+  std::vector<greens::HalfSpaceEllipse> fields;
+  for (const Ellipse& e : ellipses) fields.emplace_back(gel, e);
+  Eigen::VectorXd change(by_um.size());
+  numerics::parallel_for(static_cast<int>(beads_um.size()), threads, [&](int b) {
+    const auto row = 2 * static_cast<Eigen::Index>(b);
+    const Vec2 at = beads_um[static_cast<std::size_t>(b)], by{by_um[row], by_um[row + 1]}, middle = at + 0.5 * by;
+    Vec2 sum;
+    for (std::size_t k = 0; k < ellipses.size(); ++k) {
+      const Vec2 offset = middle - ellipses[k].centre_um, F = force_on(forces_nN, k);
+      if (is_far(ellipses[k], offset)) {
+        const Slopes slopes = slopes_of_point(gel, offset, F);
+        sum += by.x * slopes.by_x + by.y * slopes.by_y;
+        continue;
+      }
+      const greens::Sym2 a = fields[k].compliance_um_per_nN(at), c = fields[k].compliance_um_per_nN(at + by);
+      sum += {(c.xx - a.xx) * F.x + (c.xy - a.xy) * F.y, (c.xy - a.xy) * F.x + (c.yy - a.yy) * F.y};
+    }
+    change.segment<2>(row) << sum.x, sum.y;
+  });
+  return change;
+}
+
+void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
+                 int threads) {
+  add_motions(data, placement_motions(gel, ellipses_of(cell), forces_nN, data.position_um,
+                                      data.response->displace(forces_nN), centre_um, threads));
+}
+
+PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
+                      LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
+                      const Trial& start, const std::string& setting, int threads) {
+  const stage::Stopwatch watch;
+  constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
+  constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
+  constexpr int kMostPasses = 12;     // far off it takes four
+  const double width_um = mean_semi_minor_um(cell);
+  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const Placement none{.centre_um = centre_of(cell), .shift_um = {}};
+  PlacedCell result{.placement = none, .data = {}, .start = start, .effect = {}};
+  const auto off = [&](const std::string& why) {
+    result.placement = none;
+    result.data = std::move(data);
+    result.effect = stage::decided(kChannelShift, setting, false, why);
+    return result;
+  };
+  if (setting == "off") return off("as told: cell and beads lie on each other");
+  FitParameters rough = parameters;
+  rough.tolerance = std::max(rough.tolerance, 0.02);  // the pattern of the forces is all that is asked for
+  LinearData there = data;
+  for (int pass = 0; pass < kMostPasses; ++pass) {
+    const TensionProblem problem(network, there.reduced, adhesion_ids_of(cell), {}, threads);
+    const TensionFit fit = fit_tensions(
+        problem, rough, threads, pass == 0 ? start : scaled_to_data(problem, result.start.tensions_nN, &result.start),
+        Search::nearest);
+    result.start = fit.trial;
+    const Eigen::VectorXd model_um = there.response->displace(fit.trial.forces_nN);
+    const Eigen::MatrixXd motions =
+        placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
+    const Step step = step_of(there, fit.trial, problem.force_derivatives(fit.trial), motions);
+    const double length_um = step.value.head<2>().norm(), sigma_um = std::max(step.sigma[0], step.sigma[1]);
+    if (setting == "auto" && !(sigma_um < 0.5 * width_um)) {
+      return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));
+    }
+    if (length_um < kLinear * width_um) {
+      result.data = std::move(there);
+      add_motions(result.data, motions);
+      result.effect = stage::decided(kChannelShift, setting, true, "found with the tensions");
+      result.effect.seconds = watch.seconds();
+      return result;
+    }
+    // steps no longer than the field is linear for
+    result.placement = moved(result.placement, std::min(1.0, width_um / length_um) * step.value);
+    if (norm(result.placement.shift_um) > kFarthest_um) break;
+    there = data_of(in_cell_frame(beads, result.placement));
+  }
+  return off("no place within " + brief(kFarthest_um) + " um suits the beads");
+}
+
+FoundPlacement placement_among(const MotionsBeside& motions, Placement placement) {
+  return {.placement = moved(placement, motions.values.tail<3>()), .sigma = motions.sigma.tail<3>()};
+}
+
+Figures figures_of(const FoundPlacement& found) {
+  return {{"channel_shift_x_um", found.placement.shift_um.x},
+          {"channel_shift_y_um", found.placement.shift_um.y},
+          {"channel_shift_sigma_um", std::max(found.sigma[0], found.sigma[1])},
+          {"channel_turn_deg", kDegree * found.placement.turn_rad},
+          {"channel_turn_sigma_deg", kDegree * found.sigma[2]}};
+}
+
+std::string sentence_of(const FoundPlacement& found) {
+  return in_words(found.placement.shift_um, found.sigma) + ", turned by " + brief(kDegree * found.placement.turn_rad) +
+         " +- " + brief(kDegree * found.sigma[2]) + " degrees";
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,93 @@
+/// Where the cell lies on the beads. The camera sees them through other filters than the cell, or after the stage has
+/// moved, so that both are off by some pixels. The cell is therefore a rigid body with three unknowns, a shift s and a
+/// turn Q about its centre c, which are found with the tensions:
+///
+///   u(x) = Q G(Qᵀ (x − c − s)) F
+///
+/// The beads are taken into the cell's frame, where all results are. In a small rest of shift and turn u is linear.
+/// That rest stays among the motions that the beads may have besides (linear_data.h), so that the error bars hold what
+/// the beads do not know of the cell's place.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "mbtfm/tensions/tension_fit.h"
+#include "network/cables/cables.h"
+#include "pipeline/contract/report.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::tensions {
+
+/// From the cell's frame to that of the beads: a turn about the centre, then a shift.
+struct Placement {
+  Vec2 centre_um, shift_um;
+  double turn_rad = 0;  ///< from +x towards +y
+  Vec2 turned(Vec2 vector) const;
+  Vec2 of(Vec2 place_um) const;
+};
+/// Beads, and how they move, as the cell sees them.
+DisplacementField in_cell_frame(DisplacementField beads, const Placement& placement);
+/// Displacements of the cell's frame at these beads.
+DisplacementField in_bead_frame(DisplacementField fitted, const DisplacementField& beads, const Placement& placement);
+
+/// Displacement of the beads per shift of the cell along x and y (um/um) and per turn about the centre (um/rad), forces
+/// and all: 2·beads × 3. By the half-space's field, beyond four semi-axes that of a point force: the base and the sides
+/// of a gel change little so near to an adhesion that its place matters.
+/// @param model_um  displacement of the beads by these forces, 2·beads
+Eigen::MatrixXd placement_motions(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
+                                  const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
+                                  const Eigen::VectorXd& model_um, Vec2 centre_um, int threads);
+
+/// By how much the displacement by these forces changes where each bead goes `by_um` (2·beads). By the half-space's
+/// field, as above.
+Eigen::VectorXd carried_um(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
+                           const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
+                           const Eigen::VectorXd& by_um, int threads);
+
+/// Let the beads move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
+/// them.
+void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
+                 int threads);
+
+/// A cell where the beads want it.
+struct PlacedCell {
+  Placement placement;
+  LinearData data;  ///< of the beads in the cell's frame, what is left of shift and turn among its motions
+  Trial start;      ///< of the network there
+  Effect effect;    ///< off: the cell is where it was
+};
+
+/// The data of these beads.
+using DataOf = std::function<LinearData(const DisplacementField&)>;
+
+inline constexpr const char* kChannelShift = "channel shift";
+
+/// Gauss–Newton over shift and turn on one network, tensions fitted at each place, until what is left is linear.
+///
+/// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
+/// field is linear in it, or where no place is found within kFarthest.
+/// @param data  of the beads as they are
+/// @param start  a trial with these data
+PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
+                      LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
+                      const Trial& start, const std::string& setting, int threads);
+
+/// What came of it beside the fit: shift x, y (um) and turn (rad) with standard errors.
+struct FoundPlacement {
+  Placement placement;
+  Eigen::Vector3d sigma;
+};
+/// @param motions  the last three those of placement_motions()
+FoundPlacement placement_among(const MotionsBeside& motions, Placement placement);
+/// Of fit.json.
+Figures figures_of(const FoundPlacement& found);
+/// "(0.31, -0.12) +- (0.02, 0.02) um, turned by 0.1 +- 0.2 degrees"
+std::string sentence_of(const FoundPlacement& found);
+
+}  // namespace mbtfm::tensions

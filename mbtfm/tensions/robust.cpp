@@ -1,0 +1,233 @@
+#include "mbtfm/tensions/robust.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/parallel.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+constexpr double kHuber = 1.500, kTukey = 5.123;  // see robust_weight
+// An L1 weight grows without bound at zero; below a hundredth of the noise a residual is as good as none.
+constexpr double kSmallest = 0.01;
+
+/// Length of each bead's residual, of the beads in use.
+std::vector<double> used_lengths(const LinearData& data, const Eigen::VectorXd& residual) {
+  std::vector<double> lengths;
+  for (Eigen::Index i = 0; i < residual.size(); i += 2) {
+    if (data.weight_per_um[i] > 0) lengths.push_back(residual.segment<2>(i).norm());
+  }
+  return lengths;
+}
+
+Eigen::VectorXd weights_of(const std::string& loss, const Eigen::VectorXd& residual, double scale) {
+  Eigen::VectorXd weights(residual.size() / 2);
+  for (Eigen::Index i = 0; i < weights.size(); ++i) {
+    weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
+  }
+  return weights;
+}
+
+/// Where the middle bead is explained to rounding there is nothing to be robust against.
+bool is_exact(const LinearData& data, double scale) {
+  return scale <= 1e-9 * data.weight_per_um.cwiseProduct(data.displacement_um).cwiseAbs().maxCoeff();
+}
+
+/// Changes of the weighted displacements by tension, 2·beads × tensions. Single precision: weights settle to 1e-4.
+using BeadJacobian = Eigen::MatrixXf;
+
+BeadJacobian bead_jacobian(const LinearData& data, const Eigen::MatrixXd& force_derivatives) {
+  constexpr Eigen::Index kColumns = 64;  // at a time in double precision
+  BeadJacobian J(data.weight_per_um.size(), force_derivatives.cols());
+  for (Eigen::Index first = 0; first < J.cols(); first += kColumns) {
+    const Eigen::Index count = std::min(kColumns, J.cols() - first);
+    J.middleCols(first, count) =
+        (data.weight_per_um.asDiagonal() *
+         less_motion(data, data.response->displace(force_derivatives.middleCols(first, count))))
+            .cast<float>();
+  }
+  return J;
+}
+
+/// Jᵀ W J and Jᵀ W r, W the weights by bead.
+struct NormalEquations {
+  Eigen::MatrixXd H;
+  Eigen::VectorXd b;
+};
+
+NormalEquations normal_equations(const BeadJacobian& J, const Eigen::VectorXd& bead_weights,
+                                 const Eigen::VectorXd& residual, int threads) {
+  constexpr int kPieces = 8;             // that sums are made of, whatever the threads
+  constexpr Eigen::Index kBeads = 4096;  // at a time in double precision
+  std::vector<NormalEquations> sums(kPieces,
+                                    {Eigen::MatrixXd::Zero(J.cols(), J.cols()), Eigen::VectorXd::Zero(J.cols())});
+  numerics::parallel_for(kPieces, threads, [&](int piece) {
+    NormalEquations& sum = sums[static_cast<std::size_t>(piece)];
+    for (Eigen::Index first = piece * kBeads; first < bead_weights.size(); first += kPieces * kBeads) {
+      const Eigen::Index count = std::min(kBeads, bead_weights.size() - first);
+      Eigen::VectorXd root(2 * count);
+      for (Eigen::Index b = 0; b < count; ++b) root.segment<2>(2 * b).setConstant(std::sqrt(bead_weights[first + b]));
+      const Eigen::MatrixXd weighted = root.asDiagonal() * J.middleRows(2 * first, 2 * count).cast<double>();
+      numerics::add_upper_gram(weighted, sum.H, 1);
+      sum.b += weighted.transpose() * root.cwiseProduct(residual.segment(2 * first, 2 * count));
+    }
+  });
+  for (int piece = 1; piece < kPieces; ++piece) {
+    sums.front().H += sums[static_cast<std::size_t>(piece)].H;
+    sums.front().b += sums[static_cast<std::size_t>(piece)].b;
+  }
+  numerics::mirror_upper(sums.front().H);
+  return sums.front();
+}
+
+/// J s, by parts of the rows.
+Eigen::VectorXd times(const BeadJacobian& J, const Eigen::VectorXd& s, int threads) {
+  constexpr Eigen::Index kRows = 8192;
+  const Eigen::VectorXf step = s.cast<float>();
+  Eigen::VectorXd moved(J.rows());
+  numerics::parallel_for(static_cast<int>((J.rows() + kRows - 1) / kRows), threads, [&](int part) {
+    const Eigen::Index first = part * kRows, count = std::min(kRows, J.rows() - first);
+    moved.segment(first, count) = (J.middleRows(first, count) * step).cast<double>();
+  });
+  return moved;
+}
+
+/// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
+Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& residual, const BeadJacobian& J,
+                               const Eigen::VectorXd& low, double scale, int threads) {
+  Eigen::VectorXd step = Eigen::VectorXd::Zero(J.cols());
+  Eigen::VectorXd weights = weights_of(loss, residual, scale);
+  constexpr int kMaxSteps = 50;  // the weights settle linearly, in some ten steps
+  for (int i = 0; i < kMaxSteps; ++i) {
+    auto [H, b] = normal_equations(J, weights, residual, threads);
+    H.diagonal() += 1e-12 * H.diagonal().maxCoeff() * Eigen::VectorXd::Ones(H.rows());  // a tension that no bead feels
+    const Eigen::VectorXd next = bounded_quadratic_minimum(H, -b, low);
+    const double change = (next - step).norm();
+    step = next;
+    weights = weights_of(loss, residual - times(J, step, threads), scale);
+    if (change <= 1e-4 * step.norm()) break;
+  }
+  return weights;
+}
+
+TensionFit fit_with_loss(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+                         const FitParameters& parameters, int threads, TensionFit fit, const std::string& loss,
+                         std::optional<double> fixed_scale) {
+  constexpr int kMaxRounds = 20;      // each halves the change at least
+  constexpr double kSettled = 0.022;  // of a standard error, mean over the directions: a tenth along one of twenty
+  for (int round = 0; round < kMaxRounds; ++round) {
+    const Trial last = fit.trial;
+    const Eigen::VectorXd& before = last.tensions_nN;
+    const Eigen::VectorXd residual = weighted_residual(data, fit.trial.forces_nN);
+    const double scale = fixed_scale ? *fixed_scale : robust_scale(data, residual);
+    if (is_exact(data, scale)) break;
+    const TensionProblem problem(network, data.reduced, adhesion_ids, {}, threads);
+    const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
+    reweight(data, linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads));
+    const TensionProblem reweighted(network, data.reduced, adhesion_ids, {}, threads);
+    const auto fit_again = [&](const Trial& start, Search search) {
+      const int n_evaluations = fit.n_evaluations;
+      fit = fit_tensions(reweighted, parameters, threads, start, search);
+      fit.n_evaluations += n_evaluations;
+    };
+    const auto is_settled = [&] {
+      // or a thousandth of the largest tension: at a kink of the forces fits may end on either side in turn
+      const Eigen::VectorXd change = fit.trial.tensions_nN - before;
+      const double settled = kSettled * scale * std::sqrt(static_cast<double>(change.size()));
+      const Eigen::VectorXd changed = less_motion(data, data.response->displace(derivatives * change));
+      const double moved = data.weight_per_um.cwiseProduct(changed).norm();
+      return moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff();
+    };
+    fit_again(scaled_to_data(reweighted, before, &last), Search::nearest);
+    if (!is_settled()) continue;
+    fit_again(fit.trial, Search::best);  // only now: weights that still change do not change which side is best
+    if (is_settled()) break;
+  }
+  return fit;
+}
+
+/// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
+bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen::Index row) {
+  const Vec2 place = data.position_um[static_cast<std::size_t>(row / 2)];
+  double nearest = std::numeric_limits<double>::infinity(), along = 0;
+  for (Eigen::Index other = 0; other < residual.size(); other += 2) {
+    if (other == row || data.weight_per_um[other] == 0) continue;
+    const double distance = norm(data.position_um[static_cast<std::size_t>(other / 2)] - place);
+    if (distance >= nearest) continue;
+    nearest = distance;
+    along = residual.segment<2>(other).dot(residual.segment<2>(row));
+  }
+  return along < 0.5 * residual.segment<2>(row).squaredNorm();
+}
+
+}  // namespace
+
+std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual) {
+  if (loss != "auto") return loss;
+  const double scale = robust_scale(data, weighted_residual);
+  if (is_exact(data, scale)) return "squares";
+  constexpr double kChance = 0.05;
+  const double limit = scale * std::sqrt(2 * std::log(0.5 * static_cast<double>(data.n_used) / kChance));
+  int n_large = 0, n_alone = 0;
+  for (Eigen::Index i = 0; i < weighted_residual.size(); i += 2) {
+    if (data.weight_per_um[i] == 0 || weighted_residual.segment<2>(i).norm() <= limit) continue;
+    ++n_large;
+    n_alone += stands_alone(data, weighted_residual, i);
+  }
+  return 2 * n_alone > n_large ? "huber" : "squares";
+}
+
+double robust_weight(const std::string& loss, double residual) {
+  if (loss == "squares") return 1;
+  if (loss == "huber") return residual <= kHuber ? 1 : kHuber / residual;
+  if (loss == "tukey") return residual < kTukey ? std::pow(1 - std::pow(residual / kTukey, 2), 2) : 0;
+  if (loss == "l1") return 1 / std::max(residual, kSmallest);
+  throw UsageError("fit: unknown loss '" + loss + "'");
+}
+
+double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
+  std::vector<double> lengths = used_lengths(data, weighted_residual);
+  if (lengths.empty()) return 0;
+  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
+  std::nth_element(lengths.begin(), middle, lengths.end());
+  return *middle / std::sqrt(2 * std::log(2.0));
+}
+
+TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+                          const FitParameters& parameters, const std::string& loss, int threads, TensionFit first) {
+  const std::string begin = loss == "tukey" ? "huber" : loss;
+  TensionFit fit = fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(first), begin, {});
+  if (loss != "tukey") return fit;
+  const double scale = robust_scale(data, weighted_residual(data, fit.trial.forces_nN));
+  return fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), "tukey", scale);
+}
+
+double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
+                       const std::string& loss) {
+  const Eigen::VectorXd residual = weighted_residual(data, forces_nN);
+  const auto degrees = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
+  double variance = residual.squaredNorm() / degrees;
+  const double scale = robust_scale(data, residual);
+  if (loss != "squares" && scale > 0) {
+    double psi_squared = 0, slope = 0, weight = 0;
+    const std::vector<double> lengths = used_lengths(data, residual);
+    for (const double length : lengths) {
+      const double r = length / scale, w = robust_weight(loss, r);
+      constexpr double kStep = 1e-4;  // psi' by differences: psi is smooth but for one kink
+      const double above = (r + kStep) * robust_weight(loss, r + kStep);
+      psi_squared += w * w * r * r / 2;
+      slope += ((above - w * r) / kStep + w) / 2;
+      weight += w;
+    }
+    variance = scale * scale * psi_squared / (slope * slope) * weight;
+  }
+  return data.has_errors ? std::max(1.0, variance) : variance;
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,44 @@
+/// Robust losses (thesis 2.3.2): sum of rho(|r_b| / s) over beads b instead of the sum of squares, so that a few bad
+/// beads cannot pull the tensions away. By iterative reweighting: w(r) = rho'(r) / r.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/tensions/linear_data.h"
+#include "mbtfm/tensions/tension_fit.h"
+
+namespace mbtfm::tensions {
+
+/// The loss itself, or what the residuals call for where it is `auto`: huber where most of those that Gaussian noise
+/// has in less than one case in twenty, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni; r in robust standard deviations),
+/// stand alone: the nearest bead does not go along by half. Else squares: none is that large, or they go together, so
+/// that the model and not the beads are wrong there, and to discount them would explain the still part of the gel only.
+std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual);
+
+/// Weight of a bead whose residual has this size, in robust standard deviations; 1 at zero (l1: large there).
+/// squares 1 | huber min(1, k/r), k = 1.500 | tukey (1 − (r/c)²)², c = 5.123 | l1 1/r.
+/// k and c keep 95 % efficiency where the noise is Gaussian in the plane (Maronna, Martin & Yohai, Robust Statistics,
+/// 2006, 6.4, solved for two dimensions); l1 keeps 79 %. A bead's residual is a vector: the weight follows its length,
+/// so that nothing depends on the axes.
+double robust_weight(const std::string& loss, double residual);
+
+/// Standard deviation of a component that the middle of the residuals tells: median of |r_b| / 1.1774 (Rayleigh).
+double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual);
+
+/// Weigh the beads by the residuals of a fit, fit on this network again, until the tensions stay. Tukey's loss, which
+/// has several minima, starts from Huber's. Leaves the weights in `data`.
+/// @param loss  all but squares
+/// @param first  the fit by least squares
+/// @return the last fit
+TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+                          const FitParameters& parameters, const std::string& loss, int threads, TensionFit first);
+
+/// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where
+/// the beads state their errors; else the same from the asymptotic variance of the loss (Maronna et al., 10.3):
+/// s² <psi²/2> / <(psi' + psi/r)/2>² <w>.
+double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
+                       const std::string& loss);
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,324 @@
+#include "mbtfm/tensions/series.h"
+
+#include <algorithm>
+#include <map>
+
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "pipeline/charts/chart.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/text.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+
+void check_same_beads(const Path& file, const DisplacementField& beads, const DisplacementField& first) {
+  if (beads.size() != first.size()) {
+    throw InputError(file.string(), std::to_string(first.size()) + " beads, as in the first frame",
+                     std::to_string(beads.size()));
+  }
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    if (beads[i].position_um == first[i].position_um) continue;
+    throw InputError(file.string() + ": bead " + std::to_string(i + 1), "the place of the same bead in the first frame",
+                     "another", "track all frames of a series together, against one relaxed image");
+  }
+}
+
+/// Which of `all` are `beads`; nothing where not all of them are there, in that order.
+std::optional<std::vector<Eigen::Index>> places_among(const DisplacementField& all, const DisplacementField& beads) {
+  std::vector<Eigen::Index> places;
+  for (std::size_t i = 0, next = 0; next < beads.size(); ++i) {
+    if (i == all.size()) return std::nullopt;
+    if (all[i].position_um != beads[next].position_um) continue;
+    ++next;
+    places.push_back(static_cast<Eigen::Index>(i));
+  }
+  return places;
+}
+
+struct FrameData {
+  DisplacementField beads;
+  std::vector<bool> is_used;
+  substrate::SharedResponse response;
+};
+
+/// Without the flagged beads.
+FrameData good_beads_of(const SeriesFrame& frame, const substrate::SharedResponse& response,
+                        const std::vector<bool>& is_used) {
+  FrameData data;
+  std::vector<Eigen::Index> good;
+  for (std::size_t i = 0; i < frame.beads.size(); ++i) {
+    if (!frame.beads[i].flag.empty()) continue;
+    data.beads.push_back(frame.beads[i]);
+    data.is_used.push_back(is_used.empty() || is_used[i]);
+    good.push_back(static_cast<Eigen::Index>(i));
+  }
+  data.response = response->at_points(good);
+  return data;
+}
+
+FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit, const LinearData& data) {
+  FrameFit result{.frame = frame.frame,
+                  .refused = {},
+                  .displacement_sha256 = frame.sha256,
+                  .tensions = tensions_of(fit),
+                  .sigmas_nN = {},
+                  .total_force_nN = fit.total_force_nN,
+                  .network_force_nN = fit.network_force_nN,
+                  .relative_l2 = relative_l2(data, fit.forces_nN),
+                  .chi_squared_per_degree = fit.chi_squared_per_degree,
+                  .converged = fit.report.converged};
+  for (const Estimate& e : fit.tensions_nN) result.sigmas_nN.push_back(e.standard_error);
+  return result;
+}
+
+Eigen::VectorXd values_of(const FrameFit& fit) {
+  Eigen::VectorXd values_nN(static_cast<Eigen::Index>(fit.tensions.size()));
+  for (Eigen::Index i = 0; i < values_nN.size(); ++i)
+    values_nN[i] = fit.tensions[static_cast<std::size_t>(i)].tension_nN;
+  return values_nN;
+}
+
+/// Of a force that a table holds: value and standard error, whatever that is made of.
+Estimate estimate(const files::CsvTable& table, int row, const std::string& name) {
+  return {.value = table.number(row, name + "_nN"), .standard_error = table.number(row, name + "_sigma_nN")};
+}
+
+std::string type_name(const Tension& tension, const std::vector<Fibre>& fibres) {
+  if (tension.fibre_id == 0) return "network";
+  const auto fibre =
+      std::find_if(fibres.begin(), fibres.end(), [&](const Fibre& f) { return f.fibre_id == tension.fibre_id; });
+  return fibre == fibres.end() ? "" : std::string(name_of(fibre->type));
+}
+
+std::optional<double> time_s(int frame, std::optional<double> interval_s) {
+  if (!interval_s) return std::nullopt;
+  return (frame - 1) * *interval_s;
+}
+
+/// A value over time, with bars.
+struct Track {
+  std::vector<Vec2> points;
+  std::vector<double> low, high;
+};
+
+void draw(charts::Chart& chart, const Track& track, const std::string& colour, const std::string& name) {
+  chart.curve(track.points, "fill:none;stroke-width:1.5;stroke:" + colour);
+  for (std::size_t i = 0; i < track.points.size(); ++i) {
+    const Vec2 p = track.points[i];
+    chart.curve({{p.x, track.low[i]}, {p.x, track.high[i]}}, "stroke-width:0.8;stroke-opacity:0.45;stroke:" + colour);
+    chart.dot(p, 2.5, "fill:" + colour, name);
+  }
+}
+
+charts::Axis time_axis(const std::vector<FrameFit>& fits, std::optional<double> interval_s) {
+  std::vector<double> times;
+  for (const FrameFit& f : fits) times.push_back(time_s(f.frame, interval_s).value_or(f.frame));
+  return charts::axis_over(interval_s ? "time (s)" : "frame", times, charts::Scale::linear);
+}
+
+charts::Axis from_zero(const std::string& label, double largest) {
+  return {.label = label, .low = 0, .high = largest > 0 ? 1.15 * largest : 1, .scale = charts::Scale::linear};
+}
+
+charts::Chart tension_chart(const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
+                            std::optional<double> interval_s) {
+  std::map<int, Track> tracks;
+  std::map<int, std::string> types;
+  double largest = 0;
+  for (const FrameFit& f : fits) {
+    for (const Tension& t : f.tensions) {
+      if (t.fibre_id == 0) continue;
+      Track& track = tracks[t.fibre_id];
+      track.points.push_back({time_s(f.frame, interval_s).value_or(f.frame), t.tension_nN});
+      track.low.push_back(t.low_nN.value_or(t.tension_nN));
+      track.high.push_back(t.high_nN.value_or(t.tension_nN));
+      types[t.fibre_id] = type_name(t, fibres);
+      largest = std::max(largest, t.tension_nN);  // a bar of a fibre that no bead tells of may reach beyond
+    }
+  }
+  charts::Chart chart("Tensions of the fibres", time_axis(fits, interval_s), from_zero("tension (nN)", largest));
+  std::map<std::string, std::string> colours;
+  for (const auto& [id, track] : tracks) {
+    auto& colour = colours[types[id]];
+    if (colour.empty()) {
+      colour = charts::kColours[(colours.size() - 1) % std::size(charts::kColours)];
+      chart.key(types[id], colour);
+    }
+    draw(chart, track, colour, "fibre " + std::to_string(id));
+  }
+  return chart;
+}
+
+charts::Chart force_chart(const std::vector<FrameFit>& fits, std::optional<double> interval_s) {
+  Track total;
+  std::vector<Vec2> network;
+  double largest = 0;
+  for (const FrameFit& f : fits) {
+    if (!f.refused.empty()) continue;
+    const double x = time_s(f.frame, interval_s).value_or(f.frame), half = 1.96 * f.total_force_nN.standard_error;
+    total.points.push_back({x, f.total_force_nN.value});
+    total.low.push_back(f.total_force_nN.value - half);
+    total.high.push_back(f.total_force_nN.value + half);
+    network.push_back({x, f.network_force_nN.value});
+    largest = std::max(largest, total.high.back());
+  }
+  charts::Chart chart("Force of the cell", time_axis(fits, interval_s), from_zero("force (nN)", largest));
+  draw(chart, total, charts::kColours[0], "total");
+  chart.curve(network, std::string("fill:none;stroke-width:1.5;stroke:") + charts::kColours[1]);
+  chart.key("total", charts::kColours[0]);
+  chart.key("network", charts::kColours[1]);
+  return chart;
+}
+
+}  // namespace
+
+std::vector<SeriesFrame> read_series(const Path& folder) {
+  const files::CsvTable table(folder / "frames.csv");
+  table.require({"frame", "refused"});
+  std::vector<SeriesFrame> frames;
+  const DisplacementField* first = nullptr;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    frames.push_back({.frame = table.integer(row, "frame", 1), .refused = table.text(row, "refused"), .beads = {}});
+  }
+  for (SeriesFrame& frame : frames) {
+    if (!frame.refused.empty()) continue;
+    const Path file = folder / files::displacement_of_frame(frame.frame);
+    frame.beads = files::read_displacement(file);
+    frame.sha256 = files::sha256_of_file(file);
+    if (first) check_same_beads(file, frame.beads, *first);
+    if (!first) first = &frame.beads;
+  }
+  if (!first) throw InputError((folder / "frames.csv").string(), "a frame that was tracked", "none");
+  return frames;
+}
+
+const DisplacementField& beads_of(const std::vector<SeriesFrame>& frames) {
+  return std::find_if(frames.begin(), frames.end(), [](const SeriesFrame& f) { return f.refused.empty(); })->beads;
+}
+
+Responses responses_of(const DisplacementField& beads, const std::vector<SeriesFrame>& frames,
+                       const std::function<substrate::SharedResponse(const DisplacementField&)>& response) {
+  if (frames.empty()) return {response(beads), {}};
+  const DisplacementField& all = beads_of(frames);
+  Responses result{{}, response(all)};
+  const auto places = places_among(all, beads);
+  result.of_beads = places ? result.of_series->at_points(*places) : response(beads);
+  return result;
+}
+
+std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
+                                 const std::vector<cables::CableNetwork>& networks,
+                                 const substrate::SharedResponse& response, const std::vector<bool>& is_used,
+                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
+                                 bool is_coupled, int threads, const Progress& progress, Trial start,
+                                 const std::vector<FrameFit>& kept, const AllowMore& allow) {
+  std::vector<FrameFit> fits;
+  const auto fitted = [&](const SeriesFrame& frame) {
+    FrameData good = good_beads_of(frame, response, is_used);
+    LinearData data = reduce(good.beads, std::move(good.response), good.is_used, threads,
+                             moves ? affine_motions(good.beads) : Eigen::MatrixXd());
+    const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, threads);
+    const Trial begin = problem.evaluate(start.tensions_nN, &start);
+    if (allow) allow(data, begin.forces_nN);
+    return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &begin), data);
+  };
+  for (const SeriesFrame& frame : frames) {
+    if (progress) {
+      progress(static_cast<double>(fits.size()) / static_cast<double>(frames.size()),
+               "frame " + std::to_string(frame.frame));
+    }
+    const FrameFit not_fitted{.frame = frame.frame, .refused = frame.refused, .displacement_sha256 = frame.sha256};
+    fits.push_back(not_fitted);
+    if (!frame.refused.empty()) continue;
+    const auto known = std::find_if(kept.begin(), kept.end(), [&](const FrameFit& fit) {
+      return fit.frame == frame.frame && !frame.sha256.empty() && fit.displacement_sha256 == frame.sha256;
+    });
+    try {
+      fits.back() = known != kept.end() ? *known : fitted(frame);
+      if (is_coupled && fits.back().refused.empty()) start.tensions_nN = values_of(fits.back());
+    } catch (const NotSolved& error) {  // one frame that cannot be fitted does not stop the others
+      fits.back().refused = error.what();
+    } catch (const InvalidData& error) {
+      fits.back().refused = error.what();
+    }
+  }
+  return fits;
+}
+
+void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
+                  std::optional<double> interval_s) {
+  files::CsvText csv(
+      {"frame", "time_s", "fibre_id", "type", "tension_nN", "low_nN", "high_nN", "sigma_nN", "identifiable"});
+  for (const FrameFit& f : fits) {
+    for (std::size_t i = 0; i < f.tensions.size(); ++i) {
+      const Tension& t = f.tensions[i];
+      csv.add(f.frame).add(time_s(f.frame, interval_s)).add(t.fibre_id).add(type_name(t, fibres)).add(t.tension_nN);
+      csv.add(t.low_nN).add(t.high_nN).add(f.sigmas_nN[i]).add(t.identifiable ? "true" : "false").end_row();
+    }
+  }
+  files::write_text(file, csv.str());
+}
+
+void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::optional<double> interval_s) {
+  files::CsvText csv({"frame", "time_s", "total_force_nN", "total_force_sigma_nN", "network_force_nN",
+                      "network_force_sigma_nN", "fibre_force_nN", "relative_l2", "chi_squared_per_degree", "converged",
+                      "refused", "displacement_sha256"});
+  for (const FrameFit& f : fits) {
+    csv.add(f.frame).add(time_s(f.frame, interval_s));
+    if (f.refused.empty()) {
+      csv.add(f.total_force_nN.value).add(f.total_force_nN.standard_error);
+      csv.add(f.network_force_nN.value).add(f.network_force_nN.standard_error);
+      csv.add(f.total_force_nN.value - f.network_force_nN.value).add(f.relative_l2).add(f.chi_squared_per_degree);
+      csv.add(f.converged ? "true" : "false");
+    } else {
+      for (int column = 0; column < 8; ++column) csv.add("");
+    }
+    csv.add(f.refused).add(f.displacement_sha256).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+std::vector<FrameFit> read_fits(const Path& folder) {
+  if (!std::filesystem::is_regular_file(folder / "frames.csv")) return {};
+  if (!std::filesystem::is_regular_file(folder / "tracks.csv")) return {};
+  const files::CsvTable frames(folder / "frames.csv"), tracks(folder / "tracks.csv");
+  if (!frames.has("displacement_sha256")) return {};  // of a version that did not tell
+  std::map<int, FrameFit> fits;
+  for (int row = 0; row < frames.n_rows(); ++row) {
+    FrameFit& fit = fits[frames.integer(row, "frame", 1)];
+    fit.frame = frames.integer(row, "frame", 1);
+    fit.refused = frames.text(row, "refused");
+    fit.displacement_sha256 = frames.text(row, "displacement_sha256");
+    if (!fit.refused.empty()) continue;
+    fit.total_force_nN = estimate(frames, row, "total_force");
+    fit.network_force_nN = estimate(frames, row, "network_force");
+    fit.relative_l2 = frames.number(row, "relative_l2");
+    fit.chi_squared_per_degree = frames.number(row, "chi_squared_per_degree");
+    fit.converged = frames.text(row, "converged") == "true";
+  }
+  for (int row = 0; row < tracks.n_rows(); ++row) {
+    FrameFit& fit = fits[tracks.integer(row, "frame", 1)];
+    fit.tensions.push_back({.fibre_id = tracks.integer(row, "fibre_id", 0),
+                            .tension_nN = tracks.number(row, "tension_nN"),
+                            .low_nN = tracks.optional_number(row, "low_nN"),
+                            .high_nN = tracks.optional_number(row, "high_nN"),
+                            .identifiable = tracks.text(row, "identifiable") == "true"});
+    fit.sigmas_nN.push_back(tracks.number(row, "sigma_nN"));
+  }
+  std::vector<FrameFit> result;
+  for (auto& [frame, fit] : fits) result.push_back(std::move(fit));
+  return result;
+}
+
+std::string series_picture(const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
+                           std::optional<double> interval_s) {
+  return charts::svg_file({tension_chart(fits, fibres, interval_s), force_chart(fits, interval_s)}, 2,
+                          {std::to_string(fits.size()) + " frames. Bars: 95 % intervals."});
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,56 @@
+#include "mbtfm/tensions/tension_fit.h"
+
+#include <numeric>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::tensions {
+
+void declare(stage::ParameterList& list, FitParameters& p) {
+  list.table("fit");
+  list.add("method", p.method, "how the tensions are found", {"gauss-newton", "blockwise-cg", "plain-cg"});
+  list.add("gradients", p.gradients, "of the conjugate gradient methods", {"exact", "finite-difference"});
+  list.add("robust_kind", p.robust_kind, "what a bead's residual costs where the effect robust_loss is on",
+           {"huber", "tukey", "l1"});
+  list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial",
+           {"compliance", "per-evaluation"});
+  list.add("region_um", p.region_um, Range::zero_or_size_um(),
+           "beads further than this outside the outline are left out of the fit (um); unset: none is");
+  list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
+           "networks to fit on; tensions are their mean, and two or more tell the error of the model");
+  list.add("tolerance", p.tolerance, Range::between(1e-15, 1),
+           "relative change of the tensions at which the fit stops");
+  list.add("max_steps", p.max_steps, Range::between(1, 100000), "steps of Gauss-Newton at most");
+  list.add("max_evaluations", p.max_evaluations, Range::between(1, 10000000),
+           "equilibria solved by a conjugate gradient method at most");
+  list.add("far_distance_um", p.far_distance_um, Range::zero_or_size_um(),
+           "beads this far outside the outline tell the noise level (um)");
+  list.add("frame_interval_s", p.frame_interval_s, Range::between(1e-6, 1e7),
+           "time between the frames of a series (s)");
+  list.add("bootstrap", p.bootstrap, Range::between(0, 1000000),
+           "parametric bootstrap draws for the intervals; 0: from the misfit's profile");
+  list.add("surface_lines", p.surface_lines, Range::between(8, 10000),
+           "of the gel's surface in substrate.vtu, over the longer side of the cell");
+  list.add("cross_validation", p.cross_validation, Range::between(0, 1000000),
+           "draws of the tensions by fibre type, and with dorsal and ventral exchanged, whose misfits are compared; 0: "
+           "none");
+}
+
+TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start,
+                        Search search) {
+  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start, search);
+  std::vector<int> all(problem.n_tensions());
+  std::iota(all.begin(), all.end(), 0);
+  if (parameters.method == "plain-cg") {
+    return fit_conjugate_gradients(problem, parameters, threads, start, {{.tensions = all, .n_steps = 10}});
+  }
+  if (parameters.method == "blockwise-cg") {  // thesis 3.2.5: one step on the network, ten on the fibres
+    const std::vector<int> fibres(all.begin() + 1, all.end());
+    std::vector<Block> blocks = {{.tensions = {0}, .n_steps = 1}};
+    if (!fibres.empty()) blocks.push_back({.tensions = fibres, .n_steps = 10});
+    return fit_conjugate_gradients(problem, parameters, threads, start, blocks);
+  }
+  throw UsageError("fit: unknown method '" + parameters.method + "'");
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,133 @@
+#include "mbtfm/tensions/tension_problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/parallel.h"
+
+namespace mbtfm::tensions {
+
+namespace {
+std::vector<double> to_vector(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
+}  // namespace
+
+TensionProblem::TensionProblem(const cables::CableNetwork& cables, const ReducedData& data,
+                               const std::vector<int>& adhesion_ids, SolvedMisfit solved_misfit, int threads)
+    : cables_(cables),
+      data_(data),
+      adhesion_ids_(adhesion_ids),
+      solved_misfit_(std::move(solved_misfit)),
+      threads_(threads) {
+  MBTFM_ASSERT(data.compliance->cols() == 2 * static_cast<Eigen::Index>(adhesion_ids.size()));
+  for (const int id : cables.adhesion_ids()) {
+    const auto at = std::find(adhesion_ids.begin(), adhesion_ids.end(), id);
+    if (at == adhesion_ids.end()) {
+      throw InvalidData("adhesion " + std::to_string(id) + " of the network", "an adhesion of the cell",
+                        "none of that label");
+    }
+    pair_of_.push_back(at - adhesion_ids.begin());
+  }
+}
+
+Eigen::MatrixXd TensionProblem::to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(data_.compliance->cols(), by_network_adhesion.cols());
+  for (std::size_t i = 0; i < pair_of_.size(); ++i) {
+    rows.middleRows<2>(2 * pair_of_[i]) = by_network_adhesion.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+  }
+  return rows;
+}
+
+Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby,
+                               std::optional<double> force_tolerance) const {
+  const std::vector<double> tensions = to_vector(tensions_nN);
+  Trial trial{.tensions_nN = tensions_nN, .equilibrium = {}, .forces_nN = {}, .residual = {}};
+  trial.equilibrium =
+      cables_.equilibrium(tensions, nearby ? nearby->equilibrium.positions_um : std::vector<Vec2>{}, force_tolerance);
+  if (!trial.equilibrium.report.converged) throw NotSolved(trial.equilibrium.report);
+  trial.forces_nN = to_data_rows(cables_.adhesion_forces_nN(tensions, trial.equilibrium));
+  trial.residual = *data_.compliance * trial.forces_nN - data_.target;
+  trial.objective =
+      0.5 * (solved_misfit_ ? solved_misfit_(trial.forces_nN) - data_.floor_squared : trial.residual.squaredNorm());
+  return trial;
+}
+
+Eigen::VectorXd TensionProblem::network_part_nN(const Trial& trial) const {
+  return to_data_rows(cables_.network_part_nN(trial.equilibrium));
+}
+
+Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
+  const Network& network = cables_.network();
+  const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
+  Eigen::VectorXd torques = Eigen::VectorXd::Zero(data_.compliance->cols() / 2);
+  for (std::size_t v = 0; v < reactions.size(); ++v) {
+    if (network.adhesion_id[v] == 0) continue;
+    const auto& ids = cables_.adhesion_ids();
+    const auto at = std::lower_bound(ids.begin(), ids.end(), network.adhesion_id[v]) - ids.begin();
+    torques[pair_of_[static_cast<std::size_t>(at)]] += cross(network.vertices_um[v], reactions[v]);
+  }
+  return torques;
+}
+
+CutReaction TensionProblem::cut_reaction(const Trial& trial) const {
+  const Network& network = cables_.network();
+  CutReaction cut;
+  if (network.held_by_cut.empty()) return cut;
+  const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
+  for (std::size_t v = 0; v < reactions.size(); ++v) {
+    if (!network.held_by_cut[v]) continue;
+    cut.force_nN += Eigen::Vector2d(reactions[v].x, reactions[v].y);
+    cut.torque_nN_um += cross(network.vertices_um[v], reactions[v]);
+  }
+  return cut;
+}
+
+Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
+  return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium, threads_));
+}
+
+Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, int threads) const {
+  const double largest = trial.tensions_nN.maxCoeff();
+  Eigen::VectorXd gradient(n_tensions());
+  numerics::parallel_for(n_tensions(), threads, [&](int i) {
+    // A third of the digits of a double go into the step, which stays on the allowed side of zero. It must be far above
+    // the 1e-7 of the largest tension that a zero one stands for: below, nothing changes, and who is at zero stays
+    // there.
+    const double step = 1e-5 * std::max(largest, 1e-12);
+    Eigen::VectorXd above = trial.tensions_nN, below = trial.tensions_nN;
+    above[i] += step;
+    below[i] = std::max(0.0, below[i] - step);
+    const double difference = evaluate(above, &trial).objective - evaluate(below, &trial).objective;
+    gradient[i] = difference / (above[i] - below[i]);
+  });
+  return gradient;
+}
+
+Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby) {
+  constexpr double kRough = 1e-3;  // its size is all that is asked for
+  const Trial trial = problem.evaluate(tensions_nN, nearby, kRough);
+  const Eigen::VectorXd response = *problem.data().compliance * trial.forces_nN;
+  double factor = response.dot(problem.data().target) / std::max(response.squaredNorm(), 1e-300);
+  // Where the cell seems to push, as noise alone may look, any small positive size serves.
+  if (factor <= 0) factor = 1e-3 / std::max(tensions_nN.maxCoeff(), 1e-300);
+  return problem.evaluate(factor * tensions_nN, &trial);
+}
+
+Trial uniform_start(const TensionProblem& problem) {
+  Trial start = scaled_to_data(problem, Eigen::VectorXd::Ones(problem.n_tensions()));
+  const ReducedData& data = problem.data();
+  const Eigen::VectorXd pull = (*data.compliance * start.forces_nN).normalized();
+  const auto n_free = static_cast<double>(std::max<Eigen::Index>(1, data.n_components - data.n_felt));
+  const double sigma = std::sqrt(std::max(data.floor_squared, 1e-300) / n_free);  // of a component of the data
+  constexpr double kCertain = 6;  // standard errors: noise alone pushes by two or three, once in 1e9 by six
+  if (const double pulled = pull.dot(data.target); pulled < -kCertain * sigma) {
+    throw InvalidData("the displacement", "beads that a contracting cell pulls inward",
+                      "beads that move the other way, by " + brief(-pulled / sigma) +
+                          " standard errors: are the stressed and the relaxed image exchanged, or is the sign of the "
+                          "displacement or of an axis reversed?");
+  }
+  return start;
+}
+
+}  // namespace mbtfm::tensions

@@ -1,0 +1,86 @@
+/// The objective of the tension fit: Phi(t) = ½ |C R(t) − y|², R(t) the adhesion forces of the cable network.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "mbtfm/tensions/linear_data.h"
+#include "network/cables/cables.h"
+
+namespace mbtfm::tensions {
+
+/// One trial of the tensions. Knows its equilibrium, so that the next trial can start there.
+struct Trial {
+  Eigen::VectorXd tensions_nN;
+  cables::Equilibrium equilibrium;
+  Eigen::VectorXd forces_nN;  ///< by adhesion of the data: fx, fy
+  Eigen::VectorXd residual;   ///< C R − y
+  double objective = 0;
+};
+
+/// |W (u(R) − u)|² with the displacement u(R) solved afresh for these adhesion forces, as the thesis does (3.2.5).
+using SolvedMisfit = std::function<double(const Eigen::VectorXd& forces_nN)>;
+
+/// What a cell's unseen part is pulled with through the cut: the pull of the network on the vertices held there.
+struct CutReaction {
+  Eigen::Vector2d force_nN{0, 0};
+  double torque_nN_um = 0;  ///< about the origin
+};
+
+class TensionProblem {
+ public:
+  /// @param adhesion_ids  the adhesion of each pair of forces of the data; every adhesion that holds the network must
+  ///                      be among them
+  /// @param solved_misfit  where given, the objective of every trial comes from it, and not from the data's compliance:
+  ///                       the same to rounding, at the thesis' cost
+  /// @param threads  that derivatives take
+  TensionProblem(const cables::CableNetwork& cables, const ReducedData& data, const std::vector<int>& adhesion_ids,
+                 SolvedMisfit solved_misfit = {}, int threads = 1);
+
+  int n_tensions() const { return static_cast<int>(cables_.fibre_ids().size()); }
+  const cables::CableNetwork& cables() const { return cables_; }
+  const ReducedData& data() const { return data_; }
+  const std::vector<int>& adhesion_ids() const { return adhesion_ids_; }
+
+  /// @param nearby  a trial whose equilibrium is a good place to start, or none
+  /// @param force_tolerance  of the equilibrium, where rougher than usual will do: see CableNetwork::equilibrium
+  Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr,
+                 std::optional<double> force_tolerance = {}) const;
+  /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
+  Eigen::VectorXd torques_nN_um(const Trial& trial) const;
+  /// Zero where there is no cut. Balances the adhesions' forces: its derivatives are minus the sum of theirs.
+  CutReaction cut_reaction(const Trial& trial) const;
+  /// The part of the forces that the actin network brings, by adhesion of the data.
+  Eigen::VectorXd network_part_nN(const Trial& trial) const;
+  /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
+  Eigen::MatrixXd force_derivatives(const Trial& trial) const;
+  /// d(C R)/dt
+  Eigen::MatrixXd jacobian(const Trial& trial) const { return displace(data_, force_derivatives(trial), threads_); }
+  /// dPhi/dt, exact.
+  Eigen::VectorXd gradient(const Trial& trial) const { return jacobian(trial).transpose() * trial.residual; }
+  /// dPhi/dt by central differences over threads, as the thesis does (3.2.5); for comparison.
+  Eigen::VectorXd finite_difference_gradient(const Trial& trial, int threads) const;
+
+ private:
+  Eigen::MatrixXd to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const;
+  const cables::CableNetwork& cables_;
+  const ReducedData& data_;
+  std::vector<int> adhesion_ids_;
+  SolvedMisfit solved_misfit_;
+  int threads_;
+  std::vector<Eigen::Index> pair_of_;  ///< of the network's i-th adhesion in the data
+};
+
+/// The multiple of these tensions that fits best. Forces grow in proportion to the tensions (but for cables beyond
+/// their rest length), so one trial and one division tell it; a start of the wrong size then costs no steps. And the
+/// vertices hardly move, so the second equilibrium starts where the first one is.
+/// @param nearby  a trial of tensions like these, to start the first one from
+Trial scaled_to_data(const TensionProblem& problem, const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr);
+
+/// Tensions all equal, of the size that fits best: where the fit starts.
+/// @throws InvalidData where the beads move outward as a whole, which no contracting network explains
+Trial uniform_start(const TensionProblem& problem);
+
+}  // namespace mbtfm::tensions

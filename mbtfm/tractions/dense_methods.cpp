@@ -1,0 +1,204 @@
+/// Point forces at the adhesions (Schwarz et al., Biophys. J. 83 (2002) 1380) and tractions on elements that cover the
+/// cell (Dembo & Wang, Biophys. J. 76 (1999) 2307), both with a Tikhonov penalty.
+#include <cmath>
+
+#include "mbtfm/tractions/dense_problem.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/memory.h"
+#include "pipeline/numerics/parallel.h"
+#include "substrate/ellipse.h"
+#include "substrate/greens/models.h"
+#include "substrate/greens/square.h"
+
+namespace mbtfm::tractions {
+
+namespace {
+
+using Eigen::Index;
+
+/// A "point" is a disc smaller than any adhesion one sees: beads next to it feel a point, none on it infinity.
+constexpr double kPointRadius_um = 0.1;
+
+/// @throws InvalidData where they spread over no area
+double density_per_um2(const DisplacementField& beads) {
+  const double density = beads_per_um2(beads);
+  if (!(density > 0)) throw InvalidData("displacement", "beads spread over an area", "all on one line");
+  return density;
+}
+
+/// Forces or tractions with what is known of their errors.
+struct Loads {
+  Eigen::VectorXd values;
+  Eigen::MatrixXd covariance;  ///< by the noise
+  Eigen::MatrixXd response;    ///< to a force of one on each adhesion
+  Vec2 at(std::size_t load) const {
+    return {values[2 * static_cast<Index>(load)], values[2 * static_cast<Index>(load) + 1]};
+  }
+};
+
+/// The loads that a method has, and the forces spread evenly over the adhesions which are taken for the truth.
+struct Model {
+  Compliance compliance;
+  std::size_t n_loads = 0;
+  Compliance truth;
+  std::size_t n_adhesions = 0;
+};
+
+Compliance even_forces(const TractionInputs& inputs, const substrate::Substrate& gel) {
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return [&gel, ellipses](const std::vector<Vec2>& at) { return gel.compliance_um_per_nN(at, ellipses); };
+}
+
+/// Choose lambda and solve. `length_at_unit_density_um` is lambda E for lambda = 1 in the problem's own unit and one
+/// bead a um²: what the penalty would be over an area, ∫ |u|² + (lambda/E)² ∫ |t|², in the place of sums over beads and
+/// loads.
+Loads regularised(const TractionInputs& inputs, const TractionParameters& parameters, const Model& model,
+                  double length_at_unit_density_um, Reconstruction& r) {
+  const auto n = 2 * static_cast<Index>(model.n_loads), n_true = 2 * static_cast<Index>(model.n_adhesions);
+  const DenseProblem problem(inputs.beads, model.compliance, n, model.truth, n_true);
+  if (problem.data_squared() == 0) {
+    r.remark = "no bead has moved: there is no traction";
+    return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n_true)};
+  }
+  const double length_um = length_at_unit_density_um / std::sqrt(density_per_um2(inputs.beads));
+  r.scan = problem.scan();
+  r.lambda = parameters.lambda_um_per_kPa ? *parameters.lambda_um_per_kPa * inputs.gel.youngs_modulus_kPa / length_um
+                                          : chosen_lambda(*r.scan, parameters.lambda_by);
+  r.length_um = *r.lambda * length_um;
+  const Eigen::VectorXd loads = problem.solve(*r.lambda);
+  r.relative_l2 = problem.relative_l2(*r.lambda);
+  return {loads, problem.covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
+}
+
+/// Standard errors of the forces' magnitudes, which are `sums` (rows 2a, 2a+1 for adhesion a) of the loads: by the
+/// noise, and by what penalty and model make of forces spread over their adhesions. docs/theory.md (17).
+void state_errors(const Loads& loads, const Eigen::MatrixXd& sums, std::vector<AdhesionForce>& forces) {
+  const Eigen::MatrixXd covariance = sums * loads.covariance * sums.transpose();
+  const Eigen::MatrixXd missed = sums * loads.response - Eigen::MatrixXd::Identity(sums.rows(), loads.response.cols());
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    const Vec2 along = direction_of(forces[a].force_nN);
+    const Eigen::RowVector2d e(along.x, along.y);
+    const auto row = 2 * static_cast<Index>(a);
+    double variance = (e * covariance.block<2, 2>(row, row) * e.transpose()).value();
+    for (std::size_t b = 0; b < forces.size(); ++b) {
+      const Eigen::Vector2d force(forces[b].force_nN.x, forces[b].force_nN.y);
+      const double share = (e * missed.block<2, 2>(row, 2 * static_cast<Index>(b)) * force).value();
+      variance += share * share;
+    }
+    forces[a].sigma_nN = std::sqrt(variance);
+  }
+}
+
+std::vector<Vec2> square_centres(const Polygon& outline, double side_um) {
+  Vec2 low = outline.front(), high = low;
+  for (const Vec2 p : outline) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  const Vec2 middle = 0.5 * (low + high);
+  const int n_x = static_cast<int>(std::ceil((high.x - low.x) / side_um));
+  const int n_y = static_cast<int>(std::ceil((high.y - low.y) / side_um));
+  std::vector<Vec2> centres;
+  for (int j = 0; j < n_y; ++j) {
+    for (int i = 0; i < n_x; ++i) {
+      const Vec2 centre = middle + side_um * Vec2{i - 0.5 * (n_x - 1), j - 0.5 * (n_y - 1)};
+      if (contains(outline, centre)) centres.push_back(centre);
+    }
+  }
+  return centres;
+}
+
+}  // namespace
+
+Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const TractionParameters& parameters,
+                                        int threads) {
+  if (inputs.adhesions.empty()) throw UsageError("trpf: --adhesions is missing or holds none");
+  const auto gel = greens::make_greens(inputs.gel, {.model = parameters.gel_model}, threads);
+  std::vector<substrate::Ellipse> points, ellipses;
+  double area = 0;
+  for (const Adhesion& a : inputs.adhesions) {
+    points.push_back({a.position_um, kPointRadius_um, kPointRadius_um, 0});
+    ellipses.push_back(substrate::ellipse_of(a));
+    area += a.area_um2 / static_cast<double>(inputs.adhesions.size());
+  }
+  Reconstruction r;
+  r.lambda_unit = "um_per_nN";
+  // sum of F² over adhesions of area a stands for a times the integral of t²
+  const Model model{.compliance = [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); },
+                    .n_loads = points.size(),
+                    .truth = even_forces(inputs, *gel),
+                    .n_adhesions = points.size()};
+  const Loads loads = regularised(inputs, parameters, model, inputs.gel.youngs_modulus_kPa * std::sqrt(area), r);
+  std::vector<Vec2> forces;
+  for (std::size_t a = 0; a < points.size(); ++a) forces.push_back(loads.at(a));
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    const Adhesion& adhesion = inputs.adhesions[a];
+    r.forces.push_back({.adhesion_id = adhesion.adhesion_id,
+                        .force_nN = forces[a],
+                        .sigma_nN = {},
+                        .connected = false,
+                        .moment_nN_um = 0});
+    // a point yields without end: the work is that of the force spread over its adhesion, at its centre
+    const std::vector<Vec2> u = gel->displacements_um({adhesion.position_um}, ellipses, forces);
+    r.patches.push_back({adhesion.position_um, adhesion.area_um2, 1 / adhesion.area_um2 * forces[a], u.front()});
+  }
+  state_errors(loads, Eigen::MatrixXd::Identity(loads.values.size(), loads.values.size()), r.forces);
+  return r;
+}
+
+Reconstruction reconstruct_elements(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
+  if (inputs.outline_um.empty()) throw UsageError("bem: --outline is missing: it needs the area of the cell");
+  const double n = std::abs(signed_area_um2(inputs.outline_um)) / (parameters.element_um * parameters.element_um);
+  constexpr double kMatrices = 3;  // normal equations, eigenvectors, covariance: of two components each way
+  numerics::expect_room_for({.what = "the grid of tractions",
+                             .count = n,
+                             .parts = "elements",
+                             .bytes_each = kMatrices * 4 * n * sizeof(double),
+                             .remedy = "choose a larger element_um"});
+  const std::vector<Vec2> centres = square_centres(inputs.outline_um, parameters.element_um);
+  if (centres.empty()) throw UsageError("bem: no element of element_um fits into the outline");
+  check(inputs.gel);
+  const greens::Layer layer(inputs.gel);
+  const bool is_layer = parameters.gel_model == "layer";
+  const auto compliance = [&](const std::vector<Vec2>& at) {
+    Eigen::MatrixXd G(2 * at.size(), 2 * centres.size());
+    numerics::parallel_for(static_cast<int>(centres.size()), threads, [&](int j) {
+      for (std::size_t i = 0; i < at.size(); ++i) {
+        const Vec2 offset = at[i] - centres[static_cast<std::size_t>(j)];
+        const greens::Sym2 g = is_layer
+                                   ? greens::square_compliance_um_per_kPa(layer, parameters.element_um, offset)
+                                   : greens::square_compliance_um_per_kPa(inputs.gel, parameters.element_um, offset);
+        G.block<2, 2>(2 * static_cast<Index>(i), 2 * j) << g.xx, g.xy, g.xy, g.yy;
+      }
+    });
+    return G;
+  };
+  const double area = parameters.element_um * parameters.element_um;
+  Reconstruction r;
+  r.lambda_unit = "um_per_kPa";
+  // sum of t² over elements of area a stands for the integral of t² over a
+  const auto gel = greens::make_greens(inputs.gel, {.model = parameters.gel_model}, threads);
+  const Model model{.compliance = compliance,
+                    .n_loads = centres.size(),
+                    .truth = even_forces(inputs, *gel),
+                    .n_adhesions = inputs.adhesions.size()};
+  const Loads loads = regularised(inputs, parameters, model, inputs.gel.youngs_modulus_kPa / std::sqrt(area), r);
+  const Eigen::VectorXd u = compliance(centres) * loads.values;
+  for (std::size_t j = 0; j < centres.size(); ++j) {
+    const auto at = 2 * static_cast<Index>(j);
+    r.patches.push_back({centres[j], area, loads.at(j), {u[at], u[at + 1]}});
+  }
+  r.forces = forces_by_adhesion(r.patches, inputs.adhesions, parameters.grow_um);
+  const std::vector<int> owner = adhesion_of_patches(centres, inputs.adhesions, parameters.grow_um);
+  Eigen::MatrixXd sums = Eigen::MatrixXd::Zero(2 * static_cast<Index>(r.forces.size()), loads.values.size());
+  for (std::size_t i = 0; i < centres.size(); ++i) {
+    if (owner[i] >= 0) sums.block<2, 2>(2 * owner[i], 2 * static_cast<Index>(i)) = area * Eigen::Matrix2d::Identity();
+  }
+  state_errors(loads, sums, r.forces);
+  r.figures = {{"n_elements", std::int64_t(centres.size())}};
+  return r;
+}
+
+}  // namespace mbtfm::tractions

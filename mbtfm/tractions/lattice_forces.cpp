@@ -1,0 +1,114 @@
+#include "mbtfm/tractions/lattice_forces.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/numerics/parallel.h"
+
+namespace mbtfm::tractions {
+
+namespace {
+
+using Eigen::Index;
+
+constexpr double kTolerance = 1e-3;  // in energy: a thirtieth of a standard error
+
+/// Wᵀ D and Wᵀ u for one m.
+struct Normal {
+  Eigen::MatrixXd matrix;
+  Eigen::VectorXd right;
+};
+
+Normal normal_for(const LatticeProblem& problem, const Eigen::MatrixXd& D, double m, int threads) {
+  Normal normal{Eigen::MatrixXd(D.cols(), D.cols()), Eigen::VectorXd(D.cols())};
+  numerics::parallel_for(static_cast<int>(D.cols()), threads, [&](int a) {
+    TikhonovSolver solver(problem, problem.pulled_back(problem.spread_of(D.col(a))), 1);
+    solver.solve(m, kTolerance);
+    const Eigen::VectorXd w = D.col(a) - problem.at_beads(problem.displaced(solver.solution()));
+    normal.matrix.row(a) = (D.transpose() * w).transpose();
+    normal.right[a] = w.dot(problem.data());
+  });
+  normal.matrix = 0.5 * (normal.matrix + normal.matrix.transpose()).eval();  // but for the solver's tolerance it is
+  return normal;
+}
+
+/// What is known of the forces for one m, with the s² that makes the data most likely.
+struct Known {
+  double log_likelihood = -std::numeric_limits<double>::infinity();  ///< of the forces' part
+  Eigen::VectorXd mean;
+  Eigen::MatrixXd covariance;
+};
+
+Known known_from(const Normal& normal, double variance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal.matrix / variance);
+  const double floor = 1e-9 * eigen.eigenvalues().maxCoeff();  // rounding
+  const Eigen::ArrayXd d = eigen.eigenvalues().array().max(floor);
+  const Eigen::ArrayXd y = (eigen.eigenvectors().transpose() * normal.right).array() / variance;
+  const auto log_likelihood = [&](double before) {
+    return 0.5 * (y.square() * before / (1 + before * d)).sum() - 0.5 * (1 + before * d).log().sum();
+  };
+  // s² from what the best seen force is known to, down to nothing, and up to all of the largest
+  const double least = 1e-3 / d.maxCoeff(), most = 10 * (y / d).square().maxCoeff();
+  double best = least;
+  Known known;
+  for (double before = least; before < most; before *= 1.2) {
+    const double value = log_likelihood(before);
+    if (!(value > known.log_likelihood)) continue;
+    known.log_likelihood = value;
+    best = before;
+  }
+  const Eigen::ArrayXd after = (d + 1 / best).inverse();
+  known.mean = eigen.eigenvectors() * (after * y).matrix();
+  known.covariance = eigen.eigenvectors() * after.matrix().asDiagonal() * eigen.eigenvectors().transpose();
+  return known;
+}
+
+/// The logarithm of how likely the data are without forces, as (14), for a known variance; up to a constant.
+std::vector<double> log_likelihoods_of(const LambdaScan& scan) {
+  std::vector<double> values;
+  double log_determinant = 0;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const ScanPoint& p = scan.points[i];
+    if (i > 0) {
+      const ScanPoint& before = scan.points[i - 1];
+      log_determinant += (before.degrees + p.degrees) * std::log(before.lambda / p.lambda);
+    }
+    values.push_back(-0.5 * (p.misfit + p.lambda * p.lambda * p.norm) / scan.variance - 0.5 * log_determinant);
+  }
+  return values;
+}
+
+/// From next to no background, which is quickly solved, to that of (9) by cross-validation, which explains the data
+/// without any adhesion: until it gets less likely.
+Known most_likely(const ForceData& data, const Eigen::MatrixXd& D, int threads) {
+  const std::vector<double> without = log_likelihoods_of(data.scan);
+  Known best;
+  double likeliest = -std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < data.scan.points.size(); ++i) {
+    const double m = data.scan.points[i].lambda;
+    if (m < data.scan.by_gcv && i > 0) break;
+    Known known = known_from(normal_for(data.problem, D, m, threads), data.scan.variance);
+    const double value = without[i] + known.log_likelihood;
+    if (value < likeliest) break;
+    likeliest = value;
+    best = std::move(known);
+  }
+  return best;
+}
+
+}  // namespace
+
+std::vector<AdhesionForce> forces_on(const ForceData& data, std::vector<AdhesionForce> forces, int threads) {
+  const Known known = most_likely(data, data.problem.weighted(data.compliance), threads);
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    const auto row = 2 * static_cast<Index>(a);
+    forces[a].force_nN = {known.mean[row], known.mean[row + 1]};
+    const Vec2 along = direction_of(forces[a].force_nN);
+    const Eigen::Vector2d e(along.x, along.y);
+    forces[a].sigma_nN = std::sqrt(e.dot(known.covariance.block<2, 2>(row, row) * e));
+  }
+  return forces;
+}
+
+}  // namespace mbtfm::tractions

@@ -1,0 +1,17 @@
+/// The noise of a displacement field that states no errors, told from its neighbours.
+#pragma once
+
+#include <optional>
+
+#include "pipeline/contract/beads.h"
+
+namespace mbtfm::tractions {
+
+/// Standard deviation (um) of one component, taken to be the same for all beads. Each bead is compared with what a
+/// quadratic polynomial through its 20 nearest neighbours predicts; the half of the beads whose neighbours tell of the
+/// least strain stand for all, as the field itself is smooth there. Errors that neighbours share, as those of
+/// overlapping windows of image correlation do, are not seen.
+/// @returns none for fewer than 40 beads, or where they lie so that no polynomial is determined
+std::optional<double> noise_from_neighbours_um(const DisplacementField& beads);
+
+}  // namespace mbtfm::tractions

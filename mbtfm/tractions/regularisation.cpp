@@ -1,0 +1,192 @@
+#include "mbtfm/tractions/regularisation.h"
+
+#include <algorithm>
+#include <boost/math/interpolators/cardinal_cubic_b_spline.hpp>
+#include <cmath>
+#include <functional>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::tractions {
+
+namespace {
+
+constexpr int kPointsPerDecade = 3;      // the criteria are smooth over a factor of two
+constexpr double kLeastCurvature = 0.1;  // a radius of ten e-folds, four decades, is no corner to the eye
+constexpr int kFine = 16;                // places between two points at which their spline is looked at
+
+/// A spline through values at the points, as a function of the point's index.
+auto spline_of(const std::vector<double>& values) {
+  return boost::math::interpolators::cardinal_cubic_b_spline<double>(values.begin(), values.end(), 0.0, 1.0);
+}
+
+/// Where in the scan (as a point's index, fractions too) the function is smallest.
+double smallest_at(std::size_t n_points, const std::function<double(double)>& f) {
+  double best = 0, least = f(0);
+  const int n_places = static_cast<int>(n_points - 1) * kFine;
+  for (int i = 1; i <= n_places; ++i) {
+    const double at = std::min<double>(static_cast<double>(i) / kFine, static_cast<double>(n_points) - 1);
+    const double value = f(at);
+    if (value < least) {
+      least = value;
+      best = at;
+    }
+  }
+  return best;
+}
+
+double smallest_at(const std::vector<double>& values) {
+  const auto spline = spline_of(values);
+  return smallest_at(values.size(), [&](double at) { return spline(at); });
+}
+
+std::vector<double> over_points(const std::vector<ScanPoint>& points,
+                                const std::function<double(const ScanPoint&)>& f) {
+  std::vector<double> values;
+  for (const ScanPoint& p : points) values.push_back(f(p));
+  return values;
+}
+
+// Logarithms of quantities that vanish only where the data do; rounding may leave less than nothing of a misfit.
+double log_of(double value) { return std::log(std::max(value, 1e-300)); }
+
+}  // namespace
+
+std::vector<double> lambdas_between(double largest, double smallest) {
+  MBTFM_ASSERT(largest > smallest && smallest > 0);
+  const int n = std::max(5, static_cast<int>(std::ceil(kPointsPerDecade * std::log10(largest / smallest))) + 1);
+  std::vector<double> lambdas;
+  for (int i = 0; i < n; ++i) lambdas.push_back(largest * std::pow(smallest / largest, i / (n - 1.0)));
+  return lambdas;
+}
+
+double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square) {
+  for (double& r : residuals) r = std::abs(r);
+  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
+  std::nth_element(residuals.begin(), middle, residuals.end());
+  const double deviation = 1.4826 * *middle;  // of a Gaussian
+  const auto n = static_cast<double>(residuals.size());
+  return deviation * deviation * n / std::max(n - 2 * degrees + degrees_of_square, 1e-6 * n);
+}
+
+LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
+                 std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at) {
+  MBTFM_ASSERT(points.size() >= 5);
+  LambdaScan scan;
+  scan.points = std::move(points);
+  const auto lambda_at = [&](double at) {
+    const double first = std::log(scan.points.front().lambda), last = std::log(scan.points.back().lambda);
+    return std::exp(first + (last - first) * at / (static_cast<double>(scan.points.size()) - 1));
+  };
+
+  // (12) Golub, Heath & Wahba 1979
+  scan.gcv = over_points(scan.points, [&](const ScanPoint& p) {
+    return n_data * p.misfit / std::pow(std::max(n_data - p.degrees, 1e-6 * n_data), 2);
+  });
+  std::vector<double> log_gcv;
+  for (const double g : scan.gcv) log_gcv.push_back(log_of(g));
+  const double gcv_at = smallest_at(log_gcv);
+  scan.by_gcv = lambda_at(gcv_at);
+
+  // (13) Hansen & O'Leary 1993. As lambda falls the L-curve runs left, then up: its corner turns clockwise.
+  const auto x = spline_of(over_points(scan.points, [](const ScanPoint& p) { return log_of(p.misfit); }));
+  const auto y = spline_of(over_points(scan.points, [](const ScanPoint& p) { return log_of(p.norm); }));
+  const auto curvature_at = [&](double at) {
+    const double dx = x.prime(at), dy = y.prime(at);
+    const double turn = dy * x.double_prime(at) - dx * y.double_prime(at);
+    return turn / std::pow(std::max(dx * dx + dy * dy, 1e-300), 1.5);
+  };
+  for (std::size_t i = 0; i < scan.points.size(); ++i) scan.curvature.push_back(curvature_at(static_cast<double>(i)));
+  // At its ends a spline knows no curvature. Tractions that grow with the noise no faster than with the signal bend the
+  // curve the other way all along: then it has no corner.
+  const auto n_last = static_cast<double>(scan.points.size()) - 1;
+  const double corner_at = std::clamp(
+      smallest_at(scan.points.size(), [&](double at) { return -curvature_at(std::clamp(at, 2.0, n_last - 2)); }), 2.0,
+      n_last - 2);
+  if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(corner_at);
+
+  // (14) The determinant from its derivative: d log det(1 + G Gᵀ / lambda²) / d log lambda² = −degrees.
+  double log_determinant = 0;
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const ScanPoint& p = scan.points[i];
+    if (i > 0) {
+      const ScanPoint& before = scan.points[i - 1];
+      log_determinant += (before.degrees + p.degrees) * std::log(before.lambda / p.lambda);
+    }
+    const double energy = p.misfit + p.lambda * p.lambda * p.norm;
+    scan.evidence.push_back(-0.5 * n_data * log_of(energy) - 0.5 * log_determinant);
+  }
+  const double highest = *std::max_element(scan.evidence.begin(), scan.evidence.end());
+  for (double& e : scan.evidence) e -= highest;
+  std::vector<double> against;
+  for (const double e : scan.evidence) against.push_back(-e);
+  scan.by_evidence = lambda_at(smallest_at(against));
+
+  // (15) With the errors that the data state, or with the misfit's where it tells of larger ones.
+  const double left = variance_left_at(scan.by_gcv);
+  scan.variance = std::max(left, stated_variance.value_or(0));
+  scan.variance_source = scan.variance > left ? "the errors that the data state" : "the misfit";
+  scan.risk = over_points(scan.points, [&](const ScanPoint& p) {
+    const double lambda2 = p.lambda * p.lambda;
+    const double misfit = p.removable_misfit.value_or(p.misfit);
+    return -(2 * misfit + lambda2 * p.norm - 2 * scan.variance * (n_removable - p.degrees)) / lambda2;
+  });
+  const RiskScale scale(scan.risk);
+  std::vector<double> tamed;
+  for (const double r : scan.risk) tamed.push_back(scale.to(r));
+  scan.by_risk = lambda_at(smallest_at(tamed));
+  return scan;
+}
+
+Refinement::Refinement(const std::vector<ScanPoint>& points) {
+  const std::size_t n_places = (points.size() - 1) * kFine;
+  const double ratio = points.back().lambda / points.front().lambda;
+  for (std::size_t i = 0; i <= n_places; ++i) {
+    lambdas.push_back(points.front().lambda * std::pow(ratio, static_cast<double>(i) / static_cast<double>(n_places)));
+  }
+}
+
+std::vector<double> Refinement::of(const std::vector<double>& values, const std::function<double(double)>& to,
+                                   const std::function<double(double)>& from) const {
+  std::vector<double> scaled, fine;
+  for (const double v : values) scaled.push_back(to(v));
+  const auto spline = spline_of(scaled);
+  for (std::size_t i = 0; i < lambdas.size(); ++i) {
+    fine.push_back(from(spline(std::min(static_cast<double>(i) / kFine, static_cast<double>(values.size()) - 1))));
+  }
+  return fine;
+}
+
+RiskScale::RiskScale(const std::vector<double>& risk)
+    : least(*std::min_element(risk.begin(), risk.end())), depth(std::max(std::abs(least), 1e-300)) {}
+double RiskScale::to(double risk) const { return std::asinh((risk - least) / depth); }
+double RiskScale::from(double tamed) const { return least + depth * std::sinh(tamed); }
+
+namespace {
+
+/// But for the ends, where a spline knows no curvature.
+double largest_curvature(const LambdaScan& scan) {
+  return *std::max_element(scan.curvature.begin() + 2, scan.curvature.end() - 2);
+}
+
+}  // namespace
+
+double chosen_lambda(const LambdaScan& scan, const std::string& criterion) {
+  if (criterion == "risk") return scan.by_risk;
+  if (criterion == "gcv") return scan.by_gcv;
+  if (criterion == "l-curve" && !scan.by_l_curve) {
+    throw NotSolved({.converged = false,
+                     .iterations = 0,
+                     .last_change = 0,
+                     .reason = "the L-curve of these data has no corner (its largest curvature is " +
+                               brief(largest_curvature(scan)) + ", a corner has " + brief(kLeastCurvature) +
+                               " at least): set lambda_by = risk, which takes lambda " + brief(scan.by_risk) +
+                               " here; it aims at the tractions, and needs no corner"});
+  }
+  if (criterion == "l-curve") return *scan.by_l_curve;
+  if (criterion == "evidence") return scan.by_evidence;
+  throw UsageError("traction: unknown criterion '" + criterion + "'");
+}
+
+}  // namespace mbtfm::tractions

@@ -1,0 +1,70 @@
+/// How much to smooth: lambda from the data, by several criteria at once. docs/theory.md, (11) to (15).
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace mbtfm::tractions {
+
+/// The minimum of |u − G t|² + lambda² |t|² for one lambda, in the weights that the data carry.
+struct ScanPoint {
+  double lambda = 0;   ///< in the method's own unit
+  double misfit = 0;   ///< |u − G t|²
+  double norm = 0;     ///< |t|²
+  double degrees = 0;  ///< trace of the matrix that takes u to G t: how many data the tractions use up
+  /// The part of the misfit that other tractions could remove; unset: all of it, where there are as many as data.
+  std::optional<double> removable_misfit;
+};
+
+/// The scan with its criteria; each array by point.
+struct LambdaScan {
+  std::vector<ScanPoint> points;                    ///< evenly spaced in log lambda, falling
+  std::vector<double> gcv;                          ///< (12), to be small
+  std::vector<double> curvature;                    ///< of the L-curve (13), to be large
+  std::vector<double> evidence;                     ///< logarithm, less its largest (14), to be large
+  std::vector<double> risk;                         ///< expected |t − true|² up to a constant (15), to be small
+  double by_gcv = 0, by_evidence = 0, by_risk = 0;  ///< lambda by each
+  std::optional<double> by_l_curve;                 ///< none where the curve has no corner
+  double variance = 0;                              ///< of one datum, that the risk was found with
+  std::string variance_source;
+};
+
+/// The criteria's names, as parameters spell them.
+inline const std::vector<std::string> kCriteria = {"risk", "gcv", "l-curve", "evidence"};
+
+/// @param points           at least 5, evenly spaced in log lambda, falling
+/// @param n_data           components of displacement
+/// @param n_removable      of them as many as the tractions could follow: what lies beyond tells the risk nothing
+/// @param stated_variance  of one datum in the same weights, where the data state their errors
+/// @param variance_left_at what the residual for one lambda tells of the same: robust_variance()
+LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
+                 std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at);
+
+/// The data's variance from residuals: their median magnitude, which the few that the model cannot follow do not move,
+/// over what is left of Gaussian noise where the tractions have followed it, tr (1 − H)² of n.
+double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square);
+
+/// @throws NotSolved where the criterion is the L-curve and has no corner; it says which criterion to take
+double chosen_lambda(const LambdaScan& scan, const std::string& criterion);
+
+/// Quantities of the scan between its points too, as the criteria see them: by splines through to(value).
+struct Refinement {
+  std::vector<double> lambdas;
+  explicit Refinement(const std::vector<ScanPoint>& points);
+  std::vector<double> of(const std::vector<double>& values, const std::function<double(double)>& to,
+                         const std::function<double(double)>& from) const;
+};
+/// How the risk is brought to a scale on which a spline follows it: far from its least it grows by powers of ten.
+struct RiskScale {
+  double least = 0, depth = 1;
+  explicit RiskScale(const std::vector<double>& risk);
+  double to(double risk) const;
+  double from(double tamed) const;
+};
+
+/// Lambdas from `largest` down to `smallest`, some in each decade.
+std::vector<double> lambdas_between(double largest, double smallest);
+
+}  // namespace mbtfm::tractions

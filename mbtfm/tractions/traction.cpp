@@ -1,0 +1,252 @@
+#include "mbtfm/tractions/traction.h"
+
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/memory.h"
+#include "substrate/compliance.h"
+#include "substrate/greens/models.h"
+
+namespace mbtfm::tractions {
+
+void declare(stage::ParameterList& list, TractionParameters& p) {
+  list.table("traction");
+  list.add("method", p.method, "how the tractions are found", {"fttc", "sparse", "trpf", "bem", "adhesion-forces"});
+  list.add("gel_model", p.gel_model, "elastic model of the gel", {"layer", "half-space"});
+  list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)", kCriteria);
+  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12),
+           "regularisation, fixed: |u − G t|² + lambda² |t|² over a lattice (um/kPa); unset: by the criterion");
+  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
+           "fttc, sparse: spacing of the lattice (um); unset: that of beads on a lattice, half the mean distance of "
+           "scattered ones");
+  list.add("padding", p.padding, Range::between(1, 8),
+           "fttc, sparse: period over the field's size; 1: the field is periodic itself");
+  list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them",
+           {"cells", "points"});
+  list.add("gaussian_um", p.gaussian_um, Range::zero_or_size_um(),
+           "fttc: the tractions are smoothed by this Gaussian (um)");
+  list.add("element_um", p.element_um, Range::mesh_um(), "bem: side of the elements that cover the cell (um)");
+  list.add("grow_um", p.grow_um, Range::zero_or_size_um(),
+           "sums are taken within this of the outline or of the adhesions; bem: an adhesion's force is that of the "
+           "tractions on its ellipse grown by this (um)");
+  list.add("shift_error_um", p.shift_error_um, Range::size_um(),
+           "adhesion-forces: shift of an ellipse whose effect on its force is reported (um)");
+  list.add("size_error", p.size_error, Range::between(0.001, 10),
+           "adhesion-forces: the same for both axes too long, by this part");
+  list.add("angle_error_deg", p.angle_error_deg, Range::between(0.001, 90),
+           "adhesion-forces: the same for an ellipse turned by this (degrees)");
+}
+
+Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
+  if (parameters.method == "fttc") return reconstruct_fttc(inputs, parameters, threads);
+  if (parameters.method == "sparse") return reconstruct_sparse(inputs, parameters, threads);
+  if (parameters.method == "trpf") return reconstruct_point_forces(inputs, parameters, threads);
+  if (parameters.method == "bem") return reconstruct_elements(inputs, parameters, threads);
+  if (parameters.method == "adhesion-forces") return reconstruct_adhesion_forces(inputs, parameters, threads);
+  throw UsageError("traction: unknown method '" + parameters.method + "'");
+}
+
+namespace {
+
+/// Distance over which an ellipse would have to grow to hold the point, about: by its axes' scaling.
+double reach_um(const Adhesion& a, Vec2 point_um) {
+  const Vec2 d = point_um - a.position_um;
+  const double c = std::cos(a.angle_rad), s = std::sin(a.angle_rad);
+  const double along = c * d.x + s * d.y, across = c * d.y - s * d.x;
+  // (along/(A + g))² + (across/(B + g))² = 1 falls as g grows: its root by bisection, to far below a lattice spacing
+  const double half_major = 0.5 * a.major_axis_um, half_minor = 0.5 * a.minor_axis_um;
+  const auto is_inside = [&](double g) {
+    return std::pow(along / (half_major + g), 2) + std::pow(across / (half_minor + g), 2) <= 1;
+  };
+  if (is_inside(0)) return 0;
+  double low = 0, high = norm(d);
+  for (int i = 0; i < 30; ++i) {
+    const double middle = 0.5 * (low + high);
+    (is_inside(middle) ? high : low) = middle;
+  }
+  return high;
+}
+
+}  // namespace
+
+std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, const std::vector<Adhesion>& adhesions,
+                                     double grow_um) {
+  std::vector<int> owner(positions_um.size(), -1);
+  for (std::size_t p = 0; p < positions_um.size(); ++p) {
+    double nearest = grow_um;
+    for (std::size_t a = 0; a < adhesions.size(); ++a) {
+      if (norm(positions_um[p] - adhesions[a].position_um) > 0.5 * adhesions[a].major_axis_um + nearest) continue;
+      const double reach = reach_um(adhesions[a], positions_um[p]);
+      if (reach > nearest || (reach == nearest && owner[p] >= 0)) continue;
+      nearest = reach;
+      owner[p] = static_cast<int>(a);
+    }
+  }
+  return owner;
+}
+
+std::vector<Vec2> positions_of(const std::vector<Patch>& patches) {
+  std::vector<Vec2> positions;
+  for (const Patch& p : patches) positions.push_back(p.position_um);
+  return positions;
+}
+
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
+                                              double grow_um) {
+  const std::vector<Vec2> positions = positions_of(patches);
+  const std::vector<int> owner = adhesion_of_patches(positions, adhesions, grow_um);
+  std::vector<AdhesionForce> forces;
+  for (const Adhesion& a : adhesions) {
+    forces.push_back(
+        {.adhesion_id = a.adhesion_id, .force_nN = {}, .sigma_nN = {}, .connected = false, .moment_nN_um = 0});
+  }
+  for (std::size_t p = 0; p < patches.size(); ++p) {
+    if (owner[p] < 0) continue;
+    const auto a = static_cast<std::size_t>(owner[p]);
+    const Vec2 force = patches[p].area_um2 * patches[p].traction_kPa;
+    forces[a].force_nN += force;
+    *forces[a].moment_nN_um += cross(positions[p] - adhesions[a].position_um, force);
+  }
+  return forces;
+}
+
+Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::string& gel_model, int threads) {
+  const auto n_beads = static_cast<double>(inputs.beads.size());
+  numerics::expect_room_for({.what = "the compliance of the adhesions",
+                             .count = n_beads,
+                             .parts = "beads",
+                             .bytes_each = 3 * 4 * sizeof(double) * static_cast<double>(inputs.adhesions.size()),
+                             .remedy = "leave --adhesions out, or take fewer beads"});
+  std::vector<Vec2> points;
+  for (const Bead& b : inputs.beads) points.push_back(b.position_um);
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+  return greens::make_greens(inputs.gel, {.model = gel_model}, threads)->compliance_um_per_nN(points, ellipses);
+}
+
+Vec2 direction_of(Vec2 force_nN) {
+  const double length = norm(force_nN);
+  return length > 0 ? 1 / length * force_nN : Vec2{1, 0};
+}
+
+TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um) {
+  const std::vector<Patch>& patches = reconstruction.patches;
+  TractionSums sums;
+  const std::vector<Vec2> positions = positions_of(patches);
+  std::vector<bool> is_near(patches.size(), true);
+  sums.where = "the whole field";
+  if (!inputs.outline_um.empty()) {
+    sums.where = "the outline";
+    for (std::size_t i = 0; i < patches.size(); ++i) {
+      is_near[i] = contains(inputs.outline_um, positions[i]) ||
+                   distance_to_boundary_um(inputs.outline_um, positions[i]) <= grow_um;
+    }
+  } else if (!inputs.adhesions.empty()) {
+    sums.where = "the adhesions";
+    const std::vector<int> owner = adhesion_of_patches(positions, inputs.adhesions, grow_um);
+    for (std::size_t i = 0; i < patches.size(); ++i) is_near[i] = owner[i] >= 0;
+  }
+  // The moment of forces that do not quite balance depends on its centre: that of the force magnitudes is the cell's.
+  Vec2 centre;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!is_near[i]) continue;
+    const Vec2 force = patches[i].area_um2 * patches[i].traction_kPa;
+    centre += norm(force) * positions[i];
+    sums.total_force_nN += norm(force);
+    sums.net_force_nN += force;
+    sums.strain_energy_fJ += 0.5 * dot(force, patches[i].displacement_um);
+  }
+  if (sums.total_force_nN > 0) centre = 1 / sums.total_force_nN * centre;
+  double inward = 0, weight = 0;
+  for (std::size_t i = 0; i < patches.size(); ++i) {
+    if (!is_near[i]) continue;
+    const Vec2 force = patches[i].area_um2 * patches[i].traction_kPa;
+    const Vec2 arm = positions[i] - centre;
+    sums.moment_nN_um[0][0] += arm.x * force.x;
+    sums.moment_nN_um[0][1] += arm.x * force.y;
+    sums.moment_nN_um[1][0] += arm.y * force.x;
+    sums.moment_nN_um[1][1] += arm.y * force.y;
+    inward -= dot(arm, force) * norm(force);
+    weight += norm(arm) * dot(force, force);
+  }
+  if (weight > 0) sums.inward_share = inward / weight;
+  return sums;
+}
+
+void write_tractions(const Path& file, const std::vector<Patch>& patches) {
+  files::CsvText csv({"x_um", "y_um", "tx_kPa", "ty_kPa", "area_um2", "ux_um", "uy_um"});
+  for (const Patch& p : patches) {
+    csv.add(p.position_um.x).add(p.position_um.y).add(p.traction_kPa.x).add(p.traction_kPa.y).add(p.area_um2);
+    csv.add(p.displacement_um.x).add(p.displacement_um.y).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches) {
+  std::vector<Vec2> positions;
+  files::PointArray traction{.name = "traction_kPa", .scalars = {}, .vectors = {}};
+  files::PointArray displacement{.name = "displacement_um", .scalars = {}, .vectors = {}};
+  files::PointArray area{.name = "area_um2", .scalars = {}, .vectors = {}};
+  for (const Patch& p : patches) {
+    positions.push_back(p.position_um);
+    traction.vectors.push_back(p.traction_kPa);
+    displacement.vectors.push_back(p.displacement_um);
+    area.scalars.push_back(p.area_um2);
+  }
+  files::write_points_vtp(file, positions, {traction, displacement, area});
+}
+
+void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda) {
+  files::CsvText csv(
+      {"lambda", "length_um", "misfit", "norm", "degrees", "gcv", "l_curve_curvature", "log_evidence", "risk"});
+  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+    const ScanPoint& p = scan.points[i];
+    csv.add(p.lambda).add(p.lambda * length_um_per_lambda).add(p.misfit).add(p.norm).add(p.degrees);
+    csv.add(scan.gcv[i]).add(scan.curvature[i]).add(scan.evidence[i]).add(scan.risk[i]).end_row();
+  }
+  files::write_text(file, csv.str());
+}
+
+std::vector<files::PointArray> columns_of(const std::vector<Sensitivity>& sensitivities) {
+  if (sensitivities.empty()) return {};
+  const auto column = [&](const char* name, double Sensitivity::*member) {
+    files::PointArray array{.name = name, .scalars = {}, .vectors = {}};
+    for (const Sensitivity& s : sensitivities) array.scalars.push_back(s.*member);
+    return array;
+  };
+  return {column("shift_along_nN", &Sensitivity::shift_along_nN),
+          column("shift_across_nN", &Sensitivity::shift_across_nN), column("size_nN", &Sensitivity::size_nN),
+          column("angle_nN", &Sensitivity::angle_nN)};
+}
+
+Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
+  Figures figures = {{"total_force_nN", sums.total_force_nN},
+                     {"net_force_x_nN", sums.net_force_nN.x},
+                     {"net_force_y_nN", sums.net_force_nN.y},
+                     {"strain_energy_fJ", sums.strain_energy_fJ},
+                     {"contractile_moment_nN_um", sums.contractile_moment_nN_um()},
+                     {"inward_share", sums.inward_share},
+                     {"moment_xx_nN_um", sums.moment_nN_um[0][0]},
+                     {"moment_xy_nN_um", sums.moment_nN_um[0][1]},
+                     {"moment_yx_nN_um", sums.moment_nN_um[1][0]},
+                     {"moment_yy_nN_um", sums.moment_nN_um[1][1]},
+                     {"summed_over", sums.where},
+                     {"relative_l2", r.relative_l2}};
+  if (r.lambda) figures.emplace_back("lambda_" + r.lambda_unit, *r.lambda);
+  if (r.length_um) figures.emplace_back("lambda_length_um", *r.length_um);
+  if (r.scan && r.lambda && r.length_um) {
+    const double scale = *r.length_um / *r.lambda;
+    figures.emplace_back("length_by_risk_um", r.scan->by_risk * scale);
+    figures.emplace_back("length_by_gcv_um", r.scan->by_gcv * scale);
+    if (r.scan->by_l_curve) figures.emplace_back("length_by_l_curve_um", *r.scan->by_l_curve * scale);
+    figures.emplace_back("length_by_evidence_um", r.scan->by_evidence * scale);
+    figures.emplace_back("noise_from", r.scan->variance_source);
+  }
+  for (const auto& figure : r.figures) figures.push_back(figure);
+  return figures;
+}
+
+}  // namespace mbtfm::tractions

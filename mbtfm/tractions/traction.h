@@ -1,0 +1,129 @@
+/// Standard traction reconstructions from bead displacements, by name, and what is summed up of them.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/tractions/lattice_problem.h"
+#include "mbtfm/tractions/regularisation.h"
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/path.h"
+#include "pipeline/contract/report.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/files/named_array.h"
+#include "pipeline/stage/parameters.h"
+
+namespace mbtfm::tractions {
+
+struct TractionParameters {
+  std::string method = "fttc";
+  std::string gel_model = "layer";          ///< gels are some tens of um thick: a cell feels the base
+  std::string lambda_by = "risk";           ///< aims at the tractions; the others at the displacements
+  std::optional<double> lambda_um_per_kPa;  ///< fixed instead
+  std::optional<double> spacing_um;         ///< of the lattice
+  double padding = 1.5;                     ///< neighbours' images half a field away: their dipole fields are small
+  std::string read_out = "cells";           ///< sums of traction times area are forces
+  double gaussian_um = 0;                   ///< regularisation smooths already
+  double element_um = 2;                    ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
+  double grow_um = 1.5;                     ///< smoothed tractions spill over an adhesion's rim by about that
+  // adhesion-forces: errors of an ellipse whose effect on its force is reported, as segmentations have them
+  double shift_error_um = 0.3;
+  double size_error = 0.2;
+  double angle_error_deg = 10;
+};
+void declare(stage::ParameterList& list, TractionParameters& parameters);
+
+struct TractionInputs {
+  DisplacementField beads;  ///< without the flagged ones
+  Gel gel;
+  std::vector<Adhesion> adhesions;  ///< may be empty
+  Polygon outline_um;               ///< may be empty
+};
+
+/// A patch of surface with its traction, or a point with its force over an area of one.
+struct Patch {
+  Vec2 position_um;
+  double area_um2 = 0;
+  Vec2 traction_kPa;
+  Vec2 displacement_um;  ///< of the surface there, as the model has it
+};
+
+std::vector<Vec2> positions_of(const std::vector<Patch>& patches);
+
+/// How far a force moves (length of the change of its vector) where its ellipse is wrong by what a segmentation errs.
+struct Sensitivity {
+  double shift_along_nN = 0, shift_across_nN = 0;  ///< the ellipse shifted along and across its major axis
+  double size_nN = 0;                              ///< both axes longer
+  double angle_nN = 0;                             ///< turned
+};
+
+struct Reconstruction {
+  std::vector<Patch> patches;
+  std::vector<AdhesionForce> forces;       ///< by adhesion, where there are any
+  std::vector<Sensitivity> sensitivities;  ///< by adhesion, adhesion-forces only
+  std::optional<LambdaScan> scan;
+  std::optional<double> lambda;     ///< in the method's own unit
+  std::string lambda_unit;          ///< um_per_kPa, um_per_nN
+  std::optional<double> length_um;  ///< lambda times E, per area: the same for every method
+  double relative_l2 = 0;           ///< |u − model| / |u| at the beads, weighted
+  Report report{.converged = true, .iterations = 0, .last_change = 0, .reason = {}};
+  std::string remark;  ///< to be said in the last line; empty: nothing
+  Figures figures;
+};
+
+/// @throws UsageError, InvalidData, NotSolved
+Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
+
+/// One force for each adhesion, spread evenly over its ellipse; no regularisation.
+Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const TractionParameters& parameters,
+                                           int threads);
+Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
+/// Group L1, its weight by generalised cross-validation.
+Reconstruction reconstruct_sparse(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
+
+/// A force at the centre of each adhesion, with a Tikhonov penalty.
+Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const TractionParameters& parameters,
+                                        int threads);
+/// Tractions on square elements that cover the cell, with a Tikhonov penalty.
+Reconstruction reconstruct_elements(const TractionInputs& inputs, const TractionParameters& parameters, int threads);
+
+/// Each adhesion's force: the sum over the patches on its grown ellipse; without errors.
+std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches, const std::vector<Adhesion>& adhesions,
+                                              double grow_um);
+
+/// Displacements of the beads by a force of one spread evenly over each adhesion: 2·beads × 2·adhesions.
+Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::string& gel_model, int threads);
+
+/// Along which the error of a force's magnitude is taken: the force, or x where there is none.
+Vec2 direction_of(Vec2 force_nN);
+
+/// Sums over the patches near the cell.
+struct TractionSums {
+  double total_force_nN = 0;  ///< sum of magnitudes
+  Vec2 net_force_nN;
+  double strain_energy_fJ = 0;     ///< half the sum of t · u A
+  double moment_nN_um[2][2] = {};  ///< sum of (x − centre)_i F_j
+  double contractile_moment_nN_um() const { return -(moment_nN_um[0][0] + moment_nN_um[1][1]); }  ///< > 0: inward
+  /// Mean cosine between force and direction to the centre, weighted by distance and the square of the force, as noise
+  /// is everywhere: near 1 for a contracting cell, 0 where forces know no centre, -1 where they push outward.
+  double inward_share = 0;
+  std::string where;
+};
+/// Near the cell: inside its outline or within `grow_um` of it, else of its adhesions; with neither, everywhere.
+TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs& inputs, double grow_um);
+
+/// For each patch the index of the adhesion whose ellipse, grown, holds it (the nearest where several do), or -1.
+std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, const std::vector<Adhesion>& adhesions,
+                                     double grow_um);
+
+// files beside traction.csv
+void write_tractions(const Path& file, const std::vector<Patch>& patches);
+void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches);
+void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda);
+/// The criteria over lambda in both its units, an SVG. @param chosen_by  for people; the reconstruction has a scan
+void write_lambda_picture(const Path& file, const Reconstruction& reconstruction, const std::string& chosen_by);
+std::vector<files::PointArray> columns_of(const std::vector<Sensitivity>& sensitivities);
+Figures summary_of(const Reconstruction& reconstruction, const TractionSums& sums);
+
+}  // namespace mbtfm::tractions

@@ -1,0 +1,19 @@
+/// The elastic gel under the cell.
+#pragma once
+
+#include <optional>
+
+namespace mbtfm {
+
+struct Gel {
+  double youngs_modulus_kPa = 0;
+  double poisson_ratio = 0.49;
+  double thickness_um = 60;
+  // standard errors, where the user knows them: the error budget then has a part for the gel
+  std::optional<double> youngs_modulus_sigma_kPa{}, poisson_ratio_sigma{}, thickness_sigma_um{};
+};
+
+/// State what must hold of a value. @throws InvalidData naming the element and the finding.
+void check(const Gel& gel);
+
+}  // namespace mbtfm

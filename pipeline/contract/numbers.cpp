@@ -1,0 +1,20 @@
+#include "pipeline/contract/numbers.h"
+
+#include <charconv>
+#include <cstdio>
+
+namespace mbtfm {
+
+std::string shortest(double value) {
+  char buffer[32];
+  const auto result = std::to_chars(buffer, buffer + sizeof buffer, value);
+  return {buffer, result.ptr};
+}
+
+std::string brief(double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.3g", value);
+  return text;
+}
+
+}  // namespace mbtfm

@@ -1,0 +1,84 @@
+/// What is found for a cell: tensions, forces, their errors.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "pipeline/contract/geometry.h"
+#include "pipeline/contract/report.h"
+
+namespace mbtfm {
+
+struct Tension {
+  int fibre_id = 0;  ///< 0: the actin network
+  double tension_nN = 0;
+  std::optional<double> low_nN, high_nN;  ///< 95 % interval
+  bool identifiable = true;
+};
+
+struct AdhesionForce {
+  int adhesion_id = 0;
+  Vec2 force_nN;  ///< of the cell on the substrate
+  std::optional<double> sigma_nN;
+  bool connected = false;              ///< a segmented fibre ends on it
+  std::optional<double> moment_nN_um;  ///< about the adhesion's centre, from +x towards +y
+};
+
+/// What each source adds to a standard error. In squares they add up.
+struct ErrorParts {
+  double beads = 0;               ///< noise of the displacements
+  double segmentation = 0;        ///< shift, area and angle of the adhesions; free ends of the fibres
+  std::optional<double> mesh{};   ///< one network is not another; none: a single mesh tells nothing of it
+  double substrate = 0;           ///< discretisation of the gel, or what its model leaves out
+  double solver = 0;              ///< where the iterations stopped
+  double model = 0;               ///< what the misfit calls for beside the beads' noise and the mesh
+  std::optional<double> gel{};    ///< modulus, thickness and Poisson's ratio, where their errors are stated
+  std::optional<double> place{};  ///< of the cell on the beads, where it was found with the tensions
+};
+/// The one list of the parts. @param visit  of name and part
+template <class Parts, class Visit>
+void for_each_part(Parts& p, const Visit& visit) {
+  visit("beads", p.beads);
+  visit("segmentation", p.segmentation);
+  visit("mesh", p.mesh);
+  visit("substrate", p.substrate);
+  visit("solver", p.solver);
+  visit("model", p.model);
+  visit("gel", p.gel);
+  visit("place", p.place);
+}
+double total(const ErrorParts& parts);
+
+struct TensionError {
+  int fibre_id = 0;  ///< 0: the actin network
+  double tension_nN = 0;
+  ErrorParts parts_nN;
+};
+struct ErrorBudget {
+  std::vector<TensionError> tensions;
+  double total_force_nN = 0;
+  ErrorParts total_force_parts_nN;
+  struct CutForce {
+    double force_nN = 0;
+    ErrorParts parts_nN;
+  };
+  std::optional<CutForce> cut_force;  ///< through the image's cut; none: the image shows the whole cell
+};
+
+/// What the fit found for the cell as a whole: fit.json.
+struct FitSummary {
+  double relative_l2 = 0;           ///< |u_measured − u_model| / |u_measured|
+  double expected_relative_l2 = 0;  ///< what the bead noise alone would give
+  double noise_um = 0;              ///< standard deviation of a displacement component far from the cell
+  double total_force_nN = 0;        ///< sum of force magnitudes over adhesions
+  double network_force_nN = 0;      ///< the same with every fibre at the network's tension
+  double fibre_force_nN = 0;        ///< the difference
+  double network_surface_tension_nN_per_um = 0;
+  int n_meshes = 1;
+  int iterations = 0;
+  bool converged = false;
+  std::optional<ErrorBudget> error_budget;
+  Figures more;  ///< further figures, written after the named ones
+};
+
+}  // namespace mbtfm

@@ -1,0 +1,26 @@
+/// Figures, effects and findings as JSON. Inside pipeline/ only.
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "pipeline/contract/report.h"
+#include "pipeline/files/json_record.h"
+
+namespace mbtfm::files {
+
+nlohmann::ordered_json json_of(const Value& value);
+nlohmann::ordered_json json_of(const Figures& figures);
+nlohmann::ordered_json json_of(const Effect& effect);
+nlohmann::ordered_json json_of(const Finding& finding);
+/// @throws InputError where it is none
+Effect effect_of(const JsonRecord& record);
+Finding finding_of(const JsonRecord& record);
+/// The member `findings` of a record; none where it has none, as records of older versions.
+std::vector<Finding> findings_of(const JsonRecord& record);
+
+/// As text, in lines where indent >= 0. JSON is UTF-8: texts that are not, as names of files may be, tell their
+/// bytes (names.h), keys too.
+std::string json_text(const nlohmann::ordered_json& json, int indent = -1);
+
+}  // namespace mbtfm::files

@@ -1,0 +1,81 @@
+#include "pipeline/files/names.h"
+
+#include <charconv>
+
+namespace mbtfm::files {
+
+namespace {
+
+std::string bytes_told_by(std::string_view text) {
+  constexpr std::size_t kEscape = 4;       // \xE9
+  constexpr unsigned kBeyondAscii = 0x80;  // no other byte is told so: none makes a name of "..", say
+  std::string bytes;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned byte = 0;
+    const char* digits = text.data() + i + 2;
+    if (text.substr(i).starts_with("\\x") && i + kEscape <= text.size() &&
+        std::from_chars(digits, digits + 2, byte, 16).ptr == digits + 2 && byte >= kBeyondAscii) {
+      bytes += static_cast<char>(byte);
+      i += kEscape - 1;
+    } else {
+      bytes += text[i];
+    }
+  }
+  return bytes;
+}
+
+}  // namespace
+
+std::size_t utf8_length(std::string_view text) {
+  if (text.empty()) return 0;
+  const auto byte = [&](std::size_t i) { return static_cast<unsigned char>(text[i]); };
+  if (byte(0) < 0x80) return 1;
+  const std::size_t n = byte(0) >= 0xF0 ? 4 : byte(0) >= 0xE0 ? 3 : 2;
+  if (byte(0) < 0xC2 || byte(0) > 0xF4 || text.size() < n) return 0;
+  for (std::size_t i = 1; i < n; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  // longer than it need be, half of a surrogate pair, beyond the last character (RFC 3629)
+  const bool is_allowed = !(byte(0) == 0xE0 && byte(1) < 0xA0) && !(byte(0) == 0xED && byte(1) >= 0xA0) &&
+                          !(byte(0) == 0xF0 && byte(1) < 0x90) && !(byte(0) == 0xF4 && byte(1) >= 0x90);
+  return is_allowed ? n : 0;
+}
+
+bool is_utf8(std::string_view text) {
+  while (!text.empty()) {
+    const std::size_t n = utf8_length(text);
+    if (n == 0) return false;
+    text.remove_prefix(n);
+  }
+  return true;
+}
+
+std::string byte_shown(char byte) {
+  constexpr std::string_view kDigits = "0123456789ABCDEF";
+  const auto value = static_cast<unsigned char>(byte);
+  return {'\\', 'x', kDigits[value / 16], kDigits[value % 16]};
+}
+
+std::string shown_name(std::string_view bytes) {
+  if (is_utf8(bytes)) return std::string(bytes);
+  std::string text;
+  while (!bytes.empty()) {
+    const std::size_t n = utf8_length(bytes);
+    if (n == 0) {
+      text += byte_shown(bytes.front());
+      bytes.remove_prefix(1);
+    } else {
+      text += bytes.substr(0, n);
+      bytes.remove_prefix(n);
+    }
+  }
+  return text;
+}
+
+std::filesystem::path file_shown_as(const std::filesystem::path& folder, const std::string& name) {
+  std::error_code ignored;
+  const std::filesystem::path same = folder / name;
+  return std::filesystem::exists(same, ignored) ? same : folder / bytes_told_by(name);
+}
+
+}  // namespace mbtfm::files

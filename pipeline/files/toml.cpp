@@ -1,0 +1,67 @@
+#define TOML_IMPLEMENTATION  // compiled here, not taken from the system's library, which was built as toml++ has it
+#include "pipeline/files/toml.h"
+
+#include <algorithm>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/files/names.h"
+#include "pipeline/files/text.h"
+
+namespace mbtfm::files {
+
+namespace {
+
+bool is_control(char c) {
+  const auto byte = static_cast<unsigned char>(c);
+  return (byte < 0x20 && c != '\t' && c != '\n' && c != '\r') || byte == 0x7F;
+}
+
+/// TOML is UTF-8 without control characters. @throws InputError
+void expect_text(std::string_view text, const std::string& name) {
+  int line = 1;
+  for (std::string_view rest = text; !rest.empty();) {
+    const std::size_t n = utf8_length(rest);
+    if (n == 0 || is_control(rest.front())) {
+      throw InputError(name + ":" + std::to_string(line), "TOML, a text in UTF-8",
+                       (n == 0 ? "the byte " : "the control character ") + byte_shown(rest.front()),
+                       "save the file as plain text in UTF-8");
+    }
+    if (rest.front() == '\n') ++line;
+    rest.remove_prefix(n);
+  }
+}
+
+/// toml++ bounds how deep values nest, but not how many parts a dotted key has: each is a table, and tables are taken
+/// down one in the other. A key of some ten thousand parts overflows the stack.
+void expect_shallow_keys(std::string_view text, const std::string& name) {
+  constexpr std::ptrdiff_t kMostDots = 1000;  // on a line of ours: some; of tables in a stack of 8 MB: ten thousands
+  int number = 1;
+  while (!text.empty()) {
+    const std::string_view line = text.substr(0, text.find('\n'));
+    if (std::ranges::count(line, '.') > kMostDots) {
+      throw InputError(name + ":" + std::to_string(number),
+                       "TOML with at most " + std::to_string(kMostDots) + " dots on a line", "more",
+                       "the file may be damaged");
+    }
+    text.remove_prefix(std::min(line.size() + 1, text.size()));
+    ++number;
+  }
+}
+
+}  // namespace
+
+toml::table parse_toml(std::string_view text, const std::string& name) {
+  expect_text(text, name);
+  expect_shallow_keys(text, name);
+  try {
+    return toml::parse(text, name);
+  } catch (const toml::parse_error& error) {
+    throw InputError(name + ":" + std::to_string(error.source().begin.line), "TOML", std::string(error.description()));
+  } catch (const ImpossibleToml&) {
+    throw InputError(name, "TOML", "brackets, quotes or keys that make none");
+  }
+}
+
+toml::table parse_toml(const std::filesystem::path& file) { return parse_toml(read_text(file), file.string()); }
+
+}  // namespace mbtfm::files

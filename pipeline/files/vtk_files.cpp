@@ -1,0 +1,292 @@
+#include <vtkCellArray.h>
+#include <vtkCellData.h>
+#include <vtkCellType.h>
+#include <vtkCommand.h>
+#include <vtkDoubleArray.h>
+#include <vtkIntArray.h>
+#include <vtkNew.h>
+#include <vtkPointData.h>
+#include <vtkPoints.h>
+#include <vtkPolyData.h>
+#include <vtkUnstructuredGrid.h>
+#include <vtkXMLPolyDataWriter.h>
+#include <vtkXMLUnstructuredGridWriter.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/named_array.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_errors.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/files/vtu_file.h"
+
+namespace mbtfm::files {
+
+namespace {
+
+template <class Writer, class Data>
+void write_xml(const Path& file, Data* data) {
+  vtkNew<Writer> writer;
+  const VtkErrors errors;
+  writer->SetInputData(data);
+  writer->SetWriteToOutputString(true);
+  writer->SetDataModeToAppended();
+  writer->EncodeAppendedDataOff();
+  writer->SetCompressorTypeToZLib();
+  if (writer->Write() != 1) throw OutputError("cannot write " + file.string() + ": " + errors.text());
+  write_text(file, writer->GetOutputString());
+}
+
+vtkNew<vtkPoints> points_of(const std::vector<Vec2>& positions_um) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const Vec2 p : positions_um) points->InsertNextPoint(p.x, p.y, 0);
+  return points;
+}
+
+vtkNew<vtkIntArray> int_array(const char* name) {
+  vtkNew<vtkIntArray> array;
+  array->SetName(name);
+  return array;
+}
+
+vtkNew<vtkDoubleArray> double_array(const PointArray& values) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(values.name.c_str());
+  for (const double v : values.scalars) array->InsertNextValue(v);
+  if (!values.vectors.empty()) {
+    array->SetNumberOfComponents(3);  // ParaView draws arrows of vectors in space only
+    for (const Vec2 v : values.vectors) array->InsertNextTuple3(v.x, v.y, 0);
+  }
+  return array;
+}
+
+constexpr int kEllipseCorners = 32;  // enough to look smooth
+
+/// Points and cells of a vtkPolyData in the making. VTK numbers the cells: vertices, lines, polygons.
+class Shapes {
+ public:
+  void add_line(const Polyline& line) { add(line, lines_); }
+  void add_polygon(const Polygon& polygon) { add(polygon, polygons_); }
+  vtkNew<vtkPolyData> data() const {
+    vtkNew<vtkPolyData> poly;
+    const vtkNew<vtkPoints> points = points_of(points_um_);
+    poly->SetPoints(points);
+    poly->SetLines(lines_);
+    poly->SetPolys(polygons_);
+    return poly;
+  }
+
+ private:
+  void add(const std::vector<Vec2>& corners, vtkCellArray* cells) {
+    cells->InsertNextCell(static_cast<int>(corners.size()));
+    for (const Vec2 p : corners) {
+      cells->InsertCellPoint(static_cast<vtkIdType>(points_um_.size()));
+      points_um_.push_back(p);
+    }
+  }
+  std::vector<Vec2> points_um_;
+  vtkNew<vtkCellArray> lines_, polygons_;
+};
+
+vtkNew<vtkUnstructuredGrid> grid_of(const Network& network, const std::vector<Vec2>& positions_um) {
+  vtkNew<vtkUnstructuredGrid> grid;
+  const vtkNew<vtkPoints> points = points_of(positions_um);
+  grid->SetPoints(points);
+  const auto adhesion = int_array("adhesion_id");
+  for (const int id : network.adhesion_id) adhesion->InsertNextValue(id);
+  grid->GetPointData()->AddArray(adhesion);
+  if (!network.held_by_cut.empty()) {
+    const auto by_cut = int_array("held_by_cut");
+    for (const bool is_held : network.held_by_cut) by_cut->InsertNextValue(is_held ? 1 : 0);
+    grid->GetPointData()->AddArray(by_cut);
+  }
+  grid->Allocate(static_cast<vtkIdType>(network.links.size()));
+  const auto fibre = int_array("fibre_id");
+  PointArray rest{.name = "rest_length_um", .scalars = {}, .vectors = {}};
+  PointArray share{.name = "share", .scalars = {}, .vectors = {}};
+  for (const Link& link : network.links) {
+    const vtkIdType ends[2] = {link.vertex_a, link.vertex_b};
+    grid->InsertNextCell(VTK_LINE, 2, ends);
+    fibre->InsertNextValue(link.fibre_id);
+    rest.scalars.push_back(link.rest_length_um);
+    share.scalars.push_back(link.share);
+  }
+  grid->GetCellData()->AddArray(fibre);
+  grid->GetCellData()->AddArray(double_array(rest));
+  grid->GetCellData()->AddArray(double_array(share));
+  return grid;
+}
+
+vtkNew<vtkDoubleArray> double_array(const GridArray& values) {
+  vtkNew<vtkDoubleArray> array;
+  array->SetName(values.name.c_str());
+  array->SetNumberOfComponents(values.components);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(values.values.size()) / values.components);
+  for (std::size_t k = 0; k < values.values.size(); ++k) array->SetValue(static_cast<vtkIdType>(k), values.values[k]);
+  return array;
+}
+
+/// An id or the number of a vertex. @throws InputError
+int whole_number(double value, const std::string& where) {
+  constexpr double kLargest = std::numeric_limits<int>::max();
+  if (value == std::floor(value) && std::abs(value) <= kLargest) return static_cast<int>(value);
+  throw InputError(where, "whole numbers", shortest(value));
+}
+
+std::vector<int> whole_numbers(const VtuFile& vtu, VtuSection section, const std::string& array, const Path& file) {
+  std::vector<int> numbers;
+  for (const double value : vtu.scalars(section, array))
+    numbers.push_back(whole_number(value, file.string() + ": array '" + array + "'"));
+  return numbers;
+}
+
+Network network_of(const VtuFile& vtu, const Path& file) {
+  Network network;
+  const std::vector<double> xyz_um = vtu.coordinates(), ends = vtu.line_ends();
+  for (std::size_t at = 0; at < xyz_um.size(); at += 3) network.vertices_um.push_back({xyz_um[at], xyz_um[at + 1]});
+  network.adhesion_id = whole_numbers(vtu, VtuSection::point_data, "adhesion_id", file);
+  if (vtu.has(VtuSection::point_data, "held_by_cut")) {
+    for (const int is_held : whole_numbers(vtu, VtuSection::point_data, "held_by_cut", file))
+      network.held_by_cut.push_back(is_held != 0);
+  }
+  const std::vector<int> fibre_id = whole_numbers(vtu, VtuSection::cell_data, "fibre_id", file);
+  const std::vector<double> rest_um = vtu.scalars(VtuSection::cell_data, "rest_length_um");
+  std::vector<double> share(fibre_id.size(), 1.0);
+  if (vtu.has(VtuSection::cell_data, "share")) share = vtu.scalars(VtuSection::cell_data, "share");
+  for (std::size_t k = 0; k < fibre_id.size(); ++k) {
+    const std::string where = file.string() + ": cell " + std::to_string(k);
+    network.links.push_back({.vertex_a = whole_number(ends[2 * k], where),
+                             .vertex_b = whole_number(ends[2 * k + 1], where),
+                             .fibre_id = fibre_id[k],
+                             .rest_length_um = rest_um[k],
+                             .share = share[k]});
+  }
+  try {
+    check(network);
+  } catch (const InvalidData& error) {
+    throw InputError(file.string() + ": " + error.element, error.expected, error.found);
+  }
+  return network;
+}
+
+}  // namespace
+
+Network read_network(const Path& file) { return network_of(VtuFile(read_text(file), file.string()), file); }
+
+void write_network(const Path& file, const Network& network) {
+  check(network);
+  const auto grid = grid_of(network, network.vertices_um);
+  write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
+}
+
+ContractedNetwork read_contracted_network(const Path& file) {
+  const VtuFile vtu(read_text(file), file.string());
+  return {.network = network_of(vtu, file), .link_force_nN = vtu.scalars(VtuSection::cell_data, "force_nN")};
+}
+
+void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
+                              const std::vector<double>& link_force_nN, const std::vector<CableState>& link_states) {
+  check(network);
+  MBTFM_ASSERT(positions_um.size() == network.vertices_um.size() && link_force_nN.size() == network.links.size() &&
+               link_states.size() == network.links.size());
+  const auto grid = grid_of(network, positions_um);
+  grid->GetCellData()->AddArray(double_array({.name = "force_nN", .scalars = link_force_nN, .vectors = {}}));
+  const auto state = int_array("state");  // 0 slack, 1 taut, 2 collapsed
+  for (const CableState s : link_states) state->InsertNextValue(static_cast<int>(s));
+  grid->GetCellData()->AddArray(state);
+  std::vector<Vec2> moves_um;
+  for (std::size_t v = 0; v < positions_um.size(); ++v) moves_um.push_back(positions_um[v] - network.vertices_um[v]);
+  grid->GetPointData()->AddArray(double_array({.name = "contraction_um", .scalars = {}, .vectors = moves_um}));
+  write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
+}
+
+void write_cell_vtp(const Path& file, const Cell& cell) {
+  check(cell);
+  Shapes shapes;
+  const auto fibre = int_array("fibre_id");
+  const auto type = int_array("fibre_type");  // 1 dorsal, 2 arc, 3 ventral, 4 edge; 0: no fibre
+  const auto adhesion = int_array("adhesion_id");
+  const auto origin = int_array("adhesion_origin");  // 1 image, 2 drawn, 3 anchor, 4 candidate; 0: no adhesion
+  const auto label = [&](int fibre_id, int fibre_type, int adhesion_id, int adhesion_origin = 0) {
+    fibre->InsertNextValue(fibre_id);
+    type->InsertNextValue(fibre_type);
+    adhesion->InsertNextValue(adhesion_id);
+    origin->InsertNextValue(adhesion_origin);
+  };
+  std::vector<Polygon> rings = cell.holes_um;
+  rings.insert(rings.begin(), cell.outline_um);
+  for (Polyline& ring : rings) {
+    ring.push_back(ring.front());
+    shapes.add_line(ring);
+    label(0, 0, 0);
+  }
+  for (const Fibre& f : cell.fibres) {
+    shapes.add_line(f.points_um);
+    label(f.fibre_id, 1 + static_cast<int>(f.type), 0);
+  }
+  for (const Adhesion& a : cell.adhesions) {
+    shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
+    label(0, 0, a.adhesion_id, 1 + static_cast<int>(a.origin));
+  }
+  const auto poly = shapes.data();
+  for (vtkIntArray* array : {fibre.Get(), type.Get(), adhesion.Get(), origin.Get()})
+    poly->GetCellData()->AddArray(array);
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays) {
+  vtkNew<vtkPolyData> poly;
+  const vtkNew<vtkPoints> points = points_of(points_um);
+  poly->SetPoints(points);
+  vtkNew<vtkCellArray> vertices;
+  for (vtkIdType i = 0; i < points->GetNumberOfPoints(); ++i) vertices->InsertNextCell(1, &i);
+  poly->SetVerts(vertices);
+  for (const PointArray& array : arrays) {
+    MBTFM_ASSERT(array.scalars.size() + array.vectors.size() == points_um.size());
+    poly->GetPointData()->AddArray(double_array(array));
+  }
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
+                        const std::vector<PointArray>& arrays) {
+  check(adhesions);
+  Shapes shapes;
+  const auto label = int_array("adhesion_id");
+  for (const Adhesion& a : adhesions) {
+    shapes.add_polygon(ellipse_corners(a, kEllipseCorners));
+    label->InsertNextValue(a.adhesion_id);
+  }
+  const auto poly = shapes.data();
+  poly->GetCellData()->AddArray(label);
+  for (const PointArray& array : arrays) {
+    MBTFM_ASSERT(array.scalars.size() + array.vectors.size() == adhesions.size());
+    poly->GetCellData()->AddArray(double_array(array));
+  }
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
+void write_grid_vtu(const Path& file, const Grid& grid) {
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const auto& p : grid.points_um) points->InsertNextPoint(p.data());
+  vtkNew<vtkUnstructuredGrid> data;
+  data->SetPoints(points);
+  const int type = grid.corners == 4 ? VTK_QUAD : VTK_HEXAHEDRON;
+  data->Allocate(static_cast<vtkIdType>(grid.cells.size()) / grid.corners);
+  for (std::size_t first = 0; first < grid.cells.size(); first += grid.corners) {
+    vtkIdType corners[8];
+    std::copy_n(grid.cells.begin() + static_cast<std::ptrdiff_t>(first), grid.corners, corners);
+    data->InsertNextCell(type, grid.corners, corners);
+  }
+  for (const GridArray& array : grid.point_arrays) data->GetPointData()->AddArray(double_array(array));
+  for (const GridArray& array : grid.cell_arrays) data->GetCellData()->AddArray(double_array(array));
+  write_xml<vtkXMLUnstructuredGridWriter>(file, data.Get());
+}
+
+}  // namespace mbtfm::files

@@ -1,0 +1,44 @@
+/// VTK files (XML, binary appended, compressed). Readers and writers call `check` and throw InputError and OutputError.
+#pragma once
+
+#include <array>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/network.h"
+#include "pipeline/contract/path.h"
+#include "pipeline/files/named_array.h"
+
+namespace mbtfm::files {
+
+Network read_network(const Path& file);
+void write_network(const Path& file, const Network& network);
+
+/// Values of a grid in space, some numbers each; the name carries the unit.
+struct GridArray {
+  std::string name;
+  int components = 1;
+  std::vector<double> values;
+};
+/// Quadrilaterals (4 corners, round) or hexahedra (8 corners: one face round, then the face across).
+struct Grid {
+  int corners = 4;
+  std::vector<std::array<double, 3>> points_um;
+  std::vector<int> cells;  ///< points of the corners, cell by cell
+  std::vector<GridArray> point_arrays, cell_arrays;
+};
+void write_grid_vtu(const Path& file, const Grid& grid);
+
+/// Outline, adhesion ellipses and fibres as polygons and lines, with adhesion_id, fibre_id and fibre_type by cell.
+void write_cell_vtp(const Path& file, const Cell& cell);
+/// A point cloud with arrays.
+void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays);
+/// Adhesion ellipses with arrays by adhesion.
+void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
+                        const std::vector<PointArray>& arrays);
+ContractedNetwork read_contracted_network(const Path& file);
+void write_contracted_network(const Path& file, const Network& network, const std::vector<Vec2>& positions_um,
+                              const std::vector<double>& link_force_nN, const std::vector<CableState>& link_states);
+
+}  // namespace mbtfm::files

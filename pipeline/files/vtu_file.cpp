@@ -1,0 +1,268 @@
+#include "pipeline/files/vtu_file.h"
+
+#include <expat.h>
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <memory>
+#include <optional>
+#include <type_traits>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::files {
+namespace {
+
+constexpr const char* kGrid = "an unstructured grid (.vtu)";
+constexpr const char* kDamaged = "the file may be damaged: write it again";
+constexpr std::string_view kEnd = "</VTKFile>";
+
+std::optional<std::uint64_t> count_of(const std::string& text) {
+  const std::size_t begin = text.find_first_not_of(' '), end = text.find_last_not_of(' ');
+  if (begin == text.npos) return std::nullopt;
+  std::uint64_t value = 0;
+  const auto [stop, error] = std::from_chars(text.data() + begin, text.data() + end + 1, value);
+  if (error != std::errc() || stop != text.data() + end + 1) return std::nullopt;
+  return value;
+}
+
+std::optional<VtuSection> section_of(std::string_view element) {
+  if (element == "PointData") return VtuSection::point_data;
+  if (element == "CellData") return VtuSection::cell_data;
+  if (element == "Points") return VtuSection::points;
+  if (element == "Cells") return VtuSection::cells;
+  return std::nullopt;
+}
+
+std::string name_of(VtuSection section) {
+  switch (section) {
+    case VtuSection::point_data:
+      return "point array";
+    case VtuSection::cell_data:
+      return "cell array";
+    case VtuSection::points:
+      return "array of points";
+    case VtuSection::cells:
+      return "array of cells";
+  }
+  throw InternalError("unknown section of a VTK file");
+}
+
+using Attributes = std::map<std::string, std::string>;
+
+/// What the XML says, up to the appended data, which need not be XML.
+struct Structure {
+  XML_Parser parser = nullptr;
+  Attributes head, appended;
+  std::vector<VtuFile::Piece> pieces;
+  std::optional<std::size_t> appended_begin;  ///< the first byte after the tag
+  std::string error;                          ///< a count that is none
+
+  std::vector<std::string> open;  ///< elements
+  std::optional<VtuSection> section;
+
+  std::uint64_t count(Attributes& attributes, const char* name) {
+    const auto value = count_of(attributes[name]);
+    if (!value && error.empty()) error = std::string(name) + "=\"" + attributes[name] + "\"";
+    return value.value_or(0);
+  }
+
+  void begin(const std::string& element, Attributes attributes) {
+    open.push_back(element);
+    if (element == "VTKFile") head = attributes;
+    if (element == "Piece") {
+      pieces.emplace_back();
+      pieces.back().n_points = count(attributes, "NumberOfPoints");
+      pieces.back().n_cells = count(attributes, "NumberOfCells");
+    }
+    if (const auto begun = section_of(element); begun && !pieces.empty()) section = begun;
+    if (element == "DataArray" && section) {
+      pieces.back().arrays.push_back({.section = *section,
+                                      .name = attributes["Name"],
+                                      .type = attributes["type"],
+                                      .format = attributes["format"],
+                                      .offset = attributes["offset"],
+                                      .n_components = attributes["NumberOfComponents"],
+                                      .text = {}});
+    }
+    if (element == "AppendedData") {
+      appended = std::move(attributes);
+      appended_begin = static_cast<std::size_t>(XML_GetCurrentByteIndex(parser) + XML_GetCurrentByteCount(parser));
+      XML_StopParser(parser, XML_FALSE);
+    }
+  }
+
+  void end(const std::string& element) {
+    open.pop_back();
+    if (section_of(element)) section.reset();
+  }
+
+  void add_text(std::string_view text) {
+    // an array's own, not that of the keys that VTK puts into it
+    const bool is_own = section && !open.empty() && open.back() == "DataArray" && !pieces.back().arrays.empty();
+    if (is_own) pieces.back().arrays.back().text += text;
+  }
+};
+
+void on_begin(void* structure, const char* element, const char** attributes) {
+  Attributes named;
+  for (; *attributes; attributes += 2) named[attributes[0]] = attributes[1];
+  static_cast<Structure*>(structure)->begin(element, std::move(named));
+}
+void on_end(void* structure, const char* element) { static_cast<Structure*>(structure)->end(element); }
+void on_text(void* structure, const char* text, int length) {
+  static_cast<Structure*>(structure)->add_text({text, static_cast<std::size_t>(length)});
+}
+
+Structure structure_of(const std::string& text, const std::string& name) {
+  Structure structure;
+  const std::unique_ptr<std::remove_pointer_t<XML_Parser>, decltype(&XML_ParserFree)> parser(XML_ParserCreate(nullptr),
+                                                                                             &XML_ParserFree);
+  structure.parser = parser.get();
+  XML_SetUserData(parser.get(), &structure);
+  XML_SetElementHandler(parser.get(), on_begin, on_end);
+  XML_SetCharacterDataHandler(parser.get(), on_text);
+  constexpr std::size_t kPart = 1u << 20;  // expat counts with int
+  for (std::size_t at = 0; at < text.size() && !structure.appended_begin; at += kPart) {
+    const std::size_t n = std::min(kPart, text.size() - at);
+    const auto status = XML_Parse(parser.get(), text.data() + at, static_cast<int>(n), at + n == text.size());
+    if (status != XML_STATUS_OK && !structure.appended_begin) {
+      throw InputError(name + ":" + std::to_string(XML_GetCurrentLineNumber(parser.get())), kGrid,
+                       XML_ErrorString(XML_GetErrorCode(parser.get())), kDamaged);
+    }
+  }
+  return structure;
+}
+
+/// What a file of this size may claim: as many numbers as it has bytes, eight times over for those that pack well, and
+/// as many as a network of a million links has.
+std::uint64_t most_numbers(std::size_t n_bytes) { return (std::uint64_t{1} << 23) + 8 * std::uint64_t{n_bytes}; }
+
+void require_plausible_counts(const std::vector<VtuFile::Piece>& pieces, std::size_t n_bytes, const std::string& name) {
+  std::uint64_t left = most_numbers(n_bytes);
+  for (const VtuFile::Piece& piece : pieces) {
+    // three coordinates and a label a point; two ends, an offset, a type and four numbers a cell
+    const bool fits = piece.n_points <= left / 4 && piece.n_cells <= (left - 4 * piece.n_points) / 8;
+    if (!fits) {
+      throw InputError(name, "as many points and cells as the file can hold",
+                       std::to_string(piece.n_points) + " points and " + std::to_string(piece.n_cells) + " cells in " +
+                           std::to_string(n_bytes) + " bytes",
+                       kDamaged);
+    }
+    left -= 4 * piece.n_points + 8 * piece.n_cells;
+  }
+}
+
+}  // namespace
+
+VtuFile::VtuFile(std::string text, std::string name) : text_(std::move(text)), name_(std::move(name)) {
+  if (text_.find(kEnd) == text_.npos)
+    throw InputError(name_, "a VTK XML file that ends with " + std::string(kEnd), "an early end or another format");
+  Structure structure = structure_of(text_, name_);
+  if (!structure.error.empty()) throw InputError(name_, "a number of points or cells", structure.error, kDamaged);
+  const auto word = [&](const char* key) { return structure.head.contains(key) ? structure.head[key] : std::string(); };
+  if (word("type") != "UnstructuredGrid") throw InputError(name_, kGrid, "type '" + word("type") + "'");
+  if (structure.pieces.empty()) throw InputError(name_, kGrid, "no points");
+  require_plausible_counts(structure.pieces, text_.size(), name_);
+  encoding_ = {.is_big_endian = word("byte_order") == "BigEndian",
+               .header_bytes = word("header_type") == "UInt64" ? 8 : 4,
+               .compressor = word("compressor")};
+  pieces_ = std::move(structure.pieces);
+  if (!structure.appended_begin) return;
+  const std::size_t begin = text_.find('_', *structure.appended_begin), end = text_.rfind(kEnd);
+  if (begin == text_.npos || end < begin || text_.find_first_not_of(" \t\r\n", end + kEnd.size()) != text_.npos)
+    throw InputError(name_, "appended data after a '_', and " + std::string(kEnd) + " at the end", "none", kDamaged);
+  appended_ = std::string_view(text_).substr(begin + 1, end - begin - 1);
+  appended_storage_ = structure.appended["encoding"] == "base64" ? VtuStorage::base64 : VtuStorage::raw;
+}
+
+const VtuFile::Array* VtuFile::find(const Piece& piece, VtuSection section, const std::string& array) const {
+  for (const Array& a : piece.arrays) {
+    // the coordinates are the only array of points, whatever it is called
+    if (a.section == section && (a.name == array || section == VtuSection::points)) return &a;
+  }
+  return nullptr;
+}
+
+bool VtuFile::has(VtuSection section, const std::string& array) const {
+  return std::all_of(pieces_.begin(), pieces_.end(),
+                     [&](const Piece& piece) { return find(piece, section, array) != nullptr; });
+}
+
+std::vector<double> VtuFile::numbers(const Piece& piece, VtuSection section, const std::string& array,
+                                     std::uint64_t n_components, std::uint64_t n_tuples) const {
+  const Array* a = find(piece, section, array);
+  if (a == nullptr) throw InputError(name_, name_of(section) + " '" + array + "'", "none of that name");
+  const std::string where = name_ + ": array '" + array + "'";
+  if (n_components != count_of(a->n_components.empty() ? "1" : a->n_components))
+    throw InputError(where, std::to_string(n_components) + " components", a->n_components);
+  VtuData data{.bytes = a->text,
+               .storage = a->format == "binary" ? VtuStorage::base64 : VtuStorage::ascii,
+               .type = a->type,
+               .n_values = n_components * n_tuples};
+  if (a->format == "appended") {
+    const auto offset = count_of(a->offset);
+    if (!offset || *offset > appended_.size())
+      throw InputError(where, "an offset within the appended data", "'" + a->offset + "'", kDamaged);
+    data.bytes = appended_.substr(*offset);
+    data.storage = appended_storage_;
+  } else if (a->format != "binary" && a->format != "ascii") {
+    throw InputError(where, "the format ascii, binary or appended", "'" + a->format + "'", kDamaged);
+  }
+  try {
+    auto decoded = decode_vtu(data, encoding_, where);
+    const auto is_finite = [](double value) { return std::isfinite(value); };
+    if (!std::ranges::all_of(decoded, is_finite)) throw InputError(where, "finite numbers", "NaN or infinity");
+    return decoded;
+  } catch (const InvalidData& error) {
+    throw InputError(error.element, error.expected, error.found, kDamaged);
+  }
+}
+
+std::vector<double> VtuFile::scalars(VtuSection section, const std::string& array) const {
+  std::vector<double> all;
+  for (const Piece& piece : pieces_) {
+    const bool is_of_points = section == VtuSection::point_data;
+    const auto part = numbers(piece, section, array, 1, is_of_points ? piece.n_points : piece.n_cells);
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  return all;
+}
+
+std::vector<double> VtuFile::coordinates() const {
+  std::vector<double> all;
+  for (const Piece& piece : pieces_) {
+    const auto part = numbers(piece, VtuSection::points, "Points", 3, piece.n_points);
+    all.insert(all.end(), part.begin(), part.end());
+  }
+  return all;
+}
+
+std::vector<double> VtuFile::line_ends() const {
+  constexpr double kLine = 3;  // VTK_LINE
+  std::vector<double> all;
+  double n_points_before = 0, n_cells_before = 0;
+  for (const Piece& piece : pieces_) {
+    const auto types = numbers(piece, VtuSection::cells, "types", 1, piece.n_cells);
+    const auto offsets = numbers(piece, VtuSection::cells, "offsets", 1, piece.n_cells);
+    for (std::size_t k = 0; k < types.size(); ++k) {
+      if (types[k] == kLine && offsets[k] == 2.0 * static_cast<double>(k + 1)) continue;
+      throw InputError(name_ + ": cell " + std::to_string(static_cast<std::size_t>(n_cells_before) + k),
+                       "a line of two points", "cell type " + shortest(types[k]));
+    }
+    for (const double end : numbers(piece, VtuSection::cells, "connectivity", 1, 2 * piece.n_cells)) {
+      if (!(end >= 0 && end < static_cast<double>(piece.n_points)) || end != std::floor(end)) {
+        throw InputError(name_ + ": array 'connectivity'", "a point below " + std::to_string(piece.n_points),
+                         shortest(end), kDamaged);
+      }
+      all.push_back(end + n_points_before);
+    }
+    n_points_before += static_cast<double>(piece.n_points);
+    n_cells_before += static_cast<double>(piece.n_cells);
+  }
+  return all;
+}
+
+}  // namespace mbtfm::files

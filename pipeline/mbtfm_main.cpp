@@ -1,0 +1,355 @@
+/// mbtfm: starts the stages. It links none of them.
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <cstdlib>
+#include <iostream>
+#include <map>
+#include <optional>
+#include <sstream>
+#include <utility>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/results.h"
+#include "pipeline/contract/version.h"
+#include "pipeline/cost/accuracy.h"
+#include "pipeline/cost/presets.h"
+#include "pipeline/cost/study_report.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/report/compare.h"
+#include "pipeline/report/report.h"
+#include "pipeline/runner/batch.h"
+#include "pipeline/runner/batch_table.h"
+#include "pipeline/runner/image_sets.h"
+#include "pipeline/runner/lock.h"
+#include "pipeline/runner/process.h"
+#include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/verify.h"
+#include "pipeline/stage/console.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace mbtfm;
+
+using namespace exit_code;
+
+struct CommandLine {
+  fs::path folder;
+  fs::path stage_folder = runner::executable_folder();
+  int threads = numerics::available_threads();
+  int jobs = 1;
+  bool is_quiet = false, only_list = false, only_table = false, is_checked = false, explain = false;
+  std::vector<std::string> only, redo, patterns;
+  std::vector<fs::path> more_cells;
+  fs::path template_toml, out, inputs;
+  std::optional<double> timeout_s;
+  std::optional<std::uint64_t> memory_bytes;
+  std::string preset, accuracy;
+  double budget_min = 10;  // a study that one waits for
+  int repeats = 3;         // whose median one busy moment does not move
+  bool is_whole = false;
+};
+
+bool is_terminal() { return isatty(STDERR_FILENO) != 0; }
+
+// What stands on the line of a terminal before gives way.
+void say(const std::string& line) {
+  std::fprintf(stderr, "%smbtfm: %s\n", is_terminal() ? "\r\033[K" : "", line.c_str());
+}
+void show(const std::string& line) { std::fprintf(stderr, "\r\033[K%s", line.c_str()); }
+
+runner::RunOptions run_options(const CommandLine& line) {
+  return {.stage_folder = line.stage_folder,
+          .threads = line.threads,
+          .is_quiet = line.is_quiet,
+          .is_checked = line.is_checked,
+          .only = line.only,
+          .redo = line.redo,
+          .explain = line.explain,
+          .limits = {.seconds = line.timeout_s, .memory_bytes = line.memory_bytes},
+          .preset = line.preset,
+          .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
+          .version = kVersion,
+          .say = line.is_quiet ? nullptr : say,
+          .finish = nullptr};
+}
+
+/// Presets are tried without a report; the last of them is then found up to date, and told of with what it reached.
+runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions options) {
+  const double wanted = cost::parse_accuracy(line.accuracy);
+  const std::function<void()> write_report = std::exchange(options.finish, nullptr);
+  if (!line.only.empty()) throw UsageError("--accuracy: is reached by all stages together: leave out --only");
+  const cost::AccuracyOutcome reached = cost::reach_accuracy(wanted, [&](const std::string& preset) {
+    options.preset = preset;
+    options.beneath = cost::preset_named(preset).settings;
+    runner::run_cell(line.folder, options);
+    options.redo.clear();  // once is enough, whatever preset comes next
+    const std::optional<ErrorBudget> budget = files::read_fit_summary(line.folder / "4_fit/fit.json").error_budget;
+    if (budget) return *budget;
+    throw InputError((line.folder / "4_fit/fit.json").string(), "an error budget", "none", "run with --redo fit");
+  });
+  options.say = nullptr;
+  options.explain = false;
+  options.finish = [&] {
+    cost::record_accuracy(line.folder, wanted, reached);
+    write_report();
+  };
+  say(reached.verdict);
+  return runner::run_cell(line.folder, options);
+}
+
+int run(const CommandLine& line) {
+  runner::RunOptions options = run_options(line);
+  options.finish = [&] {
+    if (!files::is_own_file(line.folder / "4_fit/fit.json")) return;
+    report::update_report(line.folder);
+    if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
+  };
+  const runner::CellOutcome outcome =
+      line.accuracy.empty() ? runner::run_cell(line.folder, options) : run_to_accuracy(line, options);
+  if (outcome.converged()) return kDone;
+  std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", outcome.not_converged().c_str());
+  return kNotSolved;
+}
+
+/// The cells below the folder, made from images first where patterns say so.
+std::vector<fs::path> cells_of(const CommandLine& line) {
+  std::vector<runner::ImagePattern> patterns;
+  for (const std::string& text : line.patterns) patterns.push_back(runner::parse_pattern(text));
+  if (!patterns.empty()) runner::make_cell_folders(line.folder, patterns, line.template_toml);
+  runner::FoundCells found = runner::find_cells(line.folder);
+  for (const runner::SkippedFolder& skipped : found.skipped)
+    say("skipped, as it cannot be read: " + skipped.folder.string() + ": " + skipped.why);
+  return std::move(found.cells);
+}
+
+std::vector<std::string> arguments_of_cell(const CommandLine& line) {
+  std::vector<std::string> arguments = {"--threads", std::to_string(std::max(1, line.threads / line.jobs)),
+                                        "--stages-dir", line.stage_folder.string(), "--checked"};
+  if (!line.preset.empty()) arguments.insert(arguments.end(), {"--preset", line.preset});
+  if (!line.accuracy.empty()) arguments.insert(arguments.end(), {"--accuracy", line.accuracy});
+  for (const std::string& stage : line.only) arguments.insert(arguments.end(), {"--only", stage});
+  for (const std::string& stage : line.redo) arguments.insert(arguments.end(), {"--redo", stage});
+  if (line.timeout_s) arguments.insert(arguments.end(), {"--timeout", std::to_string(*line.timeout_s)});
+  if (line.memory_bytes) arguments.insert(arguments.end(), {"--memory", std::to_string(*line.memory_bytes)});
+  return arguments;
+}
+
+int batch(const CommandLine& line) {
+  const std::vector<fs::path> cells = cells_of(line);
+  if (line.only_list) {
+    stage::print(runner::list_cells(cells, run_options(line), line.threads));
+    return kDone;
+  }
+  const auto outcomes = line.only_table
+                            ? runner::outcomes_so_far(cells, run_options(line), line.threads)
+                            : runner::run_batch(cells, {.program = fs::read_symlink("/proc/self/exe"),
+                                                        .arguments = arguments_of_cell(line),
+                                                        .jobs = line.jobs,
+                                                        .threads = line.threads,
+                                                        .run = run_options(line),
+                                                        .say = line.is_quiet ? nullptr : say,
+                                                        .show = line.is_quiet || !is_terminal() ? nullptr : show});
+  const auto n_failed =
+      std::count_if(outcomes.begin(), outcomes.end(), [](const auto& cell) { return cell.exit_code != 0; });
+  const fs::path table = line.folder / "batch.csv";
+  if (n_failed > 0) say("failed:" + runner::failure_table(line.folder, outcomes));
+  runner::write_batch_table(table, line.folder, outcomes, line.only);
+  say(std::to_string(outcomes.size() - n_failed) + " cells done, " + std::to_string(n_failed) + " failed; " +
+      table.string());
+  return n_failed == 0 ? kDone : kFailed;
+}
+
+int tell(const runner::Verification& found, const std::string& what) {
+  for (const std::string& difference : found.differences) stage::print(difference + "\n");
+  if (found.differences.empty())
+    stage::print(what + ": " + std::to_string(found.n_files) + " files, all as run.json tells\n");
+  return found.differences.empty() ? kDone : kFailed;
+}
+
+int verify(const CommandLine& line) { return tell(runner::verify_cell(line.folder), line.folder.string()); }
+
+int repeat(const CommandLine& line) {
+  const fs::path run_json = files::is_file(line.folder) ? line.folder : line.folder / "run.json";
+  const fs::path inputs = line.inputs.empty() ? run_json.parent_path() : line.inputs;
+  return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
+}
+
+/// Become mbtfm-stats.
+int stats(const CommandLine& line, const std::vector<std::string>& further) {
+  const std::string program = (runner::executable_folder() / "mbtfm-stats").string();
+  std::vector<std::string> arguments = {program,
+                                        "--cells",
+                                        line.folder.string(),
+                                        "--out",
+                                        files::inside(line.folder, "statistics", line.folder.string()).string(),
+                                        "--threads",
+                                        std::to_string(line.threads)};
+  if (line.is_quiet) arguments.emplace_back("--quiet");
+  for (const std::string& argument : further) {
+    // the one flag that people write with a dash
+    constexpr std::string_view kDashed = "--condition-from";
+    const bool is_dashed = argument.starts_with(kDashed);
+    arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
+  }
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  execv(pointers[0], pointers.data());
+  throw OutputError("cannot start " + program);
+}
+
+int cost_study(const CommandLine& line) {
+  if (!line.more_cells.empty() && line.out.empty())
+    throw UsageError("--out: is needed for the study of several cells: a folder of its own");
+  std::vector<fs::path> cells = line.more_cells;
+  cells.insert(cells.begin(), line.folder);
+  std::vector<cost::Study> studies;
+  std::string names;
+  for (const fs::path& cell : cells) {
+    names += (names.empty() ? "" : ", ") + fs::weakly_canonical(cell).filename().string();
+    studies.push_back(cost::measure(cell, {.stage_folder = line.stage_folder,
+                                           .threads = line.threads,
+                                           .budget_s = 60 * line.budget_min / static_cast<double>(cells.size()),
+                                           .repeats = line.repeats,
+                                           .extent = line.is_whole ? cost::Extent::whole : cost::Extent::quick,
+                                           .say = line.is_quiet ? nullptr : say}));
+  }
+  const fs::path folder = line.out.empty() ? files::inside(line.folder, "cost", line.folder.string()) : line.out;
+  cost::write_study(folder, cost::combined(studies), names);
+  if (!line.is_quiet) say("cost.csv, cost.svg and cost.md in " + folder.string());
+  return kDone;
+}
+
+int compare(const CommandLine& line) {
+  stage::print(report::comparison_text(line.folder));
+  return kDone;
+}
+
+CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name, const std::string& purpose,
+                      const std::string& folder) {
+  CLI::App* command = app.add_subcommand(name, purpose);
+  command->add_option(folder, line.folder, folder == "CELL" ? "a cell folder" : "a folder of cell folders")->required();
+  command->add_option("--threads", line.threads, "processors to use")
+      ->check(CLI::Range(1, 1024))
+      ->capture_default_str();
+  command->add_flag("--quiet", line.is_quiet, "print errors only");
+  return command;
+}
+
+void add_stage_options(CLI::App* command, CommandLine& line) {
+  std::vector<std::string> names;
+  std::string meaning = "parameters, where cell.toml sets none";
+  for (const cost::Preset& preset : cost::presets()) {
+    names.push_back(preset.name);
+    meaning += (names.size() == 1 ? ": " : ", ") + preset.name + " (" + preset.purpose + ")";
+  }
+  CLI::Option* preset = command->add_option("--preset", line.preset, meaning)->check(CLI::IsMember(names));
+  command->add_option("--accuracy", line.accuracy, "the cheapest preset that finds the tensions to this error, as 5%")
+      ->excludes(preset);
+  // one value a flag: else the folder that follows would be taken for another
+  command
+      ->add_option("--only", line.only,
+                   "run this stage only: segment, track, network or fit; several with commas: segment,network")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--redo", line.redo, "run this stage even if up to date or changed by hand; several with commas")
+      ->delimiter(',')
+      ->allow_extra_args(false);
+  command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
+  const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
+  command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
+      ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
+      ->check(CLI::PositiveNumber);
+  command->add_option("--memory", line.memory_bytes, "kill a stage that takes more memory: 500MB, 4GB")
+      ->transform(CLI::AsSizeValue(/*kb_is_1000=*/true))
+      ->check(CLI::PositiveNumber);
+}
+
+int start(int argc, char** argv) {
+  CommandLine line;
+  CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
+  app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
+  app.require_subcommand(1);
+  app.footer(
+      "Exit codes: 0 done, 1 some cells failed, 2 wrong flag, 3 bad input, 4 not converged (outputs are there, "
+      "marked), "
+      "5 cannot write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, "
+      "130 interrupted, 128 + n killed by signal n.");
+  CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
+  add_stage_options(run_command, line);
+  run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
+  run_command->add_flag("--explain", line.explain, "fit anew and say what each effect that is off would change");
+  CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
+  add_stage_options(batch_command, line);
+  batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
+  batch_command
+      ->add_option("--pattern", line.patterns,
+                   "make cell folders for images that lie together: KEY=PATTERN with KEY of [images] and "
+                   "{cell} for the cell's name, as in adhesion='{cell}_pax.tif'")
+      ->allow_extra_args(false);
+  batch_command->add_option("--template", line.template_toml, "settings for the cell.toml of these folders");
+  batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
+  batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
+  CLI::App* verify_command =
+      add_command(app, line, "verify", "hash all inputs and outputs anew: as run.json tells?", "CELL");
+  CLI::App* repeat_command =
+      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", "CELL");
+  repeat_command->add_option("--out", line.out, "the new cell folder")->required();
+  repeat_command->add_option("--inputs", line.inputs, "where the inputs are; default: beside run.json");
+  repeat_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
+      ->capture_default_str();
+  CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
+  stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
+  CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", "CELL");
+  cost_command->add_option("MORE", line.more_cells, "further cells, over all of which the errors are taken");
+  cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
+  cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  cost_command->add_option("--repeats", line.repeats, "runs of each choice, at most; the median counts")
+      ->check(CLI::Range(1, 100))
+      ->capture_default_str();
+  cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
+  cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
+      ->capture_default_str();
+  add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", "CELL");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    std::ostringstream help;
+    const int code = app.exit(error, help, std::cerr);
+    stage::print(help.str());
+    return code == 0 ? kDone : kUsage;
+  }
+  if (run_command->parsed()) return run(line);
+  if (batch_command->parsed()) return batch(line);
+  if (cost_command->parsed()) return cost_study(line);
+  if (verify_command->parsed()) return verify(line);
+  if (repeat_command->parsed()) return repeat(line);
+  if (stats_command->parsed()) return stats(line, stats_command->remaining());
+  return compare(line);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  runner::watch_interrupts();
+  if (is_terminal()) setenv("MBTFM_TERMINAL", "1", 1);  // the stages' own progress is seen
+  try {
+    return start(argc, argv);
+  } catch (const runner::StageFailed& error) {
+    std::fprintf(stderr, "mbtfm: error: %s\n", error.what());
+    return error.failure.exit_code;
+  } catch (const runner::CellBusy& error) {
+    std::fprintf(stderr, "mbtfm: error: %s\n", error.what());
+    return kBusy;
+  } catch (...) {
+    return report_current_exception("mbtfm");
+  }
+}

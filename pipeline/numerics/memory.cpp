@@ -1,0 +1,30 @@
+#include "pipeline/numerics/memory.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <algorithm>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::numerics {
+
+double memory_bytes() {
+  const double of_machine = static_cast<double>(sysconf(_SC_PHYS_PAGES)) * static_cast<double>(sysconf(_SC_PAGESIZE));
+  rlimit given{};
+  if (getrlimit(RLIMIT_AS, &given) != 0 || given.rlim_cur == RLIM_INFINITY) return of_machine;
+  return std::min(of_machine, static_cast<double>(given.rlim_cur));
+}
+
+void expect_room_for(const Demand& demand) {
+  constexpr double kShare = 0.8;  // the rest is the program's other things, and the machine's other programs
+  const double needed = demand.count * demand.bytes_each, allowed = kShare * memory_bytes();
+  if (needed <= allowed) return;
+  const auto gigabytes = [](double bytes) { return brief(1e-9 * bytes) + " GB"; };
+  throw OutOfMemory(demand.what + " would have " + brief(demand.count) + " " + demand.parts + ", which take " +
+                    gigabytes(needed) + " of memory at the least; allowed are " + gigabytes(allowed) + ": " +
+                    demand.remedy);
+}
+
+}  // namespace mbtfm::numerics

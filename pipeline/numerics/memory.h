@@ -1,0 +1,22 @@
+/// Large things are counted before they are made.
+#pragma once
+
+#include <string>
+
+namespace mbtfm::numerics {
+
+/// Bytes that a program may take in all: the machine's memory, or less where it was given less (ulimit -v).
+double memory_bytes();
+
+/// What is about to be made.
+struct Demand {
+  std::string what;       ///< "the mesh", "the lattice of tractions"
+  double count = 0;       ///< of its parts
+  std::string parts;      ///< "vertices"
+  double bytes_each = 0;  ///< at the least
+  std::string remedy;     ///< "choose a larger edge_length_um"
+};
+/// @throws OutOfMemory with the count and the memory, where it would take more than four fifths of memory_bytes()
+void expect_room_for(const Demand& demand);
+
+}  // namespace mbtfm::numerics

@@ -1,0 +1,95 @@
+#include "pipeline/stage/effects.h"
+
+#include <algorithm>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::stage {
+namespace {
+
+struct Key {
+  std::string name;
+  std::string EffectSwitches::*member;
+  std::string meaning;
+};
+
+const std::vector<Key>& switches() {
+  using S = EffectSwitches;
+  static const std::vector<Key> list = {
+      {"stress_fibres", &S::stress_fibres, "stress fibres in the network; auto: where any was found"},
+      {"finite_thickness", &S::finite_thickness, "the gel's rigid base; auto: where it changes the field"},
+      {"finite_sides", &S::finite_sides, "the gel's sides at side_distance_um; auto: where they change the field"},
+      {"depth_graded_gel", &S::depth_graded_gel, "modulus_profile; auto: where the modulus differs from even"},
+      {"vertical_displacement", &S::vertical_displacement,
+       "displacement into the gel; auto: where a three-dimensional surface is written"},
+      {"drift_affine", &S::drift_affine,
+       "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
+      {"common_motion", &S::common_motion,
+       "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
+      {"beads_under_load", &S::beads_under_load,
+       "beads are taken where they lie while the cell pulls, as its images show the cell; auto: where the beads say "
+       "so"},
+      {"channel_shift", &S::channel_shift,
+       "shift and turn of the cell against the beads, found with the tensions; auto: on, where beads tell it"},
+      {"beyond_cut", &S::beyond_cut,
+       "forces beyond the cut of a cell that its image cuts; auto: where the outline has a cut"},
+      {"cable_elasticity", &S::cable_elasticity,
+       "cables resist to be longer than at rest; auto: where any would be longer"},
+      {"robust_loss", &S::robust_loss, "outlying beads count less; auto: where tails cost more than the loss does"},
+      {"time_coupling", &S::time_coupling, "start from the frame before; auto: where one is given"},
+  };
+  return list;
+}
+
+constexpr const char* kTolerance = "effect_tolerance";
+
+}  // namespace
+
+std::vector<std::string> effect_keys() {
+  std::vector<std::string> keys;
+  for (const Key& key : switches()) keys.push_back(key.name);
+  keys.emplace_back(kTolerance);
+  return keys;
+}
+
+void declare(ParameterList& list, EffectSwitches& values, const std::vector<std::string>& names) {
+  list.table("effects");
+  const auto is_named = [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); };
+  for (const Key& key : switches()) {
+    if (is_named(key.name)) list.add(key.name, values.*key.member, key.meaning, {"auto", "on", "off"});
+  }
+  if (!is_named(kTolerance)) return;
+  list.add(kTolerance, values.effect_tolerance, Range{.low = 0, .high = 1, .excludes_low = true},
+           "what leaving an effect out may change, as a share of the displacement");
+}
+
+Effect decided(const std::string& name, const std::string& setting, double number, double threshold,
+               const std::string& found) {
+  const bool is_above = number > threshold;
+  Effect effect = decided(name, setting, is_above,
+                          found + " " + brief(number) + (is_above ? ", above " : ", not above ") + brief(threshold));
+  effect.number = number;
+  effect.threshold = threshold;
+  return effect;
+}
+
+Effect decided(const std::string& name, const std::string& setting, bool is_called_for, const std::string& why) {
+  return {.name = name,
+          .setting = setting,
+          .is_on = setting == "auto" ? is_called_for : setting == "on",
+          .number = {},
+          .threshold = {},
+          .why = why};
+}
+
+std::string line_of(const Effect& effect) {
+  std::string line = effect.name + ": " + (effect.is_on ? "on" : "off");
+  line += effect.setting == "auto" ? " (auto)" : " (as switched)";
+  line += ": " + effect.why;
+  if (effect.seconds > 0) line += "; " + brief(effect.seconds) + " s";
+  if (!effect.would_change.empty()) line += "; on, it " + effect.would_change;
+  return line;
+}
+
+}  // namespace mbtfm::stage

@@ -1,0 +1,59 @@
+/// The effects of the physics, one switch each: the table [effects] of cell.toml.
+///
+/// `on` and `off` are obeyed, or refused where the scene or the method has no place for them. `auto`, the default, asks
+/// one number of the scene, what leaving the effect out would cost, before the effect is paid for: it is on where that
+/// number exceeds its threshold. docs/effects.md has the numbers.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/report.h"
+#include "pipeline/stage/parameters.h"
+
+namespace mbtfm::stage {
+
+struct EffectSwitches {
+  std::string stress_fibres = "auto";
+  std::string finite_thickness = "auto";
+  std::string finite_sides = "auto";
+  std::string depth_graded_gel = "auto";
+  std::string vertical_displacement = "auto";
+  std::string drift_affine = "auto";
+  std::string common_motion = "auto";
+  std::string beads_under_load = "auto";
+  std::string channel_shift = "auto";
+  std::string beyond_cut = "auto";
+  std::string cable_elasticity = "auto";
+  std::string robust_loss = "auto";
+  std::string time_coupling = "auto";
+  double effect_tolerance = 0.01;  ///< a tenth of the tensions' usual error bars: what is left out then does not show
+};
+
+/// Declare these keys of [effects]; a stage leaves the others' to them. @param names  members of EffectSwitches
+void declare(ParameterList& list, EffectSwitches& switches, const std::vector<std::string>& names);
+
+/// All keys of [effects].
+std::vector<std::string> effect_keys();
+
+/// Whether an effect is on: as its switch says or, where that is `auto`, where `number` exceeds `threshold`.
+/// @param found  what the number is, in words before it: "the base changes the field by"
+Effect decided(const std::string& name, const std::string& setting, double number, double threshold,
+               const std::string& found);
+/// The same where the scene either calls for it or does not.
+Effect decided(const std::string& name, const std::string& setting, bool is_called_for, const std::string& why);
+
+/// "finite sides: off (auto): sides at 2.5 thicknesses change the field by 0.025, ...; 0.2 s"
+std::string line_of(const Effect& effect);
+
+/// Seconds since it was made.
+class Stopwatch {
+ public:
+  double seconds() const { return std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count(); }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+}  // namespace mbtfm::stage

@@ -1,0 +1,307 @@
+#include "pipeline/stage/parameters.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/contract/range.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/toml.h"
+#include "pipeline/stage/effects.h"
+
+namespace mbtfm::stage {
+
+namespace {
+
+/// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
+constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network",  "cables", "effects",
+                                "substrate", "fit",    "stats",   "scenario", "traction", "checks"};
+/// The keys above the first table.
+constexpr std::array kRootKeys = {"pixel_size_um"};
+
+template <class... F>
+struct Overloaded : F... {
+  using F::operator()...;
+};
+template <class... F>
+Overloaded(F...) -> Overloaded<F...>;
+
+int edit_distance(std::string_view a, std::string_view b) {
+  std::vector<int> row(b.size() + 1);
+  std::iota(row.begin(), row.end(), 0);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    int diagonal = std::exchange(row[0], static_cast<int>(i) + 1);
+    for (std::size_t j = 0; j < b.size(); ++j) {
+      const int replaced = diagonal + (a[i] != b[j]);
+      diagonal = row[j + 1];
+      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
+    }
+  }
+  return row.back();
+}
+
+std::string nearest(const std::vector<std::string>& known, std::string_view name) {
+  const auto closest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
+    return edit_distance(a, name) < edit_distance(b, name);
+  });
+  return closest == known.end() ? std::string() : *closest;
+}
+
+std::string in_table(const Parameter& p) { return (p.table.empty() ? "" : "[" + p.table + "] ") + p.name; }
+
+/// What a value must be: "a number > 0", "true or false", "one of a, b".
+std::string expectation(const Parameter& p) {
+  return std::visit(Overloaded{[&](double*) { return describe("a number", p.range); },
+                               [&](std::optional<double>*) { return describe("a number", p.range); },
+                               [&](int*) { return describe("an integer", p.range); },
+                               [&](std::optional<int>*) { return describe("an integer", p.range); },
+                               [&](std::uint64_t*) { return std::string("an integer >= 0"); },
+                               [&](bool*) { return std::string("true or false"); },
+                               [&](std::string*) {
+                                 std::string names;
+                                 for (const auto& c : p.choices) names += (names.empty() ? "one of " : ", ") + c;
+                                 return names.empty() ? std::string("a text") : names;
+                               }},
+                    p.member);
+}
+
+template <class T>
+bool read_number(const std::string& text, T& value) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+/// Set the member; false where the text is not what it must be.
+bool try_set(Parameter& p, const std::string& text) {
+  const auto set_real = [&](auto* member) {
+    double value = 0;
+    if (!read_number(text, value) || !std::isfinite(value) || !is_inside(p.range, value)) return false;
+    *member = value;
+    return true;
+  };
+  const auto set_whole = [&](auto* member) {
+    int value = 0;
+    if (!read_number(text, value) || !is_inside(p.range, value)) return false;
+    *member = value;
+    return true;
+  };
+  return std::visit(Overloaded{[&](double* member) { return set_real(member); },
+                               [&](std::optional<double>* member) { return set_real(member); },
+                               [&](int* member) { return set_whole(member); },
+                               [&](std::optional<int>* member) { return set_whole(member); },
+                               [&](std::uint64_t* member) { return read_number(text, *member); },
+                               [&](bool* member) {
+                                 if (text != "true" && text != "false") return false;
+                                 *member = text == "true";
+                                 return true;
+                               },
+                               [&](std::string* member) {
+                                 const auto& c = p.choices;
+                                 if (!c.empty() && std::find(c.begin(), c.end(), text) == c.end()) return false;
+                                 *member = text;
+                                 return true;
+                               }},
+                    p.member);
+}
+
+std::string unit_slip(const Parameter& p, const std::string& text) {
+  double value = 0;
+  return read_number(text, value) ? mbtfm::unit_slip(p.name, value, p.range) : std::string();
+}
+
+std::string advice_on(const Parameter& p, const std::string& text) {
+  const std::string slip = unit_slip(p, text);
+  return slip.empty() ? p.meaning : slip + " (" + p.meaning + ")";
+}
+
+std::string place(const std::string& name, const toml::node& node) {
+  return name + ":" + std::to_string(node.source().begin.line);
+}
+
+/// The texts of an array with commas between them.
+std::string joined(const toml::array& list, const std::string& where) {
+  std::string text;
+  for (const toml::node& element : list) {
+    const auto* name = element.as_string();
+    if (!name) throw InputError(where, "a number, a text, true or false", "an array of other things than texts");
+    text += (text.empty() ? "" : ",") + name->get();
+  }
+  return text;
+}
+
+/// The value as a flag would spell it.
+std::string spelled(const toml::node& node, const std::string& where) {
+  if (const auto* v = node.as_floating_point()) return shortest(v->get());
+  if (const auto* v = node.as_integer()) return std::to_string(v->get());
+  if (const auto* v = node.as_boolean()) return v->get() ? "true" : "false";
+  if (const auto* v = node.as_string()) return v->get();
+  if (const auto* list = node.as_array()) return joined(*list, where);
+  throw InputError(where, "a number, a text, true or false", "a date or a nested table");
+}
+
+std::string unknown_key_hint(const std::vector<std::string>& known, std::string_view key) {
+  const std::string closest = nearest(known, key);
+  return closest.empty() ? "" : "did you mean '" + closest + "'?";
+}
+
+}  // namespace
+
+void ParameterList::add(Parameter parameter) {
+  parameter.table = table_;
+  parameter.default_value = to_text(parameter);
+  for (const Parameter& other : parameters_) MBTFM_ASSERT(other.name != parameter.name);
+  parameters_.push_back(std::move(parameter));
+}
+
+namespace {
+Parameter parameter(std::string name, auto& member, Range range, std::string meaning) {
+  Parameter p;
+  p.name = std::move(name);
+  p.member = &member;
+  p.range = range;
+  p.meaning = std::move(meaning);
+  return p;
+}
+}  // namespace
+
+void ParameterList::add(std::string name, double& member, Range range, std::string meaning) {
+  add(parameter(std::move(name), member, range, std::move(meaning)));
+}
+void ParameterList::add(std::string name, std::optional<double>& member, Range range, std::string meaning) {
+  add(parameter(std::move(name), member, range, std::move(meaning)));
+}
+void ParameterList::add(std::string name, int& member, Range range, std::string meaning) {
+  add(parameter(std::move(name), member, range, std::move(meaning)));
+}
+void ParameterList::add(std::string name, std::optional<int>& member, Range range, std::string meaning) {
+  add(parameter(std::move(name), member, range, std::move(meaning)));
+}
+void ParameterList::add(std::string name, std::uint64_t& member, std::string meaning) {
+  add(parameter(std::move(name), member, Range::not_negative(), std::move(meaning)));
+}
+void ParameterList::add(std::string name, bool& member, std::string meaning) {
+  add(parameter(std::move(name), member, Range::any(), std::move(meaning)));
+}
+void ParameterList::add(std::string name, std::string& member, std::string meaning, std::vector<std::string> choices) {
+  Parameter p = parameter(std::move(name), member, Range::any(), std::move(meaning));
+  p.choices = std::move(choices);
+  add(std::move(p));
+}
+
+void read_toml(ParameterList& list, const std::filesystem::path& file) {
+  read_toml(list, files::read_text(file), file.string());
+}
+
+void read_toml(ParameterList& list, std::string_view text, const std::string& name) {
+  const toml::table root = files::parse_toml(text, name);
+  std::map<std::string, std::vector<std::string>> keys_of;  // by table, of this list
+  for (const Parameter& p : list.all()) keys_of[p.table].push_back(p.name);
+
+  const auto set = [&](const std::string& table, std::string_view key, const toml::node& node) {
+    for (Parameter& p : list.all()) {
+      if (p.table != table || p.name != key) continue;
+      const std::string where = place(name, node) + ": " + in_table(p);
+      const std::string value = spelled(node, where);
+      if (!try_set(p, value)) throw InputError(where, expectation(p), "'" + value + "'", advice_on(p, value));
+      p.is_set = true;
+      return true;
+    }
+    return false;
+  };
+  for (const auto& [key, node] : root) {
+    const std::string key_name(key.str());
+    if (const toml::table* table = node.as_table()) {
+      if (keys_of.contains(key_name)) {
+        for (const auto& [inner_key, inner] : *table) {
+          if (set(key_name, inner_key.str(), inner)) continue;
+          const std::vector<std::string> others = key_name == "effects" ? effect_keys() : std::vector<std::string>();
+          if (std::ranges::find(others, std::string(inner_key.str())) != others.end()) continue;  // another stage's
+          throw InputError(place(name, inner), "a known key of [" + key_name + "]",
+                           "'" + std::string(inner_key.str()) + "'",
+                           unknown_key_hint(others.empty() ? keys_of[key_name] : others, inner_key.str()));
+        }
+      } else if (std::find(kTables.begin(), kTables.end(), key_name) == kTables.end()) {
+        throw InputError(place(name, node), "a known table", "[" + key_name + "]",
+                         unknown_key_hint({kTables.begin(), kTables.end()}, key_name));
+      }
+    } else if (!set("", key_name, node) && std::find(kRootKeys.begin(), kRootKeys.end(), key_name) == kRootKeys.end()) {
+      std::vector<std::string> known(kRootKeys.begin(), kRootKeys.end());
+      throw InputError(place(name, node), "a known key above the first table", "'" + key_name + "'",
+                       unknown_key_hint(known, key_name));
+    }
+  }
+}
+
+void set_from_text(Parameter& p, const std::string& text) {
+  if (!try_set(p, text)) {
+    const std::string slip = unit_slip(p, text);
+    throw UsageError("--" + p.name + ": expected " + expectation(p) + ", found '" + text + "'" +
+                     (slip.empty() ? "" : "; " + slip));
+  }
+  p.is_set = true;
+}
+
+std::string to_text(const Parameter& p) {
+  return std::visit(
+      Overloaded{[](double* m) { return shortest(*m); },
+                 [](std::optional<double>* m) { return *m ? shortest(**m) : std::string(); },
+                 [](int* m) { return std::to_string(*m); },
+                 [](std::optional<int>* m) { return *m ? std::to_string(**m) : std::string(); },
+                 [](std::uint64_t* m) { return std::to_string(*m); },
+                 [](bool* m) { return std::string(*m ? "true" : "false"); }, [](std::string* m) { return *m; }},
+      p.member);
+}
+
+Parameter& parameter_named(ParameterList& list, const std::string& name) {
+  std::vector<std::string> known;
+  for (Parameter& p : list.all()) {
+    if (p.name == name) return p;
+    known.push_back(p.name);
+  }
+  throw UsageError("no parameter is called '" + name + "': " + unknown_key_hint(known, name));
+}
+
+void check_complete(const ParameterList& list) {
+  for (const Parameter& p : list.all()) {
+    if (p.is_required && !p.is_set) {
+      throw UsageError(in_table(p) + " is missing: give it in cell.toml or as --" + p.name + " (" + p.meaning + ")");
+    }
+  }
+}
+
+std::string to_markdown(const ParameterList& list) {
+  std::string text;
+  std::string table = "\n";  // no table is called so
+  for (const Parameter& p : list.all()) {
+    if (p.table != table) {
+      table = p.table;
+      text += "\n### " + (table.empty() ? "Above the first table" : "`[" + table + "]`") + "\n\n";
+      text += "| key | default | value | meaning |\n|---|---|---|---|\n";
+    }
+    const std::string value = p.is_required ? "required" : p.default_value.empty() ? "" : "`" + p.default_value + "`";
+    text += "| `" + p.name + "` | " + value + " | " + expectation(p) + " | " + p.meaning + " |\n";
+  }
+  return text;
+}
+
+void declare(ParameterList& list, Gel& gel) {
+  list.table("gel");
+  list.add("youngs_modulus_kPa", gel.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the gel (kPa)");
+  list.required();
+  list.add("poisson_ratio", gel.poisson_ratio, Range::between(0, 0.5),
+           "Poisson's ratio of the gel; 0.5, the incompressible limit, for models without finite elements");
+  list.add("thickness_um", gel.thickness_um, Range::thickness_um(), "thickness of the gel on its rigid base (um)");
+  list.add("youngs_modulus_sigma_kPa", gel.youngs_modulus_sigma_kPa, Range{.low = 0},
+           "standard error of Young's modulus, for the error budget (kPa); unset: not known");
+  list.add("poisson_ratio_sigma", gel.poisson_ratio_sigma, Range{.low = 0, .high = 0.5},
+           "standard error of Poisson's ratio, for the error budget; unset: not known");
+  list.add("thickness_sigma_um", gel.thickness_sigma_um, Range{.low = 0},
+           "standard error of the thickness, for the error budget (um); unset: not known");
+}
+
+}  // namespace mbtfm::stage

@@ -1,0 +1,317 @@
+#include "pipeline/stage/plausible.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <utility>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::stage {
+
+namespace {
+
+constexpr const char* kPixelSize = "pixel_size_um";
+
+const PlausibleQuantity* find(std::string_view id) {
+  const auto& all = plausible_quantities();
+  const auto found = std::ranges::find_if(all, [&](const PlausibleQuantity& q) { return q.id == id; });
+  return found == all.end() ? nullptr : &*found;
+}
+
+const PlausibleQuantity& quantity_of(std::string_view id) {
+  const PlausibleQuantity* quantity = find(id);
+  MBTFM_ASSERT(quantity != nullptr);
+  return *quantity;
+}
+
+/// "kPa" of "youngs_modulus_kPa"; empty where the name has no unit.
+std::string unit_of(std::string_view id) {
+  for (const char* unit : {"kPa", "um2", "um", "nN"}) {
+    if (id.ends_with(std::string("_") + unit)) return unit;
+  }
+  return id.ends_with("_per_um2") ? "per um²" : "";
+}
+
+std::string with_unit(std::string_view id, const std::string& number) {
+  const std::string unit = unit_of(id);
+  return number + (unit.empty() ? "" : " " + (unit == "um2" ? "um²" : unit));
+}
+/// Six digits: 8400, not 8.4e+03.
+std::string with_unit(std::string_view id, double value) {
+  char text[32];
+  std::snprintf(text, sizeof text, "%.6g", value);
+  return with_unit(id, text);
+}
+
+std::optional<double> value_of(const Parameter& p) {
+  if (const auto* member = std::get_if<double*>(&p.member)) return **member;
+  if (const auto* member = std::get_if<std::optional<double>*>(&p.member)) return **member;
+  return std::nullopt;
+}
+
+std::string range_text(const Range& range) { return describe("", range); }
+
+}  // namespace
+
+const std::vector<PlausibleQuantity>& plausible_quantities() {
+  static const std::vector<PlausibleQuantity> table = {
+      {.id = "youngs_modulus_kPa",
+       .quantity = "Young's modulus of the gel",
+       .usual = Range::between(0.1, 100),
+       .possible = Range::between(0.01, 1000),
+       .source =
+           "Tissues and the gels that stand for them have 0.1 kPa (brain) to 40 kPa (bone before it mineralises): "
+           "Discher, Janmey & Wang, Science 310 (2005) 1139; gels for traction are made up to 100 kPa. Above 1000 kPa "
+           "the strongest adhesions known, 10 kPa "
+           "over a radius of 1 um, move beads by 20 nm (2.25 t a / E), which images do not show; below 0.01 kPa a "
+           "gel does not keep its shape",
+       .remedy = "check the modulus and its unit, kPa"},
+      {.id = "poisson_ratio",
+       .quantity = "Poisson's ratio of the gel",
+       .usual = Range::between(0.3, 0.5),
+       .possible = Range::between(0, 0.5),
+       .source =
+           "Water in a gel has no time to leave it: 0.45 to 0.5 for polyacrylamide and silicone (Takigawa et al., "
+           "Polym. Gels Netw. 4 (1996) 1: 0.457). 0.5 is the limit of an elastic body, and no gel gets thicker where "
+           "it is pulled",
+       .remedy = "take 0.49 for polyacrylamide, 0.5 or 0.499 for silicone"},
+      {.id = "thickness_um",
+       .quantity = "thickness of the gel",
+       .usual = Range::between(10, 1000),
+       .possible = Range::between(1, 1e5),
+       .source =
+           "Gels for traction force microscopy are cast 20 to 100 um thick. Below some 10 um the displacements are "
+           "set by the glass below (Merkel et al., Biophys. J. 93 (2007) 3314); beyond 1000 um no objective with "
+           "the resolution for beads looks through",
+       .remedy = "measure the thickness by focusing on the glass and on the surface; for a half-space set gel_model or "
+                 "the effect finite_thickness"},
+      {.id = kPixelSize,
+       .quantity = "pixel size",
+       .usual = Range::between(0.02, 1.3),
+       .possible = Range::between(0.005, 7),
+       .source =
+           "Camera pixels of 2 to 16 um behind lenses of 10 to 100 times: 0.02 to 1.3 um; 7 um is a camera without "
+           "a lens",
+       .remedy = "check the pixel size and its unit, um: the camera's pixel over the magnification, times the camera's "
+                 "binning"},
+      {.id = "beads_per_um2",
+       .quantity = "density of the beads",
+       .usual = Range::between(0.02, 10),
+       .possible = Range::not_negative(),
+       .source =
+           "Adhesions are some um apart: at less than one bead in 7 x 7 um no force can be told from its neighbours' "
+           "(Sabass et al., Biophys. J. 94 (2008) 207: the resolution is the beads' distance). At more than 10 a um² "
+           "beads are nearer than the 0.3 um that a lens resolves: then neighbours share their errors",
+       .remedy = "check the pixel size; use more beads, or thin out a field that was interpolated"},
+      {.id = "adhesion_area_um2",
+       .quantity = "median area of the adhesions",
+       .usual = Range::between(0.1, 10),
+       .possible = Range::between(0.01, 100),
+       .source = "Focal adhesions have 0.1 to 10 um² (mean 0.46 um² in U2OS cells: Soine et al., PLoS Comput. Biol. 11 "
+                 "(2015) e1004076). A spot of 0.01 um² is a sixth of what a lens resolves; 100 um² is a small cell",
+       .remedy = "check the pixel size, the channel and the thresholds of [segment]"},
+      {.id = "cell_area_um2",
+       .quantity = "area of the cell",
+       .usual = Range::between(200, 20000),
+       .possible = Range::between(10, 1e6),
+       .source =
+           "Adherent cells spread over 500 to 10 000 um², platelets over 30; 1 mm² is a colony of hundreds of cells",
+       .remedy = "check the pixel size, and whether the outline holds one cell"},
+      {.id = "total_force_nN",
+       .quantity = "total force of the cell",
+       .usual = Range::between(1, 5000),
+       .possible = Range::between(0, 1e5),
+       .source = "U2OS cells exert about 200 nN (3612 adhesions in 21 cells, 1.19 nN each: Soine et al. 2015). 5.5 kPa "
+                 "(Balaban et al. 2001) on a tenth of a large cell, 10 000 um², are 5500 nN; 100 000 nN are that on "
+                 "twenty such cells",
+       .remedy = "check the modulus (kPa) and the pixel size (um) first: the force goes with the product of modulus, "
+                 "displacement and length. Of several cells the forces add up"},
+      {.id = "fibre_tension_nN",
+       .quantity = "tension of a stress fibre",
+       .usual = Range::between(0, 150),
+       .possible = Range::between(0, 400),
+       .source =
+           "An isolated stress fibre breaks at 380 nN and carried about 10 nN in the cell (Deguchi, Ohashi & Sato, "
+           "J. Biomech. 39 (2006) 2603)",
+       .remedy = "check the modulus (kPa) and the pixel size (um), and whether a fibre is missing beside it"},
+      {.id = "traction_kPa",
+       .quantity = "traction of the adhesions that bear half of the force",
+       .usual = Range::between(0, 15),
+       .possible = Range::between(0, 100),
+       .source =
+           "Adhesions carry 5.5 kPa (Balaban et al., Nat. Cell Biol. 3 (2001) 466), supermature ones 12 kPa (Goffin "
+           "et al., J. Cell Biol. 172 (2006) 259). 100 kPa are 2500 bonds of 40 pN on each um²",
+       .remedy =
+           "check the modulus (kPa) and the pixel size (um), and the adhesion's ellipse: a force on too small an area "
+           "is a large traction"},
+  };
+  return table;
+}
+
+std::optional<Doubt> doubt_about(std::string_view id, double value) {
+  const PlausibleQuantity& q = quantity_of(id);
+  if (is_inside(q.usual, value)) return std::nullopt;
+  const bool is_possible = is_inside(q.possible, value);
+  const Range& range = is_possible ? q.usual : q.possible;
+  const std::string slip = unit_slip(id, value, q.usual);
+  return Doubt{.id = q.id,
+               .quantity = q.quantity,
+               .value = value,
+               .limit = value > range.high ? range.high : range.low,
+               .source = q.source,
+               .remedy = slip.empty() ? q.remedy : slip + "; " + q.remedy,
+               .level = is_possible ? DoubtLevel::caution : DoubtLevel::refused};
+}
+
+std::string sentence_of(const Doubt& d) {
+  return "the " + d.quantity + " is " + with_unit(d.id, d.value) + (d.value > d.limit ? ", above " : ", below ") +
+         brief(d.limit) + (d.level == DoubtLevel::refused ? ": it cannot be" : ": unusual");
+}
+
+void require_possible(const Doubt& d, const std::vector<std::string>& allowed, const std::string& where) {
+  if (d.level != DoubtLevel::refused || std::ranges::find(allowed, d.id) != allowed.end()) return;
+  const PlausibleQuantity& q = quantity_of(d.id);
+  const bool is_of_table = !is_inside(q.possible, d.value);
+  const std::string expected = is_of_table ? with_unit(d.id, describe("a number", q.possible))
+                                           : "about " + with_unit(d.id, d.limit) + ", the image's own calibration";
+  throw InputError(where, expected, with_unit(d.id, d.value),
+                   d.remedy + ". " + d.source + ". If the value is right, set [checks] allow = [\"" + d.id + "\"]");
+}
+
+void declare(ParameterList& list, CheckParameters& p) {
+  list.table("checks");
+  list.add("allow", p.allow,
+           "quantities that may have values which the table of plausible values refuses: their names, with commas "
+           "between them (in cell.toml also an array)");
+}
+
+std::vector<std::string> allowed_quantities(const CheckParameters& p) {
+  std::vector<std::string> names;
+  std::string name;
+  for (const char c : p.allow + ",") {
+    if (c != ',' && c != ' ') {
+      name += c;
+      continue;
+    }
+    if (name.empty()) continue;
+    if (!find(name)) {
+      std::string known;
+      for (const PlausibleQuantity& q : plausible_quantities())
+        known += (known.empty() ? "" : ", ") + std::string(q.id);
+      throw UsageError("[checks] allow: expected names out of " + known + ", found '" + name + "'");
+    }
+    names.push_back(std::exchange(name, {}));
+  }
+  return names;
+}
+
+std::vector<Doubt> doubts_about(const ParameterList& list, const std::vector<std::string>& allowed) {
+  std::vector<Doubt> doubts;
+  for (const Parameter& p : list.all()) {
+    const std::optional<double> value = value_of(p);
+    if (!value || !find(p.name)) continue;
+    const std::optional<Doubt> doubt = doubt_about(p.name, *value);
+    if (!doubt) continue;
+    require_possible(*doubt, allowed, (p.table.empty() ? "" : "[" + p.table + "] ") + p.name);
+    doubts.push_back(*doubt);
+  }
+  return doubts;
+}
+
+bool has_plausible_quantity(const ParameterList& list) {
+  return std::ranges::any_of(list.all(), [](const Parameter& p) { return find(p.name) != nullptr; });
+}
+
+std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
+  // Calibrations by a stage micrometer agree to a per cent; by a fifth none is wrong: then another objective, a binning
+  // of the camera or a resized copy is meant. Forces go with the pixel size squared.
+  constexpr double kCaution = 0.01, kRefused = 0.2;
+  const double ratio = std::max(used_um, of_file_um) / std::min(used_um, of_file_um);
+  if (!(ratio > 1 + kCaution)) return std::nullopt;
+  const double whole = std::round(ratio);
+  const bool is_binning = whole >= 2 && whole <= 16 && std::abs(ratio - whole) < kCaution * whole;
+  return Doubt{.id = kPixelSize,
+               .quantity = "pixel size",
+               .value = used_um,
+               .limit = of_file_um,
+               .source = "The image's own calibration says " + with_unit(kPixelSize, of_file_um) +
+                         ". Forces go with the square of the pixel size",
+               .remedy = is_binning
+                             ? "the two differ by a factor of " + brief(whole) +
+                                   ": was the camera's binning, or a reduced copy, left out in one of them?"
+                             : "find out which of the two is right, and leave pixel_size_um out if it is the image's",
+               .level = ratio > 1 + kRefused ? DoubtLevel::refused : DoubtLevel::caution};
+}
+
+double traction_of_half_the_force_kPa(const std::vector<AdhesionForce>& forces,
+                                      const std::vector<Adhesion>& adhesions) {
+  MBTFM_ASSERT(forces.size() == adhesions.size());
+  std::vector<std::pair<double, double>> loads;  // traction, force
+  double total_nN = 0;
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    const double least_nN = std::max(0.0, norm(forces[a].force_nN) - 2 * forces[a].sigma_nN.value_or(0));
+    loads.emplace_back(least_nN / area_stood_for_um2(adhesions[a]), least_nN);
+    total_nN += least_nN;
+  }
+  std::ranges::sort(loads, std::greater());
+  double sum_nN = 0;
+  for (const auto& [traction_kPa, force_nN] : loads) {
+    sum_nN += force_nN;
+    if (2 * sum_nN >= total_nN) return traction_kPa;
+  }
+  return 0;
+}
+
+double surest_fibre_tension_nN(const std::vector<Tension>& tensions) {
+  double largest = 0;
+  for (const Tension& t : tensions) {
+    if (t.fibre_id != 0) largest = std::max(largest, t.low_nN.value_or(t.tension_nN));
+  }
+  return largest;
+}
+
+std::vector<AssumedInput> assumed_inputs(const ParameterList& list) {
+  static const std::vector<AssumedInput> physical = {
+      {"thickness_um", "thickness of the gel", "",
+       "On a gel thinner than assumed the forces are larger than found, most of all those far apart."},
+      {"poisson_ratio", "Poisson's ratio of the gel", "",
+       "Between 0.45 and 0.5 the force for a given displacement changes by at most 6 %."}};
+  std::vector<AssumedInput> assumed;
+  for (const Parameter& p : list.all()) {
+    if (p.is_set) continue;
+    const auto known = std::ranges::find(physical, p.name, &AssumedInput::id);
+    const std::optional<double> value = value_of(p);
+    if (known == physical.end() || !value) continue;
+    assumed.push_back(*known);
+    assumed.back().value = with_unit(p.name, *value);
+  }
+  return assumed;
+}
+
+AssumedInput assumed_noise(double sigma_um) {
+  return {"sigma_um", "error of the displacements", with_unit("sigma_um", sigma_um),
+          "It was found from neighbouring beads and taken to be the same for all. Error bars go with it."};
+}
+
+std::string sentence_of(const AssumedInput& input) {
+  return input.id + " = " + input.value + " (assumed: the " + input.quantity + " was not given)";
+}
+
+std::string plausible_page() {
+  std::string page =
+      "# Plausible values\n\nThe programs check their inputs and their results against this table, which they write "
+      "themselves. Outside the usual\nrange a value is a caution. Outside the possible range it is an error, unless "
+      "`cell.toml` allows it:\n\n```toml\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n```\n\n"
+      "`pixel_size_um` is also compared with each image's own calibration: a difference above 1 % is a caution, above "
+      "20 % an error.\nIf `thickness_um`, `poisson_ratio` or the errors of the displacements are not given, they are "
+      "listed as assumed.\n\n| quantity | usual | possible | source | what to do |\n|---|---|---|---|---|\n";
+  for (const PlausibleQuantity& q : plausible_quantities()) {
+    page += "| `" + std::string(q.id) + "`: " + q.quantity + " |" + range_text(q.usual) + " |" +
+            range_text(q.possible) + " | " + q.source + " | " + q.remedy + " |\n";
+  }
+  return page;
+}
+
+}  // namespace mbtfm::stage

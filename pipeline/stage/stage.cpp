@@ -1,0 +1,349 @@
+#include "pipeline/stage/stage.h"
+
+#include <sys/resource.h>
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <nlohmann/json.hpp>
+
+#include "pipeline/contract/version.h"
+#include "pipeline/files/hash.h"
+#include "pipeline/files/json.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/blas.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/console.h"
+#include "pipeline/stage/effects.h"
+
+namespace mbtfm::stage {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using namespace exit_code;
+
+/// What the command line says, before any of it is believed.
+struct CommandLine {
+  std::map<std::string, std::string> files, values;
+  std::string config, record;
+  int threads = numerics::available_threads();
+  bool is_quiet = false, only_check = false, only_parameters = false, only_version = false;
+};
+
+void add_options(CLI::App& app, CommandLine& line, const StageDescription& description, const ParameterList& list) {
+  for (const FileArgument& file : description.files) {
+    const bool is_output = file.kind == FileArgument::Kind::output || file.kind == FileArgument::Kind::output_folder;
+    std::string meaning = file.meaning;
+    if (file.kind == FileArgument::Kind::optional_input) meaning += " (optional)";
+    app.add_option("--" + file.name, line.files[file.name], meaning)
+        ->type_name(file.kind == FileArgument::Kind::output_folder ? "FOLDER" : "FILE")
+        ->group(is_output ? "Outputs" : "Inputs");
+  }
+  app.add_option("--config,--gel", line.config, "cell.toml with the parameters")->type_name("FILE")->group("Inputs");
+  app.add_option("--record", line.record, "write the run's provenance here (JSON)")
+      ->type_name("FILE")
+      ->group("Outputs");
+  app.add_option("--threads", line.threads, "processors to use")->check(CLI::Range(1, 1024))->capture_default_str();
+  app.add_flag("--quiet", line.is_quiet, "print errors only");
+  app.add_flag("--check", line.only_check, "read the parameters, run nothing");
+  app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
+  app.add_flag("--version", line.only_version, "print the version");
+  for (const Parameter& p : list.all()) {
+    std::string meaning = p.meaning;
+    if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
+    const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
+    if (std::holds_alternative<bool*>(p.member)) {
+      app.add_flag("--" + p.name + "{true}", line.values[p.name], meaning)->group(group);
+    } else {
+      app.add_option("--" + p.name, line.values[p.name], meaning)->type_name("")->group(group);
+    }
+  }
+}
+
+void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
+  if (!line.config.empty()) read_toml(list, fs::path(line.config));
+  for (Parameter& p : list.all()) {
+    if (app.count("--" + p.name) > 0) set_from_text(p, line.values.at(p.name));
+  }
+  check_complete(list);
+}
+
+void set_files(StageContext& context, const StageDescription& description, const CommandLine& line) {
+  using Kind = FileArgument::Kind;
+  for (const FileArgument& file : description.files) {
+    const std::string& path = line.files.at(file.name);
+    const bool is_output = file.kind == Kind::output || file.kind == Kind::output_folder;
+    if (path.empty() && file.kind != Kind::optional_input) {
+      throw UsageError("--" + file.name + " is missing: " + file.meaning);
+    }
+    if (path.empty()) continue;
+    (is_output ? context.outputs_ : context.inputs_)[file.name] = path;
+  }
+}
+
+/// A line that is overwritten as the work goes on, on a terminal only.
+Progress terminal_progress(const std::string& stage, bool is_quiet) {
+  // mbtfm passes on what a stage prints; where it prints on a terminal, it says so
+  const bool is_shown = !is_quiet && (isatty(STDERR_FILENO) || std::getenv("MBTFM_TERMINAL") != nullptr);
+  return [stage, is_shown, last = -1](double fraction, std::string_view what) mutable {
+    if (is_stop_asked()) throw Interrupted("interrupted; nothing was written");
+    const int percent = static_cast<int>(100 * fraction);
+    if (!is_shown || percent == last) return;
+    last = percent;
+    std::fprintf(stderr, "\r\033[K%s %3d %% %.*s", stage.c_str(), percent, static_cast<int>(what.size()), what.data());
+    if (percent >= 100) std::fprintf(stderr, "\r\033[K");
+  };
+}
+
+/// Content hashes of files that lie at `at` now and are called `name` when all is in place.
+struct HashedFile {
+  fs::path at, name;
+};
+
+nlohmann::ordered_json hashes_of(const std::vector<HashedFile>& files, const fs::path& folder) {
+  auto list = nlohmann::ordered_json::array();
+  for (const HashedFile& file : files) {
+    if (!fs::is_regular_file(file.at)) continue;
+    list.push_back(
+        {{"file", fs::proximate(file.name, folder).generic_string()}, {"sha256", files::sha256_of_file(file.at)}});
+  }
+  return list;
+}
+
+nlohmann::ordered_json parameters_of(const ParameterList& list) {
+  auto json = nlohmann::ordered_json::object();
+  for (const Parameter& p : list.all()) {
+    auto& table = p.table.empty() ? json : json[p.table];
+    table[p.name] = std::visit(
+        [](auto* member) -> nlohmann::ordered_json {
+          if constexpr (std::is_same_v<decltype(member), std::optional<double>*> ||
+                        std::is_same_v<decltype(member), std::optional<int>*>) {
+            return *member ? nlohmann::ordered_json(**member) : nlohmann::ordered_json();
+          } else {
+            return *member;
+          }
+        },
+        p.member);
+  }
+  return json;
+}
+
+double peak_memory_MB() {
+  rusage usage{};
+  getrusage(RUSAGE_SELF, &usage);
+  return static_cast<double>(usage.ru_maxrss) / 1024;
+}
+
+void write_record(const fs::path& file, const StageDescription& description, const ParameterList& list,
+                  StageContext& context, const StageReport& report, double seconds) {
+  const fs::path folder = fs::absolute(file).parent_path();
+  std::vector<HashedFile> inputs, outputs;
+  for (const fs::path& read : context.read_) inputs.push_back({.at = read, .name = read});
+  for (const auto& pending : context.pending_) {
+    outputs.push_back({.at = pending.temporary, .name = pending.destination});
+  }
+  nlohmann::ordered_json effects = nlohmann::ordered_json::array();
+  for (const Effect& e : report.effects) effects.push_back(files::json_of(e));
+  nlohmann::ordered_json findings = nlohmann::ordered_json::array();
+  for (const Finding& f : report.findings) findings.push_back(files::json_of(f));
+  const nlohmann::ordered_json record = {{"stage", description.name},
+                                         {"version", kVersion},
+                                         {"parameters", parameters_of(list)},
+                                         {"inputs", hashes_of(inputs, folder)},
+                                         {"outputs", hashes_of(outputs, folder)},
+                                         {"threads", context.threads},
+                                         {"seconds", seconds},
+                                         {"peak_memory_MB", peak_memory_MB()},
+                                         {"converged", report.converged},
+                                         {"summary", report.summary},
+                                         {"figures", files::json_of(report.figures)},
+                                         {"effects", effects},
+                                         {"findings", findings}};
+  files::write_text(context.pending_path(file), files::json_text(record, 2) + "\n");
+}
+
+/// Remove what an unfinished run has left: temporary files, and folders made for them that are still empty.
+void discard(const StageContext& context) {
+  std::error_code ignored;
+  for (const auto& pending : context.pending_) fs::remove(pending.temporary, ignored);
+  for (auto folder = context.made_.rbegin(); folder != context.made_.rend(); ++folder) fs::remove(*folder, ignored);
+}
+
+void expect_all_written(const StageContext& context) {
+  for (const auto& [temporary, destination] : context.pending_) {
+    if (!fs::exists(temporary)) throw InternalError(destination.string() + " was announced and not written");
+  }
+}
+
+void commit(const StageContext& context) {
+  for (const auto& [temporary, destination] : context.pending_) files::put_in_place(temporary, destination);
+}
+
+/// What was noticed, doubted and assumed beside what the stage itself reports.
+void add_findings(StageReport& report, const StageContext& context) {
+  std::vector<Finding> findings;
+  for (const Doubt& doubt : context.doubts) {
+    Finding finding = *noticed(FindingKind::unusual_value, 1, sentence_of(doubt) + ".");
+    finding.number = doubt.value;
+    finding.threshold = doubt.limit;
+    finding.number_is = doubt.quantity;
+    finding.reason = doubt.source;
+    finding.remedy = doubt.remedy;
+    findings.push_back(std::move(finding));
+  }
+  findings.insert(findings.end(), context.findings_.begin(), context.findings_.end());
+  report.findings.insert(report.findings.begin(), findings.begin(), findings.end());
+  for (const AssumedInput& input : context.assumed)
+    report.findings.push_back(*noticed(FindingKind::assumed_input, 1, sentence_of(input) + ". " + input.effect));
+}
+
+int run(const StageDescription& description, ParameterList& list, const CommandLine& line, StageContext context,
+        const std::function<StageReport(StageContext&)>& body) {
+  const auto begin = std::chrono::steady_clock::now();
+  set_files(context, description, line);
+  context.threads = line.threads;
+  context.progress = terminal_progress(description.name, line.is_quiet);
+  try {
+    StageReport report = body(context);
+    add_findings(report, context);
+    expect_all_written(context);
+    const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
+    // The record takes its place last: where it is, all that it speaks of is.
+    if (!line.record.empty()) write_record(line.record, description, list, context, report, seconds.count());
+    commit(context);
+    if (!report.converged) {
+      std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", description.name.c_str(), report.summary.c_str());
+      return kNotSolved;
+    }
+    if (!line.is_quiet) {
+      std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
+      for (const Effect& e : report.effects) std::fprintf(stderr, "  %s\n", line_of(e).c_str());
+      for (const Finding& f : report.findings) std::fprintf(stderr, "  %s\n", line_of(f).c_str());
+    }
+    return kDone;
+  } catch (...) {
+    discard(context);
+    throw;
+  }
+}
+
+}  // namespace
+
+StageReport read_report(const fs::path& record_file) {
+  const files::JsonRecord record(record_file, "a stage's record");
+  StageReport report{.converged = record.at("converged").is_true(),
+                     .summary = record.at("summary").text(),
+                     .figures = {},
+                     .effects = {},
+                     .findings = files::findings_of(record)};
+  for (const auto& [name, value] : record.at("figures").members()) report.figures.emplace_back(name, value.figure());
+  for (const files::JsonRecord& effect : record.at("effects").list())
+    report.effects.push_back(files::effect_of(effect));
+  return report;
+}
+
+fs::path StageContext::input(const std::string& name) {
+  MBTFM_ASSERT(inputs_.contains(name));
+  read_.push_back(inputs_.at(name));
+  return inputs_.at(name);
+}
+
+fs::path StageContext::input(const std::string& name, const std::vector<std::string>& files) {
+  MBTFM_ASSERT(inputs_.contains(name));
+  for (const std::string& file : files) read_.push_back(inputs_.at(name) / file);
+  return inputs_.at(name);
+}
+
+fs::path StageContext::output(const std::string& name) { return output(name, {}); }
+
+fs::path StageContext::output(const std::string& name, const std::string& file) {
+  MBTFM_ASSERT(outputs_.contains(name));
+  const fs::path& output = outputs_.at(name);
+  // The output folder may be a link, of whoever named it; folders in it may not.
+  if (const fs::path below = fs::path(file).parent_path(); !below.empty())
+    files::inside(output, below, output.string());
+  return pending_path(file.empty() ? output : output / file);
+}
+
+fs::path StageContext::output_beside(const std::string& name, const std::string& ending) {
+  MBTFM_ASSERT(outputs_.contains(name));
+  const fs::path& output = outputs_.at(name);
+  return pending_path(output.parent_path() / (output.stem().string() + ending));
+}
+
+fs::path StageContext::pending_path(const fs::path& destination) {
+  make_folder(destination.parent_path());
+  const fs::path temporary = files::temporary_name(destination);
+  files::make_way(temporary);  // whoever writes it, VTK or a TIFF library, opens it by name
+  pending_.push_back({.temporary = temporary, .destination = destination});
+  return temporary;
+}
+
+void StageContext::notice(const std::optional<Finding>& finding) {
+  const auto is_same = [&](const Finding& f) { return f.id == finding->id && f.text == finding->text; };
+  if (finding && std::ranges::none_of(findings_, is_same)) findings_.push_back(*finding);
+}
+
+void StageContext::doubt(const std::optional<Doubt>& doubt, const std::string& where) {
+  if (!doubt) return;
+  require_possible(*doubt, allowed_, where);
+  const auto is_same = [&](const Doubt& d) { return d.id == doubt->id && d.value == doubt->value; };
+  if (std::ranges::any_of(doubts, is_same)) return;  // of another frame or channel
+  doubts.push_back(*doubt);
+}
+
+void StageContext::make_folder(const fs::path& folder) {
+  if (folder.empty() || fs::exists(folder)) return;
+  make_folder(folder.parent_path());
+  std::error_code error;
+  fs::create_directory(folder, error);
+  if (error) throw OutputError("cannot make the folder " + folder.string() + ": " + error.message());
+  made_.push_back(folder);
+}
+
+int run_stage(const StageDescription& description, int argc, char** argv,
+              const std::function<void(ParameterList&)>& declare_parameters,
+              const std::function<StageReport(StageContext&)>& body) {
+  const std::string& stage = description.name;
+  numerics::restart_as_blas_needs(argv);
+  watch_signals(SecondSignal::ends_at_once);
+  numerics::keep_blas_to_one_thread();
+  try {
+    ParameterList list;
+    declare_parameters(list);
+    CheckParameters checks;
+    if (has_plausible_quantity(list)) declare(list, checks);
+    CommandLine line;
+    CLI::App app(description.purpose, "mbtfm-" + stage);
+    add_options(app, line, description, list);
+    try {
+      app.parse(argc, argv);
+    } catch (const CLI::CallForHelp&) {
+      print(app.help());
+      return kDone;
+    } catch (const CLI::ParseError& error) {
+      throw UsageError(std::string(error.what()) + " (see mbtfm-" + stage + " --help)");
+    }
+    if (line.only_version || line.only_parameters) {
+      print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));
+      return kDone;
+    }
+    set_parameters(list, line, app);
+    StageContext context;
+    context.allowed_ = allowed_quantities(checks);
+    context.doubts = doubts_about(list, context.allowed_);
+    context.assumed = assumed_inputs(list);
+    if (line.only_check) return kDone;
+    numerics::reserve_blas_buffers(line.threads);
+    return run(description, list, line, std::move(context), body);
+  } catch (...) {
+    return report_current_exception("mbtfm-" + stage);
+  }
+}
+
+}  // namespace mbtfm::stage

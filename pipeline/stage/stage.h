@@ -1,0 +1,97 @@
+/// The frame of every executable: arguments, parameters, errors to exit codes, atomic outputs, provenance.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/report.h"
+#include "pipeline/stage/parameters.h"
+#include "pipeline/stage/plausible.h"
+
+namespace mbtfm::stage {
+
+struct FileArgument {
+  enum class Kind { input, optional_input, output, output_folder };
+  std::string name;  ///< the flag --name
+  Kind kind = Kind::input;
+  std::string meaning;
+};
+
+struct StageDescription {
+  std::string name;  ///< the executable is mbtfm-<name>
+  std::string purpose;
+  std::vector<FileArgument> files;
+};
+
+/// A stage's files and surroundings. Outputs go to temporary names and take their own only when the stage is done.
+class StageContext {
+ public:
+  int threads = 1;
+  Progress progress;
+  /// About inputs and results, so far; they become findings of the stage.
+  std::vector<Doubt> doubts;
+  std::vector<AssumedInput> assumed;
+  /// Add a finding, if there is one that was not there yet.
+  void notice(const std::optional<Finding>& finding);
+
+  /// A doubt about an input or a result, if there is one. @param where  as in messages
+  /// @throws InputError where it is refused and [checks] does not allow it
+  void doubt(const std::optional<Doubt>& doubt, const std::string& where);
+  /// The same about a result of the table of plausible values.
+  void expect_plausible(std::string_view id, double value) { doubt(doubt_about(id, value), std::string(id)); }
+
+  /// Path of an input that was given.
+  std::filesystem::path input(const std::string& name);
+  /// An input that is a folder, of which these files are read.
+  std::filesystem::path input(const std::string& name, const std::vector<std::string>& files);
+  bool has_input(const std::string& name) const { return inputs_.contains(name); }
+  /// Temporary path to write an output to.
+  std::filesystem::path output(const std::string& name);
+  /// Temporary path for `file` of an output folder.
+  std::filesystem::path output(const std::string& name, const std::string& file);
+  /// Temporary path for a file beside the output `name`, called after it: its name with `ending` for its extension.
+  std::filesystem::path output_beside(const std::string& name, const std::string& ending);
+
+  // used by run_stage
+  std::vector<Finding> findings_;
+  std::vector<std::string> allowed_;  ///< quantities whose values are not refused
+  /// Temporary path, free to be written to, of what is to be `destination`.
+  std::filesystem::path pending_path(const std::filesystem::path& destination);
+  std::map<std::string, std::filesystem::path> inputs_, outputs_;
+  std::vector<std::filesystem::path> read_, made_;
+  struct Pending {
+    std::filesystem::path temporary, destination;
+  };
+  std::vector<Pending> pending_;
+
+ private:
+  /// Folders that outputs need are made, and unmade where the stage fails.
+  void make_folder(const std::filesystem::path& folder);
+};
+
+/// What a stage reported when it wrote this record. @throws InputError where it is no record of a stage
+StageReport read_report(const std::filesystem::path& record_file);
+
+/// Parse the arguments, read the parameters, call `body`, put the outputs in place, write the record, return the exit
+/// code. Flags of every stage: --help --version --threads --quiet --config (or --gel)
+/// --record --check --parameters.
+int run_stage(const StageDescription& description, int argc, char** argv,
+              const std::function<void(ParameterList&)>& declare_parameters,
+              const std::function<StageReport(StageContext&)>& body);
+
+/// The same for a struct with a `declare(ParameterList&, Parameters&)` beside it.
+template <class Parameters>
+int run_stage(const StageDescription& description, int argc, char** argv,
+              const std::function<StageReport(const Parameters&, StageContext&)>& body) {
+  Parameters parameters;
+  return run_stage(
+      description, argc, argv, [&](ParameterList& list) { declare(list, parameters); },
+      [&](StageContext& context) { return body(parameters, context); });
+}
+
+}  // namespace mbtfm::stage

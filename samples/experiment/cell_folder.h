@@ -1,0 +1,22 @@
+/// Writes an experiment as a cell folder.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "samples/experiment/experiment.h"
+
+namespace mbtfm::experiment {
+
+/// Where to write a file of the cell folder.
+using FileNamer = std::function<std::filesystem::path(const std::string& file)>;
+
+/// cell.toml; truth/; and in place of images the true segmentation and the noisy displacement.
+void write_cell_folder(const Experiment& experiment, const drawing::ScenarioParameters& parameters,
+                       const FileNamer& file);
+
+/// The four images, and truth/beads.csv. The noise is in the stressed positions of the beads.
+void write_images(const Experiment& experiment, const drawing::ScenarioParameters& parameters, const FileNamer& file,
+                  int threads, const Progress& progress);
+
+}  // namespace mbtfm::experiment

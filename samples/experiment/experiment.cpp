@@ -1,0 +1,183 @@
+#include "samples/experiment/experiment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "network/cables/cables.h"
+#include "network/mesh/mesh.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/memory.h"
+#include "samples/drawing/random.h"
+#include "substrate/compliance.h"
+#include "substrate/greens/models.h"
+
+namespace mbtfm::experiment {
+
+namespace {
+
+/// Far from the small numbers people give a reconstruction, so that the two never share a mesh.
+constexpr std::uint64_t kFirstSimulationSeed = 0x73696d00;
+
+void tell(const Progress& progress, double fraction, std::string_view what) {
+  if (progress) progress(fraction, what);
+}
+
+/// The simulation's network. The width of material that a cable stands for is counted in cables of the reference mesh:
+/// tension and stiffness by width are then those of the cell, whatever the mesh.
+Network span(const Cell& cell, const drawing::ScenarioParameters& p) {
+  mesh::NetworkParameters parameters;
+  parameters.edge_length_um = p.mechanics.simulation_edge_length_um;
+  parameters.seed = kFirstSimulationSeed + p.seed;
+  mesh::GeneratedNetwork generated = mesh::generate_network(cell, parameters);
+  for (Link& link : generated.network.links) {
+    if (link.fibre_id == 0) link.share *= parameters.edge_length_um / kReferenceEdge_um;
+  }
+  return std::move(generated.network);
+}
+
+std::vector<Tension> tensions_of(const drawing::DrawnCell& drawn, const drawing::TensionParameters& p) {
+  std::vector<Tension> tensions(1 + drawn.cell.fibres.size());
+  // surface tension of a triangular lattice of cables: sqrt(3) t / edge
+  tensions.front().tension_nN = p.surface_tension_nN_per_um * kReferenceEdge_um / std::sqrt(3.0);
+  for (std::size_t i = 0; i < drawn.cell.fibres.size(); ++i) {
+    tensions[i + 1].fibre_id = drawn.cell.fibres[i].fibre_id;
+    tensions[i + 1].tension_nN = drawn.tensions_nN[i];
+  }
+  return tensions;
+}
+
+/// Contract the network; the force of each adhesion on the substrate.
+std::map<int, Vec2> forces_by_adhesion(const Network& network, const std::vector<Tension>& tensions) {
+  const cables::CableNetwork cables(network);
+  std::vector<double> by_group;
+  for (const int id : cables.fibre_ids()) {
+    const auto has_id = [&](const Tension& t) { return t.fibre_id == id; };
+    by_group.push_back(std::ranges::find_if(tensions, has_id)->tension_nN);
+  }
+  const cables::Equilibrium equilibrium = cables.equilibrium(by_group);
+  if (!equilibrium.report.converged) throw NotSolved(equilibrium.report);
+  const Eigen::VectorXd forces = cables.adhesion_forces_nN(by_group, equilibrium);
+  std::map<int, Vec2> result;
+  for (std::size_t i = 0; i < cables.adhesion_ids().size(); ++i) {
+    result[cables.adhesion_ids()[i]] = {forces[2 * i], forces[2 * i + 1]};
+  }
+  return result;
+}
+
+std::vector<AdhesionForce> force_list(const Cell& cell, const std::map<int, Vec2>& forces) {
+  std::set<int> connected;
+  for (const Fibre& f : cell.fibres) {
+    if (f.start_adhesion_id) connected.insert(*f.start_adhesion_id);
+    if (f.end_adhesion_id) connected.insert(*f.end_adhesion_id);
+  }
+  std::vector<AdhesionForce> list;
+  for (const Adhesion& a : cell.adhesions) {
+    const auto found = forces.find(a.adhesion_id);
+    list.push_back({.adhesion_id = a.adhesion_id,
+                    .force_nN = found == forces.end() ? Vec2{} : found->second,
+                    .sigma_nN = {},
+                    .connected = connected.contains(a.adhesion_id),
+                    .moment_nN_um = {}});
+  }
+  return list;
+}
+
+DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioParameters& p, int threads) {
+  substrate::SubstrateParameters substrate_parameters;
+  substrate_parameters.model = p.mechanics.simulation_substrate;
+  const auto gel = greens::make_greens(p.gel, substrate_parameters, threads);
+  std::vector<substrate::Ellipse> ellipses;
+  std::vector<Vec2> forces;
+  for (std::size_t i = 0; i < e.cell.adhesions.size(); ++i) {
+    ellipses.push_back(substrate::ellipse_of(e.cell.adhesions[i]));
+    forces.push_back(e.forces[i].force_nN);
+  }
+  const std::vector<Vec2> beads = place_beads(p);
+  const std::vector<Vec2> displacements = gel->displacements_um(beads, ellipses, forces);
+  DisplacementField field;
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    field.push_back({.position_um = beads[i], .displacement_um = displacements[i], .sigma_um = 0, .flag = {}});
+  }
+  return field;
+}
+
+/// Gaussian noise on each component.
+DisplacementField with_noise(DisplacementField field, double noise_um, std::uint64_t seed) {
+  drawing::Random random(seed, drawing::Stream::noise);
+  for (Bead& bead : field) {
+    const double x = random.normal();
+    const double y = random.normal();
+    bead.displacement_um += noise_um * Vec2{x, y};
+    bead.sigma_um = noise_um;
+  }
+  return field;
+}
+
+}  // namespace
+
+std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
+  constexpr double kBytes = 300;  // of a bead: its place in the grid, its displacement, its spots in two images
+  numerics::expect_room_for({.what = "the field of beads",
+                             .count = static_cast<double>(p.beads),
+                             .parts = "beads",
+                             .bytes_each = kBytes,
+                             .remedy = "choose fewer beads"});
+  const double field = drawing::field_um(p.microscope);
+  // cells of a grid so small that each holds one bead at most; a bead's neighbours lie within two cells
+  const double cell_um = std::max(p.bead_distance_um / std::sqrt(2.0), 1e-3 * field);
+  const int n_cells = static_cast<int>(field / cell_um) + 1;
+  std::vector<std::vector<Vec2>> grid(static_cast<std::size_t>(n_cells) * n_cells);
+  const int reach = static_cast<int>(std::ceil(p.bead_distance_um / cell_um));
+  const auto is_free = [&](Vec2 bead, int column, int row) {
+    for (int j = std::max(0, row - reach); j <= std::min(n_cells - 1, row + reach); ++j) {
+      for (int i = std::max(0, column - reach); i <= std::min(n_cells - 1, column + reach); ++i) {
+        for (const Vec2 other : grid[static_cast<std::size_t>(j) * n_cells + i]) {
+          if (norm(other - bead) < p.bead_distance_um) return false;
+        }
+      }
+    }
+    return true;
+  };
+  drawing::Random random(p.seed, drawing::Stream::beads);
+  std::vector<Vec2> beads;
+  constexpr int kMaxMisses = 10000;  // in a row: beyond that less than 1e-4 of the field is free
+  for (int misses = 0; static_cast<int>(beads.size()) < p.beads;) {
+    const double x = random.uniform(0, field);
+    const Vec2 bead{x, random.uniform(0, field)};
+    const int column = static_cast<int>(bead.x / cell_um), row = static_cast<int>(bead.y / cell_um);
+    if (is_free(bead, column, row)) {
+      beads.push_back(bead);
+      grid[static_cast<std::size_t>(row) * n_cells + column].push_back(bead);
+      misses = 0;
+    } else if (++misses > kMaxMisses) {
+      throw UsageError("only " + std::to_string(beads.size()) + " of " + std::to_string(p.beads) + " beads fit at a " +
+                       "bead_distance_um of " + std::to_string(p.bead_distance_um));
+    }
+  }
+  return beads;
+}
+
+Experiment simulate(const drawing::ScenarioParameters& p, int threads, const Progress& progress) {
+  Experiment e;
+  tell(progress, 0, "drawing the cell");
+  drawing::DrawnCell drawn = drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), p.seed);
+  e.tensions = tensions_of(drawn, p.tension);
+  e.cell = std::move(drawn.cell);
+  tell(progress, 0.1, "spanning the network");
+  e.network = span(e.cell, p);
+  tell(progress, 0.2, "contracting it");
+  e.forces = force_list(e.cell, forces_by_adhesion(e.network, e.tensions));
+  for (const AdhesionForce& f : e.forces) e.total_force_nN += norm(f.force_nN);
+  tell(progress, 0.4, "deforming the gel");
+  e.displacement = displacement_of(e, p, threads);
+  for (const Bead& bead : e.displacement) {
+    e.largest_displacement_um = std::max(e.largest_displacement_um, norm(bead.displacement_um));
+  }
+  e.noise_um = p.noise * e.largest_displacement_um;
+  e.measured = with_noise(e.displacement, e.noise_um, p.seed);
+  return e;
+}
+
+}  // namespace mbtfm::experiment

@@ -1,0 +1,344 @@
+#include "segment/beads/at_rest.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <opencv2/core.hpp>
+
+#include "segment/beads/plane.h"
+
+namespace mbtfm::beads {
+namespace {
+
+/// Half a dozen beads know their mean to under half of a bead's noise, and outliers among them show.
+constexpr double kBeadsOfSquare = 6;
+constexpr int kMostSquares = 24;  // a side: an ordinary cell's tail is smooth over a 24th of the picture
+/// What moves by less than this share of the largest displacement may be the cell's tail; where that leaves less than a
+/// quarter of the picture at rest, by less than twice as much: the tail of a cell that the border cuts is long.
+constexpr double kTail = 0.1;
+constexpr double kEnough = 0.25;
+/// What moves by more is pulled by adhesions nearby: the field of one falls to a quarter within two of its widths.
+constexpr double kPulled = 0.25;
+/// Of the picture's side: what is as near to what is pulled may be, too. Gaps in a ring of adhesions are closed so,
+/// since inside of it the gel is quiet, but not far away.
+constexpr double kGap = 1.0 / 12;
+/// A gel grows, and a dish put back is turned, by a few per cent at most.
+constexpr double kLargestLinear = 0.03;
+
+FieldCell cell_of(const std::vector<int>& beads, const std::vector<Vec2>& positions, const std::vector<Vec2>& u) {
+  FieldCell cell;
+  if (beads.empty()) return cell;
+  std::vector<double> x, y, off;
+  for (const int k : beads) x.push_back(u[k].x), y.push_back(u[k].y);
+  const Vec2 median{quantile(std::move(x), 0.5), quantile(std::move(y), 0.5)};
+  for (const int k : beads) off.push_back(norm(u[k] - median));
+  cell.spread = quantile(off, 0.5) / 1.18;  // the median length of a two-dimensional normal is 1.18 sd
+  for (std::size_t at = 0; at < beads.size(); ++at) {
+    if (beads.size() >= 4 && off[at] > 3 * 1.18 * cell.spread) continue;
+    cell.place += positions[beads[at]];
+    cell.u += u[beads[at]];
+    ++cell.n_beads;
+  }
+  cell.place = (1.0 / cell.n_beads) * cell.place;
+  cell.u = (1.0 / cell.n_beads) * cell.u;
+  return cell;
+}
+
+RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Vec2>& u, Vec2 corner, double width,
+                        double height) {
+  RestingField field;
+  const double wanted = std::sqrt(static_cast<double>(positions.size()) / kBeadsOfSquare);
+  field.side = std::sqrt(width * height) / std::clamp(std::floor(wanted), 2.0, 1.0 * kMostSquares);
+  field.nx = std::max(1, static_cast<int>(std::lround(width / field.side)));
+  field.ny = std::max(1, static_cast<int>(std::lround(height / field.side)));
+  std::vector<std::vector<int>> beads(static_cast<std::size_t>(field.nx) * field.ny);
+  for (std::size_t k = 0; k < positions.size(); ++k) {
+    const int i = std::clamp(static_cast<int>((positions[k].x - corner.x) / width * field.nx), 0, field.nx - 1);
+    const int j = std::clamp(static_cast<int>((positions[k].y - corner.y) / height * field.ny), 0, field.ny - 1);
+    beads[static_cast<std::size_t>(j) * field.nx + i].push_back(static_cast<int>(k));
+  }
+  std::vector<double> spreads;
+  for (const auto& own : beads) {
+    field.cells.push_back(cell_of(own, positions, u));
+    if (own.size() >= 4) spreads.push_back(field.cells.back().spread);
+  }
+  field.bead_noise = quantile(std::move(spreads), 0.5);
+  return field;
+}
+
+/// Weighted least squares over the squares; the linear part is held to what pictures do.
+AffineMotion fitted(const RestingField& field, const std::vector<double>& weights, Vec2 centre, double scale,
+                    double width) {
+  cv::Matx<double, 6, 6> normal;
+  cv::Vec<double, 6> right;
+  for (std::size_t k = 0; k < field.cells.size(); ++k) {
+    if (!(weights[k] > 0)) continue;
+    const FieldCell& cell = field.cells[k];
+    const GlobalColumns c = global_columns((1 / scale) * (cell.place - centre));
+    for (int a = 0; a < 6; ++a) {
+      for (int b = 0; b < 6; ++b) normal(a, b) += weights[k] * (c.x[a] * c.x[b] + c.y[a] * c.y[b]);
+      right[a] += weights[k] * (c.x[a] * cell.u.x + c.y[a] * cell.u.y);
+    }
+  }
+  const double per_variance = width * width / std::pow(kLargestLinear * scale, 2);
+  for (int a = 0; a < 6; ++a) normal(a, a) += a < 2 ? 1e-12 : per_variance;
+  const cv::Vec<double, 6> p = normal.solve(right, cv::DECOMP_SVD);
+  return {{p[0], p[1]}, p[2] / scale, p[3] / scale, p[4] / scale, p[5] / scale, centre};
+}
+
+double misfit(const FieldCell& cell, const AffineMotion& motion) { return norm(cell.u - motion.at(cell.place)); }
+
+struct Followed {
+  AffineMotion motion;
+  double score = -1;
+};
+
+/// The picture as it is divided for the search.
+struct Search {
+  const RestingField& field;
+  Vec2 centre;
+  double scale;                  ///< half the picture
+  std::vector<double> width_of;  ///< by square: what a square at rest may be off by
+
+  double weight(std::size_t k, const AffineMotion& motion, double widened) const {
+    if (field.cells[k].n_beads == 0) return 0;
+    const double r = misfit(field.cells[k], motion) / (widened * width_of[k]), s = 1 / (1 + r * r);
+    return s * s;
+  }
+
+  Followed from(const std::function<bool(int, int)>& is_in) const {
+    std::vector<double> weights(field.cells.size(), 0), misfits;
+    const double typical = quantile(width_of, 0.5);
+    for (int j = 0; j < field.ny; ++j) {
+      for (int i = 0; i < field.nx; ++i) {
+        const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+        weights[k] = field.cells[k].n_beads > 0 && is_in(i, j);
+      }
+    }
+    Followed result{fitted(field, weights, centre, scale, typical)};
+    for (std::size_t k = 0; k < weights.size(); ++k) {
+      if (weights[k] > 0) misfits.push_back(misfit(field.cells[k], result.motion));
+    }
+    if (misfits.empty()) return result;
+    double widened = std::max(1.0, quantile(std::move(misfits), 0.7) / typical);
+    for (int round = 0; round < 20; ++round, widened = std::max(1.0, 0.7 * widened)) {
+      for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = weight(k, result.motion, widened);
+      result.motion = fitted(field, weights, centre, scale, typical);
+    }
+    result.score = 0;
+    for (std::size_t k = 0; k < weights.size(); ++k) result.score += weight(k, result.motion, 1);
+    return result;
+  }
+};
+
+AffineMotion mode_of(const Search& search) {
+  const int nx = search.field.nx, ny = search.field.ny;
+  struct Place {
+    double left, top, right, bottom;  ///< distances from the sides, as shares of the picture
+  };
+  const auto place = [&](int i, int j) {
+    const double x = (i + 0.5) / nx, y = (j + 0.5) / ny;
+    return Place{x, y, 1 - x, 1 - y};
+  };
+  using Part = std::function<bool(const Place&)>;
+  std::vector<Part> parts = {[](const Place&) { return true; },
+                             [](const Place& p) {
+                               return std::min({p.left, p.top, p.right, p.bottom}) < 0.15;
+                             }};
+  for (const double share : {0.2, 0.4}) {
+    for (const auto side : {&Place::left, &Place::top, &Place::right, &Place::bottom}) {
+      parts.emplace_back([=](const Place& p) { return p.*side < share; });
+    }
+    for (const auto side : {&Place::left, &Place::right}) {
+      for (const auto other : {&Place::top, &Place::bottom}) {
+        parts.emplace_back([=](const Place& p) { return std::max(p.*side, p.*other) < 1.5 * share; });
+      }
+    }
+  }
+  Followed best;
+  for (const Part& part : parts) {
+    const Followed next = search.from([&](int i, int j) { return part(place(i, j)); });
+    if (next.score > best.score * (1 + 1e-9)) best = next;
+  }
+  return best.motion;
+}
+
+/// Of the eight around a square (inside of the picture) the share for which `is` holds.
+double share_around(const RestingField& field, const std::vector<char>& is, int i, int j) {
+  int n = 0, n_is = 0;
+  for (int b = std::max(0, j - 1); b <= std::min(field.ny - 1, j + 1); ++b) {
+    for (int a = std::max(0, i - 1); a <= std::min(field.nx - 1, i + 1); ++a) {
+      if (a == i && b == j) continue;
+      ++n;
+      n_is += is[static_cast<std::size_t>(b) * field.nx + a];
+    }
+  }
+  return n == 0 ? 1 : 1.0 * n_is / n;
+}
+
+/// A square goes with most of those around it: noise makes single ones of either kind.
+std::vector<char> smoothed(const RestingField& field, const std::vector<char>& is) {
+  std::vector<char> result = is;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+      const double share = share_around(field, is, i, j);
+      if (share < 0.3) result[k] = 0;
+      if (share > 0.7 || (field.cells[k].n_beads == 0 && share > 0.5)) result[k] = 1;
+    }
+  }
+  return result;
+}
+
+/// Only what is connected with the border: inside of a ring of adhesions the gel is quiet, but not far away.
+std::vector<char> from_border(const RestingField& field, const std::vector<char>& is) {
+  std::vector<char> result(is.size(), 0);
+  std::vector<int> open;
+  const auto visit = [&](int i, int j) {
+    if (i < 0 || j < 0 || i >= field.nx || j >= field.ny) return;
+    const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+    if (!is[k] || result[k]) return;
+    result[k] = 1;
+    open.push_back(static_cast<int>(k));
+  };
+  for (int i = 0; i < field.nx; ++i) visit(i, 0), visit(i, field.ny - 1);
+  for (int j = 0; j < field.ny; ++j) visit(0, j), visit(field.nx - 1, j);
+  while (!open.empty()) {
+    const int k = open.back(), i = k % field.nx, j = k / field.nx;
+    open.pop_back();
+    visit(i - 1, j), visit(i + 1, j), visit(i, j - 1), visit(i, j + 1);
+  }
+  return result;
+}
+
+/// All squares within `reach` of one for which `is` holds.
+std::vector<char> grown(const RestingField& field, const std::vector<char>& is, int reach) {
+  std::vector<char> result = is;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      if (!is[static_cast<std::size_t>(j) * field.nx + i]) continue;
+      for (int b = std::max(0, j - reach); b <= std::min(field.ny - 1, j + reach); ++b) {
+        for (int a = std::max(0, i - reach); a <= std::min(field.nx - 1, i + reach); ++a) {
+          result[static_cast<std::size_t>(b) * field.nx + a] = 1;
+        }
+      }
+    }
+  }
+  return result;
+}
+
+std::vector<char> opposite(std::vector<char> is) {
+  for (char& value : is) value = !value;
+  return is;
+}
+
+/// Mean of a square and the eight around it, beside a motion; nothing where there are no beads.
+struct Around {
+  Vec2 u;
+  int n_beads = 0;
+};
+Around around(const RestingField& field, const AffineMotion& motion, int i, int j) {
+  Around result;
+  for (int b = std::max(0, j - 1); b <= std::min(field.ny - 1, j + 1); ++b) {
+    for (int a = std::max(0, i - 1); a <= std::min(field.nx - 1, i + 1); ++a) {
+      const FieldCell& cell = field.at(a, b);
+      if (cell.n_beads == 0) continue;
+      result.u += cell.n_beads * (cell.u - motion.at(cell.place));
+      result.n_beads += cell.n_beads;
+    }
+  }
+  if (result.n_beads > 0) result.u = (1.0 / result.n_beads) * result.u;
+  return result;
+}
+
+/// Squares that move by more than a share of the largest displacement.
+std::vector<char> pulled(const RestingField& field, double share) {
+  std::vector<char> result;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const Around here = around(field, field.motion, i, j);
+      const double error = field.bead_noise / std::sqrt(std::max(1, here.n_beads));
+      result.push_back(here.n_beads == 0 || norm(here.u) > std::max(3 * error, share * field.largest));
+    }
+  }
+  return smoothed(field, result);
+}
+
+double share_of_border(const RestingField& field, const std::vector<char>& is) {
+  int n = 0, n_is = 0;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      if (i > 0 && j > 0 && i < field.nx - 1 && j < field.ny - 1) continue;
+      ++n;
+      n_is += is[static_cast<std::size_t>(j) * field.nx + i];
+    }
+  }
+  return 1.0 * n_is / std::max(1, n);
+}
+
+/// Largest motion along the border, as a mean of nine squares, over the largest displacement.
+double pull_of_border(const RestingField& field) {
+  double border = 0;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const bool is_border = i == 0 || j == 0 || i == field.nx - 1 || j == field.ny - 1;
+      if (is_border) border = std::max(border, norm(around(field, field.motion, i, j).u));
+    }
+  }
+  return field.largest > 0 ? border / field.largest : 0;
+}
+
+/// What rests by the field's motion and largest displacement.
+void divide(RestingField& field, double tail) {
+  const int gap = std::max(1, static_cast<int>(std::lround(kGap * std::min(field.nx, field.ny))));
+  const std::vector<char> closed = grown(field, pulled(field, tail), gap);
+  const std::vector<char> rests = grown(field, from_border(field, opposite(closed)), gap - 1);
+  int n = 0, n_rests = 0;
+  field.n_moving = 0;
+  for (std::size_t k = 0; k < field.cells.size(); ++k) {
+    field.cells[k].rests = rests[k];
+    field.n_moving += !rests[k];
+    if (field.cells[k].n_beads == 0) continue;
+    ++n, n_rests += rests[k];
+  }
+  field.share_at_rest = n == 0 ? 0 : 1.0 * n_rests / n;
+  field.share_of_border_moving = share_of_border(field, opposite(rests));
+  field.share_of_border_pulled = share_of_border(field, pulled(field, kPulled));
+  field.pull_of_border = pull_of_border(field);
+}
+
+}  // namespace
+
+double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements,
+                     const AffineMotion& motion) {
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < positions.size(); ++k)
+    lengths.push_back(norm(displacements[k] - motion.at(positions[k])));
+  return quantile(std::move(lengths), 0.99);
+}
+
+RestingField resting_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
+                           double width, double height) {
+  RestingField field = in_squares(positions, displacements, corner, width, height);
+  field.motion.centre = corner + Vec2{0.5 * width, 0.5 * height};
+  if (positions.empty()) return field;
+  Search search{field, field.motion.centre, 0.5 * std::min(width, height), std::vector<double>(field.cells.size(), 1)};
+  std::vector<double> all;
+  for (const FieldCell& cell : field.cells) all.push_back(cell.n_beads);
+  AffineMotion motion = fitted(field, all, search.centre, search.scale, 1e-9);
+  for (int round = 0; round < 2; ++round) {  // the second with the largest displacement about what rests
+    field.largest = largest_about(positions, displacements, motion);
+    for (std::size_t k = 0; k < field.cells.size(); ++k) {
+      const double error = field.bead_noise / std::sqrt(std::max(1, field.cells[k].n_beads));
+      search.width_of[k] = std::max({3 * error, kTail * field.largest, 1e-12});
+    }
+    motion = mode_of(search);
+  }
+  field.motion = motion;
+  field.largest = largest_about(positions, displacements, motion);
+  divide(field, kTail);
+  if (field.share_at_rest < kEnough) divide(field, 2 * kTail);
+  return field;
+}
+
+}  // namespace mbtfm::beads

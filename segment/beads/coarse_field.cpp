@@ -1,0 +1,213 @@
+#include "segment/beads/coarse_field.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "pipeline/numerics/parallel.h"
+
+namespace mbtfm::beads {
+namespace {
+
+/// `n` x `n` px of the plane in the corner of a square of `side`, less their mean; all else is zero.
+cv::Mat cut(const Plane& plane, int left, int top, int n, int side) {
+  cv::Mat result = cv::Mat::zeros(side, side, CV_32F);
+  const int i0 = std::max(0, -left), i1 = std::min(n, plane.width - left);
+  const int j0 = std::max(0, -top), j1 = std::min(n, plane.height - top);
+  if (i0 >= i1 || j0 >= j1) return result;
+  cv::Mat inside = result(cv::Range(j0, j1), cv::Range(i0, i1));
+  const cv::Mat whole(plane.height, plane.width, CV_32F, const_cast<float*>(plane.values.data()));
+  const cv::Mat source = whole(cv::Range(top + j0, top + j1), cv::Range(left + i0, left + i1));
+  cv::subtract(source, cv::mean(source), inside);
+  return result;
+}
+
+double vertex(double before, double here, double after) {
+  const double curvature = before - 2 * here + after;
+  return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
+}
+
+/// Place of the highest value of a periodic map, to a fraction of a pixel; nothing where it is not within the first
+/// `n` x `n` px, or the next peak, anywhere, is nearly as high.
+std::optional<Vec2> peak_of(const cv::Mat& map, int n, double least_ratio) {
+  cv::Point best;
+  double highest = 0;
+  cv::minMaxLoc(map, nullptr, &highest, nullptr, &best);
+  if (!(highest > 0) || best.x < 1 || best.y < 1 || best.x + 1 >= n || best.y + 1 >= n) return std::nullopt;
+  const float nearly = static_cast<float>(highest / least_ratio);
+  constexpr int kOwn = 4;  // px around the peak that belong to it
+  const auto is_own = [](int k, int at, int size) {
+    return std::min(std::abs(k - at), size - std::abs(k - at)) <= kOwn;
+  };
+  for (int j = 0; j < map.rows; ++j) {
+    const float* row = map.ptr<float>(j);
+    for (int i = 0; i < map.cols; ++i) {
+      if (row[i] < nearly) continue;
+      if (!is_own(j, best.y, map.rows) || !is_own(i, best.x, map.cols)) return std::nullopt;
+    }
+  }
+  const auto value = [&](int i, int j) { return map.at<float>(best.y + j, best.x + i); };
+  return Vec2{best.x + vertex(value(-1, 0), value(0, 0), value(1, 0)),
+              best.y + vertex(value(0, -1), value(0, 0), value(0, 1))};
+}
+
+/// Shift, of up to half a window, between a window of the reference and the place in the target where it is expected.
+std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Vec2 centre, Vec2 expected, int window) {
+  const int side = 2 * window, most = window / 2;
+  const int left = static_cast<int>(std::lround(centre.x)) - most;
+  const int top = static_cast<int>(std::lround(centre.y)) - most;
+  const int dx = static_cast<int>(std::lround(expected.x)), dy = static_cast<int>(std::lround(expected.y));
+  cv::Mat a, b, product;
+  cv::dft(cut(reference, left, top, window, side), a, 0, window);
+  cv::dft(cut(target, left + dx - most, top + dy - most, side, side), b);
+  cv::mulSpectrums(b, a, product, 0, true);
+  cv::idft(product, product, cv::DFT_REAL_OUTPUT | cv::DFT_SCALE);
+  constexpr double kLeastRatio = 1.15;
+  const auto shift = peak_of(product, window + 1, kLeastRatio);  // these shifts do not wrap
+  if (!shift) return std::nullopt;
+  return Vec2{shift->x - most + dx, shift->y - most + dy};
+}
+
+Vec2 median_of(const std::vector<Vec2>& values) {
+  std::vector<double> x, y;
+  for (const Vec2 v : values) x.push_back(v.x), y.push_back(v.y);
+  return {quantile(x, 0.5), quantile(y, 0.5)};
+}
+
+std::vector<Vec2> around(const GridField& field, const std::vector<std::optional<Vec2>>& known, int i, int j,
+                         int reach) {
+  std::vector<Vec2> result;
+  for (int b = std::max(0, j - reach); b <= std::min(field.ny - 1, j + reach); ++b) {
+    for (int a = std::max(0, i - reach); a <= std::min(field.nx - 1, i + reach); ++a) {
+      const auto& value = known[static_cast<std::size_t>(b) * field.nx + a];
+      if (value && !(a == i && b == j)) result.push_back(*value);
+    }
+  }
+  return result;
+}
+
+/// Normalised median test (Westerweel & Scarano 2005), then holes take the median of what is known around them.
+void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherwise) {
+  const std::vector<std::optional<Vec2>> before = found;
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+      const std::vector<Vec2> others = around(field, before, i, j, 1);
+      if (!before[k] || others.size() < 3) continue;
+      const Vec2 median = median_of(others);
+      std::vector<double> spread;
+      for (const Vec2 other : others) spread.push_back(norm(other - median));
+      // their threshold of 2, with a floor of 0.5 px: a steep peak is no outlier
+      if (norm(*before[k] - median) > 2 * (quantile(spread, 0.5) + 0.5)) found[k].reset();
+    }
+  }
+  for (int j = 0; j < field.ny; ++j) {
+    for (int i = 0; i < field.nx; ++i) {
+      const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
+      Vec2 value = otherwise;
+      for (int reach = 1; !found[k] && reach < std::max(field.nx, field.ny); ++reach) {
+        const std::vector<Vec2> others = around(field, found, i, j, reach);
+        if (others.size() < 3) continue;
+        value = median_of(others);
+        break;
+      }
+      field.u[k] = found[k].value_or(value);
+    }
+  }
+}
+
+/// Every `scale` pixels a side made one.
+Plane reduced(const Plane& plane, int scale) {
+  if (scale == 1) return plane;
+  Plane result{plane.width / scale, plane.height / scale, {}};
+  result.values.resize(static_cast<std::size_t>(result.width) * result.height);
+  cv::Mat small(result.height, result.width, CV_32F, result.values.data());
+  const cv::Mat whole(plane.height, plane.width, CV_32F, const_cast<float*>(plane.values.data()));
+  cv::resize(whole({0, 0, scale * result.width, scale * result.height}), small, small.size(), 0, 0, cv::INTER_AREA);
+  return result;
+}
+
+/// Shift of the target as a whole: phase correlation.
+Vec2 drift_of(const Plane& reference, const Plane& target) {
+  const auto as_mat = [](const Plane& p) {
+    return cv::Mat(p.height, p.width, CV_32F, const_cast<float*>(p.values.data()));
+  };
+  cv::Mat window;
+  cv::createHanningWindow(window, {reference.width, reference.height}, CV_32F);
+  const cv::Point2d shift = cv::phaseCorrelate(as_mat(reference), as_mat(target), window);
+  return {shift.x, shift.y};
+}
+
+}  // namespace
+
+GridField grid_over(const Plane& plane, double spacing) {
+  GridField field;
+  field.spacing = spacing;
+  field.nx = std::max(1, static_cast<int>(plane.width / spacing));
+  field.ny = std::max(1, static_cast<int>(plane.height / spacing));
+  field.first = {0.5 * (plane.width - 1 - (field.nx - 1) * spacing),
+                 0.5 * (plane.height - 1 - (field.ny - 1) * spacing)};
+  field.u.resize(static_cast<std::size_t>(field.nx) * field.ny);
+  return field;
+}
+
+Plane compressed(const Plane& plane) {
+  std::vector<double> sample;
+  for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
+  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
+  Plane result = plane;
+  for (float& value : result.values) value = value / (std::abs(value) + level);
+  return result;
+}
+
+Motion GridField::at(Vec2 place) const {
+  const auto split = [&](double offset, int n) {
+    const double at = std::clamp(offset / spacing, 0.0, std::max(0.0, n - 1.0));
+    const int k = std::clamp(static_cast<int>(at), 0, std::max(0, n - 2));
+    return std::pair(k, at - k);
+  };
+  const auto [i, s] = split(place.x - first.x, nx);
+  const auto [j, t] = split(place.y - first.y, ny);
+  const auto point = [&](int a, int b) {
+    return u[static_cast<std::size_t>(std::min(b, ny - 1)) * nx + std::min(a, nx - 1)];
+  };
+  const Vec2 above = (1 - s) * point(i, j) + s * point(i + 1, j);
+  const Vec2 below = (1 - s) * point(i, j + 1) + s * point(i + 1, j + 1);
+  const Vec2 along_x =
+      (1 / spacing) * ((1 - t) * (point(i + 1, j) - point(i, j)) + t * (point(i + 1, j + 1) - point(i, j + 1)));
+  const Vec2 along_y = (1 / spacing) * (below - above);
+  return {(1 - t) * above + t * below, along_x.x, along_y.x, along_x.y, along_y.y};
+}
+
+GridField coarse_field(const Plane& reference, const Plane& target, int window, int threads) {
+  const Plane a = compressed(reference), b = compressed(target);
+  Vec2 drift;
+  GridField field;
+  for (const int scale : {2, 1}) {
+    const Plane from = reduced(a, scale), to = reduced(b, scale);
+    if (scale == 2) {
+      drift = 2.0 * drift_of(from, to);
+      field.u = {drift};
+      field.nx = field.ny = 1;
+    }
+    // the second pass, at half the size, looks around what the first has found
+    const double spacing = scale == 2 ? 0.75 * window : 0.375 * window;
+    GridField finer = grid_over(a, spacing);
+    std::vector<std::optional<Vec2>> found(finer.u.size());
+    numerics::parallel_for(finer.ny, threads, [&](int j) {
+      for (int i = 0; i < finer.nx; ++i) {
+        const Vec2 centre = finer.first + finer.spacing * Vec2{1.0 * i, 1.0 * j};
+        const auto shift =
+            window_shift(from, to, (1.0 / scale) * centre, (1.0 / scale) * field.at(centre).u, window / 2);
+        if (shift) found[static_cast<std::size_t>(j) * finer.nx + i] = 1.0 * scale * *shift;
+      }
+    });
+    clean(finer, std::move(found), drift);
+    field = std::move(finer);
+  }
+  return field;
+}
+
+}  // namespace mbtfm::beads

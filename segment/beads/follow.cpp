@@ -1,0 +1,166 @@
+#include "segment/beads/follow.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "pipeline/contract/errors.h"
+#include "segment/beads/local_motion.h"
+
+namespace mbtfm::beads {
+namespace {
+
+constexpr int kAround = 12;
+
+/// What the good tracks around say of each good one, kept while tracks are found and rejected.
+struct Surroundings {
+  std::vector<Motion> motions;
+  std::vector<char> was_good, is_changed;  ///< changed: a track around is another than at the update before
+  std::vector<std::optional<LocalMotion>> around;
+};
+
+void update(const Scene& scene, const std::vector<Track>& tracks, Surroundings& s) {
+  const std::vector<Motion> before = std::exchange(s.motions, motions_of(tracks));
+  std::vector<char> is_good, is_other(tracks.size(), 1);
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    is_good.push_back(tracks[k].is_good());
+    if (before.empty() || is_good[k] != s.was_good[k]) continue;
+    is_other[k] = is_good[k] && !(before[k].u.x == s.motions[k].u.x && before[k].u.y == s.motions[k].u.y);
+  }
+  s.was_good = std::move(is_good);
+  s.is_changed.assign(tracks.size(), 0);
+  s.around.resize(tracks.size());
+  for_each_bead(scene, [&](int k) {
+    const std::vector<int>& near = scene.relaxed->around[k];
+    const std::size_t n = std::min<std::size_t>(3 * kAround, near.size());  // those that good_around() looks at
+    s.is_changed[k] = is_other[k];
+    for (std::size_t at = 0; at < n && !s.is_changed[k]; ++at) s.is_changed[k] = is_other[near[at]];
+    if (!s.is_changed[k]) return;
+    s.around[k].reset();
+    if (!tracks[k].is_good()) return;
+    const std::vector<int> others = good_around(scene, tracks, k, kAround);
+    s.around[k] = local_motion(scene.position(k), others, scene.relaxed->positions, s.motions);
+  });
+}
+
+int flag_outliers(const std::vector<std::optional<LocalMotion>>& around, double threshold, std::vector<Track>& tracks) {
+  // Twelve neighbours know their spread to a third: it is no smaller than the picture's.
+  const double typical = typical_spread(around);
+  int n_outliers = 0;
+  for (std::size_t k = 0; k < tracks.size(); ++k) {
+    if (!tracks[k].is_good()) continue;
+    const auto& local = around[k];
+    if (local && local->n_beads >= 3) {
+      const double spread = std::max(local->spread_px, typical);
+      const double misfit = norm(tracks[k].found.motion.u - local->motion.u);
+      // The floor is what a field's curvature within the reach may do without being wrong.
+      if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + 0.3) continue;
+    }
+    tracks[k].flag = "neighbours disagree";
+    ++n_outliers;
+  }
+  return n_outliers;
+}
+
+/// First round: from the grid.
+void follow_grid(const Scene& scene, const GridField& grid, double least_similarity, std::vector<Track>& tracks) {
+  for_each_bead(scene, [&](int k) {
+    Track& track = tracks[k];
+    const Motion guess = grid.at(scene.position(k));
+    track.found = registered(scene.relaxed->image, scene.stressed.image.spline, scene.position(k), guess, scene.wide);
+    const double moved = norm(track.found.motion.u - guess.u);
+    // further than two bead widths from the guess a registration has caught another bead
+    if (track.found.is_converged && track.found.similarity > least_similarity && moved < 4 * scene.bead_sigma()) {
+      track.flag.clear();
+    }
+  });
+}
+
+/// A track of bead k from what its neighbours do: their affine motion itself, and the stressed image's beads near where
+/// it leads; the most similar counts.
+std::optional<Registered> retried(const Scene& scene, const std::vector<Track>& tracks,
+                                  const std::vector<Motion>& motions, int k, double least_similarity) {
+  const Vec2 place = scene.position(k);
+  const auto local = local_motion(place, good_around(scene, tracks, k, 8), scene.relaxed->positions, motions);
+  if (!local || local->n_beads < 3) return std::nullopt;
+  std::vector<Motion> guesses = {local->motion};
+  const double search = std::clamp(4 * local->spread_px, 2 * scene.bead_sigma(), 5 * scene.bead_sigma());
+  for (const int b : scene.stressed.neighbours.within(place + local->motion.u, search, 4)) {
+    guesses.push_back(local->motion);
+    guesses.back().u = scene.stressed.positions[b] - place;
+  }
+  Window window = scene.wide;
+  window.sigma = std::max(2.2 * scene.bead_sigma(), 0.6 * scene.wide.sigma);
+  window.is_thinned = false;
+  std::optional<Registered> best;
+  for (const Motion& guess : guesses) {
+    const Registered found = registered(scene.relaxed->image, scene.stressed.image.spline, place, guess, window);
+    if (!found.is_converged || norm(found.motion.u - local->motion.u) > search) continue;
+    if (found.similarity > std::max(least_similarity, best ? best->similarity : -1)) best = found;
+  }
+  return best;
+}
+
+void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Surroundings& surroundings,
+                       std::vector<Track>& tracks) {
+  constexpr int kMaxRounds = 12;
+  for (int round = 0; round < kMaxRounds; ++round) {
+    std::vector<std::optional<Registered>> found(tracks.size());
+    for_each_bead(scene, [&](int k) {
+      if (tracks[k].is_good() || !surroundings.is_changed[k]) return;
+      // a narrow window may take a stranger for the bead: more is asked of it
+      found[k] = retried(scene, tracks, surroundings.motions, k, 0.5 * (1 + parameters.least_similarity));
+    });
+    int n_found = 0;
+    for (std::size_t k = 0; k < tracks.size(); ++k) {
+      if (!found[k]) continue;
+      tracks[k] = {.found = *found[k], .flag = {}};
+      ++n_found;
+    }
+    update(scene, tracks, surroundings);
+    const int n_rejected = flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
+    if (n_found <= n_rejected) break;
+  }
+}
+
+}  // namespace
+
+void require_common_beads(int n_by_grid, int n_in_the_end, int n_beads) {
+  constexpr double kFewest = 0.2, kMost = 2.0 / 3;
+  const int n_found = std::min(n_by_grid, n_in_the_end);
+  if (n_found >= kFewest * n_beads || n_in_the_end >= kMost * n_beads) return;
+  throw NotFollowed("the stressed image", "the beads of the relaxed image, displaced",
+                    std::to_string(n_found) + " of " + std::to_string(n_beads) + " of them");
+}
+
+Followed follow(const Scene& scene, const GridField& grid, const TrackParameters& parameters) {
+  std::vector<Track> tracks(scene.relaxed->beads.size());
+  follow_grid(scene, grid, parameters.least_similarity, tracks);
+  Surroundings surroundings;
+  update(scene, tracks, surroundings);
+  flag_outliers(surroundings.around, parameters.outlier_threshold, tracks);
+  const int n_by_grid = n_good(tracks);
+  follow_neighbours(scene, parameters, surroundings, tracks);
+  return {std::move(tracks), n_by_grid};
+}
+
+std::vector<std::optional<LocalMotion>> motions_around(const Scene& scene, const std::vector<Track>& tracks) {
+  Surroundings surroundings;
+  update(scene, tracks, surroundings);
+  return std::move(surroundings.around);
+}
+
+double typical_spread(const std::vector<std::optional<LocalMotion>>& around) {
+  std::vector<double> spreads;
+  for (const auto& local : around) {
+    if (local && local->n_beads >= 3) spreads.push_back(local->spread_px);
+  }
+  return quantile(std::move(spreads), 0.5);
+}
+
+int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks) {
+  return flag_outliers(motions_around(scene, tracks), threshold, tracks);
+}
+
+}  // namespace mbtfm::beads

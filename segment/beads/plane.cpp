@@ -1,0 +1,168 @@
+#include "segment/beads/plane.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "pipeline/numerics/parallel.h"
+
+namespace mbtfm::beads {
+namespace {
+
+cv::Mat as_mat(const std::vector<float>& values, int width, int height) {
+  return {height, width, CV_32F, const_cast<float*>(values.data())};
+}
+
+std::vector<float> blurred_values(const std::vector<float>& values, int width, int height, double sigma) {
+  std::vector<float> result(values.size());
+  cv::Mat out = as_mat(result, width, height);
+  const int reach = 2 * static_cast<int>(std::ceil(3.5 * sigma)) + 1;  // beyond 3.5 sigma lies 5e-4 of the weight
+  cv::GaussianBlur(as_mat(values, width, height), out, {reach, reach}, sigma, sigma, cv::BORDER_REFLECT_101);
+  return result;
+}
+
+/// The same for a wide Gaussian, on a picture a quarter the size: what is left has no detail that this would lose.
+std::vector<float> widely_blurred_values(const std::vector<float>& values, int width, int height, double sigma) {
+  constexpr int kFactor = 4;
+  if (width < 8 * kFactor || height < 8 * kFactor || sigma < 2 * kFactor) {
+    return blurred_values(values, width, height, sigma);
+  }
+  cv::Mat small;
+  cv::resize(as_mat(values, width, height), small, {}, 1.0 / kFactor, 1.0 / kFactor, cv::INTER_AREA);
+  cv::GaussianBlur(small, small, {}, sigma / kFactor, sigma / kFactor, cv::BORDER_REFLECT_101);
+  std::vector<float> result(values.size());
+  cv::Mat out = as_mat(result, width, height);
+  cv::resize(small, out, {width, height}, 0, 0, cv::INTER_LINEAR);
+  return result;
+}
+
+/// Mean product of the tile's values (mean removed) with those `di`, `dj` further on.
+double autocorrelation(const Plane& plane, int left, int top, int side, int di, int dj, double mean) {
+  double sum = 0;
+  for (int j = top; j < top + side; ++j) {
+    for (int i = left; i < left + side; ++i) sum += (plane.at(i, j) - mean) * (plane.at(i + di, j + dj) - mean);
+  }
+  return sum / (side * side);
+}
+
+/// For Gaussian spots of sigma s the autocorrelation is exp(−r²/4s²): s² = (r2² − r1²) / (4 ln(C1/C2)).
+double sigma_of_tile(const Plane& plane, int left, int top, int side) {
+  double mean = 0;
+  for (int j = top; j < top + side; ++j) {
+    for (int i = left; i < left + side; ++i) mean += plane.at(i, j);
+  }
+  mean /= side * side;
+  const auto c = [&](int di, int dj) { return autocorrelation(plane, left, top, side, di, dj, mean); };
+  const double at_zero = c(0, 0);
+  const double near = 0.5 * (c(1, 0) + c(0, 1));
+  const double far = 0.5 * (c(2, 0) + c(0, 2));
+  if (!(near > 0.05 * at_zero) || !(far > 0.02 * at_zero) || !(near > far)) return 0;
+  return std::sqrt(3 / (4 * std::log(near / far)));
+}
+
+}  // namespace
+
+Plane without_background(const images::Image& image, double sigma) {
+  Plane result{image.width, image.height, widely_blurred_values(image.pixels, image.width, image.height, sigma)};
+  for (std::size_t k = 0; k < result.values.size(); ++k) result.values[k] = image.pixels[k] - result.values[k];
+  return result;
+}
+
+Plane blurred(const Plane& plane, double sigma) {
+  return {plane.width, plane.height, blurred_values(plane.values, plane.width, plane.height, sigma)};
+}
+
+void in_strips(int n, int threads, const std::function<void(int, int)>& body) {
+  constexpr int kStrip = 64;
+  numerics::parallel_for((n + kStrip - 1) / kStrip, threads,
+                         [&](int strip) { body(strip * kStrip, std::min(n, (strip + 1) * kStrip)); });
+}
+
+double quantile(std::vector<double> values, double p) {
+  if (values.empty()) return 0;
+  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), nth, values.end());
+  return *nth;
+}
+
+double noise_of(const Plane& plane) {
+  // Immerkaer's mask (CVIU 64:300, 1996), the difference of two Laplacians: blind to slopes and curvatures, norm 6
+  std::vector<double> high;
+  // a quarter of a million pixels tell a quantile to 0.3 %
+  const int step = 1 + static_cast<int>(std::sqrt(plane.values.size() / 2.5e5));
+  for (int j = 1; j + 1 < plane.height; j += step) {
+    const float *above = plane.row(j - 1), *here = plane.row(j), *below = plane.row(j + 1);
+    for (int i = 1; i + 1 < plane.width; i += step) {
+      const double corners = above[i - 1] + above[i + 1] + below[i - 1] + below[i + 1];
+      const double sides = above[i] + below[i] + here[i - 1] + here[i + 1];
+      high.push_back(std::abs(corners - 2 * sides + 4 * here[i]) / 6);
+    }
+  }
+  // Low quantiles of |normal| (0.385, 0.674, 0.994 sd) stay clear of the beads; a camera that cuts noise off at zero
+  // leaves exact zeros, so the larger of them counts.
+  return std::max({quantile(high, 0.3) / 0.3853, high.empty() ? 0 : 0.25 * quantile(high, 0.68) / 0.9945});
+}
+
+double bead_sigma_of(const Plane& plane) {
+  const int side = std::min({64, plane.width - 2, plane.height - 2});
+  std::vector<double> sigmas;
+  if (side < 8) return 0;
+  // some 100 tiles tell the median to a few per cent, which is all a bead's width must be known to
+  const int step = side * std::max(1, static_cast<int>(std::sqrt(plane.values.size() / 1e2) / side));
+  for (int top = 0; top + side + 2 <= plane.height; top += step) {
+    for (int left = 0; left + side + 2 <= plane.width; left += step) {
+      const double sigma = sigma_of_tile(plane, left, top, side);
+      if (sigma > 0) sigmas.push_back(sigma);
+    }
+  }
+  return quantile(sigmas, 0.5);
+}
+
+Neighbours::Neighbours(std::vector<Vec2> points, double cell) : points_(std::move(points)), cell_(cell) {
+  if (points_.empty()) return;
+  Vec2 last = points_[0];
+  left_ = last.x, top_ = last.y;
+  for (const Vec2 p : points_) {
+    left_ = std::min(left_, p.x), top_ = std::min(top_, p.y);
+    last = {std::max(last.x, p.x), std::max(last.y, p.y)};
+  }
+  // no more cells than some for each point, however far apart the points are: of a line, or with one astray
+  const double width = last.x - left_, height = last.y - top_, most = 16.0 * static_cast<double>(points_.size());
+  cell_ = std::max({cell_, std::sqrt(width / most) * std::sqrt(height), width / most, height / most});
+  nx_ = 1 + static_cast<int>((last.x - left_) / cell_);
+  ny_ = 1 + static_cast<int>((last.y - top_) / cell_);
+  const auto cell_of = [&](Vec2 p) {
+    return static_cast<std::size_t>((p.y - top_) / cell_) * nx_ + static_cast<std::size_t>((p.x - left_) / cell_);
+  };
+  first_.assign(static_cast<std::size_t>(nx_) * ny_ + 1, 0);
+  for (const Vec2 p : points_) ++first_[cell_of(p) + 1];
+  std::partial_sum(first_.begin(), first_.end(), first_.begin());
+  std::vector<int> next(first_.begin(), first_.end() - 1);
+  order_.resize(points_.size());
+  for (std::size_t k = 0; k < points_.size(); ++k) order_[next[cell_of(points_[k])]++] = static_cast<int>(k);
+}
+
+std::vector<int> Neighbours::within(Vec2 place, double radius, int n) const {
+  const auto cell_of = [&](double offset, int last) {
+    return static_cast<int>(std::clamp(std::floor(offset / cell_), 0.0, static_cast<double>(last)));
+  };
+  std::vector<std::pair<double, int>> found;
+  for (int j = cell_of(place.y - radius - top_, ny_ - 1); j <= cell_of(place.y + radius - top_, ny_ - 1); ++j) {
+    const std::size_t row = static_cast<std::size_t>(j) * nx_;
+    const int from = first_[row + cell_of(place.x - radius - left_, nx_ - 1)];
+    const int to = first_[row + cell_of(place.x + radius - left_, nx_ - 1) + 1];
+    for (int at = from; at < to; ++at) {
+      const Vec2 d = points_[order_[at]] - place;
+      if (dot(d, d) <= radius * radius) found.emplace_back(dot(d, d), order_[at]);
+    }
+  }
+  const std::size_t kept = std::min(found.size(), static_cast<std::size_t>(n));
+  std::partial_sort(found.begin(), found.begin() + static_cast<std::ptrdiff_t>(kept), found.end());
+  std::vector<int> result;
+  for (std::size_t k = 0; k < kept; ++k) result.push_back(found[k].second);
+  return result;
+}
+
+}  // namespace mbtfm::beads

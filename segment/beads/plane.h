@@ -1,0 +1,56 @@
+/// Inside of the bead tracker: grey values as floats, and a search for neighbours.
+#pragma once
+
+#include <functional>
+#include <vector>
+
+#include "pipeline/contract/geometry.h"
+#include "segment/images/image.h"
+
+namespace mbtfm::beads {
+
+/// Grey values, row by row. Coordinates are px, 0 at the centre of the first pixel.
+struct Plane {
+  int width = 0;
+  int height = 0;
+  std::vector<float> values;
+  const float* row(int j) const { return values.data() + static_cast<std::size_t>(j) * width; }
+  float at(int i, int j) const { return row(j)[i]; }
+};
+
+/// The image less its Gaussian average over `sigma` px: light that varies slowly is gone.
+Plane without_background(const images::Image& image, double sigma);
+
+/// Gaussian average.
+Plane blurred(const Plane& plane, double sigma);
+
+/// Standard deviation of the pixels' noise where the image is dark.
+double noise_of(const Plane& plane);
+
+/// Gaussian sigma (px) of a bead's picture: from the ratios of the autocorrelation at lags 1, sqrt 2 and 2, whose zero
+/// lag alone carries the noise; the median over tiles, so that a bright clump does not decide. 0: nothing but noise.
+double bead_sigma_of(const Plane& plane);
+
+/// Points sorted into square cells.
+class Neighbours {
+ public:
+  Neighbours() = default;
+  Neighbours(std::vector<Vec2> points, double cell);
+  /// Indices of the points within `radius` of a place, nearest first, at most `n`.
+  std::vector<int> within(Vec2 place, double radius, int n) const;
+
+ private:
+  std::vector<Vec2> points_;
+  double cell_ = 1, left_ = 0, top_ = 0;
+  int nx_ = 1, ny_ = 1;
+  std::vector<int> first_ = {0, 0};  ///< of each cell in order_
+  std::vector<int> order_;
+};
+
+/// Call body(from, to) for strips of 0 … n; the strips do not depend on the threads.
+void in_strips(int n, int threads, const std::function<void(int from, int to)>& body);
+
+/// The p-quantile (0 to 1); 0 of nothing.
+double quantile(std::vector<double> values, double p);
+
+}  // namespace mbtfm::beads

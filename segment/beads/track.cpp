@@ -1,0 +1,430 @@
+#include "segment/beads/track.h"
+
+#include <algorithm>
+#include <cmath>
+#include <exception>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/stage/effects.h"
+#include "segment/beads/alignment.h"
+#include "segment/beads/beads.h"
+#include "segment/beads/coarse_field.h"
+#include "segment/beads/common_motion.h"
+#include "segment/beads/focus.h"
+#include "segment/beads/follow.h"
+#include "segment/beads/given_field.h"
+#include "segment/beads/measure.h"
+#include "segment/beads/pool.h"
+#include "segment/beads/scene.h"
+#include "segment/beads/windows.h"
+
+namespace mbtfm::beads {
+namespace {
+
+constexpr const char* kCorrelationWindows = "correlation windows";  // the effect's name
+
+/// @param least_px  that makes the right peak stand out: sixteen beads
+int search_window(double least_px, const TrackParameters& parameters, double pixel_size_um) {
+  double needed = std::max(64.0, least_px);
+  // shifts are found up to half a window
+  if (parameters.largest_displacement_um > 0) {
+    needed = std::max(needed, 2.2 * parameters.largest_displacement_um / pixel_size_um);
+  }
+  int window = 32;
+  while (window < needed) window *= 2;
+  return window;
+}
+
+TrackMethod method_of(const TrackParameters& parameters) {
+  for (const auto& [method, word] : kTrackMethods) {
+    if (parameters.method == word) return method;
+  }
+  throw UsageError("track.method is " + parameters.method);
+}
+
+void require_numbers(const images::Image& image, const char* which) {
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      if (std::isfinite(image.at(i, j))) continue;
+      throw InvalidData(std::string("the ") + which + " image", "a number in every pixel",
+                        "none at column " + std::to_string(i + 1) + ", row " + std::to_string(j + 1));
+    }
+  }
+}
+
+/// The motion of each place, px: of a bead, or of a window.
+struct Measured {
+  std::shared_ptr<const Scene> scene;
+  std::vector<Track> tracks;
+  Pooling pooling;
+  std::optional<SizeRatio> size_ratio = {};
+  double window_px = 0;  ///< Gaussian sigma of the windows; 0: beads
+};
+
+/// What moved the good beads together, px. @param setting  as of TrackParameters::drift_affine
+MotionTaken motion_of_all(const Measured& measured, const std::string& setting, double tolerance) {
+  const Scene& scene = *measured.scene;
+  std::vector<Vec2> positions, displacements;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    if (!measured.tracks[k].is_good()) continue;
+    positions.push_back(scene.position(k));
+    displacements.push_back(measured.pooling.beads[k].u);
+  }
+  const Plane& plane = scene.relaxed->image.plane;
+  return motion_taken(positions, displacements, {-0.5, -0.5}, plane.width, plane.height, setting, tolerance, 1);
+}
+
+/// A turn that is taken for displacement is a wrong field, however well its beads were found.
+void require_shift_alone(const MotionTaken& all) {
+  if (all.affine.is_on || !all.is_large) return;
+  throw InvalidData("the stressed image", "one that is shifted at most (effects.drift_affine = off)",
+                    affine_in_words(all.common));
+}
+
+/// The beads that left the stressed image when it was turned.
+void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& tracks) {
+  const Plane& plane = scene.stressed.image.plane;
+  const double margin = 2 * scene.bead_sigma();
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    const Vec2 there = turn.of(scene.position(k) + tracks[k].found.motion.u);
+    const double inside = std::min({there.x, there.y, plane.width - 1 - there.x, plane.height - 1 - there.y});
+    if (inside < margin) tracks[k].flag = "edge";
+  }
+}
+
+/// Found from the grid with the wide window, measured in the narrow one, even where beads are loose or not resolved and
+/// single ones scatter: a wider window would hide the scatter and flatten the peaks.
+Followed followed_and_measured(const Scene& scene, const std::optional<Turn>& turn, const TrackParameters& parameters,
+                               int window) {
+  const GridField grid = coarse_field(scene.relaxed->image.plane, scene.stressed.image.plane, window, scene.threads);
+  Followed followed = follow(scene, grid, parameters);
+  measure(scene, parameters.least_similarity, followed.tracks);
+  verify(scene, followed.tracks);
+  if (turn) flag_turned_out(scene, *turn, followed.tracks);
+  flag_outliers(scene, parameters.outlier_threshold, followed.tracks);
+  return followed;
+}
+
+Measured measured_beads(const std::shared_ptr<const Side>& relaxed, const images::Image& stressed,
+                        const std::optional<Turn>& turn, const TrackParameters& parameters, double pixel_size_um,
+                        int threads) {
+  const auto scene = std::make_shared<const Scene>(scene_of(
+      relaxed, side_of(stressed, relaxed->bead_sigma, parameters.detection_snr, "stressed", threads), threads));
+  auto [tracks, n_by_grid] =
+      followed_and_measured(*scene, turn, parameters, search_window(4 * scene->spacing(), parameters, pixel_size_um));
+  recover(*scene, parameters.least_similarity, tracks);
+  if (turn) flag_turned_out(*scene, *turn, tracks);  // those found again
+  require_common_beads(n_by_grid, n_good(tracks), scene->n_beads());
+  Pooling pooling = pooled(*scene, tracks);
+  const SizeRatio sizes = size_ratio(*scene, tracks);
+  return {.scene = scene, .tracks = std::move(tracks), .pooling = std::move(pooling), .size_ratio = sizes};
+}
+
+/// What a size of window gives.
+struct Tried {
+  Measured measured;
+  int n_by_grid = 0;
+  bool is_sound = false;  ///< two windows in three are found again, and their errors are known
+  double median_sigma_px = 0;
+  double knowledge = 0;  ///< sum of 1/sigma²
+};
+
+Tried tried_windows(const Texture& relaxed, const Texture& stressed, double window_px, const std::optional<Turn>& turn,
+                    TrackParameters parameters, double pixel_size_um, int threads) {
+  const Windows windows = windows_on(relaxed, stressed, window_px, threads);
+  const auto scene = std::make_shared<const Scene>(windows.scene);
+  parameters.least_similarity = least_similarity(relaxed, window_px);
+  // a square of seven Gaussian sigmas is halved on the finer grid, and holds as much as the Gaussian then
+  auto [tracks, n_by_grid] =
+      followed_and_measured(*scene, turn, parameters, search_window(7 * window_px, parameters, pixel_size_um));
+  Tried result{.measured = {scene, std::move(tracks), {}, {}, window_px}, .n_by_grid = n_by_grid};
+  auto pooling = calibrated(windows, result.measured.tracks);
+  if (!pooling) return result;
+  std::vector<double> sigmas;
+  for (int k = 0; k < scene->n_beads(); ++k) {
+    if (!result.measured.tracks[k].is_good()) continue;
+    const double sigma_px = pooling->beads[k].sigma_px;
+    sigmas.push_back(sigma_px);
+    result.knowledge += 1 / (sigma_px * sigma_px);
+  }
+  result.is_sound = 3 * sigmas.size() >= 2 * result.measured.tracks.size();
+  result.median_sigma_px = quantile(std::move(sigmas), 0.5);
+  result.measured.pooling = std::move(*pooling);
+  return result;
+}
+
+/// In the smallest windows that are fine enough; where none are, in those that know most together.
+Measured measured_windows(const Texture& relaxed, const images::Image& stressed, const std::optional<Turn>& turn,
+                          const TrackParameters& parameters, double pixel_size_um, int threads) {
+  const Texture moved = texture_of(stressed, relaxed.spot_sigma_px, "stressed");
+  std::optional<Tried> best;
+  int n_by_grid = 0, n_found = 0, n_tried = 0;
+  for (const double window_px : window_sigmas(relaxed)) {
+    Tried tried = tried_windows(relaxed, moved, window_px, turn, parameters, pixel_size_um, threads);
+    constexpr double kFineEnough = 0.1;  // px: a tenth of what moves in a picture worth tracking
+    const bool is_fine = tried.is_sound && tried.median_sigma_px <= kFineEnough;
+    n_by_grid = tried.n_by_grid, n_found = n_good(tried.measured.tracks), n_tried = tried.measured.scene->n_beads();
+    if (tried.is_sound && (is_fine || !best || tried.knowledge > best->knowledge)) best = std::move(tried);
+    if (is_fine) break;
+  }
+  if (!best) {
+    throw NotFollowed(
+        "the stressed image", "the relaxed image's texture, displaced",
+        std::to_string(std::min(n_by_grid, n_found)) + " of " + std::to_string(n_tried) + " windows of it");
+  }
+  return std::move(best->measured);
+}
+
+CommonMotion in_um(CommonMotion common, double pixel_size_um) {
+  common.drift_um = pixel_size_um * common.drift_um;
+  common.drift_sigma_um *= pixel_size_um;
+  return common;
+}
+
+/// With the turn by which the image was turned back before.
+CommonMotion turned_as_before(CommonMotion common, const Turn& turn, Vec2 centre) {
+  common.drift_um = turn.of(centre + common.drift_um) - centre;
+  common.turn_rad += turn.angle_rad;
+  return common;
+}
+
+Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pixel_size_um) {
+  const Scene& scene = *measured.scene;
+  const std::vector<Track>& tracks = measured.tracks;
+  const Pooling& pooling = measured.pooling;
+  Tracking result;
+  result.far_field_rms_um = pixel_size_um * all.rms;
+  result.noise_um = pixel_size_um * all.noise;
+  result.scatter_um = pixel_size_um * pooling.scatter_px;
+  result.bead_sigma_um = pixel_size_um * scene.bead_sigma();
+  result.n_beads_stressed = static_cast<int>(scene.stressed.beads.size());
+  result.window_um = pixel_size_um * measured.window_px;
+  if (measured.size_ratio) {
+    result.size_ratio = measured.size_ratio->ratio;
+    result.size_ratio_sigma = measured.size_ratio->sigma;
+  }
+  result.affine = all.affine;
+  for (int k = 0; k < scene.n_beads(); ++k) {
+    const Pooled& found = pooling.beads[k];
+    const Vec2 place = scene.position(k);
+    result.field.push_back({.position_um = pixel_size_um * (place + Vec2{0.5, 0.5}),
+                            .displacement_um = pixel_size_um * (found.u - all.motion.at(place)),
+                            .sigma_um = pixel_size_um * found.sigma_px,
+                            .flag = tracks[k].flag});
+    if (tracks[k].is_good()) ++result.n_good;
+  }
+  return result;
+}
+
+}  // namespace
+
+const char* word_of(TrackMethod method) {
+  return std::ranges::find(kTrackMethods, method, &std::pair<TrackMethod, const char*>::first)->second;
+}
+
+void declare(stage::ParameterList& list, TrackParameters& p) {
+  list.table("");
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
+           "side of a pixel in the specimen (um); unset: from the image's own calibration");
+  list.table("track");
+  declare(list, p.stressed_plane, "stressed", "the stressed bead image");
+  declare(list, p.relaxed_plane, "relaxed", "the relaxed bead image");
+  list.add(
+      "stressed_last", p.stressed_last, {.low = 0},
+      "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
+  std::vector<std::string> methods;
+  for (const auto& [method, word] : kTrackMethods) methods.emplace_back(word);
+  list.add("method", p.method,
+           "what is followed: single beads, or the texture in windows (correlation); auto: windows where beads fail",
+           methods);
+  list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
+  list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
+           "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
+  list.add("may_push", p.may_push,
+           "the cell may push its gel outward; otherwise that is taken for exchanged images, an error");
+  list.add("least_similarity", p.least_similarity, Range::between(0, 1),
+           "least correlation of a bead's surroundings in both images");
+  list.add("outlier_threshold", p.outlier_threshold, Range::factor(),
+           "difference from the neighbours that flags a bead (robust standard deviations)");
+  list.add("x_column", p.x_column, "column of --displacement: position in the relaxed state");
+  list.add("y_column", p.y_column, "column of --displacement");
+  list.add("ux_column", p.ux_column, "column of --displacement: stressed minus relaxed position");
+  list.add("uy_column", p.uy_column, "column of --displacement");
+  list.add("sigma_column", p.sigma_column,
+           "column of --displacement: standard error of a component; where there is none, from the neighbours");
+  list.add("length_unit", p.length_unit,
+           "of --displacement: um, or px (0 at the centre of the first pixel, of pixel_size_um)", {"um", "px"});
+}
+
+RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads)
+    : relaxed_(relaxed), parameters_(parameters), threads_(threads) {
+  require_numbers(relaxed, "relaxed");
+  const TrackMethod method = method_of(parameters);
+  const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
+  const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
+  if (method != TrackMethod::correlation) {
+    Side side = side_of(relaxed, bead_sigma, parameters.detection_snr, "relaxed", threads);
+    side.around = beads_around(side, threads);
+    side_ = std::make_shared<const Side>(std::move(side));
+  }
+  if (method != TrackMethod::beads) {
+    texture_ = std::make_shared<const Texture>(texture_of(relaxed, bead_sigma, "relaxed"));
+  }
+}
+
+Tracking RelaxedBeads::track(const images::Image& stressed, double pixel_size_um, const Progress& progress) const {
+  const auto size = [](const images::Image& image) {
+    return std::to_string(image.width) + " x " + std::to_string(image.height);
+  };
+  if (size(relaxed_) != size(stressed)) {
+    throw InvalidData("the stressed image", "the relaxed image's " + size(relaxed_) + " pixels", size(stressed));
+  }
+  require_numbers(stressed, "stressed");
+  try {
+    return track_by_any(stressed, pixel_size_um, progress);
+  } catch (NotFollowed& error) {
+    error.hint = remedy(stressed, pixel_size_um);
+    throw;
+  }
+}
+
+/// Single beads first: where they can be followed, each knows more of its place than a window does.
+Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_size_um,
+                                    const Progress& progress) const {
+  const auto by = [&](TrackMethod method) { return track_by(method, stressed, pixel_size_um, progress); };
+  const TrackMethod method = method_of(parameters_);
+  if (method != TrackMethod::automatic) {
+    Tracking result = by(method);
+    const bool is_on = method == TrackMethod::correlation;
+    result.windows = stage::decided(kCorrelationWindows, is_on ? "on" : "off", is_on, "as asked");
+    return result;
+  }
+  try {
+    Tracking result = by(TrackMethod::beads);
+    result.windows = stage::decided(kCorrelationWindows, "auto", false, "single beads can be followed");
+    return result;
+  } catch (const NotFollowed& beads) {
+    const stage::Stopwatch watch;
+    std::optional<Tracking> result;
+    try {
+      result = by(TrackMethod::correlation);
+    } catch (const NotFollowed&) {
+      throw beads;
+    }
+    result->windows = stage::decided(kCorrelationWindows, "auto", true,
+                                     "single beads cannot be followed: of " + beads.element + " " + beads.expected +
+                                         " were expected, " + beads.found + " found");
+    result->windows.seconds = watch.seconds();
+    return *result;
+  }
+}
+
+Tracking RelaxedBeads::track_by(TrackMethod method, const images::Image& stressed, double pixel_size_um,
+                                const Progress& progress) const {
+  const auto as = [&](const std::string& setting) {
+    return track_as(method, setting, stressed, pixel_size_um, progress);
+  };
+  if (parameters_.drift_affine != "auto") return as(parameters_.drift_affine);
+  std::optional<Tracking> unturned;
+  std::exception_ptr refused;
+  try {
+    unturned = as("auto");
+  } catch (const ExchangedImages&) {
+    throw;
+  } catch (const InvalidData&) {  // turned so far that its beads are not met with again?
+    refused = std::current_exception();
+  }
+  // A turn is its angle and nothing else while it is small: 0.01 shortens lengths by 5e-5.
+  constexpr double kSmall_rad = 0.01;
+  if (unturned && !(unturned->affine.is_on && std::abs(unturned->common.turn_rad) > kSmall_rad)) return *unturned;
+  try {
+    Tracking turned = as("on");
+    turned.affine = stage::decided(
+        turned.affine.name, "auto", true,
+        "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
+    return turned;
+  } catch (const ExchangedImages&) {
+    throw;
+  } catch (const InvalidData&) {
+    if (unturned) return *unturned;
+    std::rethrow_exception(refused);
+  }
+}
+
+Tracking RelaxedBeads::track_as(TrackMethod method, const std::string& setting, const images::Image& stressed,
+                                double pixel_size_um, const Progress& progress) const {
+  const auto tell = [&](double fraction, const char* what) {
+    if (progress) progress(fraction, what);
+  };
+  const bool by_beads = method == TrackMethod::beads;
+  const Plane& plane = by_beads ? side_->image.plane : texture_->plane;
+  const double spot_sigma = by_beads ? side_->bead_sigma : texture_->spot_sigma_px;
+  std::optional<Turn> turn;
+  if (setting == "on") {
+    tell(0, "turning the image back");
+    const Plane light = by_beads ? without_background(stressed, background_sigma(spot_sigma))
+                                 : texture_of(stressed, spot_sigma, "stressed").plane;
+    turn = turn_between(plane, light, spot_sigma, threads_);
+    if (!turn && by_beads) require_common_beads(0, 0, static_cast<int>(side_->beads.size()));
+    if (!turn)
+      throw NotFollowed("the stressed image", "the relaxed image's texture, turned", "no turn that stands out");
+  }
+  const images::Image unturned = turn ? turned_back(stressed, *turn, threads_) : stressed;
+  tell(0, by_beads ? "following beads" : "following windows");
+  const Measured measured = by_beads
+                                ? measured_beads(side_, unturned, turn, parameters_, pixel_size_um, threads_)
+                                : measured_windows(*texture_, unturned, turn, parameters_, pixel_size_um, threads_);
+  const MotionTaken all = motion_of_all(measured, setting, parameters_.effect_tolerance);
+  require_shift_alone(all);
+  Tracking result = tracking_of(measured, all, pixel_size_um);
+  const CommonMotion common = turn ? turned_as_before(all.common, *turn, all.motion.centre) : all.common;
+  result.common = in_um(common, pixel_size_um);
+  const bool is_affine_left = all.is_affine && !all.affine.is_on;
+  if (!parameters_.may_push && points_outward(result.field, result.common, is_affine_left)) {
+    throw ExchangedImages("the stressed image", "beads that a cell pulls inward",
+                          "beads that move outward (" + brief(outwardness(result.field)) +
+                              " of -1, inward, to 1), as if the stressed and the relaxed image were exchanged");
+  }
+  return result;
+}
+
+/// Tried out one by one: an error has the time, and a hint that does not help costs the reader more.
+std::string RelaxedBeads::remedy(const images::Image& stressed, double pixel_size_um) const {
+  const auto helps = [&](const auto& change) {
+    TrackParameters changed = parameters_;
+    change(changed);
+    try {
+      RelaxedBeads(relaxed_, changed, threads_).track_by_any(stressed, pixel_size_um, {});
+      return true;
+    } catch (const InvalidData&) {
+      return false;
+    }
+  };
+  std::vector<std::string> found;
+  if (method_of(parameters_) != TrackMethod::automatic && helps([](auto& p) { p.method = "auto"; })) {
+    found.push_back("track.method = auto");
+  }
+  if (parameters_.drift_affine == "off" && helps([](auto& p) { p.drift_affine = "auto"; })) {
+    found.push_back("effects.drift_affine = auto: one image is turned against the other");
+  }
+  const double further_um = 0.25 * std::min(stressed.width, stressed.height) * pixel_size_um;
+  if (parameters_.largest_displacement_um < further_um &&
+      helps([&](auto& p) { p.largest_displacement_um = further_um; })) {
+    found.push_back("track.largest_displacement_um = " + brief(further_um) + ": what moved, moved far");
+  }
+  constexpr double kLow = 3;  // below 3 sd most of what is found is noise
+  if (parameters_.detection_snr > kLow && helps([](auto& p) { p.detection_snr = kLow; })) {
+    found.push_back("track.detection_snr = " + brief(kLow) + ": the beads are weak");
+  }
+  std::string text;
+  for (const std::string& way : found) text += (text.empty() ? "" : "; or ") + way;
+  return text;
+}
+
+Tracking track_beads(const images::Image& relaxed, const images::Image& stressed, double pixel_size_um,
+                     const TrackParameters& parameters, int threads, const Progress& progress) {
+  return RelaxedBeads(relaxed, parameters, threads).track(stressed, pixel_size_um, progress);
+}
+
+}  // namespace mbtfm::beads

@@ -1,0 +1,160 @@
+/// Displacement of the substrate from two images of its beads: pulled by the cell, and relaxed.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "pipeline/contract/beads.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/geometry.h"
+#include "pipeline/contract/report.h"
+#include "pipeline/stage/parameters.h"
+#include "segment/images/image.h"
+
+namespace mbtfm::beads {
+
+/// What is followed from one image to the other.
+enum class TrackMethod {
+  automatic,   ///< single beads; where they cannot be followed, windows
+  beads,       ///< each bead by itself
+  correlation  ///< the texture in windows on a lattice, whatever it shows
+};
+inline constexpr std::pair<TrackMethod, const char*> kTrackMethods[] = {
+    {TrackMethod::automatic, "auto"}, {TrackMethod::beads, "beads"}, {TrackMethod::correlation, "correlation"}};
+const char* word_of(TrackMethod method);
+
+struct TrackParameters {
+  std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
+  images::PlaneChoice stressed_plane;   ///< of a time series the first
+  images::PlaneChoice relaxed_plane;
+  int stressed_last = 0;               ///< of a time series the last time or page; 0: a single image
+  std::string method = "auto";         ///< of kTrackMethods: single beads know most where they can be told apart
+  double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
+  double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
+  /// on, off or auto: a stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too
+  std::string drift_affine = "off";
+  bool may_push = false;           ///< a gel that is pushed outward is no sign of exchanged images
+  double effect_tolerance = 0.01;  ///< auto: what displaces the border by less, of the largest displacement, stays
+  double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
+  double outlier_threshold = 4;    ///< in robust sd: 4 rejects one good bead in 16 000
+  // a displacement field from elsewhere
+  std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
+  std::string sigma_column = "sigma_um";  ///< need not be there
+  std::string length_unit = "um";
+};
+void declare(stage::ParameterList& list, TrackParameters& parameters);
+
+/// A bead in one image; pixels, 0 at the centre of the first pixel.
+struct DetectedBead {
+  Vec2 position_px;
+  double brightness = 0;  ///< height of the fitted spot above its surroundings, in the image's units
+};
+
+/// Bright spots of the image's own bead size, found to a fraction of a pixel.
+///
+/// The bead size is measured from the image's autocorrelation, the threshold from its noise; a Gaussian of that size
+/// is fitted to each local maximum with its neighbours' spots taken away.
+std::vector<DetectedBead> detect_beads(const images::Image& image,
+                                       double detection_snr = TrackParameters{}.detection_snr, int threads = 1);
+
+/// What all beads do together beside the cell's pull, with standard errors. The drift is taken off the field; turn,
+/// growth and shear as `drift_affine` says.
+struct CommonMotion {
+  Vec2 drift_um;  ///< of the stressed image's centre
+  double drift_sigma_um = 0;
+  double turn_rad = 0;  ///< of the stressed image, from +x towards +y
+  double turn_sigma_rad = 0;
+  double growth = 0;  ///< relative
+  double growth_sigma = 0;
+  double shear = 0;            ///< longer by so much along its direction, shorter across it
+  double shear_angle_rad = 0;  ///< from +x towards +y
+  double shear_sigma = 0;
+  bool has_far_field = false;  ///< some part of the picture is at rest; otherwise all are those of all beads alike
+  double share_at_rest = 0;    ///< of the picture
+  double share_of_border_moving = 0;
+  bool is_affine = false;             ///< turn, growth and shear are there, taken off or not
+  double share_of_border_pulled = 0;  ///< by a quarter of the largest displacement: there a cell is cut
+  double pull_of_border = 0;          ///< largest motion along the border over the largest anywhere
+};
+
+struct Tracking {
+  DisplacementField field;      ///< one entry for each bead found in the relaxed image, good or flagged
+  CommonMotion common;          ///< what all beads do together
+  double far_field_rms_um = 0;  ///< of a displacement component at rest, less drift and the cell's tail
+  double noise_um = 0;          ///< the same as robust standard deviation
+  double bead_sigma_um = 0;     ///< of a bead's picture
+  double scatter_um = 0;  ///< of single beads about their neighbours, beyond the registration's error; in each sigma
+  double size_ratio = 1;  ///< of the beads in the stressed image over those in the relaxed one (focus.h)
+  double size_ratio_sigma = 0;  ///< its standard error; 0: not known
+  int n_good = 0;
+  Effect affine{};           ///< whether turn, growth and shear were taken off, and why
+  Effect windows{};          ///< whether windows were followed in place of single beads, and why
+  double window_um = 0;      ///< Gaussian sigma of the windows; 0: single beads
+  int n_beads_stressed = 0;  ///< found in the stressed image
+};
+
+/// The beads, or the texture, of one image are not met with again in the other.
+struct NotFollowed : InvalidData {
+  using InvalidData::InvalidData;
+  std::string hint;  ///< the parameters that help, as was tried out; empty: none of them does
+};
+
+/// The two images seem to be exchanged.
+struct ExchangedImages : InvalidData {
+  using InvalidData::InvalidData;
+};
+
+struct Side;
+struct Texture;
+
+/// The beads, and the texture, of the relaxed image, found once for any number of stressed ones.
+class RelaxedBeads {
+ public:
+  /// Where no beads stand out, windows are followed if they are asked for and not by themselves: they would follow the
+  /// pattern of a camera's pixels, too, which never moves.
+  /// @throws NotFollowed where the image shows no beads
+  RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads);
+
+  /// Displacement of each bead of the relaxed image.
+  ///
+  /// 1. Windows of both images are cross-correlated on a grid, coarse to fine (drift: phase correlation; before that,
+  ///    where `drift_affine` asks for it, the stressed image is turned back).
+  /// 2. Around each bead the stressed image is registered to the relaxed one by an affine map with free gain and offset
+  ///    (inverse-compositional Gauss–Newton: Baker & Matthews, IJCV 56:221, 2004), from the grid's prediction, and,
+  ///    where that fails, from that of the beads already tracked nearby or from the stressed image's beads there; then
+  ///    once more in a window of the bead's own size, which no neighbour and no steepness spoils.
+  /// 3. Each is registered backwards, compared with its neighbours (Westerweel & Scarano, Exp Fluids 39:1096, 2005) and
+  ///    flagged where it fails: `no partner`, `ambiguous` (does not come back, goes where another bead goes), `edge`,
+  ///    `neighbours disagree`.
+  /// 4. Where beads are loose, those that no window found are matched by pattern, light and neighbours (match.h).
+  /// 5. What the beads around predict is weighed in by how well such predictions hold there (pool.h).
+  ///
+  /// Where beads are dimmer than for 0.02 px, errors are correlated over some bead distances.
+  ///
+  /// By correlation, steps 1 to 3 are those of windows on a lattice in place of beads (windows.h): the smallest whose
+  /// standard error is a tenth of a pixel. Nothing is weighed in.
+  /// @throws NotFollowed where the stressed image shows no beads, or others than the relaxed one
+  /// @throws InvalidData where the sizes differ, or a turn is found and must not be taken off
+  /// @throws ExchangedImages where the gel is pushed outward as if the images were exchanged (given_field.h)
+  Tracking track(const images::Image& stressed, double pixel_size_um, const Progress& progress = {}) const;
+
+ private:
+  Tracking track_by_any(const images::Image& stressed, double pixel_size_um, const Progress& progress) const;
+  Tracking track_by(TrackMethod method, const images::Image& stressed, double pixel_size_um,
+                    const Progress& progress) const;
+  Tracking track_as(TrackMethod method, const std::string& setting, const images::Image& stressed, double pixel_size_um,
+                    const Progress& progress) const;
+  std::string remedy(const images::Image& stressed, double pixel_size_um) const;
+  images::Image relaxed_;
+  std::shared_ptr<const Side> side_;        ///< unless windows alone are asked for
+  std::shared_ptr<const Texture> texture_;  ///< unless beads alone are
+  TrackParameters parameters_;
+  int threads_;
+};
+
+/// Both at once.
+Tracking track_beads(const images::Image& relaxed, const images::Image& stressed, double pixel_size_um,
+                     const TrackParameters& parameters = {}, int threads = 1, const Progress& progress = {});
+
+}  // namespace mbtfm::beads

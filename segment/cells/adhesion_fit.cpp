@@ -1,0 +1,382 @@
+#include "segment/cells/adhesion_fit.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utility.hpp>
+
+namespace mbtfm::cells {
+
+namespace {
+
+constexpr int kGround = EllipseValue::kParameters, kBlur = kGround - 1, kDome = kBlur - 1, kBrightness = 5,
+              kUnknowns = kGround + 1;
+using Vector = cv::Vec<double, kUnknowns>;
+using Matrix = cv::Matx<double, kUnknowns, kUnknowns>;
+
+/// Beyond the rim the window reaches this many deviations of the blur: where an ellipse's light has gone, and there is
+/// ground to tell.
+constexpr double kMargin = 3;
+constexpr int kRounds = 2;         // of neighbours taking each other's light off
+constexpr int kIterations = 40;    // a dozen do but for the least determined
+constexpr double kSettled = 0.01;  // of one pixel's mean square: a tenth of the standard error that the noise makes
+
+/// First order in the distance; exact enough to choose pixels by.
+double distance_to_rim(const BlurredEllipse& e, double x, double y) {
+  const double c = std::cos(e.angle_rad), s = std::sin(e.angle_rad), a = e.semi_major, b = e.semi_minor;
+  const double u = (x - e.x) * c + (y - e.y) * s, v = -(x - e.x) * s + (y - e.y) * c;
+  const double q = std::sqrt(u * u / (a * a) + v * v / (b * b));
+  return q < 1e-9 ? -b : (q - 1) * q / std::sqrt(u * u / (a * a * a * a) + v * v / (b * b * b * b));
+}
+
+/// Pixels within `margin` of the ellipse's rim or inside.
+cv::Rect box_of(const BlurredEllipse& e, double margin, cv::Size size) {
+  const double c = std::cos(e.angle_rad), s = std::sin(e.angle_rad);
+  const double half_x = std::hypot(e.semi_major * c, e.semi_minor * s) + margin;
+  const double half_y = std::hypot(e.semi_major * s, e.semi_minor * c) + margin;
+  const cv::Point low(cvFloor(e.x - half_x), cvFloor(e.y - half_y)), high(cvCeil(e.x + half_x), cvCeil(e.y + half_y));
+  return cv::Rect(low, high + cv::Point(1, 1)) & cv::Rect(cv::Point(0, 0), size);
+}
+
+struct Sample {
+  int column, row;
+  double value;
+};
+
+std::vector<Sample> samples_around(const cv::Mat& height, const BlurredEllipse& e,
+                                   const std::vector<EllipseModel>& neighbours) {
+  const double margin = kMargin * e.blur + 1;
+  const cv::Rect box = box_of(e, margin, height.size());
+  std::vector<Sample> samples;
+  for (int y = box.y; y < box.br().y; ++y)
+    for (int x = box.x; x < box.br().x; ++x) {
+      if (distance_to_rim(e, x, y) > margin) continue;
+      double value = height.at<float>(y, x);
+      for (const EllipseModel& neighbour : neighbours) value -= neighbour.value(x, y);
+      samples.push_back({x, y, value});
+    }
+  return samples;
+}
+
+struct State {
+  BlurredEllipse ellipse;
+  double ground = 0;
+};
+
+State moved(const State& s, const Vector& step) {
+  State next = s;
+  BlurredEllipse& e = next.ellipse;
+  // no step leaves the ellipse: half a semi-axis at most, axes by at most a factor of 1.6
+  const double reach = 0.5 * std::min(e.semi_major, e.semi_minor) + 0.5;
+  e.x += std::clamp(step[0], -reach, reach);
+  e.y += std::clamp(step[1], -reach, reach);
+  e.semi_major *= std::exp(std::clamp(step[2], -0.5, 0.5));
+  e.semi_minor *= std::exp(std::clamp(step[3], -0.5, 0.5));
+  e.angle_rad += std::clamp(step[4], -0.5, 0.5);
+  e.brightness += step[5];
+  e.slope += step[6];
+  e.dome += std::clamp(step[kDome], -0.2, 0.2);
+  e.blur *= std::exp(std::clamp(step[kBlur], -0.3, 0.3));
+  next.ground += step[kGround];
+  return next;
+}
+
+/// What is known of an unknown beforehand: its logarithm's (brightness, blur) or its own (dome) mean, and the weight of
+/// the squared difference in the sum of squares: the mean square of the residuals over the variance.
+struct Prior {
+  double mean = 0, weight = 0;
+};
+
+struct Priors {
+  Prior brightness, dome, blur;
+};
+
+struct Difference {
+  int unknown;
+  double value, slope, weight;  ///< slope: derivative by the unknown
+};
+
+std::array<Difference, 3> differences(const BlurredEllipse& e, const Priors& p) {
+  const double brightness = std::max(e.brightness, 1e-100);  // far off, and its square a number still
+  return {{{kBrightness, std::log(brightness) - p.brightness.mean, 1 / brightness, p.brightness.weight},
+           {kDome, e.dome - p.dome.mean, 1, p.dome.weight},
+           {kBlur, std::log(e.blur) - p.blur.mean, 1, p.blur.weight}}};
+}
+
+/// Sum of squares and normal equations of the linearised problem.
+struct Normal {
+  Matrix matrix = Matrix::zeros();
+  Vector right;
+  double squares = 0;        ///< of residuals and differences from what is known before
+  double image_squares = 0;  ///< of residuals alone
+};
+
+Normal normal_equations(const std::vector<Sample>& samples, const State& s, const Priors& priors) {
+  const EllipseModel model(s.ellipse);
+  Normal n;
+  for (const Sample& p : samples) {
+    const EllipseValue f = model.with_derivatives(p.column, p.row);
+    const double residual = p.value - s.ground - f.value;
+    n.image_squares += residual * residual;
+    Vector d;
+    for (int i = 0; i < kGround; ++i) d[i] = f.derivative[i];
+    d[kGround] = 1;
+    for (int i = 0; i < kUnknowns; ++i) {
+      n.right[i] += d[i] * residual;
+      for (int j = 0; j <= i; ++j) n.matrix(i, j) += d[i] * d[j];
+    }
+  }
+  for (int i = 0; i < kUnknowns; ++i)
+    for (int j = 0; j < i; ++j) n.matrix(j, i) = n.matrix(i, j);
+  n.squares = n.image_squares;
+  for (const Difference& d : differences(s.ellipse, priors))
+    if (d.weight > 0) {
+      n.squares += d.weight * d.value * d.value;
+      n.matrix(d.unknown, d.unknown) += d.weight * d.slope * d.slope;
+      n.right[d.unknown] -= d.weight * d.value * d.slope;
+    }
+  return n;
+}
+
+enum class Shape { held, free };
+
+void hold(Normal& n, int unknown) {
+  for (int i = 0; i < kUnknowns; ++i) n.matrix(i, unknown) = n.matrix(unknown, i) = 0;
+  n.matrix(unknown, unknown) = 1;
+  n.right[unknown] = 0;
+}
+
+struct Solution {
+  State state;
+  Normal normal;  ///< there
+  bool is_settled = false;
+  double scatter = 0;  ///< mean square of the residuals
+};
+
+/// Axes and blur stay within a factor of four of where they began: beyond, the window shows no such ellipse.
+bool is_in_range(const BlurredEllipse& e, const BlurredEllipse& start) {
+  constexpr double kFactor = 4;
+  const double widest = kFactor * std::max(start.semi_major, start.blur);
+  return std::max(e.semi_major, e.semi_minor) < widest && std::min(e.semi_major, e.semi_minor) > start.blur / 20 &&
+         e.blur < kFactor * start.blur && e.blur > start.blur / kFactor;
+}
+
+/// Levenberg–Marquardt (Marquardt 1963).
+Solution solve(const std::vector<Sample>& samples, const State& start, Shape shape, const Priors& priors) {
+  Solution s{start, normal_equations(samples, start, priors)};
+  const double n_samples = static_cast<double>(samples.size());
+  double damping = 1e-3;
+  for (int k = 0; k < kIterations && !s.is_settled && damping < 1e6; ++k) {
+    Normal n = s.normal;
+    if (shape == Shape::held) hold(n, kBlur), hold(n, kDome);
+    for (int i = 0; i < kUnknowns; ++i) n.matrix(i, i) *= 1 + damping;
+    Vector step;
+    if (!cv::solve(n.matrix, n.right, step, cv::DECOMP_CHOLESKY)) {
+      damping *= 10;
+      continue;
+    }
+    const State next = moved(s.state, step);
+    if (!is_in_range(next.ellipse, start.ellipse)) {
+      damping *= 10;
+      continue;
+    }
+    const Normal there = normal_equations(samples, next, priors);
+    s.is_settled = std::abs(n.squares - there.squares) < kSettled * n.squares / n_samples;
+    if (there.squares <= n.squares) {
+      s.state = next;
+      s.normal = there;
+      damping /= 10;
+    } else {
+      damping *= 10;
+    }
+  }
+  s.scatter = s.normal.image_squares / n_samples;
+  return s;
+}
+
+/// The major axis is the longer one; the slope along it does not matter any more.
+BlurredEllipse in_order(BlurredEllipse e) {
+  if (e.semi_minor > e.semi_major) {
+    std::swap(e.semi_minor, e.semi_major);
+    e.angle_rad += CV_PI / 2;
+    e.slope = 0;
+  }
+  return e;
+}
+
+bool is_plausible(const BlurredEllipse& e, const BlurredEllipse& start) {
+  return distance_to_rim(start, e.x, e.y) < 0 && e.brightness > 0;
+}
+
+double mean_noise(const cv::Mat& noise, const std::vector<Sample>& samples) {
+  double sum = 0;
+  for (const Sample& p : samples) sum += noise.at<float>(p.row, p.column);
+  return sum / static_cast<double>(samples.size());
+}
+
+/// @param window  the ellipse around which pixels are taken
+/// @param from    where the iteration starts
+FittedEllipse fit(const cv::Mat& height, const cv::Mat& noise, const BlurredEllipse& window, const State& from,
+                  const std::vector<EllipseModel>& neighbours, const Priors& priors) {
+  const auto samples = samples_around(height, window, neighbours);
+  FittedEllipse result{window, 0};
+  if (samples.size() <= kUnknowns) return result;
+  const Solution s = solve(samples, from, Shape::held, priors);
+  const double n = static_cast<double>(samples.size());
+  double mean = 0, variance = 0;
+  for (const Sample& p : samples) mean += p.value / n;
+  for (const Sample& p : samples) variance += (p.value - mean) * (p.value - mean) / n;
+  const double of_noise = std::pow(mean_noise(noise, samples), 2), signal = variance - of_noise;
+  result.unexplained = signal > 0 ? std::max(0.0, s.scatter - of_noise) / signal : 1;
+  result.scatter = s.scatter;
+  result.is_settled = s.is_settled && is_plausible(s.state.ellipse, window);
+  if (!is_plausible(s.state.ellipse, window)) return result;
+  result.ellipse = in_order(s.state.ellipse);
+  result.ground = s.state.ground;
+  return result;
+}
+
+/// Indices of the ellipses whose light reaches into another's window.
+std::vector<std::vector<int>> neighbours_of(const std::vector<BlurredEllipse>& ellipses, cv::Size size) {
+  const int n = static_cast<int>(ellipses.size());
+  std::vector<cv::Rect> boxes;
+  for (const BlurredEllipse& e : ellipses) boxes.push_back(box_of(e, kMargin * e.blur + 1, size));
+  std::vector<int> by_left(ellipses.size());
+  for (int i = 0; i < n; ++i) by_left[i] = i;
+  std::stable_sort(by_left.begin(), by_left.end(), [&](int a, int b) { return boxes[a].x < boxes[b].x; });
+  std::vector<std::vector<int>> result(ellipses.size());
+  std::vector<int> open;  // boxes that the sweep from the left has not passed yet
+  for (const int i : by_left) {
+    std::erase_if(open, [&](int j) { return boxes[j].br().x <= boxes[i].x; });
+    for (const int j : open) {
+      if ((boxes[i] & boxes[j]).empty()) continue;
+      result[i].push_back(j);
+      result[j].push_back(i);
+    }
+    open.push_back(i);
+  }
+  for (auto& list : result) std::sort(list.begin(), list.end());
+  return result;
+}
+
+/// Call `body` for each window with the models of the others whose light reaches into it, in parallel.
+template <class Body>
+void for_each_with_neighbours(const cv::Mat& height, const std::vector<BlurredEllipse>& windows,
+                              const std::vector<BlurredEllipse>& others, const Body& body) {
+  const auto neighbours = neighbours_of(windows, height.size());
+  cv::parallel_for_(cv::Range(0, static_cast<int>(windows.size())), [&](const cv::Range& range) {
+    for (int i = range.start; i < range.end; ++i) {
+      std::vector<EllipseModel> near;
+      for (const int j : neighbours[i]) near.emplace_back(others[j]);
+      body(i, near);
+    }
+  });
+}
+
+/// An ellipse narrower than this many deviations of the blur fits as well with another blur.
+constexpr double kWide = 1.5;
+constexpr int kFewest = 8;  // of which to take a mean
+
+/// Before the image is asked: the blur to a factor of about 1.6, the dome to 0.2.
+constexpr double kBlurDeviation = 0.5, kDomeDeviation = 0.2;
+
+/// What one adhesion says of ln blur and dome beyond what was known before: information (inverse covariance, the other
+/// unknowns eliminated) and information times estimate.
+struct ShapeEvidence {
+  cv::Matx22d information = cv::Matx22d::zeros();
+  cv::Vec2d weighted;
+};
+
+std::optional<ShapeEvidence> evidence_of_shape(const cv::Mat& height, const BlurredEllipse& start,
+                                               const std::vector<EllipseModel>& neighbours) {
+  const auto samples = samples_around(height, start, neighbours);
+  if (samples.size() <= kUnknowns) return std::nullopt;
+  Solution s = solve(samples, {start, 0}, Shape::held, {});
+  const double scatter = s.scatter;  // noise and misfit
+  Priors before;
+  before.blur = {std::log(start.blur), scatter / (kBlurDeviation * kBlurDeviation)};
+  before.dome = {start.dome, scatter / (kDomeDeviation * kDomeDeviation)};
+  s = solve(samples, s.state, Shape::free, before);
+  const BlurredEllipse& e = s.state.ellipse;
+  if (!s.is_settled || !is_plausible(e, start)) return std::nullopt;
+  Matrix covariance;
+  if (cv::invert(s.normal.matrix, covariance, cv::DECOMP_CHOLESKY) == 0) return std::nullopt;
+  // of the inverse, these rows and columns are the inverse of the information that is left
+  const cv::Matx22d part(covariance(kBlur, kBlur), covariance(kBlur, kDome), covariance(kDome, kBlur),
+                         covariance(kDome, kDome));
+  ShapeEvidence evidence{part.inv() * (1 / scatter), {}};
+  evidence.weighted = evidence.information * cv::Vec2d(std::log(e.blur), e.dome);
+  const cv::Vec2d known(1 / (kBlurDeviation * kBlurDeviation), 1 / (kDomeDeviation * kDomeDeviation));
+  evidence.information -= cv::Matx22d::diag(known);
+  evidence.weighted -= known.mul(cv::Vec2d(before.blur.mean, before.dome.mean));
+  return evidence;
+}
+
+double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+struct LogBrightness {
+  double mean, deviation;
+};
+
+/// Of the adhesions that are wide enough to show their brightness. A narrower one shows the product of brightness and
+/// area only; that it is about as bright as its neighbours is what tells the two apart.
+std::optional<LogBrightness> common_brightness(const std::vector<FittedEllipse>& fitted) {
+  std::vector<double> logarithms;
+  for (const FittedEllipse& f : fitted)
+    if (f.is_settled && f.ellipse.semi_minor > kWide * f.ellipse.blur)
+      logarithms.push_back(std::log(f.ellipse.brightness));
+  if (logarithms.size() < kFewest) return std::nullopt;
+  const double middle = median(logarithms);
+  for (double& value : logarithms) value = std::abs(value - middle);
+  // never surer than a quarter: adhesions of one cell differ by that
+  return LogBrightness{middle, std::max(0.25, 1.4826 * median(logarithms))};
+}
+
+}  // namespace
+
+CommonShape common_shape(const cv::Mat& height, const std::vector<BlurredEllipse>& start) {
+  // judged before the fit, lest those be chosen that come out with little blur
+  std::vector<double> widths;
+  for (const BlurredEllipse& e : start) widths.push_back(e.semi_minor / e.blur);
+  std::sort(widths.begin(), widths.end(), std::greater<>());
+  constexpr std::size_t kMost = 40;
+  const double width = std::max(kWide, widths.size() > kMost ? widths[kMost] : 0.0);
+  std::vector<std::optional<ShapeEvidence>> evidence(start.size());
+  for_each_with_neighbours(height, start, start, [&](int i, const std::vector<EllipseModel>& near) {
+    if (start[i].semi_minor >= width * start[i].blur) evidence[i] = evidence_of_shape(height, start[i], near);
+  });
+  const cv::Vec2d known(1 / (kBlurDeviation * kBlurDeviation), 1 / (kDomeDeviation * kDomeDeviation));
+  ShapeEvidence all{cv::Matx22d::diag(known), known.mul(cv::Vec2d(std::log(start[0].blur), start[0].dome))};
+  for (const auto& one : evidence) {
+    if (!one) continue;
+    all.information += one->information;
+    all.weighted += one->weighted;
+  }
+  const cv::Vec2d mean = all.information.inv() * all.weighted;
+  // beyond a half the rim, where the brightness ends, would lie below half of the height: no edge any more
+  constexpr double kSteepestDome = 0.5;
+  return {std::exp(mean[0]), std::clamp(mean[1], 0.0, kSteepestDome)};
+}
+
+std::vector<FittedEllipse> fit_ellipses(const cv::Mat& height, const cv::Mat& noise,
+                                        const std::vector<BlurredEllipse>& start) {
+  std::vector<BlurredEllipse> current = start;
+  std::vector<FittedEllipse> fitted(start.size());
+  std::vector<Priors> priors(start.size());
+  for (int round = 0; round < kRounds; ++round) {
+    for_each_with_neighbours(height, start, current, [&](int i, const std::vector<EllipseModel>& near) {
+      fitted[i] = fit(height, noise, start[i], {current[i], fitted[i].ground}, near, priors[i]);
+    });
+    const auto common = common_brightness(fitted);
+    for (std::size_t i = 0; i < current.size(); ++i) {
+      current[i] = fitted[i].ellipse;
+      if (common) priors[i].brightness = {common->mean, fitted[i].scatter / (common->deviation * common->deviation)};
+    }
+  }
+  return fitted;
+}
+
+}  // namespace mbtfm::cells

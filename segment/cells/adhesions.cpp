@@ -1,0 +1,155 @@
+#include "segment/cells/adhesions.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/numbers.h"
+#include "segment/cells/adhesion_fit.h"
+#include "segment/cells/adhesion_parts.h"
+#include "segment/cells/emptiness.h"
+#include "segment/cells/grid.h"
+
+namespace mbtfm::cells {
+
+namespace {
+
+constexpr double kUsualDome = 0.2;  ///< adhesions fade towards their rim
+
+BlurredEllipse in_pixels(const Adhesion& a, double pixel_um, CommonShape shape) {
+  const cv::Point2d centre = to_pixels(a.position_um, pixel_um);
+  return {.x = centre.x,
+          .y = centre.y,
+          .semi_major = a.major_axis_um / 2 / pixel_um,
+          .semi_minor = a.minor_axis_um / 2 / pixel_um,
+          .angle_rad = a.angle_rad,
+          .brightness = a.mean_intensity,
+          .dome = shape.dome,
+          .blur = shape.blur};
+}
+
+Adhesion with_ellipse(Adhesion a, const BlurredEllipse& e, double pixel_um) {
+  a.position_um = to_um({e.x, e.y}, pixel_um);
+  a.major_axis_um = 2 * e.semi_major * pixel_um;
+  a.minor_axis_um = 2 * e.semi_minor * pixel_um;
+  a.area_um2 = CV_PI / 4 * a.major_axis_um * a.minor_axis_um;
+  a.angle_rad = std::remainder(e.angle_rad, CV_PI);
+  a.eccentricity = std::sqrt(std::max(0.0, 1 - std::pow(a.minor_axis_um / a.major_axis_um, 2)));
+  return a;
+}
+
+/// The fit is of this region and not of one with its neighbourhood: axes and centre within 30 % of the moments' (a
+/// narrow region's minor axis is too large by its blur, and may shrink).
+bool agrees(const BlurredEllipse& fit, const BlurredEllipse& region) {
+  constexpr double kWithin = 0.3;
+  const double c = std::cos(region.angle_rad), s = std::sin(region.angle_rad);
+  const double dx = fit.x - region.x, dy = fit.y - region.y;
+  const double along = std::abs(dx * c + dy * s) / region.semi_major,
+               across = std::abs(dy * c - dx * s) / region.semi_minor;
+  const double major = fit.semi_major / region.semi_major, minor = fit.semi_minor / region.semi_minor;
+  return std::max(along, across) < kWithin && std::max({major, 1 / major, minor}) < 1 + kWithin;
+}
+
+/// The model explains nine tenths of the variance in the window.
+bool is_elliptical(const FittedEllipse& fit) { return fit.is_settled && fit.unexplained < 0.1; }
+
+std::vector<FittedEllipse> fitted_to(const Contrast& c, const std::vector<AdhesionRegion>& regions, double pixel_um,
+                                     const AdhesionParameters& p) {
+  const auto start = [&](CommonShape shape) {
+    std::vector<BlurredEllipse> ellipses;
+    for (const AdhesionRegion& r : regions) ellipses.push_back(in_pixels(r.adhesion, pixel_um, shape));
+    return ellipses;
+  };
+  if (regions.empty()) return {};
+  CommonShape shape{p.adhesion_blur_um.value_or(kUsualBlur_um) / pixel_um, kUsualDome};
+  if (!p.adhesion_blur_um) {
+    shape = common_shape(c.sharp, start(shape));
+    shape.blur = std::min(shape.blur, kWidestBlur_um / pixel_um);
+  }
+  shape.blur = std::max(shape.blur, 0.5);  // px: what sampling alone does
+  return fit_ellipses(c.sharp, c.sharp_noise, start(shape));
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, AdhesionParameters& p) {
+  list.table("segment");
+  list.add("adhesion_background_um", p.adhesion_background_um, Range::size_um(),
+           "radius of the median that is the background of an adhesion (um); in a noisy image up to 1.6 times larger, "
+           "as the "
+           "smoothing widens the adhesions");
+  list.add("adhesion_smoothing_um", p.adhesion_smoothing_um, Range::between(0, 100),
+           "standard deviation of the Gaussian before thresholding (um); unset: the least from 0.05 to 0.2 um at which "
+           "the faintest adhesion stands out of the noise");
+  list.add("adhesion_seed_noise", p.adhesion_seed_noise, Range::factor(),
+           "height of an adhesion's brightest pixel over its background (standard deviations of the noise)");
+  list.add("adhesion_rim_noise", p.adhesion_rim_noise, Range::factor(),
+           "least height of its other pixels (standard deviations of the noise)");
+  list.add("adhesion_rim_level", p.adhesion_rim_level,
+           {.low = 0, .high = 1, .excludes_low = true, .excludes_high = true},
+           "height of the rim as a share of the height near it");
+  list.add("adhesion_level_radius_um", p.adhesion_level_radius_um, Range::size_um(), "how near (um)");
+  list.add("adhesion_blur_um", p.adhesion_blur_um, {.low = 0, .high = 1, .excludes_low = true},
+           "standard deviation of the blurred rim of an adhesion (um); unset: as the widest adhesions show it, between "
+           "half a pixel and 0.2 um");
+  list.add("adhesion_split_depth", p.adhesion_split_depth, Range::between(0, 1),
+           "dip between two adhesions that touch, as a share of the fainter one's height");
+  list.add("adhesion_smallest_um2", p.adhesion_smallest_um2, Range::area_um2(), "smallest area (um²)");
+  list.add("adhesion_largest_um2", p.adhesion_largest_um2, Range::area_um2(), "largest area (um²)");
+  list.add("adhesion_faintest", p.adhesion_faintest, Range::between(0, 1),
+           "least height as a share of the mean height of bright pixels");
+}
+
+std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, double pixel_size_um,
+                                                  const AdhesionParameters& p) {
+  const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
+  std::vector<AdhesionRegion> regions;
+  for (auto& pixels : adhesion_parts(c, pixel_size_um, p)) {
+    const Adhesion adhesion = measure_ellipse(pixels, pixel_size_um);
+    // with the blur on it an adhesion is larger, never smaller
+    if (adhesion.area_um2 <= p.adhesion_largest_um2) regions.push_back({adhesion, std::move(pixels)});
+  }
+  const std::vector<FittedEllipse> fitted = fitted_to(c, regions, pixel_size_um, p);
+  for (std::size_t i = 0; i < regions.size(); ++i) {
+    Adhesion& adhesion = regions[i].adhesion;
+    if (is_elliptical(fitted[i]) && agrees(fitted[i].ellipse, in_pixels(adhesion, pixel_size_um, {})))
+      adhesion = with_ellipse(adhesion, fitted[i].ellipse, pixel_size_um);
+  }
+  std::erase_if(regions, [&](const AdhesionRegion& r) {
+    return r.adhesion.area_um2 < p.adhesion_smallest_um2 || r.adhesion.area_um2 > p.adhesion_largest_um2;
+  });
+  std::sort(regions.begin(), regions.end(), [](const AdhesionRegion& a, const AdhesionRegion& b) {
+    const Vec2 here = a.adhesion.position_um, there = b.adhesion.position_um;
+    return std::pair(here.y, here.x) < std::pair(there.y, there.x);
+  });
+  for (std::size_t i = 0; i < regions.size(); ++i) regions[i].adhesion.adhesion_id = static_cast<int>(i) + 1;
+  return regions;
+}
+
+std::vector<Adhesion> find_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& p) {
+  std::vector<Adhesion> adhesions;
+  for (const AdhesionRegion& region : find_adhesion_regions(image, pixel_size_um, p))
+    adhesions.push_back(region.adhesion);
+  return adhesions;
+}
+
+std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& p) {
+  if (std::string reason = emptiness_of(image); !reason.empty()) return reason;
+  const Contrast c = contrast_of(matrix_of(image), pixel_size_um, p);
+  const auto parts = adhesion_parts(c, pixel_size_um, p);
+  if (!parts.empty())
+    return "of " + std::to_string(parts.size()) +
+           " spots none is larger than adhesion_smallest_um2 = " + shortest(p.adhesion_smallest_um2) +
+           " and smaller than adhesion_largest_um2 = " + shortest(p.adhesion_largest_um2);
+  double highest = 0;
+  for (int y = 0; y < c.height.rows; ++y)
+    for (int x = 0; x < c.height.cols; ++x)
+      if (const double level = c.noise.at<float>(y, x); level > 0)
+        highest = std::max(highest, c.height.at<float>(y, x) / level);
+  if (highest > p.adhesion_seed_noise)
+    return "bright areas and edges, but no spot higher than the steps of its background";
+  return "nothing above the noise, the brightest spot " + brief(highest) +
+         " of its standard deviations over the background, where adhesion_seed_noise asks for " +
+         shortest(p.adhesion_seed_noise);
+}
+
+}  // namespace mbtfm::cells

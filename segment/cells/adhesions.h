@@ -1,0 +1,62 @@
+/// Focal adhesions of a fluorescence image.
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/cell.h"
+#include "pipeline/stage/parameters.h"
+#include "segment/cells/ellipse.h"
+#include "segment/images/image.h"
+
+namespace mbtfm::cells {
+
+struct AdhesionParameters {
+  double adhesion_background_um = 2.0;  ///< larger than half of the widest adhesion, smaller than illumination changes
+  std::optional<double> adhesion_smoothing_um;  ///< unset: as the image's noise asks for
+  double adhesion_seed_noise = 5;               ///< five standard deviations: less than one false seed in 10^6 pixels
+  double adhesion_rim_noise = 2.5;              ///< the rim may be fainter than the seed, but still out of the noise
+  double adhesion_rim_level =
+      0.45;  ///< a blurred edge passes half of the height at the true edge; less, as adhesions fade to their rim
+  double adhesion_level_radius_um = 0.4;   ///< three deviations of the blur: a bright neighbour further off is none
+  std::optional<double> adhesion_blur_um;  ///< unset: as the image shows it
+  double adhesion_split_depth = 0.25;      ///< the dip between two points that the optics just resolve (Rayleigh: 26 %)
+  double adhesion_smallest_um2 = 0.08;     ///< about one resolution element
+  double adhesion_largest_um2 = 25;        ///< beyond any focal adhesion; larger is a bright cell body
+  double adhesion_faintest = 0.25;         ///< relative to the bright ones: what is fainter is texture of the cytosol
+};
+
+void declare(stage::ParameterList& list, AdhesionParameters& parameters);
+
+/// An adhesion and the pixels above its rim.
+struct AdhesionRegion {
+  Adhesion adhesion;
+  std::vector<CoveredPixel> pixels;
+};
+
+/// Find adhesions: subtract the local median (background), threshold at the local noise with hysteresis (and above
+/// what the edge of a bright cell leaves), split at
+/// intensity dips (watershed), put the rim of each at a share of its own height; then fit each as an elliptical disc
+/// behind the microscope's blur, which gives centre, axes and angle without what the blur adds to them. Where the disc
+/// leaves more than a tenth of the variance unexplained or departs from the region by 30 %, the adhesion is no ellipse,
+/// and the ellipse of its pixels' second moments stands.
+///
+/// The result does not depend on gain or offset of the camera: every level is relative to noise or height.
+/// `mean_intensity` is the mean grey value above the local background. Sorted from left-to-right in rows of the image
+/// top to bottom, ids from 1.
+/// @param pixel_size_um  > 0
+/// @returns none where the image is constant or noise alone
+/// @throws InvalidData where a pixel is not finite
+/// Sources: Zamir et al., J Cell Sci 112:1655 (1999) for high-pass and watershed; Berginski et al., PLoS ONE 6:e22025
+/// (2011) for hysteresis and splitting.
+std::vector<AdhesionRegion> find_adhesion_regions(const images::Image& image, double pixel_size_um,
+                                                  const AdhesionParameters& parameters);
+/// The same without the pixels.
+std::vector<Adhesion> find_adhesions(const images::Image& image, double pixel_size_um,
+                                     const AdhesionParameters& parameters);
+
+/// Why there is no adhesion in an image in which none is found: what stands out of the noise least short of one.
+std::string why_no_adhesions(const images::Image& image, double pixel_size_um, const AdhesionParameters& parameters);
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,22 @@
+/// Actin as bright as a cell's fibres that is in none of them. Internal to segment/ (OpenCV types).
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <vector>
+
+#include "segment/cells/ridge.h"
+
+namespace mbtfm::cells {
+
+/// The crests of ridges as high as the middle one of these fibres, away from all of them: what the tracing, or the
+/// judgement of a line, has missed.
+/// @param is_inside    CV_8U, not 0 where fibres may be
+/// @param fibres       points about a pixel apart
+/// @param aside_px     crests nearer to a fibre are its own
+/// @param shortest_px  of a crest; shorter ones are specks
+/// @returns by crest its points, in no order; nothing of fewer than five fibres, which do not tell what bright is
+std::vector<std::vector<cv::Point2d>> bright_crests_beside(const Ridges& ridges, const cv::Mat& is_inside,
+                                                           const std::vector<std::vector<cv::Point2d>>& fibres,
+                                                           double aside_px, double shortest_px);
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,104 @@
+#include "segment/cells/candidates.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::cells {
+
+std::string_view name_of(AdhesionSource source) {
+  switch (source) {
+    case AdhesionSource::image:
+      return "image";
+    case AdhesionSource::pattern:
+      return "pattern";
+    case AdhesionSource::fibre_ends:
+      return "fibre-ends";
+    case AdhesionSource::cell:
+      return "cell";
+  }
+  throw InternalError("unknown source of adhesions");
+}
+
+void declare(stage::ParameterList& list, CandidateParameters& p) {
+  list.table("segment");
+  std::vector<std::string> choices = {"auto"};
+  for (const AdhesionSource source : kAdhesionSources) choices.emplace_back(name_of(source));
+  list.add(
+      "adhesions", p.adhesions,
+      "where adhesions are; image: as the adhesion image, a mask or ROIs show them; pattern: candidates all over the "
+      "adhesion mask, which says where adhesion is possible; fibre-ends: candidates at the ends of the fibres; cell: "
+      "there and along the rim of the cell; auto: image where there is one, else cell",
+      choices);
+  list.add("candidate_spacing_um", p.candidate_spacing_um, Range::size_um(),
+           "distance of neighbouring candidates for adhesions, and their diameter (um)");
+  list.add("candidate_band_um", p.candidate_band_um, Range::size_um(),
+           "adhesions = cell: candidates lie this near to the cell's edge (um)");
+  list.add("anchor_area_um2", p.anchor_area_um2, Range::area_um2(),
+           "area of the anchor that holds the end of a fibre where no adhesion is (um²)");
+}
+
+AdhesionSource source_of(const CandidateParameters& p, bool shows_adhesions, bool has_mask) {
+  if (p.adhesions == "auto") return shows_adhesions ? AdhesionSource::image : AdhesionSource::cell;
+  const auto source = std::ranges::find(kAdhesionSources, p.adhesions, [](AdhesionSource s) { return name_of(s); });
+  MBTFM_ASSERT(source != std::end(kAdhesionSources));
+  if (*source == AdhesionSource::image && !shows_adhesions)
+    throw UsageError(
+        "adhesions = image: no adhesion image, no adhesion mask and no adhesions drawn by hand are given; give one, or "
+        "set adhesions = cell");
+  if (*source == AdhesionSource::pattern && !has_mask)
+    throw UsageError(
+        "adhesions = pattern: no adhesion mask is given, which says where the pattern is; name it as adhesion_mask in "
+        "[images] or as --adhesion-mask");
+  return *source;
+}
+
+std::vector<Vec2> hexagonal_lattice(Vec2 low_um, Vec2 high_um, double spacing_um, Placement placement) {
+  const double rows_um = std::sqrt(3.0) / 2 * spacing_um;
+  const double shift = placement == Placement::second ? 0.5 : 0;  // of each lattice vector
+  const Vec2 middle = 0.5 * (low_um + high_um);
+  const int n_rows = static_cast<int>(std::ceil((high_um.y - low_um.y) / 2 / rows_um)) + 1;
+  std::vector<Vec2> points;
+  for (int row = -n_rows; row <= n_rows; ++row) {
+    const double y = middle.y + (row + shift) * rows_um;
+    if (y < low_um.y || y > high_um.y) continue;
+    // a column further along x, a row half a column aside
+    const double aside = (0.5 * (row + shift) + shift) * spacing_um;
+    const int first = static_cast<int>(std::ceil((low_um.x - middle.x - aside) / spacing_um));
+    const int last = static_cast<int>(std::floor((high_um.x - middle.x - aside) / spacing_um));
+    for (int column = first; column <= last; ++column) points.push_back({middle.x + aside + column * spacing_um, y});
+  }
+  return points;
+}
+
+Adhesion disc(Vec2 position_um, double diameter_um, AdhesionOrigin origin) {
+  return {.adhesion_id = 0,
+          .position_um = position_um,
+          .area_um2 = std::numbers::pi / 4 * diameter_um * diameter_um,
+          .major_axis_um = diameter_um,
+          .minor_axis_um = diameter_um,
+          .origin = origin};
+}
+
+Adhesion anchor(Vec2 position_um, double area_um2) {
+  return disc(position_um, std::sqrt(4 / std::numbers::pi * area_um2), AdhesionOrigin::anchor);
+}
+
+std::vector<Adhesion> candidates_at(const std::vector<Vec2>& ends_um, double spacing_um) {
+  std::vector<Adhesion> candidates;
+  for (const Vec2 end : ends_um) {
+    const bool is_near = std::ranges::any_of(
+        candidates, [&](const Adhesion& other) { return norm(other.position_um - end) < spacing_um; });
+    if (!is_near) candidates.push_back(disc(end, spacing_um, AdhesionOrigin::candidate));
+  }
+  return numbered(std::move(candidates));
+}
+
+std::vector<Adhesion> numbered(std::vector<Adhesion> adhesions) {
+  for (std::size_t i = 0; i < adhesions.size(); ++i) adhesions[i].adhesion_id = static_cast<int>(i) + 1;
+  return adhesions;
+}
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,17 @@
+/// Images that show nothing, and why.
+#pragma once
+
+#include <string>
+
+#include "segment/images/image.h"
+
+namespace mbtfm::cells {
+
+/// Why nothing in the image can be measured: "every pixel is 100", "42 % of the pixels at 255, the brightest value: the
+/// detector was saturated". Empty where there may be something.
+///
+/// More than a tenth at one brightest value is no structure: adhesions cover a few per cent of a field, and an image
+/// that is not cut off has few pixels at its very maximum.
+std::string emptiness_of(const images::Image& image);
+
+}  // namespace mbtfm::cells

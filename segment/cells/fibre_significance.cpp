@@ -1,0 +1,129 @@
+#include "segment/cells/fibre_significance.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "segment/cells/grid.h"
+
+namespace mbtfm::cells {
+
+double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
+                    double independent_px) {
+  constexpr double kMost = 2;  // of the middle one: a bright spot on the way makes no line
+  if (points.empty()) return 0;
+  std::vector<double> over_noise;
+  for (std::size_t i = 0; i < points.size(); ++i)
+    over_noise.push_back(height[i] / std::max<double>(sample(ridges.noise, points[i]), 1e-30));
+  std::vector<double> sorted = over_noise;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  double sum = 0;
+  for (const double h : over_noise) sum += std::min(h, kMost * *middle);
+  const auto n = static_cast<double>(points.size());
+  return sum / n * std::sqrt(n / independent_px);
+}
+
+namespace {
+
+/// Nothing is traced that is less significant.
+constexpr double kLeast = 3;
+/// The tail of the lines of texture falls as exp(−x^1.3): counted in simulated cells of meshwork alone and of dense
+/// fibres (docs/theory.md, (24)).
+constexpr double kShape = 1.3;
+
+}  // namespace
+
+double TextureLines::expected_false(double significance) const {
+  constexpr double kBarely = 7, kMany = 20;  // noise alone makes such lines, of pieces that happen to lie in a row
+  const double n_false = n * std::exp(-std::pow(std::max(0.0, significance - kLeast) / scale, kShape));
+  return significance < kBarely ? std::max(n_false, kMany) : n_false;
+}
+
+double TextureLines::chance_of_fibre(double significance, double factor) const {
+  // Near the limit a cell has about one fibre in 8 units of significance: counted in 24 crowded simulated cells.
+  constexpr double kFibres_per_unit = 0.12;
+  const double x = std::max(0.0, significance - kLeast) / scale;
+  const double density = factor * expected_false(significance) * kShape / scale * std::pow(x, kShape - 1);
+  return kFibres_per_unit / (kFibres_per_unit + density);
+}
+
+TextureLines texture_lines(std::vector<double> significances) {
+  constexpr double kFewest = 10;
+  constexpr double kPrior = 30, kUsual = 2;  // a few lines do not tell the scale: as many of the usual one are added
+  std::erase_if(significances, [](double s) { return s >= kHardlyTexture || s < kLeast; });
+  const auto n = static_cast<double>(significances.size());
+  if (significances.empty()) return {kFewest, kUsual};
+  const auto middle = significances.begin() + static_cast<std::ptrdiff_t>(significances.size() / 2);
+  std::nth_element(significances.begin(), middle, significances.end());
+  const double scale = (*middle - kLeast) / std::pow(std::numbers::ln2, 1 / kShape);  // of a median
+  return {n + kFewest, (n * scale + kPrior * kUsual) / (n + kPrior)};
+}
+
+namespace {
+
+constexpr double kBeside_um = 3;  // bundles of one carpet lie nearer
+constexpr std::size_t kEach = 3;  // point
+
+Vec2 direction_at(const Polyline& line, std::size_t i) {
+  const Vec2 d = line[std::min(i + kEach, line.size() - 1)] - line[i >= kEach ? i - kEach : 0];
+  return (1 / std::max(norm(d), 1e-12)) * d;
+}
+
+std::pair<int, int> square_of(Vec2 p, int dx = 0, int dy = 0) {
+  return {static_cast<int>(std::floor(p.x / kBeside_um)) + dx, static_cast<int>(std::floor(p.y / kBeside_um)) + dy};
+}
+
+}  // namespace
+
+void Bundles::add(const Polyline& line_um) {
+  for (std::size_t i = 0; i < line_um.size(); i += kEach)
+    squares_[square_of(line_um[i])].push_back({line_um[i], direction_at(line_um, i)});
+}
+
+bool Bundles::has_beside(const Place& place) const {
+  constexpr double kParallel = 0.9659;  // cosine of 15°
+  for (int dy = -1; dy <= 1; ++dy)
+    for (int dx = -1; dx <= 1; ++dx) {
+      const auto found = squares_.find(square_of(place.position_um, dx, dy));
+      if (found == squares_.end()) continue;
+      for (const Place& other : found->second)
+        if (norm(other.position_um - place.position_um) < kBeside_um &&
+            std::abs(dot(other.along, place.along)) > kParallel)
+          return true;
+    }
+  return false;
+}
+
+double Bundles::share_beside(const Polyline& line_um) const {
+  std::size_t n = 0, n_beside = 0;
+  for (std::size_t i = 0; i < line_um.size(); i += kEach, ++n)
+    n_beside += has_beside({line_um[i], direction_at(line_um, i)});
+  return static_cast<double>(n_beside) / static_cast<double>(std::max<std::size_t>(1, n));
+}
+
+bool winds(const Polyline& line_um) {
+  constexpr double kStep_um =
+      1;  // longer than the noise of a centreline, shorter than a ruffle's wave (1.5 um and more)
+  constexpr double kWinding_per_um = 0.06;  // above nearly all bundles of a real cell
+  double turning = 0, net = 0, length = 0, last_angle = 0;
+  Vec2 from = line_um.front();
+  bool has_angle = false;
+  for (const Vec2 p : line_um) {
+    const Vec2 d = p - from;
+    if (norm(d) < kStep_um) continue;
+    const double angle = std::atan2(d.y, d.x);
+    if (has_angle) {
+      const double turn = std::remainder(angle - last_angle, 2 * std::numbers::pi);
+      turning += std::abs(turn);
+      net += turn;
+    }
+    has_angle = true;
+    last_angle = angle;
+    from = p;
+    length += norm(d);
+  }
+  return turning - std::abs(net) > kWinding_per_um * length;
+}
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,58 @@
+/// What tells a bundle from the meshwork of the cortex. Internal to segment/ (OpenCV types).
+#pragma once
+
+#include <map>
+#include <opencv2/core.hpp>
+#include <utility>
+#include <vector>
+
+#include "pipeline/contract/geometry.h"
+#include "segment/cells/ridge.h"
+
+namespace mbtfm::cells {
+
+/// Signal to noise of a whole line: its mean height in standard deviations of the texture around, times the root of the
+/// number of independent pieces in its length. Texture averages out along a line, a bundle persists. Spots brighter
+/// than twice the line count as twice the line.
+double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points, const std::vector<double>& height,
+                    double independent_px);
+
+/// Texture hardly makes more significant lines.
+constexpr double kHardlyTexture = 10;
+
+/// The lines that a cell's texture makes: how many, and how significant they are as a rule.
+struct TextureLines {
+  double n = 0;
+  double scale = 0;  ///< of their significance
+
+  /// How many at least as significant one finds by chance: the number of false alarms (Desolneux, Moisan & Morel, From
+  /// Gestalt Theory to Image Analysis, Springer 2008, ch. 3).
+  double expected_false(double significance) const;
+  /// The chance that such a line is a fibre: the density of fibres at that significance over that of all lines, where
+  /// those of texture are rarer by a factor.
+  double chance_of_fibre(double significance, double factor = 1) const;
+};
+/// From the lines of the cell itself, most of which are its texture's.
+TextureLines texture_lines(std::vector<double> significances);
+
+/// Lines that others may lie beside. Bundles lie in carpets; a line of texture is beside one by chance.
+class Bundles {
+ public:
+  /// @param line_um  with points about a pixel apart
+  void add(const Polyline& line_um);
+  /// Share of a line that has one of these beside it: nearer than 3 um, at less than 15 degrees.
+  double share_beside(const Polyline& line_um) const;
+
+ private:
+  struct Place {
+    Vec2 position_um, along;
+  };
+  bool has_beside(const Place& place) const;
+  std::map<std::pair<int, int>, std::vector<Place>> squares_;
+};
+
+/// Does the line wind to and fro, as a fold of the membrane does and a bundle under tension does not? Turning beyond
+/// its net turning, by length.
+bool winds(const Polyline& line_um);
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,347 @@
+#include "segment/cells/fibres.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <iterator>
+#include <limits>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <optional>
+
+#include "segment/cells/bright_actin.h"
+#include "segment/cells/fibre_line.h"
+#include "segment/cells/fibre_profile.h"
+#include "segment/cells/fibre_scales.h"
+#include "segment/cells/fibre_significance.h"
+#include "segment/cells/grid.h"
+#include "segment/cells/trace.h"
+
+namespace mbtfm::cells {
+
+namespace {
+
+/// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
+struct Field {
+  cv::Mat image;
+  cv::Mat is_inside;  ///< CV_8U: of the cell's outline
+  double pixel_um = 0;
+  Vec2 origin_um;  ///< outer corner of its first pixel
+
+  Vec2 in_um(cv::Point2d point) const { return origin_um + to_um(point, pixel_um); }
+};
+
+cv::Rect box_of(const Polygon& outline_um, cv::Size size, double pixel_um, double margin_um) {
+  const cv::Rect whole(cv::Point(0, 0), size);
+  if (outline_um.empty()) return whole;
+  const auto [left, right] = std::ranges::minmax(outline_um, {}, &Vec2::x);
+  const auto [top, bottom] = std::ranges::minmax(outline_um, {}, &Vec2::y);
+  const cv::Point first(cvFloor((left.x - margin_um) / pixel_um), cvFloor((top.y - margin_um) / pixel_um));
+  const cv::Point last(cvCeil((right.x + margin_um) / pixel_um), cvCeil((bottom.y + margin_um) / pixel_um));
+  const cv::Rect box = cv::Rect(first, last) & whole;
+  return box.empty() ? whole : box;
+}
+
+Field field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
+  const cv::Rect box = box_of(outline_um, image.size(), pixel_um, 2 * p.fibre_averaging_um);
+  const int factor = grid_factor(p, pixel_um);
+  Field field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
+  field.is_inside = cv::Mat(field.image.size(), CV_8U, cv::Scalar(outline_um.empty() ? 255 : 0));
+  if (outline_um.empty()) return field;
+  std::vector<std::vector<cv::Point>> corners(1);
+  for (const Vec2 u : outline_um) corners[0].emplace_back(to_pixels(u - field.origin_um, field.pixel_um));
+  cv::fillPoly(field.is_inside, corners, cv::Scalar(255));
+  return field;
+}
+
+bool falls_on_both_sides(const Profile& profile, double ratio) {
+  return profile.lower_drop >= ratio * profile.upper_drop && profile.lower_drop > 3 * profile.noise;
+}
+
+/// Folds of the membrane lie within a lamellipodium's width of the edge and wind.
+bool is_ruffle(const Polyline& line_um, const Polygon& outline_um, double lamellipodium_um) {
+  if (outline_um.empty() || !winds(line_um)) return false;
+  return distance_to_boundary_um(outline_um, line_um[line_um.size() / 2]) < lamellipodium_um;
+}
+
+/// A line of which so much has a fibre beside it lies in its bundle.
+constexpr double kMostBeside = 0.5;
+
+/// A traced line that may be a fibre.
+struct Candidate {
+  Polyline points_um;
+  WayOn before, after;
+  Profile profile;
+  double significance = 0;
+  double expected_false = 0;  ///< lines as significant as this one that texture would make
+  bool is_beside = false;     ///< a fibre
+};
+
+double significance_of(const std::vector<cv::Point2d>& points, const std::vector<double>& height, const Ridges& ridges,
+                       const Field& field, const FibreParameters& p) {
+  return significance(ridges, points, height, independent_px(p, field.pixel_um));
+}
+
+Polyline in_um(const std::vector<cv::Point2d>& points, const Field& field) {
+  Polyline line;
+  for (const cv::Point2d& point : points) line.push_back(field.in_um(point));
+  return line;
+}
+
+/// From the lines that do not lie beside fibres: those are faint fibres as often as texture.
+TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
+                              const FibreParameters& p) {
+  std::vector<double> all, apart;
+  for (const Trace& t : traces) all.push_back(significance_of(t.points, t.own_height(), ridges, field, p));
+  Bundles bundles;
+  for (std::size_t i = 0; i < traces.size(); ++i)
+    if (all[i] >= kHardlyTexture) bundles.add(in_um(traces[i].points, field));
+  for (std::size_t i = 0; i < traces.size(); ++i)
+    if (bundles.share_beside(in_um(traces[i].points, field)) < kMostBeside) apart.push_back(all[i]);
+  return texture_lines(std::move(apart));
+}
+
+/// Where the cell's texture is to be seen: inside of it, and away from lines that cannot be texture.
+cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
+                       const FibreParameters& p) {
+  const TextureLines texture = texture_lines_of(traces, ridges, field, p);
+  cv::Mat is_free = field.is_inside.clone();
+  const int radius = cvCeil(1.33 * p.fibre_width_um / field.pixel_um);  // the filters' side lobes end there
+  for (const Trace& t : traces) {
+    if (texture.expected_false(significance_of(t.points, t.own_height(), ridges, field, p)) > p.fibre_false_per_cell)
+      continue;
+    for (const cv::Point2d& point : t.points) cv::circle(is_free, cv::Point(point), radius, cv::Scalar(0), cv::FILLED);
+  }
+  return is_free;
+}
+
+/// Looks at one traced line after another.
+struct Judge {
+  const Field& field;
+  const Ridges& ridges;
+  const TraceRule& rule;
+  const Polygon& outline_um;
+  TextureLines texture;
+  const FibreParameters& p;
+
+  /// What is left of a line away from the cell's edge; nothing where that has not the shape of a fibre.
+  std::optional<Candidate> candidate(const Trace& trace, double edge_um) const {
+    auto points = smoothed(trace.points, cvRound(p.fibre_averaging_um / field.pixel_um));
+    Candidate c;
+    c.points_um = in_um(points, field);
+    const Piece piece = without_edge(c.points_um, outline_um, edge_um);
+    if (static_cast<double>(piece.n) * field.pixel_um < p.fibre_shortest_um) return std::nullopt;
+    const auto cut = [&](const auto& all) {
+      const auto first = all.begin() + static_cast<std::ptrdiff_t>(piece.first);
+      return std::decay_t<decltype(all)>(first, first + static_cast<std::ptrdiff_t>(piece.n));
+    };
+    c.points_um = cut(c.points_um);
+    points = cut(points);
+    c.significance = significance_of(points, cut(trace.own_height()), ridges, field, p);
+    c.expected_false = texture.expected_false(c.significance);
+    if (kFalseBeside * c.expected_false > p.fibre_false_per_cell) return std::nullopt;
+    c.profile = profile_across(field.image, points, 1.5 * p.fibre_width_um / field.pixel_um);
+    if (!falls_on_both_sides(c.profile, p.fibre_side_ratio)) return std::nullopt;
+    if (is_ruffle(c.points_um, outline_um, p.fibre_lamellipodium_um)) return std::nullopt;
+    if (piece.first == 0) c.before = way_on(trace, LineEnd::first);
+    if (piece.first + piece.n == trace.points.size()) c.after = way_on(trace, LineEnd::last);
+    return c;
+  }
+
+  WayOn way_on(const Trace& trace, LineEnd end) const {
+    FaintEnd faint = faint_end(ridges, rule, trace, end);
+    WayOn way{{}, std::move(faint.over_noise)};
+    for (const cv::Point2d& point : faint.points) way.points_um.push_back(field.in_um(point));
+    return way;
+  }
+
+  /// Of lines of texture, the share that a fibre lies beside by chance: of those below the limit in 9 simulated cells
+  /// of 20 fibres .12, in 9 of 40 fibres .22.
+  static constexpr double kFalseBeside = 0.15;
+};
+
+double quantile_of(std::vector<double> values, double q) {
+  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), place, values.end());
+  return *place;
+}
+
+/// Those that are more significant than texture, and those beside them that are more significant than the texture that
+/// lies beside fibres by chance.
+std::vector<Candidate> significant(std::vector<Candidate> candidates, const FibreParameters& p) {
+  std::vector<Candidate> kept;
+  Bundles bundles;
+  const auto take = [&](auto is_fibre) {
+    const auto first = std::stable_partition(candidates.begin(), candidates.end(), std::not_fn(is_fibre));
+    const bool has_any = first != candidates.end();
+    for (auto c = first; c != candidates.end(); ++c) bundles.add(c->points_um);
+    std::move(first, candidates.end(), std::back_inserter(kept));
+    candidates.erase(first, candidates.end());
+    return has_any;
+  };
+  take([&](const Candidate& c) { return c.expected_false <= p.fibre_false_per_cell; });
+  while (take([&](Candidate& c) {
+    if (bundles.share_beside(c.points_um) < kMostBeside) return false;
+    return c.is_beside = true;
+  })) {
+  }
+  return kept;
+}
+
+/// Of the ridges along the outline: the height of the cell's cortex, seen from its side. Infinite without an outline.
+double height_of_cortex(const Judge& judge) {
+  const Field& field = judge.field;
+  if (judge.outline_um.empty()) return std::numeric_limits<double>::infinity();
+  std::vector<double> heights;
+  Polygon ring = judge.outline_um;
+  ring.push_back(ring.front());
+  for (std::size_t i = 0; i + 1 < ring.size(); ++i) {
+    const cv::Point2d from = to_pixels(ring[i] - field.origin_um, field.pixel_um),
+                      way = to_pixels(ring[i + 1] - field.origin_um, field.pixel_um) - from;
+    const double length = std::hypot(way.x, way.y), angle = std::atan2(way.y, way.x);
+    const int reach = cvCeil(judge.p.fibre_edge_um / field.pixel_um);
+    for (double s = 0.5; s < length; ++s) {
+      double height = 0;  // inside or outside: the outline lies to either side
+      for (int k = -reach; k <= reach; ++k) {
+        const cv::Point2d p = from + (s / length) * way + (k / length) * cv::Point2d(-way.y, way.x);
+        height = std::max(height, judge.ridges.at(p, angle));
+      }
+      heights.push_back(height);
+    }
+  }
+  return heights.empty() ? std::numeric_limits<double>::infinity() : quantile_of(std::move(heights), 0.5);
+}
+
+/// All lines that are fibres. Along the edge these are only lines that stand out of the cortex, or are as high as the
+/// cell's high fibres: where bundles line most of the edge, they are what the cortex seems to be.
+std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& judge) {
+  std::vector<std::optional<Candidate>> inner;
+  std::vector<double> heights, ridge_heights;
+  for (const Trace& trace : traces) {
+    inner.push_back(judge.candidate(trace, judge.p.fibre_edge_um));
+    if (!inner.back() || inner.back()->expected_false > judge.p.fibre_false_per_cell) continue;
+    heights.push_back(inner.back()->profile.height);
+    ridge_heights.push_back(quantile_of(trace.height, 0.5));
+  }
+  constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
+  constexpr double kHigh = 0.8;       // of the second highest of ten
+  double faint = 0, bright = judge.p.fibre_edge_height * height_of_cortex(judge);
+  if (heights.size() >= kEnough) {
+    faint = judge.p.fibre_faintest * quantile_of(heights, 0.5);
+    bright = std::min(bright, kHigh * quantile_of(ridge_heights, 0.9));
+  }
+  std::vector<Candidate> candidates;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    std::optional<Candidate> whole;
+    if (quantile_of(traces[i].height, 0.5) >= bright) whole = judge.candidate(traces[i], 0);
+    if (whole && length_um(whole->points_um) >= 2 * judge.p.fibre_shortest_um)  // ruffles, roots of filopodia: shorter
+      candidates.push_back(std::move(*whole));
+    else if (inner[i])
+      candidates.push_back(std::move(*inner[i]));
+  }
+  std::erase_if(candidates, [&](const Candidate& c) { return c.profile.height < faint; });
+  return significant(std::move(candidates), judge.p);
+}
+
+/// Actin as bright as these fibres, away from them and from the folds at the cell's edge.
+std::vector<Polyline> unexplained(const std::vector<Candidate>& fibres, const Judge& judge) {
+  const Field& field = judge.field;
+  std::vector<std::vector<cv::Point2d>> points;
+  for (const Candidate& c : fibres) {
+    points.emplace_back();
+    for (const Vec2 u : c.points_um) points.back().push_back(to_pixels(u - field.origin_um, field.pixel_um));
+  }
+  cv::Mat depth;
+  cv::distanceTransform(field.is_inside, depth, cv::DIST_L2, 5);
+  std::vector<Polyline> lines_um;
+  for (const auto& crest : bright_crests_beside(judge.ridges, depth > judge.p.fibre_lamellipodium_um / field.pixel_um,
+                                                points, 1.33 * judge.p.fibre_width_um / field.pixel_um,
+                                                judge.p.fibre_shortest_um / field.pixel_um)) {
+    lines_um.emplace_back();
+    for (const cv::Point2d& p : crest) lines_um.back().push_back(field.in_um(p));
+  }
+  return lines_um;
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, FibreParameters& p) {
+  list.table("segment");
+  list.add("fibre_width_um", p.fibre_width_um, Range::between(1e-3, 100),
+           "typical width of a fibre; half to twice of it is found (um)");
+  list.add("fibre_averaging_um", p.fibre_averaging_um, Range::between(1e-3, 10),
+           "averaging along the fibre (standard deviation, um)");
+  list.add("fibre_start_noise", p.fibre_start_noise, Range::factor(),
+           "height a fibre reaches somewhere (standard deviations of the filtered noise)");
+  list.add("fibre_follow_noise", p.fibre_follow_noise, Range::factor(),
+           "height it may fall to (standard deviations of the filtered noise)");
+  list.add("fibre_false_per_cell", p.fibre_false_per_cell, Range::factor(),
+           "lines of the meshwork that may pass for fibres, expected number in a cell");
+  list.add("fibre_smallest_radius_um", p.fibre_smallest_radius_um, Range::size_um(),
+           "smallest radius of curvature (um)");
+  list.add("fibre_faintest", p.fibre_faintest, Range::between(0, 1),
+           "least height as a share of the middle one of the cell's fibres");
+  list.add("fibre_edge_um", p.fibre_edge_um, Range::zero_or_size_um(),
+           "a line along the outline this near to it is the cell's edge, not a fibre (um)");
+  list.add("fibre_edge_height", p.fibre_edge_height, Range::zero_or_factor(),
+           "unless it is by this factor as high as the edge is as a rule");
+  list.add("fibre_lamellipodium_um", p.fibre_lamellipodium_um, Range::zero_or_size_um(),
+           "a line that winds this near to the outline is a ruffle, not a fibre (um)");
+  list.add("fibre_gap_um", p.fibre_gap_um, Range::zero_or_size_um(), "length over which a fibre may be invisible (um)");
+  list.add("fibre_shortest_um", p.fibre_shortest_um, Range::size_um(), "shortest fibre (um)");
+  list.add("fibre_side_ratio", p.fibre_side_ratio, Range::between(0, 1),
+           "least drop to one side as a share of the drop to the other");
+  list.add("fibre_reach_um", p.fibre_reach_um, Range::size_um(), "an end this near to an adhesion is held by it (um)");
+  list.add("fibre_faint_um", p.fibre_faint_um, Range::zero_or_size_um(),
+           "an end is followed to an adhesion this far while it is brighter than the texture (um)");
+  list.add("fibre_simplify_um", p.fibre_simplify_um, Range::size_um(),
+           "points are left out where the line moves less (um)");
+}
+
+TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
+                         const FibreParameters& p) {
+  const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
+  const RidgeScales scales = scales_of(p, field.pixel_um);
+  const TraceRule rule = rule_of(p, field.pixel_um);
+  Ridges ridges = find_ridges(field.image, field.is_inside, scales);
+  // what is bright enough in any texture is a fibre; the texture beside it tells what else is
+  const cv::Mat is_free = free_of_fibres(trace_lines(ridges, field.is_inside, rule), ridges, field, p);
+  set_noise(ridges, is_free, scales.noise_radius_px);
+  const auto traces = trace_lines(ridges, field.is_inside, rule);
+  const Judge judge{field, ridges, rule, outline_um, texture_lines_of(traces, ridges, field, p), p};
+  std::vector<Candidate> fibres = judged(traces, judge);
+  TracedLines lines{{}, unexplained(fibres, judge)};
+  for (Candidate& c : fibres) {
+    Fibre fibre;
+    fibre.points_um = simplified(c.points_um, p.fibre_simplify_um);
+    fibre.width_um = c.profile.width_px * field.pixel_um;
+    fibre.mean_intensity = c.profile.height;
+    fibre.confidence = judge.texture.chance_of_fibre(c.significance, c.is_beside ? Judge::kFalseBeside : 1);
+    lines.fibres.push_back({std::move(fibre), std::move(c.before), std::move(c.after)});
+  }
+  return lines;
+}
+
+std::vector<Fibre> tied(std::vector<TracedFibre> traced, const std::vector<Adhesion>& adhesions,
+                        const Polygon& outline_um, const FibreParameters& p, const Cuts& cuts) {
+  std::vector<Fibre> fibres;
+  for (TracedFibre& t : traced) {
+    lead_on(t, adhesions, outline_um, p.fibre_reach_um);
+    tie_ends(t.fibre, adhesions, outline_um, p.fibre_reach_um);
+    lead_to_cut(t.fibre, cuts, p.fibre_reach_um);
+    fibres.push_back(std::move(t.fibre));
+  }
+  std::erase_if(fibres, [&](const Fibre& f) { return length_um(f.points_um) < p.fibre_shortest_um; });
+  std::stable_sort(fibres.begin(), fibres.end(),
+                   [](const Fibre& a, const Fibre& b) { return length_um(a.points_um) > length_um(b.points_um); });
+  for (std::size_t i = 0; i < fibres.size(); ++i) fibres[i].fibre_id = static_cast<int>(i) + 1;
+  return fibres;
+}
+
+std::vector<Fibre> find_fibres(const images::Image& image, const Polygon& outline_um,
+                               const std::vector<Adhesion>& adhesions, double pixel_size_um, const FibreParameters& p,
+                               const Cuts& cuts) {
+  return tied(trace_fibres(image, outline_um, pixel_size_um, p).fibres, adhesions, outline_um, p, cuts);
+}
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,409 @@
+#include "segment/cells/outline.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "segment/cells/edge_profile.h"
+#include "segment/cells/ellipse.h"
+#include "segment/cells/grid.h"
+#include "segment/cells/haze.h"
+
+namespace mbtfm::cells {
+
+namespace {
+
+constexpr double kSigma_px = 1.5;  // of the smoothing of masks
+constexpr double kGrid_um = 0.4;   // pitch of the masks: a little more than the smoothing
+
+cv::Mat filled(const cv::Mat& mask) {
+  // what cannot be reached from a frame around the image is a cell or a hole in one
+  cv::Mat framed;
+  cv::copyMakeBorder(mask, framed, 1, 1, 1, 1, cv::BORDER_CONSTANT, 0);
+  cv::floodFill(framed, cv::Point(0, 0), 128);
+  return framed(cv::Rect(1, 1, mask.cols, mask.rows)) != 128;
+}
+
+/// Parts of a mask by label, from 1, of at least `smallest` pixels each, the largest first.
+struct Parts {
+  struct Part {
+    int label, n_pixels;
+    cv::Rect box;
+  };
+  cv::Mat labels;
+  std::vector<Part> parts;
+  cv::Mat mask(const Part& part) const { return labels == part.label; }
+};
+
+Parts parts_of(const cv::Mat& mask, double smallest) {
+  Parts result;
+  cv::Mat stats, centroids;
+  const int n = cv::connectedComponentsWithStats(mask, result.labels, stats, centroids, 4, CV_32S);
+  for (int i = 1; i < n; ++i) {
+    const auto of = [&](int column) { return stats.at<int>(i, column); };
+    const cv::Rect box(of(cv::CC_STAT_LEFT), of(cv::CC_STAT_TOP), of(cv::CC_STAT_WIDTH), of(cv::CC_STAT_HEIGHT));
+    if (of(cv::CC_STAT_AREA) >= smallest) result.parts.push_back({i, of(cv::CC_STAT_AREA), box});
+  }
+  std::stable_sort(result.parts.begin(), result.parts.end(),
+                   [](const Parts::Part& a, const Parts::Part& b) { return a.n_pixels > b.n_pixels; });
+  return result;
+}
+
+cv::Mat without_debris(const cv::Mat& mask, double smallest) {
+  const Parts parts = parts_of(filled(mask), smallest);
+  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
+  for (const Parts::Part& part : parts.parts) result(part.box) |= parts.labels(part.box) == part.label;
+  return result;
+}
+
+cv::Mat smoothed(const cv::Mat& mask) {
+  cv::Mat smooth;
+  cv::GaussianBlur(mask, smooth, cv::Size(0, 0), kSigma_px);
+  return smooth > 127;
+}
+
+/// Otsu's threshold of log(1 + brightness): cells are bright by a factor, not by an amount.
+cv::Mat first_mask(const cv::Mat& image, double noise, double smallest) {
+  const double dark = quantile(image, 0.01), bright = quantile(image, 0.99);
+  // neither noise (three deviations) nor a twentieth of the range shall spread over the logarithm's steep part
+  const double unit = std::max(3 * noise, 0.05 * (bright - dark));
+  if (unit <= 0) return cv::Mat::zeros(image.size(), CV_8U);
+  cv::Mat compressed = cv::max((image - dark) / unit, 0.0) + 1.0, bytes, mask;
+  cv::log(compressed, compressed);
+  cv::normalize(compressed, bytes, 0, 255, cv::NORM_MINMAX, CV_8U);
+  cv::threshold(bytes, mask, 0, 255, cv::THRESH_BINARY | cv::THRESH_OTSU);
+  return without_debris(mask, smallest);
+}
+
+/// Mean of `values` where `mask` is not 0, weighted by a Gaussian of the distance.
+cv::Mat mean_nearby(const cv::Mat& values, const cv::Mat& mask, double sigma_px) {
+  cv::Mat weight, weighted;
+  mask.convertTo(weight, CV_32F, 1.0 / 255);
+  cv::multiply(values, weight, weighted);
+  // 1e-6: far from the mask both are nothing, and the quotient must stay finite
+  return wide_gaussian(weighted, sigma_px) / (wide_gaussian(weight, sigma_px) + 1e-6);
+}
+
+/// One round of comparing points near the edge with both sides. "Inside" is what the cell looks like along its edge:
+/// brighter things, its thick middle, fibres and adhesions, count no more than that.
+cv::Mat moved_edge(const cv::Mat& values, const cv::Mat& mask, double band_px, double smallest) {
+  cv::Mat grown, core, result = mask.clone();
+  cv::dilate(mask, grown, disc_of(band_px));
+  cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  const cv::Mat clipped = cv::min(values, median_within(values, mask & ~core));
+  const cv::Mat middle = (mean_nearby(clipped, mask, band_px) + mean_nearby(clipped, ~mask, band_px)) / 2;
+  const cv::Mat brighter = clipped > middle, band = grown & ~core;
+  brighter.copyTo(result, band);
+  return without_debris(smoothed(result), smallest);
+}
+
+void add_adhesions(cv::Mat& mask, const std::vector<Adhesion>& adhesions, double pixel_um, double reach_um) {
+  cv::Mat distance, labels;
+  cv::distanceTransform(~mask, distance, labels, cv::DIST_L2, 5, cv::DIST_LABEL_PIXEL);
+  std::vector<cv::Point> cell_pixel(mask.total() + 1);  // the mask's pixel nearest to each point, by label
+  for (int y = 0; y < mask.rows; ++y)
+    for (int x = 0; x < mask.cols; ++x)
+      if (mask.at<uchar>(y, x)) cell_pixel[static_cast<std::size_t>(labels.at<int>(y, x))] = {x, y};
+  for (const Adhesion& adhesion : adhesions) {
+    const cv::Point2d centre = to_pixels(adhesion.position_um, pixel_um);
+    const cv::Point c(std::clamp(cvRound(centre.x), 0, mask.cols - 1), std::clamp(cvRound(centre.y), 0, mask.rows - 1));
+    if (distance.at<float>(c) * pixel_um > reach_um) continue;
+    const cv::Size axes(cvRound(adhesion.major_axis_um / 2 / pixel_um), cvRound(adhesion.minor_axis_um / 2 / pixel_um));
+    cv::ellipse(mask, c, axes, adhesion.angle_rad * 180 / CV_PI, 0, 360, cv::Scalar(255), cv::FILLED);
+    // a bridge of five pixels outlives the smoothing of the polygon
+    if (distance.at<float>(c) > 0)
+      cv::line(mask, c, cell_pixel[static_cast<std::size_t>(labels.at<int>(c))], cv::Scalar(255), 5);
+  }
+}
+
+/// Points at equal distances along a closed line.
+std::vector<cv::Point2d> resampled(const std::vector<cv::Point2d>& closed, double spacing) {
+  std::vector<double> at{0};
+  for (std::size_t i = 0; i < closed.size(); ++i) {
+    const cv::Point2d d = closed[(i + 1) % closed.size()] - closed[i];
+    at.push_back(at.back() + std::hypot(d.x, d.y));
+  }
+  const int n = std::max(8, static_cast<int>(std::lround(at.back() / spacing)));
+  std::vector<cv::Point2d> result;
+  std::size_t i = 0;
+  for (int k = 0; k < n; ++k) {
+    const double s = at.back() * k / n;
+    while (at[i + 1] < s) ++i;
+    const double u = at[i + 1] > at[i] ? (s - at[i]) / (at[i + 1] - at[i]) : 0;
+    result.push_back((1 - u) * closed[i] + u * closed[(i + 1) % closed.size()]);
+  }
+  return result;
+}
+
+std::vector<cv::Point2d> smoothed_ring(const std::vector<cv::Point2d>& ring, int half_window) {
+  const int n = static_cast<int>(ring.size());
+  std::vector<cv::Point2d> result(ring.size());
+  for (int i = 0; i < n; ++i) {
+    cv::Point2d sum(0, 0);
+    for (int k = -half_window; k <= half_window; ++k) sum += ring[static_cast<std::size_t>(((i + k) % n + n) % n)];
+    result[static_cast<std::size_t>(i)] = sum / (2 * half_window + 1);
+  }
+  return result;
+}
+
+/// A ring of boundary pixels moved onto the ½ level of the smoothed mask along its gradient.
+std::vector<cv::Point2d> on_level(const std::vector<cv::Point>& ring, const cv::Mat& level) {
+  std::vector<cv::Point2d> points;
+  for (const cv::Point& start : ring) {
+    cv::Point2d p = start;
+    for (int round = 0; round < 3; ++round) {  // Newton's steps; the level is nearly linear there
+      const cv::Point2d gradient(sample(level, p + cv::Point2d(0.5, 0)) - sample(level, p - cv::Point2d(0.5, 0)),
+                                 sample(level, p + cv::Point2d(0, 0.5)) - sample(level, p - cv::Point2d(0, 0.5)));
+      const double steepness = gradient.dot(gradient), excess = 0.5 - sample(level, p);
+      if (steepness < 1e-4) break;
+      cv::Point2d step = (excess / steepness) * gradient;
+      const double l = std::hypot(step.x, step.y);
+      p += l > 1 ? step / l : step;
+    }
+    points.push_back(p);
+  }
+  return points;
+}
+
+/// The rings around one part of a mask: the outer one first, then the holes in it, the largest first.
+std::vector<std::vector<cv::Point2d>> rings_of(const cv::Mat& mask) {
+  cv::Mat framed, level;
+  constexpr int kFrame = 8;
+  cv::copyMakeBorder(mask, framed, kFrame, kFrame, kFrame, kFrame, cv::BORDER_CONSTANT, 0);
+  std::vector<std::vector<cv::Point>> contours;
+  cv::findContours(framed, contours, cv::RETR_CCOMP, cv::CHAIN_APPROX_NONE);
+  std::stable_sort(contours.begin(), contours.end(),
+                   [](const auto& a, const auto& b) { return cv::contourArea(a) > cv::contourArea(b); });
+  framed.convertTo(level, CV_32F, 1.0 / 255);
+  level = gaussian(level, kSigma_px);
+  std::vector<std::vector<cv::Point2d>> rings;
+  for (const auto& contour : contours) {
+    rings.push_back(smoothed_ring(on_level(contour, level), 2));
+    for (cv::Point2d& p : rings.back()) p -= cv::Point2d(kFrame, kFrame);
+  }
+  return rings;
+}
+
+/// Gaps in the cells where it is as dark as outside: less than half of the way up to the cells' edges, and in parts
+/// within a quarter.
+cv::Mat holes_in(const cv::Mat& values, const cv::Mat& mask, double band_px, double noise, double smallest) {
+  cv::Mat core;
+  cv::erode(mask, core, disc_of(band_px), cv::Point(-1, -1), 1, cv::BORDER_CONSTANT, cv::Scalar(255));
+  // from far away: the holes are in the middle
+  const cv::Mat outside = mean_nearby(values, ~mask, 4 * band_px),
+                edge = mean_nearby(values, mask & ~core, 4 * band_px);
+  const cv::Mat rise = edge - outside, height = values - outside;
+  cv::Mat quarter;
+  cv::min(cv::Mat(rise * 0.25), cv::Mat(rise - 4 * noise), quarter);
+  const cv::Mat dark = (height < rise * 0.5) & mask, darkest = (height < quarter) & mask;
+  cv::Mat result = cv::Mat::zeros(mask.size(), CV_8U);
+  const Parts gaps = parts_of(dark, smallest);
+  const cv::Rect frame(cv::Point(0, 0), mask.size());
+  for (const Parts::Part& gap : gaps.parts) {
+    const cv::Rect box = cv::Rect(gap.box.tl() - cv::Point(1, 1), gap.box.br() + cv::Point(1, 1)) & frame;
+    const cv::Mat hole = gaps.labels(box) == gap.label;
+    cv::Mat rim;
+    cv::dilate(hole, rim, disc_of(1));
+    // a gap that reaches the edge is no hole
+    if (cv::countNonZero(rim & ~mask(box)) == 0 && 2 * cv::countNonZero(hole & darkest(box)) > gap.n_pixels)
+      result(box) |= hole;
+  }
+  return result;
+}
+
+/// The image at the resolution of the masks, and how it is scaled.
+struct Scene {
+  cv::Mat full, smooth;
+  double pixel_um, full_pixel_um, band_px, noise;
+  double px_of(double area_um2) const { return area_um2 / (pixel_um * pixel_um); }
+  Vec2 field_um() const { return {full.cols * full_pixel_um, full.rows * full_pixel_um}; }
+  /// A ring as near as this to the image's border is one that the border has made: rings go through pixels' centres.
+  double border_um() const { return 1.5 * pixel_um; }
+};
+
+Scene scene_of(const cv::Mat& full, double pixel_size_um, const OutlineParameters& p) {
+  Scene s{full, {}, pixel_size_um, pixel_size_um, 0, 0};
+  // the rings' last move is made in the full image, so that three pixels a micrometre do here
+  const int factor = std::max(1, static_cast<int>(kGrid_um / pixel_size_um));
+  s.pixel_um = pixel_size_um * factor;
+  s.band_px = std::max(2.0, p.outline_band_um / s.pixel_um);
+  const cv::Mat small = shrink(full, factor);
+  const double sigma_px = std::max(0.5, p.outline_smoothing_um / s.pixel_um);
+  s.smooth = gaussian(small, sigma_px);
+  s.noise = overall_noise(small) * noise_gain(sigma_px);
+  return s;
+}
+
+/// All cells; holes filled.
+Body cells_in(const Scene& s, double smallest, const OutlineParameters& p) {
+  cv::Mat mask = first_mask(s.smooth, s.noise, smallest);
+  if (cv::countNonZero(mask) == 0 || cv::countNonZero(~mask) == 0) return {};
+  // two halves of pure noise differ by 1.6 standard deviations
+  if (cv::mean(s.smooth, mask)[0] - cv::mean(s.smooth, ~mask)[0] < 4 * s.noise) return {};
+  constexpr int kRounds = 6;  // the edge moves by up to a band in the first few and then stays
+  for (int round = 0; round < kRounds && cv::countNonZero(mask) > 0; ++round) {
+    const cv::Mat before = mask;
+    mask = moved_edge(s.smooth, mask, s.band_px, smallest);
+    // less than a pixel in a thousand of the cell: what still changes is noise
+    if (cv::countNonZero(before ^ mask) * 1000 < cv::countNonZero(mask)) break;
+  }
+  Body body = without_haze(s.smooth, mask, s.pixel_um, p.outline_band_um);
+  if (cv::countNonZero(body.mask ^ mask) > 0) mask = without_debris(smoothed(body.mask), smallest);
+  return {mask, body.soft};
+}
+
+/// Points at the image's border and at adhesions stay: there the ring is not an edge of this channel. So do those in
+/// haze, which has no profile of a membrane.
+std::vector<bool> movable(const std::vector<Vec2>& ring_um, const std::vector<Adhesion>& adhesions, const Scene& s,
+                          const cv::Mat& soft) {
+  std::vector<bool> result;
+  for (const Vec2 p : ring_um) {
+    const double border = std::min({p.x, p.y, s.field_um().x - p.x, s.field_um().y - p.y});
+    const int x = std::clamp(static_cast<int>(p.x / s.pixel_um), 0, soft.cols - 1);
+    const int y = std::clamp(static_cast<int>(p.y / s.pixel_um), 0, soft.rows - 1);
+    result.push_back(border > s.border_um() && !soft.at<uchar>(y, x) &&
+                     std::none_of(adhesions.begin(), adhesions.end(), [&](const Adhesion& a) {
+                       return norm(a.position_um - p) < a.major_axis_um / 2 + 1 && distance_to_ellipse_um(a, p) < 0.3;
+                     }));
+  }
+  return result;
+}
+
+/// A ring of the mask's grid as the polygon on the image's edge.
+Polygon polygon_of(const Scene& s, const std::vector<cv::Point2d>& ring, const std::vector<Adhesion>& adhesions,
+                   const cv::Mat& soft, const OutlineParameters& p) {
+  const auto points = resampled(ring, p.outline_spacing_um / s.pixel_um);
+  Polygon coarse, polygon;
+  std::vector<cv::Point2d> full_ring;
+  for (const cv::Point2d& point : points) {
+    coarse.push_back(to_um(point, s.pixel_um));
+    full_ring.push_back(to_pixels(coarse.back(), s.full_pixel_um));
+  }
+  const Vec2 field_um = s.field_um();
+  const auto moved = on_edge(s.full, full_ring, movable(coarse, adhesions, s, soft), s.full_pixel_um);
+  for (const cv::Point2d& point : resampled(smoothed_ring(moved, 1), p.outline_spacing_um / s.full_pixel_um)) {
+    const Vec2 at = to_um(point, s.full_pixel_um);
+    polygon.push_back({std::clamp(at.x, 0.0, field_um.x), std::clamp(at.y, 0.0, field_um.y)});
+  }
+  return polygon;
+}
+
+/// A gap whose ring crosses the outline is a bay.
+bool is_inside(const Polygon& hole, const Polygon& outer) {
+  return std::all_of(hole.begin(), hole.end(), [&](Vec2 p) { return contains(outer, p); });
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, OutlineParameters& p) {
+  list.table("segment");
+  list.add("outline_smoothing_um", p.outline_smoothing_um, Range::between(1e-3, 100),
+           "smoothing before the outline is looked for (standard deviation, um)");
+  list.add("outline_band_um", p.outline_band_um, Range::between(1e-3, 100),
+           "distance over which the brightness inside and outside is compared (um)");
+  list.add("outline_reach_um", p.outline_reach_um, Range::zero_or_size_um(),
+           "an adhesion this far outside still belongs to the cell (um)");
+  list.add("outline_spacing_um", p.outline_spacing_um, Range::mesh_um(), "distance of the outline's points (um)");
+  list.add("outline_smallest_um2", p.outline_smallest_um2, Range::area_um2(), "least area of a cell (um²)");
+  list.add("outline_largest_um2", p.outline_largest_um2, Range::area_um2(), "greatest area of a cell (um²)");
+  list.add("outline_smallest_hole_um2", p.outline_smallest_hole_um2, Range::area_um2(),
+           "least area of a gap in a cell (um²)");
+}
+
+std::vector<CellOutline> find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions,
+                                    double pixel_size_um, const OutlineParameters& p) {
+  const Scene s = scene_of(matrix_of(image), pixel_size_um, p);
+  const double smallest = s.px_of(p.outline_smallest_um2);
+  auto [mask, soft] = cells_in(s, smallest, p);
+  if (mask.empty() || cv::countNonZero(mask) == 0) return {};
+  const cv::Mat holes = holes_in(s.smooth, mask, s.band_px, s.noise, s.px_of(p.outline_smallest_hole_um2));
+  add_adhesions(mask, adhesions, s.pixel_um, p.outline_reach_um);
+  std::vector<CellOutline> cells;
+  const Parts parts = parts_of(filled(mask), smallest);
+  for (const Parts::Part& each : parts.parts) {
+    CellOutline cell;
+    const cv::Mat part = parts.mask(each);
+    cell.is_sheet = each.n_pixels > s.px_of(p.outline_largest_um2);
+    const auto rings = rings_of(cell.is_sheet ? part : part & ~holes);
+    for (const auto& ring : rings) {
+      const Polygon polygon = polygon_of(s, ring, adhesions, soft, p);
+      if (cell.outer_um.empty()) {
+        CutRing cut = cut_by_border(polygon, s.field_um(), s.border_um());
+        cell.outer_um = std::move(cut.points_um);
+        cell.is_cut = std::move(cut.is_cut);
+        cell.area_um2 = std::abs(signed_area_um2(cell.outer_um));
+      } else if (is_inside(polygon, cell.outer_um) && std::abs(signed_area_um2(polygon)) > 0) {
+        cell.holes_um.push_back(polygon);
+        cell.area_um2 -= std::abs(signed_area_um2(polygon));
+      }
+    }
+    cells.push_back(std::move(cell));
+  }
+  std::stable_sort(cells.begin(), cells.end(),
+                   [](const CellOutline& a, const CellOutline& b) { return a.area_um2 > b.area_um2; });
+  return cells;
+}
+
+CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um) {
+  constexpr int kLeft = 1, kTop = 2, kRight = 4, kBottom = 8;
+  constexpr double kRound = 4;  // of the reach: a ring goes round a corner of the image so near to it
+  const std::size_t n = ring_um.size();
+  const auto sides_near = [&](Vec2 p) {
+    return (p.x <= reach_um ? kLeft : 0) | (p.y <= reach_um ? kTop : 0) | (p.x >= field_um.x - reach_um ? kRight : 0) |
+           (p.y >= field_um.y - reach_um ? kBottom : 0);
+  };
+  const auto put_onto = [&](Vec2& p, int sides) {
+    if (sides & kLeft) p.x = 0;
+    if (sides & kTop) p.y = 0;
+    if (sides & kRight) p.x = field_um.x;
+    if (sides & kBottom) p.y = field_um.y;
+  };
+  std::vector<int> near(n), onto(n, 0);
+  for (std::size_t i = 0; i < n; ++i) near[i] = sides_near(ring_um[i]);
+  CutRing result;
+  std::vector<std::size_t> index;  // of each point in the ring given; n: a corner of the image
+  for (std::size_t i = 0; i < n; ++i) {
+    const std::size_t next = (i + 1) % n;
+    const int common = near[i] & near[next];
+    Vec2 corner = ring_um[i];
+    put_onto(corner, near[i] | near[next]);
+    const bool is_round = common == 0 && near[i] != 0 && near[next] != 0 &&
+                          std::max(norm(ring_um[i] - corner), norm(ring_um[next] - corner)) <= kRound * reach_um;
+    onto[i] |= is_round ? near[i] : common;
+    onto[next] |= is_round ? near[next] : common;
+    result.points_um.push_back(ring_um[i]);
+    result.is_cut.push_back(common != 0 || is_round);
+    index.push_back(i);
+    if (!is_round) continue;
+    result.points_um.push_back(corner);
+    result.is_cut.push_back(true);
+    index.push_back(n);
+  }
+  for (std::size_t k = 0; k < index.size(); ++k) {
+    if (index[k] < n) put_onto(result.points_um[k], onto[index[k]]);
+  }
+  return result;
+}
+
+Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                     const OutlineParameters& p) {
+  const auto cells = find_cells(image, adhesions, pixel_size_um, p);
+  return cells.empty() ? Polygon{} : cells.front().outer_um;
+}
+
+std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions) {
+  std::vector<Adhesion> kept;
+  for (const Adhesion& adhesion : adhesions) {
+    const auto is_in = [&](const Polygon& ring) { return contains(ring, adhesion.position_um); };
+    if (!is_in(cell.outer_um) || std::any_of(cell.holes_um.begin(), cell.holes_um.end(), is_in)) continue;
+    kept.push_back(adhesion);
+    kept.back().adhesion_id = static_cast<int>(kept.size());
+  }
+  return kept;
+}
+
+std::vector<Adhesion> inside(const Polygon& outline_um, const std::vector<Adhesion>& adhesions) {
+  return inside(CellOutline{outline_um, {}}, adhesions);
+}
+
+}  // namespace mbtfm::cells

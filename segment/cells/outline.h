@@ -1,0 +1,64 @@
+/// The outlines of the cells.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "pipeline/contract/cell.h"
+#include "pipeline/contract/geometry.h"
+#include "pipeline/stage/parameters.h"
+#include "segment/images/image.h"
+
+namespace mbtfm::cells {
+
+struct OutlineParameters {
+  double outline_smoothing_um = 0.3;      ///< just above the resolution of light: more would round the cell's corners
+  double outline_band_um = 3;             ///< brightness inside and outside is compared within this distance
+  double outline_reach_um = 3;            ///< an adhesion up to this far outside is still this cell's
+  double outline_spacing_um = 0.5;        ///< of the polygon's points
+  double outline_smallest_um2 = 50;       ///< less is debris, not a spread cell
+  double outline_largest_um2 = 30000;     ///< ten spread cells: more is a sheet of cells that touch
+  double outline_smallest_hole_um2 = 10;  ///< less is a gap in the actin mesh, over which the membrane spans
+};
+
+void declare(stage::ParameterList& list, OutlineParameters& parameters);
+
+/// A cell in the image: its outer ring and the gaps in it.
+struct CellOutline {
+  Polygon outer_um;
+  std::vector<Polygon> holes_um;
+  double area_um2 = 0;         ///< without the holes
+  bool is_sheet = false;       ///< larger than any single cell; its holes are left out
+  std::vector<bool> is_cut{};  ///< by piece of the outer ring: the image ends there before the cell does
+  bool is_cut_by_border() const { return std::ranges::find(is_cut, true) != is_cut.end(); }
+};
+
+/// A ring, and which of its pieces run along the image's border.
+struct CutRing {
+  Polygon points_um;
+  std::vector<bool> is_cut;
+};
+/// A piece is cut where both its ends lie within `reach_um` of the same side of the image; they are put onto it. The
+/// image's corner is put in where the ring goes round it that closely.
+CutRing cut_by_border(const Polygon& ring_um, Vec2 field_um, double reach_um);
+
+/// The cells of an image, the largest first. Cells that touch each other count as one.
+///
+/// A first mask by Otsu's threshold of the smoothed image's logarithm above the darkest region; then each point near
+/// the edge is put to the side, inside or outside, whose mean brightness nearby it resembles more (localised Chan–Vese,
+/// Lankton & Tannenbaum 2008), which follows uneven light and background. Adhesions within the reach are added. Gaps
+/// that are as dark as the surroundings are holes. At last each ring is moved to the edge in the unsmoothed image: see
+/// edge_profile.h.
+/// @returns none where there is no cell (constant or noise)
+std::vector<CellOutline> find_cells(const images::Image& image, const std::vector<Adhesion>& adhesions,
+                                    double pixel_size_um, const OutlineParameters& parameters);
+
+/// The largest cell's outer ring; empty where there is no cell.
+Polygon find_outline(const images::Image& image, const std::vector<Adhesion>& adhesions, double pixel_size_um,
+                     const OutlineParameters& parameters);
+
+/// The adhesions whose centre lies in the cell, with their ids renewed.
+std::vector<Adhesion> inside(const CellOutline& cell, const std::vector<Adhesion>& adhesions);
+std::vector<Adhesion> inside(const Polygon& outline_um, const std::vector<Adhesion>& adhesions);
+
+}  // namespace mbtfm::cells

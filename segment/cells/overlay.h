@@ -1,0 +1,39 @@
+/// Pictures of a segmentation on its images, to judge it by eye. Internal to segment/ (OpenCV).
+#pragma once
+
+#include <opencv2/core.hpp>
+#include <optional>
+
+#include "segment/cells/segment_cell.h"
+#include "segment/images/png.h"
+
+namespace mbtfm::cells {
+
+/// The part of the images that holds the cell: actin in grey, adhesions in purple, both stretched to their own
+/// contrast; over them the outline, the adhesions' ellipses and the fibres in the colours that their types have in the
+/// report (Okabe & Ito's palette, which colour-blind people can tell apart), all fibre ids, and the adhesion ids that
+/// have room, the largest adhesions' first, dots on bright actin that is in no fibre; below a legend and a scale bar.
+images::Picture draw_overlay(const std::optional<images::Channel>& adhesion,
+                             const std::optional<images::Channel>& actin, const Segmentation& segmentation);
+
+/// The same part of the images without any mark, and where it lies, for pages that draw the marks themselves.
+struct Ground {
+  images::Picture picture;
+  Vec2 low_um, size_um;
+};
+Ground draw_ground(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
+                   const Segmentation& segmentation);
+
+/// The part of the specimen that a picture shows.
+struct View {
+  Vec2 low_um, high_um;
+};
+
+/// The cell and a margin around it.
+View view_of(const Segmentation& segmentation);
+
+/// The same in small, without text: outline, ellipses and fibres (8-bit red, green, blue).
+cv::Mat draw_thumbnail(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
+                       const Segmentation& segmentation, const View& view, int long_side_px);
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,364 @@
+#include "segment/cells/segment_cell.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "segment/cells/emptiness.h"
+#include "segment/cells/fibre_ends.h"
+
+namespace mbtfm::cells {
+
+void declare(stage::ParameterList& list, SegmentParameters& p) {
+  list.table("");
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
+           "side of a pixel in the specimen (um); unset: from the image's own calibration");
+  list.table("segment");
+  list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
+           "the images are reduced first: means of blocks of so many pixels a side");
+  list.add(
+      "cell", p.cell, {.low = 0},
+      "which cell of the image, by area from 1, the largest; 0: all, each in a folder cell_1, cell_2, … of its own");
+  declare(list, p.adhesion_plane, "adhesion", "the adhesion image");
+  declare(list, p.actin_plane, "actin", "the actin image");
+  list.add("align_channels", p.align_channels,
+           "move fibres and outline to where the adhesion image has them; auto: where fibre ends tell a shift",
+           {"auto", "off"});
+  list.add("contact_sheet", p.contact_sheet,
+           "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
+  declare(list, p.adhesions);
+  declare(list, p.candidates);
+  declare(list, p.fibres);
+  declare(list, p.outline);
+}
+
+namespace {
+
+void require_content(const images::Channel& channel) {
+  const std::string reason = emptiness_of(channel.image);
+  if (!reason.empty())
+    throw InputError(channel.name, "a picture of a cell", reason,
+                     "is this the right file, channel and page? Was it overexposed?");
+}
+
+std::vector<Adhesion> adhesions_of(const images::Channel& channel, double pixel_um, const SegmentParameters& p) {
+  require_content(channel);
+  const auto found = find_adhesions(channel.image, pixel_um, p.adhesions);
+  if (found.empty())
+    throw InputError(
+        channel.name,
+        "bright spots of " + shortest(p.adhesions.adhesion_smallest_um2) + " um² or more that stand out of the noise",
+        "no adhesion: " + why_no_adhesions(channel.image, pixel_um, p.adhesions),
+        "is this the adhesion channel, in focus? Check pixel_size_um (" + images::in_um(pixel_um) +
+            "), adhesion_channel, and adhesion_seed_noise for a faint image");
+  return found;
+}
+
+std::vector<CellOutline> outlines_of(const images::Channel& channel, const std::vector<Adhesion>& adhesions,
+                                     double pixel_um, const SegmentParameters& p) {
+  require_content(channel);
+  std::vector<CellOutline> cells = find_cells(channel.image, adhesions, pixel_um, p.outline);
+  if (cells.empty())
+    throw InputError(
+        channel.name, "a cell brighter than its surroundings",
+        "no cell: nothing of " + shortest(p.outline.outline_smallest_um2) + " um² or more stands out of the noise",
+        "is this the right channel and page? Check pixel_size_um (" + images::in_um(pixel_um) +
+            ") and outline_smallest_um2");
+  if (cells.front().is_sheet)
+    throw InputError(
+        channel.name, "single cells", "cells that touch over " + brief(cells.front().area_um2) + " um²",
+        "crop the image to a single cell; outline_largest_um2 is " + shortest(p.outline.outline_largest_um2));
+  return cells;
+}
+
+/// The cells that the parameters ask for.
+std::vector<CellOutline> chosen(std::vector<CellOutline> cells, const images::Channel& channel,
+                                const SegmentParameters& p) {
+  if (p.cell == 0) return cells;
+  if (p.cell > static_cast<int>(cells.size()))
+    throw InputError(channel.name, "cell " + std::to_string(p.cell), std::to_string(cells.size()) + " in all",
+                     "cells that touch count as one");
+  return {std::move(cells[static_cast<std::size_t>(p.cell - 1)])};
+}
+
+/// Move what the actin image shows to where the adhesion image has it.
+void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& traced,
+           const std::vector<Adhesion>& adhesions, const SegmentParameters& p) {
+  std::vector<Fibre> fibres;
+  for (const TracedFibre& t : traced) fibres.push_back(t.fibre);
+  s.alignment = align_channels(fibres, adhesions);
+  if (!s.alignment || p.align_channels == "off" || !s.alignment->is_significant()) return;
+  s.is_aligned = true;
+  const auto move = [&](auto& points) {
+    for (Vec2& point : points) point = s.alignment->of(point);
+  };
+  move(outline.outer_um);
+  for (Polygon& hole : outline.holes_um) move(hole);
+  s.cell.outline_um = outline.outer_um;
+  s.cell.holes_um = outline.holes_um;
+  for (Polyline& crest : s.unexplained_um) move(crest);
+  for (TracedFibre& t : traced) {
+    for (Polyline* points : {&t.fibre.points_um, &t.before.points_um, &t.after.points_um}) move(*points);
+  }
+}
+
+/// The images of a field, and where its adhesions come from.
+struct Inputs {
+  const std::optional<images::Channel>&adhesion, &actin;
+  const SegmentParameters& parameters;
+  const HandDrawn& drawn;
+  Field field;
+  AdhesionSource source = AdhesionSource::image;
+};
+
+/// Seen ones: by hand, of a mask, or of the image.
+std::vector<Adhesion> seen_adhesions(const Inputs& in) {
+  if (in.source != AdhesionSource::image) return {};
+  if (in.drawn.adhesions) return hand_drawn_adhesions(*in.drawn.adhesions, in.adhesion, in.field);
+  if (in.drawn.adhesion_mask) return mask_adhesions(*in.drawn.adhesion_mask, in.adhesion, in.field);
+  return adhesions_of(*in.adhesion, in.field.pixel_um, in.parameters);
+}
+
+const std::string& name_of_adhesions(const Inputs& in) {
+  if (in.drawn.adhesions) return in.drawn.adhesions->name;
+  return in.drawn.adhesion_mask ? in.drawn.adhesion_mask->name : in.adhesion->name;
+}
+
+struct Outlines {
+  std::vector<CellOutline> chosen;
+  int n_cells = 1;  ///< in the image
+};
+
+Outlines outlines_in(const Inputs& in, const std::vector<Adhesion>& found) {
+  const SegmentParameters& p = in.parameters;
+  if (in.drawn.outline) {
+    return {chosen({hand_drawn_outline(*in.drawn.outline, in.field)}, in.actin ? *in.actin : *in.adhesion, p), 1};
+  }
+  if (in.drawn.outline_mask)
+    return {mask_outlines(*in.drawn.outline_mask, p.cell, in.field, p.outline),
+            n_cells_in(*in.drawn.outline_mask, in.field, p.outline)};
+  const images::Channel& shape = in.actin ? *in.actin : *in.adhesion;
+  std::vector<CellOutline> all = outlines_of(shape, found, in.field.pixel_um, p);
+  const int n_cells = static_cast<int>(all.size());
+  return {chosen(std::move(all), shape, p), n_cells};
+}
+
+/// Fibres before they are tied: traced, or drawn by hand.
+struct Lines {
+  std::vector<TracedFibre> traced;
+  std::vector<DrawnLine> drawn;
+  bool are_drawn = false;
+};
+
+/// The ends of a traced fibre that adhesions may hold. On a pattern any.
+EndsToTie ends_to_hold(const Inputs& in, const CellOutline& cell, const TracedFibre& traced) {
+  if (in.source == AdhesionSource::pattern) return {};
+  return ends_held_by_shape(traced.fibre.points_um, cell.outer_um, in.parameters.candidates.candidate_band_um,
+                            in.parameters.fibres.fibre_lamellipodium_um);
+}
+
+/// Of the fibres' ends those where an adhesion may be.
+std::vector<Vec2> possible_ends_um(const Inputs& in, const CellOutline& cell, const Lines& lines) {
+  std::vector<Vec2> ends;
+  for (const DrawnLine& line : lines.drawn)
+    for (const Vec2 end : held_ends_um(line)) ends.push_back(end);
+  for (const TracedFibre& t : lines.traced) {
+    const EndsToTie held = ends_to_hold(in, cell, t);
+    if (held.start) ends.push_back(t.fibre.points_um.front());
+    if (held.end) ends.push_back(t.fibre.points_um.back());
+  }
+  if (in.source == AdhesionSource::pattern)
+    std::erase_if(ends, [&](Vec2 end) { return !covers(*in.drawn.adhesion_mask, end, in.field); });
+  return ends;
+}
+
+/// Where adhesions may be, in this cell. A fibre that ends on a pattern is held where it ends, not at the next point of
+/// a lattice, which may be a micrometre further in or out.
+std::vector<Adhesion> candidates_in(const Inputs& in, const CellOutline& cell, const Lines& lines,
+                                    Placement placement) {
+  const CandidateParameters& p = in.parameters.candidates;
+  std::vector<Adhesion> candidates = candidates_at(possible_ends_um(in, cell, lines), p.candidate_spacing_um);
+  if (in.source != AdhesionSource::fibre_ends) {
+    const Cell whole{.adhesions = {}, .fibres = {}, .outline_um = cell.outer_um, .holes_um = cell.holes_um};
+    const std::vector<Adhesion> at_ends = candidates;
+    const auto is_possible = [&](Vec2 point) {
+      const bool is_taken = std::ranges::any_of(
+          at_ends, [&](const Adhesion& end) { return norm(end.position_um - point) < p.candidate_spacing_um; });
+      if (is_taken) return false;
+      if (in.source == AdhesionSource::pattern) return covers(*in.drawn.adhesion_mask, point, in.field);
+      return distance_to_edge_um(whole, point) <= p.candidate_band_um;
+    };
+    Vec2 low = cell.outer_um.front(), high = low;
+    for (const Vec2 point : cell.outer_um) {
+      low = {std::min(low.x, point.x), std::min(low.y, point.y)};
+      high = {std::max(high.x, point.x), std::max(high.y, point.y)};
+    }
+    const auto in_cell = [&](Vec2 point) {
+      const auto is_in = [&](const Polygon& ring) { return contains(ring, point); };
+      return is_in(cell.outer_um) && std::ranges::none_of(cell.holes_um, is_in) && is_possible(point);
+    };
+    for (Adhesion& a : lattice_candidates(low, high, p.candidate_spacing_um, placement, in_cell))
+      candidates.push_back(std::move(a));
+  }
+  return inside(cell, candidates);  // which renews the ids
+}
+
+void require_candidates(const Inputs& in, const Cell& cell) {
+  if (!cell.adhesions.empty()) return;
+  if (in.source == AdhesionSource::pattern)
+    throw InputError(in.drawn.adhesion_mask->name, "a pattern beneath the cell", "none of it inside the outline",
+                     "does the mask lie on these images? Check candidate_spacing_um (" +
+                         images::in_um(in.parameters.candidates.candidate_spacing_um) + ")");
+  throw InputError(in.actin ? in.actin->name : in.adhesion->name, "places for adhesions in the cell",
+                   in.source == AdhesionSource::fibre_ends ? "no fibre, at whose ends they could be" : "none",
+                   "give an adhesion image or an adhesion mask, or set adhesions = cell");
+}
+
+/// As tied() for each, but a fibre has the same id wherever the candidates are: that of its place among the traced
+/// ones, the longest first.
+std::vector<Fibre> tied_one_by_one(std::vector<TracedFibre> traced, const Cell& cell, const CellOutline& outline,
+                                   const Inputs& in) {
+  const FibreParameters& p = in.parameters.fibres;
+  std::ranges::stable_sort(traced, std::greater(), [](const TracedFibre& t) { return length_um(t.fibre.points_um); });
+  std::vector<Fibre> fibres;
+  for (std::size_t i = 0; i < traced.size(); ++i) {
+    const EndsToTie held = ends_to_hold(in, outline, traced[i]);
+    Fibre& fibre = traced[i].fibre;
+    lead_on(traced[i], cell.adhesions, cell.outline_um, p.fibre_reach_um);
+    tie_ends(fibre, cell.adhesions, cell.outline_um, p.fibre_reach_um, held);
+    lead_to_cut(fibre, cuts_of(cell), p.fibre_reach_um);
+    if (length_um(fibre.points_um) < p.fibre_shortest_um) continue;
+    if (in.source != AdhesionSource::pattern) {
+      fibre.type_confidence = std::min(fibre.type_confidence, 0.5);
+      fibre.type_reason += held.start && held.end   ? "; candidates were put at its ends"
+                           : held.start || held.end ? "; an end inside the cell, pointing away from the edge, is free"
+                                                    : "; along the edge and bulging towards it: held nowhere";
+    }
+    fibre.fibre_id = static_cast<int>(i) + 1;
+    fibres.push_back(std::move(fibre));
+  }
+  return fibres;
+}
+
+/// The cell's adhesions and its fibres, tied to them.
+void hold(Cell& cell, std::vector<Adhesion> adhesions, Lines lines, const CellOutline& outline, const Inputs& in) {
+  const SegmentParameters& p = in.parameters;
+  cell.adhesions = std::move(adhesions);
+  if (lines.are_drawn) {
+    HeldFibres held = hold_fibres(std::move(lines.drawn), cell.adhesions, outline, p.fibres,
+                                  p.candidates.anchor_area_um2, cuts_of(cell));
+    cell.fibres = std::move(held.fibres);
+    cell.adhesions.insert(cell.adhesions.end(), held.anchors.begin(), held.anchors.end());
+  } else if (in.source == AdhesionSource::image) {
+    cell.fibres = tied(std::move(lines.traced), cell.adhesions, cell.outline_um, p.fibres, cuts_of(cell));
+    if (!cell.adhesions.empty())
+      hold_far_ends(cell.fibres, cell.adhesions, cell.outline_um, cuts_of(cell), p.candidates.anchor_area_um2);
+  } else {
+    cell.fibres = tied_one_by_one(std::move(lines.traced), cell, outline, in);
+  }
+  for (Adhesion& a : cell.adhesions) a.edge_distance_um = distance_to_edge_um(cell, a.position_um);
+}
+
+/// Inputs that others took the place of.
+std::vector<std::string> unused_in(const Inputs& in) {
+  const HandDrawn& d = in.drawn;
+  std::vector<std::string> unused;
+  const auto add = [&](const std::string& name, const std::string& why) {
+    unused.push_back(name + " is not used: " + why + ".");
+  };
+  if (d.outline && d.outline_mask) add(d.outline_mask->name, "the outline of " + d.outline->name + " counts");
+  const bool is_seen = in.source == AdhesionSource::image;
+  const std::string as_told = "adhesions = " + std::string(name_of(in.source));
+  if (is_seen && d.adhesions && d.adhesion_mask)
+    add(d.adhesion_mask->name, "the adhesions of " + d.adhesions->name + " count");
+  if (!is_seen && d.adhesions) add(d.adhesions->name, as_told);
+  if (!is_seen && in.source != AdhesionSource::pattern && d.adhesion_mask) add(d.adhesion_mask->name, as_told);
+  return unused;
+}
+
+Inputs inputs_of(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
+                 const SegmentParameters& p, const HandDrawn& drawn) {
+  if (!adhesion && !actin) throw UsageError("an adhesion image or an actin image is needed, best both");
+  if (drawn.fibres && p.cell == 0)
+    throw UsageError("fibres drawn by hand belong to one cell: choose it (cell), not all of them (cell = 0)");
+  const images::Channel &first = adhesion ? *adhesion : *actin, &second = actin ? *actin : *adhesion;
+  images::require_equal_sizes(first, second);
+  const double pixel_um = images::common_pixel_size_um(first, second, p.pixel_size_um);
+  Inputs in{adhesion, actin, p, drawn, {first.image.width, first.image.height, pixel_um}};
+  in.source =
+      source_of(p.candidates, adhesion || drawn.adhesions || drawn.adhesion_mask, drawn.adhesion_mask != nullptr);
+  for (const auto& mask : {drawn.outline_mask, drawn.adhesion_mask})
+    if (mask) require_size(*mask, in.field);
+  if (in.source == AdhesionSource::pattern) require_upright_pattern(*drawn.adhesion_mask);
+  return in;
+}
+
+Segmentation segment_one(const Inputs& in, const CellOutline& outline, const std::vector<Adhesion>& found,
+                         int n_cells) {
+  const SegmentParameters& p = in.parameters;
+  Segmentation s{.cell = {{}, {}, outline.outer_um, outline.holes_um, outline.is_cut},
+                 .pixel_size_um = in.field.pixel_um,
+                 .n_cells = n_cells,
+                 .area_um2 = outline.area_um2,
+                 .is_cut_by_border = outline.is_cut_by_border(),
+                 .source = in.source};
+  if (!s.is_cut_by_border) s.cell.is_cut.clear();
+  const bool is_given = in.drawn.outline || in.drawn.outline_mask;
+  Lines lines{.traced = {}, .drawn = {}, .are_drawn = in.drawn.fibres.has_value()};
+  if (in.drawn.fibres)
+    lines.drawn = drawn_lines(*in.drawn.fibres, in.actin, in.field, p.fibres);
+  else if (in.actin) {
+    TracedLines traced = trace_fibres(in.actin->image, s.cell.outline_um, in.field.pixel_um, p.fibres);
+    lines.traced = std::move(traced.fibres);
+    s.unexplained_um = std::move(traced.unexplained_um);
+  }
+  CellOutline around = outline;
+  if (in.source == AdhesionSource::image) {
+    if (in.adhesion && !is_given) align(s, around, lines.traced, found, p);
+    std::vector<Adhesion> own = inside(around, found);
+    s.n_adhesions_outside = static_cast<int>(found.size() - own.size());
+    if (!found.empty() && own.empty() && p.cell != 0)
+      throw InputError(name_of_adhesions(in), "adhesions inside the cell's outline",
+                       std::to_string(found.size()) + " outside and none inside",
+                       "do both channels show the same cell at the same place?");
+    hold(s.cell, std::move(own), std::move(lines), around, in);
+  } else {
+    if (in.source != AdhesionSource::fibre_ends) {
+      s.second = s.cell;
+      hold(*s.second, candidates_in(in, around, lines, Placement::second), lines, around, in);
+    }
+    std::vector<Adhesion> candidates = candidates_in(in, around, lines, Placement::first);
+    hold(s.cell, std::move(candidates), std::move(lines), around, in);
+    require_candidates(in, s.cell);
+    if (in.source == AdhesionSource::pattern)
+      s.pattern_beneath = share_beneath(*in.drawn.adhesion_mask, around, in.field);
+  }
+  s.n_anchors = static_cast<int>(std::ranges::count(s.cell.adhesions, AdhesionOrigin::anchor, &Adhesion::origin));
+  s.unused = unused_in(in);
+  return s;
+}
+
+}  // namespace
+
+std::vector<Segmentation> segment_cells(const std::optional<images::Channel>& adhesion,
+                                        const std::optional<images::Channel>& actin, const SegmentParameters& p,
+                                        const HandDrawn& drawn) {
+  const Inputs in = inputs_of(adhesion, actin, p, drawn);
+  const std::vector<Adhesion> found = seen_adhesions(in);
+  const Outlines outlines = outlines_in(in, found);
+  const bool is_given = drawn.outline || drawn.outline_mask;
+  if (actin && is_given && !drawn.fibres) require_content(*actin);  // else the outline has asked for it
+  std::vector<Segmentation> result;
+  for (const CellOutline& outline : outlines.chosen)
+    result.push_back(segment_one(in, outline, found, outlines.n_cells));
+  return result;
+}
+
+Segmentation segment_cell(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
+                          const SegmentParameters& p, const HandDrawn& drawn) {
+  return segment_cells(adhesion, actin, p, drawn).front();
+}
+
+}  // namespace mbtfm::cells

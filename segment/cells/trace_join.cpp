@@ -1,0 +1,221 @@
+#include "segment/cells/trace_join.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <optional>
+#include <tuple>
+
+#include "segment/cells/grid.h"
+
+namespace mbtfm::cells {
+
+namespace {
+
+/// An end of a piece: 2 · piece for its first point, 2 · piece + 1 for its last.
+using End = std::size_t;
+End opposite(End end) { return end ^ 1; }
+
+struct EndPoint {
+  cv::Point2d point, outward;
+  double height = 0;  ///< mean of the last part
+};
+
+std::vector<EndPoint> ends_of(const std::vector<Trace>& traces, double reach_px) {
+  std::vector<EndPoint> ends;
+  for (const Trace& t : traces) {
+    const auto n = static_cast<std::ptrdiff_t>(std::min<double>(static_cast<double>(t.height.size()), 4 * reach_px));
+    const auto mean = [n](auto from) { return std::accumulate(from, from + n, 0.0) / static_cast<double>(n); };
+    ends.push_back({t.points.front(), outward(t.points, LineEnd::first, reach_px), mean(t.height.begin())});
+    ends.push_back({t.points.back(), outward(t.points, LineEnd::last, reach_px), mean(t.height.rbegin())});
+  }
+  return ends;
+}
+
+double angle_between(cv::Point2d a, cv::Point2d b) { return std::atan2(std::abs(a.cross(b)), a.dot(b)); }
+
+/// Is the way from end to end brighter than texture?
+bool is_bright_between(cv::Point2d a, cv::Point2d b, const Ridges& ridges, const TraceRule& rule) {
+  const cv::Point2d way = b - a;
+  const double angle = std::atan2(way.y, way.x), n = std::ceil(std::hypot(way.x, way.y));
+  double over_noise = 0;
+  for (double i = 0; i < n; ++i) {
+    const cv::Point2d p = a + ((i + 0.5) / n) * way;
+    over_noise += ridges.at(p, angle) / std::max<double>(sample(ridges.noise, p), 1e-30) / n;
+  }
+  return over_noise >= rule.follow_noise;
+}
+
+/// How badly two ends fit to one line, the sum of the squares of what separates them in its usual size; nothing where
+/// they do not.
+std::optional<double> mismatch(const EndPoint& a, const EndPoint& b, const Ridges& ridges, const TraceRule& rule) {
+  constexpr double kTurn = 0.14;   // 8°: by as much a fibre turns from the one to the other
+  constexpr double kHeight = 0.5;  // logarithm
+  constexpr double kWorst = 9;
+  const cv::Point2d gap = b.point - a.point;
+  const cv::Point2d course = a.outward - b.outward, along = course / std::max(1e-9, std::hypot(course.x, course.y));
+  const double distance = std::hypot(gap.x, gap.y), overlap = -gap.dot(along);
+  if (distance > rule.join_gap_px || overlap > rule.overlap_px) return std::nullopt;
+  if (std::min(a.height, b.height) < rule.follow_share * std::max(a.height, b.height)) return std::nullopt;
+  const double turn = angle_between(a.outward, -b.outward) / kTurn;
+  const double sideways = std::abs(gap.cross(along)) / (rule.line_radius_px / 2 + (overlap > 0 ? 0 : 0.1 * distance));
+  const double far = 2 * distance / rule.join_gap_px;
+  const double height = std::log(a.height / b.height) / kHeight;
+  const double sum = turn * turn + sideways * sideways + far * far + height * height;
+  if (!(sum <= kWorst)) return std::nullopt;
+  if (overlap < -2 * rule.line_radius_px && !is_bright_between(a.point, b.point, ridges, rule)) return std::nullopt;
+  return sum;
+}
+
+struct Fit {
+  double mismatch;
+  End a, b;
+  bool operator<(const Fit& other) const {
+    return std::tie(mismatch, a, b) < std::tie(other.mismatch, other.a, other.b);
+  }
+};
+
+/// The ends by squares of the image.
+class EndGrid {
+ public:
+  EndGrid(const std::vector<EndPoint>& ends, double side) : side_(side) {
+    for (End e = 0; e < ends.size(); ++e) grid_[square(ends[e].point, 0, 0)].push_back(e);
+  }
+  /// Those in the square of a point and in its neighbours.
+  void add_near(cv::Point2d point, std::vector<End>& near) const {
+    for (int dy = -1; dy <= 1; ++dy)
+      for (int dx = -1; dx <= 1; ++dx) {
+        const auto found = grid_.find(square(point, dx, dy));
+        if (found != grid_.end()) near.insert(near.end(), found->second.begin(), found->second.end());
+      }
+  }
+
+ private:
+  std::pair<int, int> square(cv::Point2d p, int dx, int dy) const {
+    return {static_cast<int>(std::floor(p.x / side_)) + dx, static_cast<int>(std::floor(p.y / side_)) + dy};
+  }
+  double side_;
+  std::map<std::pair<int, int>, std::vector<End>> grid_;
+};
+
+/// All pairs of ends that fit, the best first.
+std::vector<Fit> fits_of(const std::vector<EndPoint>& ends, const Ridges& ridges, const TraceRule& rule) {
+  const EndGrid grid(ends, std::max(1.0, rule.join_gap_px));
+  std::vector<Fit> fits;
+  for (End a = 0; a < ends.size(); ++a) {
+    std::vector<End> near;
+    grid.add_near(ends[a].point, near);
+    for (const End b : near)
+      if (a < b && b != opposite(a))
+        if (const auto m = mismatch(ends[a], ends[b], ridges, rule)) fits.push_back({*m, a, b});
+  }
+  std::sort(fits.begin(), fits.end());
+  return fits;
+}
+
+/// The end that each end is joined to.
+std::vector<std::optional<End>> links_of(const std::vector<Fit>& fits, std::size_t n_traces) {
+  std::vector<std::optional<End>> link(2 * n_traces);
+  std::vector<std::size_t> line(n_traces);
+  std::iota(line.begin(), line.end(), std::size_t{0});
+  const auto line_of = [&](std::size_t piece) {
+    while (line[piece] != piece) piece = line[piece] = line[line[piece]];
+    return piece;
+  };
+  for (const Fit& fit : fits) {
+    const std::size_t a = line_of(fit.a / 2), b = line_of(fit.b / 2);
+    if (link[fit.a] || link[fit.b] || a == b) continue;
+    link[fit.a] = fit.b;
+    link[fit.b] = fit.a;
+    line[std::max(a, b)] = std::min(a, b);
+  }
+  return link;
+}
+
+/// Add the next piece of the line. Ends that lie beside each other, of one line traced twice, each give half of what
+/// both have.
+void append(Trace& line, Trace piece) {
+  if (line.size() == 0) {
+    line = std::move(piece);
+    return;
+  }
+  constexpr double kCourse_px = 10;
+  const cv::Point2d beyond = line.points.back() - piece.points.front();
+  const double half = beyond.dot(outward(line.points, LineEnd::last, kCourse_px)) / 2;
+  const double most = static_cast<double>(std::min(line.size(), piece.size())) / 2;
+  const auto n = static_cast<std::size_t>(std::clamp(half, 0.0, most));
+  line = line.part(0, line.size() - n);
+  line.append(piece.part(n, piece.size()));
+}
+
+/// Where the ends of others lie on a piece: the points to cut it at.
+std::vector<std::size_t> cuts_of(const std::vector<Trace>& traces, std::size_t piece, const std::vector<EndPoint>& ends,
+                                 const std::vector<End>& near, const TraceRule& rule) {
+  constexpr double kAlong = 0.5;  // cosine of 60°: what ends at a steeper angle is no part of this line
+  const Trace& trace = traces[piece];
+  const auto margin = static_cast<std::size_t>(2 * rule.line_radius_px) + 2;
+  std::vector<std::size_t> cuts;
+  if (trace.points.size() <= 2 * margin) return cuts;
+  for (const End end : near) {
+    if (end / 2 == piece) continue;
+    double least = 2 * rule.line_radius_px;
+    std::size_t at = 0;
+    for (std::size_t i = margin; i + margin < trace.points.size(); ++i) {
+      const cv::Point2d d = trace.points[i] - ends[end].point;
+      if (std::hypot(d.x, d.y) < least) least = std::hypot(d.x, d.y), at = i;
+    }
+    if (at == 0) continue;
+    const cv::Point2d along = trace.points[at + 2] - trace.points[at - 2];
+    if (std::abs(along.dot(ends[end].outward)) < kAlong * std::hypot(along.x, along.y)) continue;
+    cuts.push_back(at);
+  }
+  std::sort(cuts.begin(), cuts.end());
+  return cuts;
+}
+
+std::vector<Trace> cut_at_junctions(const std::vector<Trace>& traces, const TraceRule& rule) {
+  constexpr std::size_t kShortest = 3;  // points
+  const auto ends = ends_of(traces, rule.course_px);
+  const EndGrid grid(ends, std::max(1.0, 2 * rule.line_radius_px));
+  std::vector<Trace> pieces;
+  for (std::size_t i = 0; i < traces.size(); ++i) {
+    std::vector<End> near;
+    for (const cv::Point2d& p : traces[i].points) grid.add_near(p, near);
+    std::sort(near.begin(), near.end());
+    near.erase(std::unique(near.begin(), near.end()), near.end());
+    auto cuts = cuts_of(traces, i, ends, near, rule);
+    cuts.push_back(traces[i].points.size());
+    std::size_t from = 0;
+    for (const std::size_t to : cuts) {
+      if (to - from < kShortest) continue;
+      pieces.push_back(traces[i].part(from, to));
+      from = to;
+    }
+  }
+  return pieces;
+}
+
+}  // namespace
+
+std::vector<Trace> joined(std::vector<Trace> traces, const Ridges& ridges, const TraceRule& rule) {
+  traces = cut_at_junctions(traces, rule);
+  const auto ends = ends_of(traces, rule.course_px);
+  const auto link = links_of(fits_of(ends, ridges, rule), traces.size());
+  std::vector<bool> is_used(traces.size());
+  std::vector<Trace> result;
+  for (End start = 0; start < link.size(); ++start) {
+    if (link[start] || is_used[start / 2]) continue;  // begin at a free end
+    Trace line;
+    for (std::optional<End> entry = start; entry; entry = link[opposite(*entry)]) {
+      is_used[*entry / 2] = true;
+      Trace& piece = traces[*entry / 2];
+      if (*entry % 2 == 1) piece.reverse();
+      append(line, std::move(piece));
+    }
+    result.push_back(std::move(line));
+  }
+  return result;
+}
+
+}  // namespace mbtfm::cells

@@ -1,0 +1,40 @@
+/// Images that belong together.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "pipeline/contract/findings.h"
+#include "pipeline/stage/plausible.h"
+#include "segment/images/image.h"
+
+namespace mbtfm::images {
+
+/// An image and the name by which errors call it.
+struct Channel {
+  std::string name;
+  Image image;
+};
+
+/// "0.1 um", for messages.
+std::string in_um(double length_um);
+
+/// @throws InputError where the two are not of one size
+void require_equal_sizes(const Channel& first, const Channel& second);
+
+/// The pixel size of two images of one field: the one given, or else the calibration that they have.
+/// @throws InputError where neither tells it, or they contradict each other
+double common_pixel_size_um(const Channel& first, const Channel& second, std::optional<double> given_um);
+
+/// A finding where the image is a JPEG.
+std::optional<Finding> noticed_loss(const Channel& channel);
+/// Share of the pixels that have the image's largest value: one or two of a picture that is not saturated.
+double share_at_brightest(const Image& image);
+/// A finding where the detector was saturated.
+std::optional<Finding> noticed_saturation(const Channel& channel);
+
+/// Where the pixel size given is not that of the image's own calibration. Both are of the image as it is, binned or
+/// not.
+std::optional<stage::Doubt> doubt_about_calibration(const Channel& channel, std::optional<double> given_um);
+
+}  // namespace mbtfm::images

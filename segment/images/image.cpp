@@ -1,0 +1,156 @@
+#include "segment/images/image.h"
+
+#include <array>
+#include <fstream>
+#include <string>
+#include <string_view>
+#include <system_error>
+
+#include "pipeline/contract/errors.h"
+#include "segment/images/image_file.h"
+#include "segment/images/stack.h"
+
+namespace mbtfm::images {
+namespace {
+
+constexpr const char* kExpected = "a TIFF, PNG or JPEG image";
+
+struct Signature {
+  std::string_view bytes;
+  std::string_view name;
+};
+using namespace std::string_view_literals;
+constexpr Signature kForeignFormats[] = {{"GIF8"sv, "a GIF image"},
+                                         {"BM"sv, "a BMP image"},
+                                         {"PK\x03\x04"sv, "a zip archive"},
+                                         {"ZISRAWFILE"sv, "a Zeiss CZI file"},
+                                         {"\x70\x00\x00\x00"sv, "a Leica LIF file"},
+                                         {"\xDA\xCE\xBE\x0A"sv, "a Nikon ND2 file"},
+                                         {"\x00\x00\x00\x0CjP  "sv, "a JPEG 2000 image"},
+                                         {"\x89HDF"sv, "an HDF5 file"},
+                                         {"\x1F\x8B"sv, "a gzip archive"},
+                                         {"\xD0\xCF\x11\xE0"sv, "an Olympus OIB or Microsoft file"}};
+
+bool is_tiff(std::string_view head) {
+  return head.starts_with("II\x2A\x00"sv) || head.starts_with("MM\x00\x2A"sv) || head.starts_with("II\x2B\x00"sv) ||
+         head.starts_with("MM\x00\x2B"sv);
+}
+
+std::string head_of(const std::filesystem::path& file) {
+  std::error_code error;
+  const auto status = std::filesystem::status(file, error);
+  if (!std::filesystem::exists(status)) throw InputError(file.string(), kExpected, "no such file");
+  if (std::filesystem::is_directory(status)) throw InputError(file.string(), kExpected, "a folder");
+  std::ifstream stream(file, std::ios::binary);
+  if (!stream) throw InputError(file.string(), kExpected, "a file that may not be read", "check its permissions");
+  std::array<char, 16> bytes{};
+  stream.read(bytes.data(), bytes.size());
+  return {bytes.data(), static_cast<std::size_t>(stream.gcount())};
+}
+
+}  // namespace
+
+namespace {
+
+constexpr std::uint64_t kAlways_bytes = 1u << 28;
+constexpr std::uint64_t kPacking = 16;  // camera noise keeps real images from packing below a third
+constexpr const char* kTooLarge = "an image of a size that the file's bytes can fill";
+constexpr const char* kDamaged = "the file is probably damaged: copy or export it again";
+
+bool can_fill(const std::filesystem::path& file, std::uint64_t n_bytes) {
+  return n_bytes <= kAlways_bytes || n_bytes / kPacking <= std::filesystem::file_size(file);
+}
+
+std::string in_bytes_of(const std::filesystem::path& file) {
+  return " in " + std::to_string(std::filesystem::file_size(file)) + " bytes";
+}
+
+}  // namespace
+
+void require_plausible_size(const std::filesystem::path& file, std::uint64_t width, std::uint64_t height) {
+  const std::string size = std::to_string(width) + " x " + std::to_string(height) + " pixels";
+  if (width == 0 || height == 0) throw InputError(file.string(), "an image of at least one pixel", size);
+  constexpr std::uint64_t kLongest = 1u << 30;  // so that products of two sides cannot overflow
+  if (width <= kLongest && height <= kLongest && can_fill(file, width * height * sizeof(float))) return;
+  throw InputError(file.string(), kTooLarge, size + in_bytes_of(file), kDamaged);
+}
+
+void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_bytes) {
+  if (can_fill(file, n_bytes)) return;
+  throw InputError(file.string(), kTooLarge, std::to_string(n_bytes) + " of them" + in_bytes_of(file), kDamaged);
+}
+
+void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {
+  choice.prefix = prefix;
+  list.add(prefix + "_channel", choice.channel,
+           "channel of " + image + ": its number, from 1, or name; must be given where the file has several");
+  list.add(prefix + "_z", choice.z, "slice of " + image + ", from 1; max: the maximum projection of all");
+  list.add(prefix + "_time", choice.time, {.low = 1},
+           "frame of " + image + ", from 1; must be given where the file has several");
+  list.add(prefix + "_page", choice.page, {.low = 1},
+           "page of " + image +
+               " as it lies in the file, from 1, instead of channel, z and time; unset: the first of a "
+               "file that does not state its dimensions");
+}
+
+namespace {
+
+void require_one_page(const std::filesystem::path& file, const PlaneChoice& choice, const std::string& kind) {
+  PlaneChoice of_page = choice;
+  of_page.channel.clear();
+  chosen_pages(Stack{.channel_names = {""}, .pages = {0}}, of_page, file.string());
+  if (choice.page.value_or(1) > 1)
+    throw InputError(file.string(), "page " + std::to_string(*choice.page), kind + ", which has only one");
+}
+
+}  // namespace
+
+Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
+  const std::string head = head_of(file);
+  if (choice.page && *choice.page < 1) throw InputError(file.string(), "a page from 1", std::to_string(*choice.page));
+  if (is_tiff(head)) return read_tiff(file, choice);
+  if (head.starts_with("\x89PNG")) {
+    require_one_page(file, choice, "a PNG image");
+    return read_png(file, choice);
+  }
+  if (head.starts_with("\xFF\xD8\xFF")) {
+    require_one_page(file, choice, "a JPEG image");
+    return read_jpeg(file, choice);
+  }
+  for (const Signature& format : kForeignFormats) {
+    if (head.starts_with(format.bytes)) {
+      throw InputError(file.string(), kExpected, std::string(format.name), "export it as 8- or 16-bit TIFF");
+    }
+  }
+  throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
+}
+
+Image binned(Image image, int binning) {
+  MBTFM_ASSERT(binning >= 1);
+  if (binning == 1) return image;
+  Image result{.width = image.width / binning,
+               .height = image.height / binning,
+               .pixels = {},
+               .pixel_size_um = image.pixel_size_um,
+               .full_scale = image.full_scale,
+               .is_lossy = image.is_lossy};
+  if (result.width == 0 || result.height == 0) {
+    throw InvalidData("binning", "blocks that fit into the image",
+                      std::to_string(binning) + " x " + std::to_string(binning) + " pixels of " +
+                          std::to_string(image.width) + " x " + std::to_string(image.height));
+  }
+  if (result.pixel_size_um) *result.pixel_size_um *= binning;
+  result.pixels.reserve(static_cast<std::size_t>(result.width) * result.height);
+  for (int row = 0; row < result.height; ++row) {
+    for (int column = 0; column < result.width; ++column) {
+      double sum = 0;
+      for (int j = 0; j < binning; ++j) {
+        for (int i = 0; i < binning; ++i) sum += image.at(column * binning + i, row * binning + j);
+      }
+      result.pixels.push_back(static_cast<float>(sum / (binning * binning)));
+    }
+  }
+  return result;
+}
+
+}  // namespace mbtfm::images

@@ -1,0 +1,65 @@
+/// Images as microscopes and ImageJ write them.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/stage/parameters.h"
+
+namespace mbtfm::images {
+
+/// A grey image, row by row from the top.
+struct Image {
+  int width = 0;
+  int height = 0;
+  std::vector<float> pixels;
+  std::optional<double> pixel_size_um;  ///< from the file's own calibration
+  double full_scale = 0;                ///< the value at which the detector saturates; 0: none (float)
+  bool is_lossy = false;                ///< as a JPEG is: intensities, and with them positions, are not the camera's
+  float at(int column, int row) const { return pixels[static_cast<std::size_t>(row) * width + column]; }
+  float& at(int column, int row) { return pixels[static_cast<std::size_t>(row) * width + column]; }
+};
+
+inline const std::string kProjection = "max";
+
+/// Which plane of a file is meant.
+struct PlaneChoice {
+  std::string prefix = "image";  ///< of its parameters' names, for hints
+  std::string channel = {};      ///< number from 1, or name; empty: the only one, and of an RGB image the mean
+  std::string z = kProjection;   ///< a slice from 1, or the brightest of all: what stands out is in focus somewhere
+  std::optional<int> time = {};  ///< frame from 1; unset: the only one
+  std::optional<int> page = {};  ///< from 1, as it lies in the file, whatever it shows; unset: by the other three
+};
+/// <prefix>_channel, <prefix>_z, <prefix>_time and <prefix>_page. @param image  "the adhesion image"
+void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);
+
+/// Read a plane of a TIFF (8 or 16 bit, float; any libtiff compression), a PNG or a JPEG.
+///
+/// Dimensions: OME-XML, ImageJ; of a file that states none, page 1. Samples of a pixel that are not red, green and blue
+/// are channels. Calibration: OME PhysicalSizeX, ImageJ unit + resolution, Volocity.
+/// @throws InputError naming the file and what it is instead, and where several channels or frames are there and none
+/// was chosen; reads no more memory than the file can fill
+Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = {});
+/// A page, from 0, as it lies in the file.
+inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
+
+/// The means of blocks of `binning` x `binning` pixels, and the calibration with them; what fills no block at the right
+/// and at the bottom is left out.
+/// @throws InvalidData where not a single block fits
+Image binned(Image image, int binning);
+
+// Of a side in one: beyond it no bead and no adhesion is left.
+inline constexpr int kLargestBinning = 16;
+/// The means of blocks of `binning` x `binning` pixels, with the calibration that follows; what fills no block at the
+/// right and at the bottom is left out.
+/// @throws InvalidData where not a single block fits
+Image binned(Image image, int binning);
+
+/// 16-bit TIFF, deflate, with ImageJ's calibration. Values are rounded and clamped to 0 … 65535.
+/// @throws OutputError
+void write_tiff(const std::filesystem::path& file, const Image& image);
+
+}  // namespace mbtfm::images

@@ -1,0 +1,49 @@
+/// Inside of the image reader: what its TIFF, PNG and JPEG parts share.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "segment/images/image.h"
+
+namespace mbtfm::images {
+
+/// Read a plane of a file that begins as a TIFF. @throws InputError
+Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
+
+/// Read a file that begins as a PNG; of RGB the mean where no channel is chosen. @throws InputError
+Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
+
+/// Read a file that begins as a JPEG, grey or RGB, of which the mean where no channel is chosen. @throws InputError
+Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice);
+
+/// Refuse a size that a damaged header makes up, before memory is taken for it.
+///
+/// Up to 2^26 pixels (256 MiB as float) any file may claim, since an even image packs almost without limit. More than
+/// that needs a sixteenth of the decoded bytes in the file: camera noise keeps real images from packing below a third.
+/// @throws InputError
+void require_plausible_size(const std::filesystem::path& file, std::uint64_t width, std::uint64_t height);
+
+/// The same of the bytes that an image, a block of it or a stack of slices takes once decoded: up to 2^28 always, more
+/// than that a sixteenth of them in the file.
+/// @throws InputError
+void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_bytes);
+
+/// The image's calibration as its TIFF tags tell it.
+struct TiffCalibration {
+  std::string description;                      ///< ImageDescription; empty: none
+  std::optional<double> x_resolution_per_unit;  ///< XResolution
+  std::optional<double> y_resolution_per_unit;  ///< YResolution
+};
+
+/// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons; nothing
+/// where none of them speaks (a resolution without a unit of ImageJ is a printer's) or where pixels are not square.
+std::optional<double> pixel_size_um(const TiffCalibration& calibration);
+
+/// The value of `key=value` at the start of a line; lines end as Unix, DOS or the old Macintosh (Volocity) ends them.
+std::optional<std::string_view> line_value(std::string_view text, std::string_view key);
+
+}  // namespace mbtfm::images

@@ -1,0 +1,169 @@
+#include <cerrno>
+#include <csetjmp>
+#include <cstdio>  // jpeglib.h needs it before
+
+#include <jpeglib.h>
+
+#include <cstring>
+#include <memory>
+#include <vector>
+
+#include "pipeline/contract/errors.h"
+#include "segment/images/image_file.h"
+#include "segment/images/png.h"
+#include "segment/images/stack.h"
+
+namespace mbtfm::images {
+namespace {
+
+/// What libjpeg calls in place of its own exit().
+struct Failure {
+  jpeg_error_mgr manager;
+  std::jmp_buf back;
+  char message[JMSG_LENGTH_MAX] = "";
+};
+
+void fail(j_common_ptr jpeg) {
+  auto* failure = reinterpret_cast<Failure*>(jpeg->err);  // its first member
+  failure->manager.format_message(jpeg, failure->message);
+  std::longjmp(failure->back, 1);
+}
+
+bool write_all(jpeg_compress_struct& jpeg, Failure& failure, std::FILE* stream, const Picture& picture) {
+  if (setjmp(failure.back)) return false;
+  jpeg_create_compress(&jpeg);
+  jpeg_stdio_dest(&jpeg, stream);
+  jpeg.image_width = static_cast<JDIMENSION>(picture.width);
+  jpeg.image_height = static_cast<JDIMENSION>(picture.height);
+  jpeg.input_components = 3;
+  jpeg.in_color_space = JCS_RGB;
+  jpeg_set_defaults(&jpeg);
+  // the last quality at which fibres of one pixel's width show no blocks; twice the bytes at 90
+  jpeg_set_quality(&jpeg, 80, TRUE);
+  jpeg_start_compress(&jpeg, TRUE);
+  while (jpeg.next_scanline < jpeg.image_height) {
+    auto* row = const_cast<JSAMPLE*>(picture.rgb.data() + std::size_t{3} * jpeg.next_scanline * jpeg.image_width);
+    jpeg_write_scanlines(&jpeg, &row, 1);
+  }
+  jpeg_finish_compress(&jpeg);
+  return true;
+}
+
+struct FileCloser {
+  void operator()(std::FILE* stream) const { std::fclose(stream); }
+};
+using FileHandle = std::unique_ptr<std::FILE, FileCloser>;
+
+/// Data that end early or contradict themselves: libjpeg would go on, with grey for what it has not.
+void fail_on_damage(j_common_ptr jpeg, int level) {
+  if (level < 0) fail(jpeg);
+}
+
+/// A progressive image may pass over all its pixels again and again, in a file of some bytes. Encoders make some ten
+/// passes.
+void limit_passes(j_common_ptr jpeg) {
+  constexpr int kMost = 100;
+  auto* failure = reinterpret_cast<Failure*>(jpeg->err);
+  if (reinterpret_cast<j_decompress_ptr>(jpeg)->input_scan_number <= kMost) return;
+  std::snprintf(failure->message, sizeof failure->message, "more than %d passes", kMost);
+  std::longjmp(failure->back, 1);
+}
+
+/// libjpeg's state; everything that a longjmp must not skip lives here, outside of the functions that jump.
+struct Reading {
+  Failure failure{};
+  jpeg_progress_mgr progress{};
+  jpeg_decompress_struct jpeg{};
+  std::vector<JSAMPLE> bytes;
+  Reading() {
+    jpeg.err = jpeg_std_error(&failure.manager);
+    failure.manager.error_exit = fail;
+    failure.manager.emit_message = fail_on_damage;
+    progress.progress_monitor = limit_passes;
+  }
+  Reading(const Reading&) = delete;
+  ~Reading() { jpeg_destroy_decompress(&jpeg); }
+};
+
+bool read_header(Reading& r, std::FILE* stream) {
+  if (setjmp(r.failure.back)) return false;
+  jpeg_create_decompress(&r.jpeg);
+  r.jpeg.progress = &r.progress;
+  jpeg_stdio_src(&r.jpeg, stream);
+  jpeg_read_header(&r.jpeg, TRUE);
+  return true;
+}
+
+bool read_rows(Reading& r) {
+  if (setjmp(r.failure.back)) return false;
+  jpeg_start_decompress(&r.jpeg);
+  const std::size_t row_bytes = static_cast<std::size_t>(r.jpeg.output_width) * r.jpeg.output_components;
+  while (r.jpeg.output_scanline < r.jpeg.output_height) {
+    JSAMPLE* row = r.bytes.data() + r.jpeg.output_scanline * row_bytes;
+    jpeg_read_scanlines(&r.jpeg, &row, 1);
+  }
+  jpeg_finish_decompress(&r.jpeg);
+  return true;
+}
+
+/// The mean of `n_colours` samples of each pixel from `first` on.
+Image to_image(const Reading& r, int n_channels, int first, int n_colours) {
+  Image image;
+  image.width = static_cast<int>(r.jpeg.image_width);
+  image.height = static_cast<int>(r.jpeg.image_height);
+  image.full_scale = 255;
+  image.is_lossy = true;
+  image.pixels.resize(static_cast<std::size_t>(image.width) * image.height);
+  for (std::size_t k = 0; k < image.pixels.size(); ++k) {
+    float sum = 0;
+    for (int c = first; c < first + n_colours; ++c) sum += r.bytes[k * n_channels + c];
+    image.pixels[k] = sum / static_cast<float>(n_colours);
+  }
+  return image;
+}
+
+}  // namespace
+
+Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice) {
+  const FileHandle stream(std::fopen(file.c_str(), "rb"));
+  if (!stream) throw InputError(file.string(), "a readable JPEG image", "a file that cannot be opened");
+  Reading r;
+  const auto expect = [&](bool is_read) {
+    if (is_read) return;
+    throw InputError(file.string(), "a whole JPEG image", r.failure.message[0] ? r.failure.message : "damaged data",
+                     "the file may be truncated or damaged: copy or export it again");
+  };
+  expect(read_header(r, stream.get()));
+  const J_COLOR_SPACE kind = r.jpeg.jpeg_color_space;
+  if (kind != JCS_GRAYSCALE && kind != JCS_YCbCr && kind != JCS_RGB) {
+    throw InputError(file.string(), "a grey or RGB image", "a JPEG image in the colours of a printer",
+                     "export it as 8- or 16-bit TIFF");
+  }
+  const bool is_rgb = kind != JCS_GRAYSCALE;
+  r.jpeg.out_color_space = is_rgb ? JCS_RGB : JCS_GRAYSCALE;
+  const int n_channels = is_rgb ? 3 : 1;
+  require_plausible_size(file, r.jpeg.image_width, r.jpeg.image_height);
+  const std::size_t n_bytes = static_cast<std::size_t>(r.jpeg.image_width) * r.jpeg.image_height * n_channels;
+  require_plausible_bytes(file, n_bytes);
+  r.bytes.resize(n_bytes);
+  const bool is_mean = is_rgb && choice.channel.empty();
+  const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};
+  const int first = is_mean ? 0 : chosen_channel(names, choice, file.string());
+  expect(read_rows(r));
+  return to_image(r, n_channels, first, is_mean ? 3 : 1);
+}
+
+void write_jpeg(const std::filesystem::path& file, const Picture& picture) {
+  std::FILE* stream = std::fopen(file.c_str(), "wb");
+  if (!stream) throw OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
+  Failure failure{};
+  jpeg_compress_struct jpeg{};
+  jpeg.err = jpeg_std_error(&failure.manager);
+  failure.manager.error_exit = fail;
+  bool is_written = write_all(jpeg, failure, stream, picture);
+  jpeg_destroy_compress(&jpeg);
+  is_written = std::fclose(stream) == 0 && is_written;  // a full disk shows here at the latest
+  if (!is_written) throw OutputError(file.string() + ": cannot be written: " + failure.message);
+}
+
+}  // namespace mbtfm::images

@@ -1,0 +1,203 @@
+#include "segment/images/stack.h"
+
+#include <algorithm>
+#include <charconv>
+#include <set>
+
+#include "pipeline/contract/errors.h"
+#include "segment/images/image_file.h"
+#include "segment/images/ome.h"
+
+namespace mbtfm::images {
+namespace {
+
+std::optional<int> whole_number(std::string_view text) {
+  int value = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
+  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
+  return value;
+}
+
+constexpr long long kMostPlanes = 1 << 22;  // beyond any file's; keeps a damaged count from taking memory
+
+/// The planes' numbers in the order in which a file stores them.
+std::vector<int> stored_order(const Stack& s, const std::string& order) {
+  // the dimensions from the fastest: their sizes, and how far a step of them moves in the plane's number
+  std::vector<int> sizes, steps;
+  for (const char axis : order.substr(2)) {
+    sizes.push_back(axis == 'C' ? s.n_channels : axis == 'Z' ? s.n_slices : s.n_frames);
+    steps.push_back(axis == 'C' ? 1 : axis == 'Z' ? s.n_channels : s.n_channels * s.n_slices);
+  }
+  std::vector<int> planes;
+  for (int k = 0; k < sizes[2]; ++k)
+    for (int j = 0; j < sizes[1]; ++j)
+      for (int i = 0; i < sizes[0]; ++i) planes.push_back(i * steps[0] + j * steps[1] + k * steps[2]);
+  return planes;
+}
+
+void require_plausible_dimensions(const Stack& s) {
+  const long long n = static_cast<long long>(s.n_channels) * s.n_slices;
+  if (n <= kMostPlanes && n * s.n_frames <= kMostPlanes) return;
+  throw InvalidData("the image's dimensions", "at most " + std::to_string(kMostPlanes) + " planes",
+                    std::to_string(s.n_channels) + " channels, " + std::to_string(s.n_slices) + " slices, " +
+                        std::to_string(s.n_frames) + " frames");
+}
+
+Stack stack_of_ome(const OmeImage& ome, const std::string& file_name) {
+  Stack s{.n_channels = ome.n_channels,
+          .n_slices = ome.n_slices,
+          .n_frames = ome.n_frames,
+          .channel_names = ome.channel_names,
+          .pages = {}};
+  s.channel_names.resize(static_cast<std::size_t>(s.n_channels));
+  require_plausible_dimensions(s);
+  std::string axes = ome.order;
+  std::sort(axes.begin(), axes.end());
+  if (axes != "CTXYZ" || !ome.order.starts_with("XY"))
+    throw InvalidData("OME-XML", "DimensionOrder of X, Y and C, Z, T", "'" + ome.order + "'");
+  const std::vector<int> planes = stored_order(s, ome.order);
+  s.pages.assign(planes.size(), std::nullopt);
+  if (ome.pages.empty()) {
+    for (std::size_t i = 0; i < planes.size(); ++i) s.pages[planes[i]] = static_cast<int>(i);
+    return s;
+  }
+  std::vector<std::size_t> place_of(planes.size());  // of a plane in the order stored
+  for (std::size_t i = 0; i < planes.size(); ++i) place_of[planes[i]] = i;
+  std::size_t n_assigned = 0;
+  for (const OmePages& p : ome.pages) {
+    const bool is_here =
+        (p.uuid.empty() && p.file_name.empty()) || (!p.uuid.empty() && p.uuid == ome.uuid) || p.file_name == file_name;
+    if (!is_here) continue;
+    if (p.first_channel >= s.n_channels || p.first_slice >= s.n_slices || p.first_frame >= s.n_frames)
+      throw InvalidData("OME-XML", "TiffData of a plane that is there", "one beyond the dimensions");
+    const int first = (p.first_frame * s.n_slices + p.first_slice) * s.n_channels + p.first_channel;
+    int page = p.first_page;
+    std::size_t at = place_of[first];
+    for (int n = 0; at < planes.size() && (!p.n_planes || n < *p.n_planes); ++n) {
+      // a plane may be told of twice; a damaged file tells of all of them over and over
+      if (++n_assigned > 2 * planes.size())
+        throw InvalidData("OME-XML", "TiffData that tell of each plane once", "the same planes over and over");
+      s.pages[planes[at++]] = page++;
+    }
+  }
+  return s;
+}
+
+/// Channels run fastest, then slices (ij.io.FileSaver). Without dimensions a stack's images are slices, as ImageJ takes
+/// them.
+std::optional<Stack> stack_of_imagej(const std::string& description) {
+  const auto count = [&](const char* key) {
+    const auto text = line_value(description, key);
+    const auto n = text ? whole_number(*text) : std::optional(1);
+    if (!n || *n < 1)
+      throw InvalidData("ImageJ's description", "a number >= 1 of " + std::string(key), "'" + std::string(*text) + "'");
+    return *n;
+  };
+  Stack s{.n_channels = count("channels"),
+          .n_slices = count("slices"),
+          .n_frames = count("frames"),
+          .channel_names = {},
+          .pages = {}};
+  const int n_images = count("images");
+  require_plausible_dimensions(s);
+  int n = s.n_channels * s.n_slices * s.n_frames;
+  if (n == 1) n = s.n_slices = n_images;
+  require_plausible_dimensions(s);
+  if (n != n_images) {
+    throw InvalidData("ImageJ's description", "images to be channels x slices x frames = " + std::to_string(n),
+                      std::to_string(n_images));
+  }
+  if (n == 1) return std::nullopt;
+  s.channel_names.resize(static_cast<std::size_t>(s.n_channels));
+  s.pages.resize(static_cast<std::size_t>(n));
+  for (int i = 0; i < n; ++i) s.pages[i] = i;
+  return s;
+}
+
+std::string listed(const std::vector<std::string>& names) {
+  std::string list = std::to_string(names.size()) + " channel" + (names.size() == 1 ? "" : "s");
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    list += (i == 0 ? ": " : ", ") + std::to_string(i + 1);
+    if (!names[i].empty()) list += " '" + names[i] + "'";
+  }
+  return list;
+}
+
+std::string lower(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return text;
+}
+
+int chosen_frame(const Stack& s, const PlaneChoice& choice, const std::string& file) {
+  const std::string hint = "set " + choice.prefix + "_time to a number from 1 to " + std::to_string(s.n_frames);
+  const std::string found = std::to_string(s.n_frames) + " frame" + (s.n_frames == 1 ? "" : "s");
+  if (!choice.time && s.n_frames > 1) throw InputError(file, "the frame to be chosen", found, hint);
+  const int frame = choice.time.value_or(1);
+  if (frame > s.n_frames) throw InputError(file, "frame " + std::to_string(frame), found, hint);
+  return frame - 1;
+}
+
+}  // namespace
+
+std::optional<Stack> stack_of(const std::string& description, const std::string& file_name) {
+  if (is_ome(description)) {
+    const OmeImage ome = parse_ome(description);
+    if (ome.companion.empty()) return stack_of_ome(ome, file_name);
+    throw InvalidData("OME-XML", "the dimensions in the file itself", "a reference to " + ome.companion);
+  }
+  if (description.starts_with("ImageJ=")) return stack_of_imagej(description);
+  return std::nullopt;
+}
+
+int n_imagej_images(const std::string& description) {
+  if (!description.starts_with("ImageJ=")) return 1;
+  return std::max(1, whole_number(line_value(description, "images").value_or("1")).value_or(1));
+}
+
+int chosen_channel(const std::vector<std::string>& names, const PlaneChoice& choice, const std::string& file) {
+  const std::string& wanted = choice.channel;
+  const std::string hint = "set " + choice.prefix + "_channel to the number or name of one";
+  if (wanted.empty()) {
+    if (names.size() == 1) return 0;
+    throw InputError(file, "the channel to be chosen", listed(names), hint);
+  }
+  for (const bool is_exact : {true, false}) {
+    const auto is_it = [&](const std::string& name) {
+      return !name.empty() && (is_exact ? name == wanted : lower(name) == lower(wanted));
+    };
+    if (std::count_if(names.begin(), names.end(), is_it) == 1)
+      return static_cast<int>(std::find_if(names.begin(), names.end(), is_it) - names.begin());
+  }
+  const auto number = whole_number(wanted);
+  if (number && *number >= 1 && *number <= static_cast<int>(names.size())) return *number - 1;
+  throw InputError(file, "channel '" + wanted + "'", listed(names), hint);
+}
+
+std::vector<int> chosen_pages(const Stack& s, const PlaneChoice& choice, const std::string& file) {
+  const int channel = chosen_channel(s.channel_names, choice, file), frame = chosen_frame(s, choice, file);
+  int low = 0, high = s.n_slices;
+  if (choice.z != kProjection) {
+    const auto slice = whole_number(choice.z);
+    if (!slice || *slice < 1 || *slice > s.n_slices) {
+      throw InputError(file, "slice '" + choice.z + "'",
+                       std::to_string(s.n_slices) + " slice" + (s.n_slices == 1 ? "" : "s"),
+                       "set " + choice.prefix + "_z to a number from 1, or to max for the maximum projection");
+    }
+    low = *slice - 1;
+    high = *slice;
+  }
+  std::vector<int> pages;
+  for (int slice = low; slice < high; ++slice) {
+    const auto page = s.pages[(frame * s.n_slices + slice) * s.n_channels + channel];
+    if (!page) {
+      throw InputError(file, "all planes of an OME-TIFF in one file", "this one in another file of the set",
+                       "give the file that holds it, or export the image as one file");
+    }
+    pages.push_back(*page);
+  }
+  if (std::set(pages.begin(), pages.end()).size() != pages.size())
+    throw InputError(file, "a page of its own for each slice", "the same page for several");
+  return pages;
+}
+
+}  // namespace mbtfm::images

@@ -1,0 +1,375 @@
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <string>
+
+#include "pipeline/contract/errors.h"
+#include "segment/images/image_file.h"
+#include "segment/images/stack.h"
+#include "segment/images/tiff_handle.h"
+
+namespace mbtfm::images {
+namespace {
+
+/// How the samples of a page are laid out.
+struct Layout {
+  std::uint32_t width = 0;
+  std::uint32_t height = 0;
+  std::uint16_t bits = 1;
+  std::uint16_t format = SAMPLEFORMAT_UINT;
+  std::uint16_t samples = 1;     ///< by pixel, alpha included
+  std::uint16_t n_channels = 1;  ///< of them: alpha is none, red, green and blue are three
+  std::uint16_t first = 0;       ///< of those whose mean is the grey value
+  std::uint16_t colours = 1;     ///< how many: 1, or 3 for RGB
+  bool is_rgb = false;
+  bool is_planar = false;
+  bool is_inverted = false;  ///< 0 is white
+};
+
+class Reader {
+ public:
+  explicit Reader(const std::filesystem::path& file) : file_(file), tiff_(open_tiff(file, "r", messages_)) {
+    if (!tiff_ || !messages_.first_error.empty()) fail("a whole TIFF image");
+    of_first_page_ = calibration();
+    calibration_ = pixel_size_um(of_first_page_);
+  }
+
+  Image read(const PlaneChoice& choice) {
+    if (choice.page) return read_page(*choice.page - 1, choice);
+    const Stack stack = dimensions(choice).value_or(Stack{.channel_names = {""}, .pages = {0}});
+    // channels are pages, or else the samples of each pixel
+    PlaneChoice of_stack = choice, of_page = choice;
+    (stack.n_channels > 1 ? of_page : of_stack).channel.clear();
+    const std::vector<int> pages = chosen_pages(stack, of_stack, file_.string());
+    Image image = read_page(pages.front(), of_page);
+    require_plausible_bytes(file_, pages.size() * image.pixels.size() * std::max(1, layout_.bits / 8));
+    for (std::size_t i = 1; i < pages.size(); ++i) project(image, read_page(pages[i], of_page));
+    return image;
+  }
+
+ private:
+  /// What the description says of channels, slices and frames; nothing of a file of one image.
+  std::optional<Stack> dimensions(const PlaneChoice& choice) {
+    try {
+      return stack_of(of_first_page_.description, file_.filename().string());
+    } catch (const InvalidData& error) {
+      if (n_pages() == 1 && n_imagej_images(of_first_page_.description) == 1) return std::nullopt;
+      throw InputError(file_.string() + ": " + error.element, error.expected, error.found,
+                       "set " + choice.prefix + "_page to the page that is meant");
+    }
+  }
+
+  int n_pages() {
+    const auto n = static_cast<int>(TIFFNumberOfDirectories(tiff_.get()));
+    messages_.first_error.clear();  // of a damaged chain of pages: it counts as far as it goes
+    return n;
+  }
+
+  void project(Image& image, const Image& slice) const {
+    if (slice.width != image.width || slice.height != image.height)
+      refuse("slices of one size", "slices of different sizes");
+    for (std::size_t k = 0; k < image.pixels.size(); ++k) image.pixels[k] = std::max(image.pixels[k], slice.pixels[k]);
+  }
+
+  Image read_page(int page, const PlaneChoice& choice) {
+    const bool is_raw = page > 0 && n_imagej_images(of_first_page_.description) > 1 && n_pages() == 1;
+    if (!TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(is_raw ? 0 : page))) {
+      messages_.first_error = std::to_string(n_pages()) + " pages";
+      fail("page " + std::to_string(page + 1));
+    }
+    if (page > 0) {
+      if (const auto own = pixel_size_um(calibration())) calibration_ = own;
+    }
+    layout_ = layout();
+    choose_samples(choice);
+    return is_raw ? read_raw(page) : read();
+  }
+
+  /// The samples of a pixel that the channel means: one of them, or the mean of red, green and blue.
+  void choose_samples(const PlaneChoice& choice) {
+    std::vector<std::string> names(layout_.n_channels);
+    if (layout_.is_rgb) {
+      if (choice.channel.empty()) return;
+      names = kRgbNames;
+    }
+    layout_.first = static_cast<std::uint16_t>(chosen_channel(names, choice, file_.string()));
+    layout_.colours = 1;
+  }
+
+  Image read() {
+    Image image = empty_image();
+    if (layout_.is_planar) {
+      for (int plane = layout_.first; plane < layout_.first + layout_.colours; ++plane) read_plane(image, plane);
+    } else {
+      read_plane(image, 0);
+    }
+    finish(image);
+    return image;
+  }
+
+  Image empty_image() const {
+    Image image;
+    image.width = static_cast<int>(layout_.width);
+    image.height = static_cast<int>(layout_.height);
+    image.pixel_size_um = calibration_;
+    image.full_scale = full_scale();
+    const auto packing = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+    image.is_lossy = packing == COMPRESSION_JPEG || packing == COMPRESSION_OJPEG;
+    image.pixels.assign(static_cast<std::size_t>(layout_.width) * layout_.height, 0.0f);
+    return image;
+  }
+
+  void finish(Image& image) const {
+    for (float& value : image.pixels) {
+      if (layout_.colours > 1) value /= static_cast<float>(layout_.colours);
+      if (layout_.is_inverted) value = static_cast<float>(image.full_scale) - value;
+      if (!std::isfinite(value)) refuse("finite pixel values", "NaN or infinity");
+    }
+  }
+
+  /// ImageJ's stacks of more than 4 GB: the planes follow the first page's own without pages of theirs.
+  Image read_raw(int plane) {
+    const bool is_plain = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE) == COMPRESSION_NONE &&
+                          !layout_.is_planar && layout_.bits % 8 == 0 && !TIFFIsTiled(tiff_.get());
+    if (!is_plain) refuse("as many pages as ImageJ says, or plain planes after the first", "one page, packed");
+    const std::uint64_t row_bytes = static_cast<std::uint64_t>(layout_.width) * layout_.samples * layout_.bits / 8;
+    const std::uint64_t begin = TIFFGetStrileOffset(tiff_.get(), 0) + plane * row_bytes * layout_.height;
+    const std::uint64_t needed = begin + row_bytes * layout_.height, size = std::filesystem::file_size(file_);
+    if (needed > size) {
+      refuse(
+          "plane " + std::to_string(plane + 1) + " at bytes " + std::to_string(begin) + " to " + std::to_string(needed),
+          "a file of " + std::to_string(size) + " bytes", "it may be truncated: copy or export it again");
+    }
+    std::ifstream stream(file_, std::ios::binary);
+    stream.seekg(static_cast<std::streamoff>(begin));
+    Image image = empty_image();
+    std::vector<unsigned char> bytes(row_bytes);
+    std::vector<float> row(static_cast<std::size_t>(layout_.width) * layout_.samples);
+    for (int j = 0; j < image.height; ++j) {
+      stream.read(reinterpret_cast<char*>(bytes.data()), static_cast<std::streamsize>(bytes.size()));
+      if (!stream) fail("a whole image");
+      if (TIFFIsByteSwapped(tiff_.get())) swap_samples(bytes);
+      unpack(bytes.data(), row);
+      add_row(row, &image.at(0, j), layout_.width);
+    }
+    finish(image);
+    return image;
+  }
+
+  void swap_samples(std::vector<unsigned char>& bytes) const {
+    const std::size_t n = layout_.bits / 8;
+    for (std::size_t i = 0; i + n <= bytes.size(); i += n) std::reverse(&bytes[i], &bytes[i] + n);
+  }
+
+  [[noreturn]] void refuse(const std::string& expected, const std::string& found, const std::string& hint = {}) const {
+    throw InputError(file_.string(), expected, found, hint);
+  }
+  [[noreturn]] void fail(const std::string& expected) const {
+    refuse(expected, messages_.first_error.empty() ? "damaged data" : messages_.first_error,
+           "the file may be truncated or damaged: copy or export it again");
+  }
+
+  template <class T>
+  T tag(ttag_t name, T otherwise) const {
+    T value{};
+    return TIFFGetFieldDefaulted(tiff_.get(), name, &value) ? value : otherwise;
+  }
+
+  TiffCalibration calibration() const {
+    TiffCalibration result;
+    const char* description = nullptr;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_IMAGEDESCRIPTION, &description) && description) {
+      result.description = description;
+    }
+    float resolution = 0;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_XRESOLUTION, &resolution)) result.x_resolution_per_unit = resolution;
+    if (TIFFGetField(tiff_.get(), TIFFTAG_YRESOLUTION, &resolution)) result.y_resolution_per_unit = resolution;
+    return result;
+  }
+
+  Layout layout() {
+    Layout result;
+    TIFFGetField(tiff_.get(), TIFFTAG_IMAGEWIDTH, &result.width);
+    TIFFGetField(tiff_.get(), TIFFTAG_IMAGELENGTH, &result.height);
+    require_plausible_size(file_, result.width, result.height);
+    result.bits = tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE, 1);
+    result.format = tag<std::uint16_t>(TIFFTAG_SAMPLEFORMAT, SAMPLEFORMAT_UINT);
+    if (result.format == SAMPLEFORMAT_VOID) result.format = SAMPLEFORMAT_UINT;
+    result.samples = tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL, 1);
+    result.is_planar = tag<std::uint16_t>(TIFFTAG_PLANARCONFIG, PLANARCONFIG_CONTIG) == PLANARCONFIG_SEPARATE;
+    require_known_samples(result);
+    set_colours(result);
+    return result;
+  }
+
+  void require_known_samples(const Layout& l) const {
+    const std::string found = std::to_string(l.bits) + " bits";
+    if (l.format == SAMPLEFORMAT_IEEEFP) {
+      if (l.bits != 32 && l.bits != 64) refuse("floating-point samples of 32 or 64 bits", found);
+    } else if (l.format == SAMPLEFORMAT_INT) {
+      if (l.bits != 8 && l.bits != 16 && l.bits != 32) refuse("signed samples of 8, 16 or 32 bits", found);
+    } else if (l.format == SAMPLEFORMAT_UINT) {
+      if (l.bits < 1 || l.bits > 32) refuse("samples of 1 to 32 bits", found);
+    } else {
+      refuse("real samples", "complex ones");
+    }
+  }
+
+  void set_colours(Layout& l) {
+    const auto compression = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+    if (!TIFFIsCODECConfigured(compression)) {
+      refuse("a compression that libtiff knows here", "compression " + std::to_string(compression),
+             "save the image uncompressed or with deflate");
+    }
+    std::uint16_t photometric = PHOTOMETRIC_MINISBLACK;
+    TIFFGetField(tiff_.get(), TIFFTAG_PHOTOMETRIC, &photometric);
+    if (photometric == PHOTOMETRIC_YCBCR && compression == COMPRESSION_JPEG && !l.is_planar) {
+      TIFFSetField(tiff_.get(), TIFFTAG_JPEGCOLORMODE, JPEGCOLORMODE_RGB);  // libjpeg converts
+      photometric = PHOTOMETRIC_RGB;
+    }
+    const bool is_grey = photometric == PHOTOMETRIC_MINISBLACK || photometric == PHOTOMETRIC_MINISWHITE ||
+                         photometric == PHOTOMETRIC_PALETTE;
+    if (!is_grey && photometric != PHOTOMETRIC_RGB) {
+      refuse("a grey or RGB image", "photometric interpretation " + std::to_string(photometric),
+             "convert it to grey: the original of the microscope is best");
+    }
+    l.is_rgb = !is_grey;
+    l.colours = l.n_channels = l.is_rgb ? 3 : 1;
+    l.is_inverted = photometric == PHOTOMETRIC_MINISWHITE;
+    if (l.is_inverted && l.format != SAMPLEFORMAT_UINT) refuse("0 to be black", "0 to be white in signed samples");
+    if (l.samples > l.colours) count_channels(l);
+    if (l.samples < l.colours) refuse("three colour channels", std::to_string(l.samples) + " channels");
+  }
+
+  /// Further samples are channels of their own where they are not transparency.
+  void count_channels(Layout& l) const {
+    std::uint16_t n_extra = 0;
+    std::uint16_t* kinds = nullptr;
+    TIFFGetFieldDefaulted(tiff_.get(), TIFFTAG_EXTRASAMPLES, &n_extra, &kinds);
+    const bool is_alpha = l.samples == l.colours + n_extra && std::all_of(kinds, kinds + n_extra, [](auto kind) {
+                            return kind != EXTRASAMPLE_UNSPECIFIED;
+                          });
+    if (is_alpha) return;
+    if (l.is_rgb) {
+      refuse("three colour channels", std::to_string(l.samples) + " channels",
+             "save each channel as a page of its own");
+    }
+    l.n_channels = l.samples;
+  }
+
+  double full_scale() const {
+    if (layout_.format == SAMPLEFORMAT_IEEEFP) return 0;
+    return std::ldexp(1.0, layout_.format == SAMPLEFORMAT_INT ? layout_.bits - 1 : layout_.bits) - 1;
+  }
+
+  /// Add the samples of a plane (of all colours, where they lie side by side) to the pixels, block by block.
+  void read_plane(Image& image, int plane) {
+    const bool is_tiled = TIFFIsTiled(tiff_.get());
+    std::uint32_t block_width = layout_.width;
+    std::uint32_t block_height = std::min(tag<std::uint32_t>(TIFFTAG_ROWSPERSTRIP, layout_.height), layout_.height);
+    if (is_tiled) {
+      block_width = tag<std::uint32_t>(TIFFTAG_TILEWIDTH, 0);
+      block_height = tag<std::uint32_t>(TIFFTAG_TILELENGTH, 0);
+      require_plausible_size(file_, block_width, block_height);
+    }
+    const auto row_bytes = is_tiled ? TIFFTileRowSize(tiff_.get()) : TIFFScanlineSize(tiff_.get());
+    const auto block_bytes = is_tiled ? TIFFTileSize(tiff_.get()) : TIFFStripSize(tiff_.get());
+    const std::uint64_t samples = layout_.is_planar ? 1 : layout_.samples;
+    const std::uint64_t needed = (samples * layout_.bits * block_width + 7) / 8;
+    if (row_bytes <= 0 || block_bytes <= 0 || static_cast<std::uint64_t>(row_bytes) < needed ||
+        static_cast<std::uint64_t>(block_bytes) < needed * block_height || samples > 64) {
+      fail("a readable image");
+    }
+    require_plausible_bytes(file_, static_cast<std::uint64_t>(block_bytes));
+    require_plausible_bytes(file_, samples * block_width * sizeof(float));
+    std::vector<unsigned char> block(static_cast<std::size_t>(block_bytes));
+    std::vector<float> row(samples * block_width);
+    for (std::uint32_t top = 0; top < layout_.height; top += block_height) {
+      for (std::uint32_t left = 0; left < layout_.width; left += block_width) {
+        const std::uint32_t n_rows = std::min(block_height, layout_.height - top);
+        read_block(is_tiled, left, top, plane, block, is_tiled ? block_bytes : row_bytes * n_rows);
+        const std::uint32_t n_columns = std::min(block_width, layout_.width - left);
+        for (std::uint32_t j = 0; j < n_rows; ++j) {
+          unpack(block.data() + static_cast<std::size_t>(j) * row_bytes, row);
+          add_row(row, &image.at(static_cast<int>(left), static_cast<int>(top + j)), n_columns);
+        }
+      }
+    }
+  }
+
+  void read_block(bool is_tiled, std::uint32_t left, std::uint32_t top, int plane, std::vector<unsigned char>& block,
+                  tmsize_t n_bytes) {
+    const auto sample = static_cast<std::uint16_t>(plane);
+    messages_.first_error.clear();
+    const tmsize_t got = is_tiled ? TIFFReadEncodedTile(tiff_.get(), TIFFComputeTile(tiff_.get(), left, top, 0, sample),
+                                                        block.data(), static_cast<tmsize_t>(block.size()))
+                                  : TIFFReadEncodedStrip(tiff_.get(), TIFFComputeStrip(tiff_.get(), top, sample),
+                                                         block.data(), static_cast<tmsize_t>(block.size()));
+    if (got < n_bytes) fail("a whole image of " + std::to_string(layout_.height) + " rows");
+  }
+
+  template <class T>
+  static void unpack_as(const unsigned char* bytes, std::vector<float>& row) {
+    for (std::size_t i = 0; i < row.size(); ++i) {
+      T value;
+      std::memcpy(&value, bytes + i * sizeof(T), sizeof(T));
+      row[i] = static_cast<float>(value);
+    }
+  }
+
+  /// Samples to floats. libtiff has put 16-, 24-, 32- and 64-bit samples into this machine's byte order; other widths
+  /// are packed from the highest bit on, without gaps.
+  void unpack(const unsigned char* bytes, std::vector<float>& row) const {
+    const bool is_signed = layout_.format == SAMPLEFORMAT_INT;
+    switch (layout_.bits) {
+      case 8:
+        return is_signed ? unpack_as<std::int8_t>(bytes, row) : unpack_as<std::uint8_t>(bytes, row);
+      case 16:
+        return is_signed ? unpack_as<std::int16_t>(bytes, row) : unpack_as<std::uint16_t>(bytes, row);
+      case 32:
+        if (layout_.format == SAMPLEFORMAT_IEEEFP) return unpack_as<float>(bytes, row);
+        return is_signed ? unpack_as<std::int32_t>(bytes, row) : unpack_as<std::uint32_t>(bytes, row);
+      case 64:
+        return unpack_as<double>(bytes, row);
+      case 24:
+        for (std::size_t i = 0; i < row.size(); ++i, bytes += 3) {
+          row[i] = static_cast<float>(bytes[0] | bytes[1] << 8 | bytes[2] << 16);
+        }
+        return;
+      default:
+        unpack_bits(bytes, row);
+    }
+  }
+
+  void unpack_bits(const unsigned char* bytes, std::vector<float>& row) const {
+    std::size_t at = 0;
+    for (float& value : row) {
+      std::uint32_t sample = 0;
+      for (int bit = 0; bit < layout_.bits; ++bit, ++at) sample = sample << 1 | (bytes[at / 8] >> (7 - at % 8) & 1u);
+      value = static_cast<float>(sample);
+    }
+  }
+
+  void add_row(const std::vector<float>& row, float* pixels, std::uint32_t n_columns) const {
+    const std::size_t stride = layout_.is_planar ? 1 : layout_.samples;
+    const std::size_t first = layout_.is_planar ? 0 : layout_.first;
+    const std::size_t n_summed = layout_.is_planar ? 1 : layout_.colours;
+    for (std::uint32_t i = 0; i < n_columns; ++i) {
+      for (std::size_t c = first; c < first + n_summed; ++c) pixels[i] += row[i * stride + c];
+    }
+  }
+
+  std::filesystem::path file_;
+  Messages messages_;
+  TiffHandle tiff_;
+  TiffCalibration of_first_page_;
+  std::optional<double> calibration_;
+  Layout layout_;
+};
+
+}  // namespace
+
+Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return Reader(file).read(choice); }
+
+}  // namespace mbtfm::images

@@ -1,0 +1,105 @@
+#include "substrate/boxes/block_mesh.h"
+
+#include <dlfcn.h>
+
+#include <algorithm>
+#include <cfenv>
+#include <cmath>
+#include <filesystem>
+#include <mutex>
+
+#include "pipeline/contract/errors.h"
+#include "substrate/boxes/mesh_maker.h"
+
+namespace mbtfm::boxes {
+
+namespace {
+
+/// deal.II and the 150 libraries that it needs take 0.25 s of each start: they are loaded where a mesh is made, not
+/// with the program. The path is told by the program's, as sanitizers hide the run path from dlopen.
+MakeMesh* load_mesh_maker() {
+  const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
+  const std::filesystem::path file = program.parent_path().parent_path() / "lib" / kMeshMakerFile;
+  std::fenv_t environment;
+  std::feholdexcept(&environment);  // the libraries' own initialisation is not ours to trap
+  void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
+  std::fesetenv(&environment);
+  void* function = library != nullptr ? dlsym(library, "mbtfm_make_mesh") : nullptr;
+  if (function != nullptr) return reinterpret_cast<MakeMesh*>(function);
+  const std::string why = dlerror();
+  const bool wants_memory = why.find("failed to map segment") != why.npos || why.find("allocate memory") != why.npos;
+  if (wants_memory) {
+    throw OutOfMemory("there is no room to load the library that makes finite element meshes (" + why +
+                      "): allow more memory, or take the model 'layer'");
+  }
+  throw InputError(file.string(), "the library that makes finite element meshes", why,
+                   "build anew, and keep lib/ beside bin/; the models 'half-space' and 'layer' do without it");
+}
+
+/// Index of the interval of `line` that holds x; the last one holds its upper end.
+int interval_of(const std::vector<double>& line, double x) {
+  const auto above = std::upper_bound(line.begin() + 1, line.end() - 1, x);
+  return static_cast<int>(above - line.begin()) - 1;
+}
+
+/// Level, and position among the level's cells across the block.
+std::uint64_t surface_key(const GridLines& lines, int level, Vec2 point) {
+  const auto index = [level](const std::vector<double>& line, double x) {
+    const int coarse = interval_of(line, x);
+    const double fraction = (x - line[coarse]) / (line[coarse + 1] - line[coarse]);
+    const std::uint64_t n = std::uint64_t{1} << level;
+    const auto fine = static_cast<std::uint64_t>(std::max(0.0, fraction * static_cast<double>(n)));
+    return coarse * n + std::min(fine, n - 1);
+  };
+  return static_cast<std::uint64_t>(level) << 58 | index(lines.x_um, point.x) << 29 | index(lines.y_um, point.y);
+}
+
+constexpr int kMostLevels = 20;  // of halving: the key has 29 bits for a position
+
+}  // namespace
+
+BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
+                          std::int64_t most_cells, int threads) {
+  static MakeMesh* const make = load_mesh_maker();
+  BlockMesh mesh;
+  mesh.order = order;
+  mesh.lines = lines;
+  {
+    // one at a time: deal.II has one limit of threads for all, and no lock on it
+    static std::mutex in_use;
+    const std::lock_guard lock(in_use);
+    make(mesh, is_too_large, most_cells, threads);
+  }
+  for (std::size_t cell = 0; cell < mesh.cells.size(); ++cell) {
+    const Box& box = mesh.cells[cell];
+    MBTFM_ASSERT(mesh.cell_levels[cell] < kMostLevels);
+    if (box.low_um[2] > 0) continue;
+    const Vec2 centre = {box.low_um[0] + 0.5 * box.size_um[0], box.low_um[1] + 0.5 * box.size_um[1]};
+    mesh.cell_at_surface[surface_key(lines, mesh.cell_levels[cell], centre)] = static_cast<int>(cell);
+  }
+  return mesh;
+}
+
+int surface_cell(const BlockMesh& mesh, Vec2 point_um) {
+  const auto is_within = [](const std::vector<double>& line, double x) {
+    return x >= line.front() && x <= line.back();
+  };
+  if (!is_within(mesh.lines.x_um, point_um.x) || !is_within(mesh.lines.y_um, point_um.y)) return -1;
+  for (int level = 0; level < kMostLevels; ++level) {
+    const auto found = mesh.cell_at_surface.find(surface_key(mesh.lines, level, point_um));
+    if (found != mesh.cell_at_surface.end()) return found->second;
+  }
+  throw InternalError("no cell of the surface holds a point of the block");
+}
+
+std::array<double, 3> shape_values(int order, double t) {
+  if (order == 1) return {1 - t, t, 0};
+  return {(1 - t) * (1 - 2 * t), 4 * t * (1 - t), t * (2 * t - 1)};
+}
+
+std::array<double, 3> shape_slopes(int order, double t) {
+  if (order == 1) return {-1, 1, 0};
+  return {4 * t - 3, 4 - 8 * t, 4 * t - 1};
+}
+
+}  // namespace mbtfm::boxes

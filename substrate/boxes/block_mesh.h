@@ -1,0 +1,58 @@
+/// Hexahedral meshes of a rectangular block, locally refined: made by deal.II, given as plain arrays.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <functional>
+#include <unordered_map>
+#include <vector>
+
+#include "pipeline/contract/geometry.h"
+
+namespace mbtfm::boxes {
+
+/// An axis-parallel box.
+struct Box {
+  std::array<double, 3> low_um{}, size_um{};
+};
+
+/// Lines of the coarsest grid along each axis, rising; z_um starts at 0, the surface.
+struct GridLines {
+  std::vector<double> x_um, y_um, z_um;
+};
+
+struct NodeWeight {
+  int node = 0;
+  double weight = 0;
+};
+
+/// Nodes of continuous elements of order 1 or 2, (order+1)³ a cell.
+struct BlockMesh {
+  int order = 2;
+  GridLines lines;
+  std::vector<Box> cells;
+  std::vector<int> cell_levels;                            ///< by cell: how often one of the grid was halved
+  std::vector<int> cell_nodes;                             ///< by cell, x fastest, then y, then z
+  std::vector<std::array<double, 3>> position_um;          ///< by node
+  std::vector<std::vector<NodeWeight>> hanging;            ///< by node: what it hangs on; empty: a node of its own
+  std::unordered_map<std::uint64_t, int> cell_at_surface;  ///< by key of level, i, j: see `surface_cell`
+
+  int nodes_per_cell() const { return (order + 1) * (order + 1) * (order + 1); }
+  const int* nodes_of(int cell) const { return &cell_nodes[static_cast<std::size_t>(cell) * nodes_per_cell()]; }
+  double thickness_um() const { return lines.z_um.back(); }
+};
+
+/// Halve cells, keeping neighbours within one level of each other, until `is_too_large` holds of none. It must hold of
+/// no part of a cell of which it does not hold.
+/// @throws NotSolved where the cells grow beyond `most_cells`
+BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
+                          std::int64_t most_cells, int threads);
+
+/// The cell of the surface that holds a point; -1 outside the block.
+int surface_cell(const BlockMesh& mesh, Vec2 point_um);
+
+/// Shape functions of order 1 or 2 on [0, 1] and their slopes.
+std::array<double, 3> shape_values(int order, double t);
+std::array<double, 3> shape_slopes(int order, double t);
+
+}  // namespace mbtfm::boxes

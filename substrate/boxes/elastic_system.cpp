@@ -1,0 +1,249 @@
+#include "substrate/boxes/elastic_system.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/memory.h"
+#include "substrate/boxes/ellipse_load.h"
+#include "substrate/ellipse.h"
+
+namespace mbtfm::boxes {
+
+namespace {
+
+/// Stiffness by shape of box: similar boxes of one modulus have the same but for length and modulus. Where the modulus
+/// changes within them, by shape, length and depth.
+class StiffnessOfBox {
+ public:
+  StiffnessOfBox(const substrate::Material& material, int order) : material_(material), order_(order) {}
+  Eigen::MatrixXd operator()(const Box& box) {
+    constexpr double kDigits = 1e9;  // sides equal to rounding are equal
+    const std::array<double, 3>& size = box.size_um;
+    const auto even = substrate::even_modulus(material_, box.low_um[2], box.low_um[2] + size[2]);
+    std::array<long, 4> key = {std::lround(kDigits * size[1] / size[0]), std::lround(kDigits * size[2] / size[0]), 0,
+                               0};
+    if (!even) key[2] = std::lround(kDigits * box.low_um[2]), key[3] = std::lround(kDigits * size[0]);
+    auto found = known_.find(key);
+    if (found == known_.end()) {
+      const Box unit = {{}, {1, size[1] / size[0], size[2] / size[0]}};
+      found = known_
+                  .emplace(key, even ? box_stiffness({material_.gel, {}}, order_, unit)
+                                     : box_stiffness(material_, order_, box))
+                  .first;
+    }
+    return (even ? *even * size[0] : 1) * found->second;
+  }
+
+ private:
+  substrate::Material material_;
+  int order_;
+  std::map<std::array<long, 4>, Eigen::MatrixXd> known_;
+};
+
+/// Merge weights of equal nodes, by rising node.
+void merge(std::vector<NodeWeight>& weights) {
+  std::sort(weights.begin(), weights.end(), [](const NodeWeight& a, const NodeWeight& b) { return a.node < b.node; });
+  std::size_t last = 0;
+  for (std::size_t k = 1; k < weights.size(); ++k) {
+    if (weights[k].node == weights[last].node) {
+      weights[last].weight += weights[k].weight;
+    } else {
+      weights[++last] = weights[k];
+    }
+  }
+  if (!weights.empty()) weights.resize(last + 1);
+}
+
+std::string shown(Vec2 point) { return "(" + std::to_string(point.x) + ", " + std::to_string(point.y) + ")"; }
+
+std::string extent_of(const GridLines& lines) {
+  return shown({lines.x_um.front(), lines.y_um.front()}) + " to " + shown({lines.x_um.back(), lines.y_um.back()});
+}
+
+}  // namespace
+
+double allowed_GB(double memory_limit_GB) {
+  if (memory_limit_GB > 0) return memory_limit_GB;
+  return 0.8e-9 * numerics::memory_bytes();
+}
+
+ElasticSystem::ElasticSystem(const substrate::Material& material, BlockMesh mesh,
+                             const numerics::FactorOptions& options)
+    : mesh_(std::move(mesh)), factor_((number_nodes(), assemble(material)), options) {}
+
+void ElasticSystem::number_nodes() {
+  const std::size_t n_nodes = mesh_.position_um.size();
+  for (std::size_t node = 0; node < n_nodes; ++node) own_.push_back({static_cast<int>(node), 1});
+  free_of_node_.assign(n_nodes, -1);
+  bottom_of_node_.assign(n_nodes, -1);
+  for (std::size_t node = 0; node < n_nodes; ++node) {
+    if (!mesh_.hanging[node].empty()) continue;
+    // the bottom's coordinate is a grid line: reached to rounding
+    if (mesh_.position_um[node][2] > mesh_.thickness_um() * (1 - 1e-9)) {
+      bottom_of_node_[node] = static_cast<int>(bottom_nodes_.size());
+      bottom_nodes_.push_back(static_cast<int>(node));
+    } else {
+      free_of_node_[node] = n_free_++;
+    }
+  }
+}
+
+std::span<const NodeWeight> ElasticSystem::carriers(int node) const {
+  const std::vector<NodeWeight>& hanging = mesh_.hanging[node];
+  return hanging.empty() ? std::span(&own_[node], 1) : std::span(hanging);
+}
+
+numerics::BlockMatrix ElasticSystem::pattern() const {
+  std::vector<std::vector<int>> nodes_of_cell(mesh_.cells.size());
+  std::vector<std::vector<int>> cells_of_node(n_free_);
+  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
+    std::vector<int>& nodes = nodes_of_cell[cell];
+    for (int k = 0; k < mesh_.nodes_per_cell(); ++k) {
+      for (const NodeWeight& carrier : carriers(mesh_.nodes_of(static_cast<int>(cell))[k])) {
+        if (free_of_node_[carrier.node] >= 0) nodes.push_back(free_of_node_[carrier.node]);
+      }
+    }
+    std::sort(nodes.begin(), nodes.end());
+    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
+    for (const int node : nodes) cells_of_node[node].push_back(static_cast<int>(cell));
+  }
+  numerics::BlockMatrix matrix;
+  matrix.n = n_free_;
+  matrix.start = {0};
+  std::vector<int> seen(n_free_, -1);
+  for (int column = 0; column < n_free_; ++column) {
+    const auto first = static_cast<std::ptrdiff_t>(matrix.row.size());
+    for (const int cell : cells_of_node[column]) {
+      for (const int row : nodes_of_cell[cell]) {
+        if (row < column || seen[row] == column) continue;
+        seen[row] = column;
+        matrix.row.push_back(row);
+      }
+    }
+    std::sort(matrix.row.begin() + first, matrix.row.end());
+    matrix.start.push_back(static_cast<int>(matrix.row.size()));
+  }
+  matrix.value.assign(9 * matrix.row.size(), 0.0);
+  return matrix;
+}
+
+numerics::BlockMatrix ElasticSystem::assemble(const substrate::Material& material) {
+  numerics::BlockMatrix matrix = pattern();
+  std::vector<Eigen::Triplet<double>> bottom;
+  const auto add = [&](const NodeWeight& at_a, const NodeWeight& at_b, const auto& block) {
+    const int row = free_of_node_[at_a.node];
+    const int column = free_of_node_[at_b.node];
+    const int fixed = bottom_of_node_[at_b.node];
+    if (row < 0 || (column >= 0 && row < column)) return;  // the lower triangle is kept
+    const double weight = at_a.weight * at_b.weight;
+    double* value = column >= 0 ? matrix.block(row, column) : nullptr;
+    for (int p = 0; p < 3; ++p) {
+      for (int q = 0; q < 3; ++q) {
+        if (value) {
+          value[3 * p + q] += weight * block(p, q);
+        } else {
+          bottom.emplace_back(3 * row + p, 3 * fixed + q, weight * block(p, q));
+        }
+      }
+    }
+  };
+  StiffnessOfBox stiffness_of(material, mesh_.order);
+  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
+    const Eigen::MatrixXd stiffness = stiffness_of(mesh_.cells[cell]);
+    const int* nodes = mesh_.nodes_of(static_cast<int>(cell));
+    for (int b = 0; b < mesh_.nodes_per_cell(); ++b) {
+      for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
+        for (const NodeWeight& at_b : carriers(nodes[b])) {
+          for (const NodeWeight& at_a : carriers(nodes[a])) add(at_a, at_b, stiffness.block<3, 3>(3 * a, 3 * b));
+        }
+      }
+    }
+  }
+  bottom_stiffness_.resize(3 * n_free_, 3 * static_cast<Eigen::Index>(bottom_nodes_.size()));
+  bottom_stiffness_.setFromTriplets(bottom.begin(), bottom.end());
+  return matrix;
+}
+
+std::vector<std::array<double, 3>> ElasticSystem::at_all_nodes(const numerics::NodalColumn& u) const {
+  std::vector<std::array<double, 3>> values(mesh_.position_um.size());
+  for (std::size_t node = 0; node < values.size(); ++node) {
+    for (const NodeWeight& carrier : carriers(static_cast<int>(node))) {
+      const int from = free_of_node_[carrier.node];
+      for (int axis = 0; from >= 0 && axis < 3; ++axis) values[node][axis] += carrier.weight * u(from, axis);
+    }
+  }
+  return values;
+}
+
+std::vector<NodeWeight> ElasticSystem::cell_weights(int cell, std::array<double, 3> unit) const {
+  const int n = mesh_.order + 1;
+  std::array<std::array<double, 3>, 3> value;
+  for (int axis = 0; axis < 3; ++axis) value[axis] = shape_values(mesh_.order, unit[axis]);
+  std::vector<NodeWeight> weights;
+  for (int k = 0; k < mesh_.nodes_per_cell(); ++k) {
+    const double shape = value[0][k % n] * value[1][k / n % n] * value[2][k / (n * n)];
+    if (shape == 0) continue;
+    for (const NodeWeight& carrier : carriers(mesh_.nodes_of(cell)[k])) {
+      const int node = free_of_node_[carrier.node];
+      if (node >= 0) weights.push_back({node, shape * carrier.weight});
+    }
+  }
+  merge(weights);
+  return weights;
+}
+
+std::vector<NodeWeight> ElasticSystem::surface_weights(Vec2 point_um) const {
+  const int cell = surface_cell(mesh_, point_um);
+  if (cell < 0) {
+    throw InvalidData("point " + shown(point_um), "one in the gel's block, " + extent_of(mesh_.lines), "it outside");
+  }
+  const Box& box = mesh_.cells[cell];
+  return cell_weights(
+      cell, {(point_um.x - box.low_um[0]) / box.size_um[0], (point_um.y - box.low_um[1]) / box.size_um[1], 0});
+}
+
+std::vector<int> ElasticSystem::touched_cells(const substrate::Ellipse& ellipse) const {
+  std::vector<int> touched;
+  const Vec2 extent = substrate::half_extent_um(ellipse);
+  for (const auto& [key, cell] : mesh_.cell_at_surface) {
+    const Box& box = mesh_.cells[cell];
+    const Vec2 low = {box.low_um[0], box.low_um[1]};
+    const Vec2 high = {low.x + box.size_um[0], low.y + box.size_um[1]};
+    const Vec2 c = ellipse.centre_um;
+    if (low.x > c.x + extent.x || high.x < c.x - extent.x || low.y > c.y + extent.y || high.y < c.y - extent.y)
+      continue;
+    if (!clipped_ellipse_rule(ellipse, {low, high}).empty()) touched.push_back(cell);
+  }
+  std::sort(touched.begin(), touched.end());  // the table's order is not ours
+  return touched;
+}
+
+std::vector<NodeWeight> ElasticSystem::load_weights(const substrate::Ellipse& ellipse) const {
+  std::vector<NodeWeight> load;
+  double share = 0;
+  for (const int cell : touched_cells(ellipse)) {
+    const Box& box = mesh_.cells[cell];
+    const Vec2 low = {box.low_um[0], box.low_um[1]};
+    const Vec2 high = {low.x + box.size_um[0], low.y + box.size_um[1]};
+    for (const substrate::DiscPoint& p : clipped_ellipse_rule(ellipse, {low, high})) {
+      share += p.weight;
+      const Vec2 unit = p.position - low;
+      for (const NodeWeight& w : cell_weights(cell, {unit.x / box.size_um[0], unit.y / box.size_um[1], 0})) {
+        load.push_back({w.node, p.weight * w.weight});
+      }
+    }
+  }
+  // the rules add up to rounding: what is missing lies outside
+  if (std::abs(share - 1) > 1e-9) {
+    throw InvalidData("the ellipse at " + shown(ellipse.centre_um),
+                      "all of it on the gel's block, " + extent_of(mesh_.lines),
+                      std::to_string(100 * (1 - share)) + " % of it outside");
+  }
+  merge(load);
+  return load;
+}
+
+}  // namespace mbtfm::boxes

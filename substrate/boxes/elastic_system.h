@@ -1,0 +1,69 @@
+/// The finite element equations of a block on a rigid base: u = given on the bottom, forces on the surface and sides.
+///
+///   2 mu (eps u, eps v) + lambda (P div u, P div v) = load(v)
+///
+/// P projects onto the linear functions of each element (Q2-P1disc) or its constants (Q1-P0): the pressure of a mixed
+/// method, eliminated element by element. So the matrix stays positive definite, and nothing locks as nu -> 1/2.
+/// Source: Boffi, Brezzi, Fortin, Mixed Finite Element Methods (2013), §8.6 and 8.8.
+#pragma once
+
+#include <Eigen/SparseCore>
+#include <span>
+
+#include "pipeline/numerics/cholesky.h"
+#include "substrate/boxes/block_mesh.h"
+#include "substrate/ellipse.h"
+#include "substrate/material.h"
+
+namespace mbtfm::boxes {
+
+class ElasticSystem {
+ public:
+  /// @throws NotSolved where memory would not suffice
+  ElasticSystem(const substrate::Material& material, BlockMesh mesh, const numerics::FactorOptions& options);
+
+  const BlockMesh& mesh() const { return mesh_; }
+  const numerics::SparseCholesky& factor() const { return factor_; }
+  int n_unknowns() const { return 3 * n_free_; }
+
+  /// The load of an ellipse on the free nodes: the share of the force that each takes.
+  /// @throws InvalidData where a part of it lies outside the block
+  std::vector<NodeWeight> load_weights(const substrate::Ellipse& ellipse) const;
+  /// The displacement of a point of the surface as a mean over free nodes. @throws InvalidData outside the block
+  std::vector<NodeWeight> surface_weights(Vec2 point_um) const;
+  /// Shape functions of a cell at a point of it given in [0, 1]³, gathered on the free nodes.
+  std::vector<NodeWeight> cell_weights(int cell, std::array<double, 3> unit) const;
+
+  /// Nodes on the bottom, in the order of the columns of bottom_stiffness(), three each.
+  const std::vector<int>& bottom_nodes() const { return bottom_nodes_; }
+  /// Rows: free unknowns.
+  const Eigen::SparseMatrix<double>& bottom_stiffness() const { return bottom_stiffness_; }
+  /// The solution at every node of the mesh, free or not.
+  std::vector<std::array<double, 3>> at_all_nodes(const numerics::NodalColumn& u) const;
+  /// Elements of the surface that an ellipse touches.
+  std::vector<int> touched_cells(const substrate::Ellipse& ellipse) const;
+
+ private:
+  void number_nodes();
+  /// The nodes that carry a node: itself, or what it hangs on.
+  std::span<const NodeWeight> carriers(int node) const;
+  numerics::BlockMatrix pattern() const;
+  numerics::BlockMatrix assemble(const substrate::Material& material);
+
+  BlockMesh mesh_;
+  int n_free_ = 0;
+  std::vector<int> free_of_node_;    ///< -1: on the bottom, or hanging
+  std::vector<int> bottom_of_node_;  ///< -1: not on the bottom
+  std::vector<int> bottom_nodes_;
+  std::vector<NodeWeight> own_;  ///< by node: itself, with weight 1
+  Eigen::SparseMatrix<double> bottom_stiffness_;
+  numerics::SparseCholesky factor_;
+};
+
+/// Stiffness of one box of order 1 or 2, (3 nodes)² by columns; unknown 3 k + i is axis i of node k, x fastest.
+Eigen::MatrixXd box_stiffness(const substrate::Material& material, int order, const Box& box);
+
+/// What `memory_limit_GB` stands for: 0 is four fifths of the machine's memory.
+double allowed_GB(double memory_limit_GB);
+
+}  // namespace mbtfm::boxes

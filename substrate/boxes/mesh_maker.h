@@ -1,0 +1,16 @@
+/// Between the program and the library that holds deal.II.
+#pragma once
+
+#include "substrate/boxes/block_mesh.h"
+
+namespace mbtfm::boxes {
+
+constexpr const char* kMeshMakerFile = "libmbtfm_mesh_maker.so";
+
+/// Fill in a mesh whose order and lines are given: all but cell_at_surface.
+using MakeMesh = void(BlockMesh& mesh, const std::function<bool(const Box&)>& is_too_large, std::int64_t most_cells,
+                      int threads);
+
+extern "C" MakeMesh mbtfm_make_mesh;
+
+}  // namespace mbtfm::boxes

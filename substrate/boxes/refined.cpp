@@ -1,0 +1,302 @@
+/// Locally refined finite elements: no closed form anywhere, so what the others are checked against, at a price.
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <mutex>
+#include <numeric>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "substrate/boxes/elastic_system.h"
+#include "substrate/boxes/load_cases.h"
+#include "substrate/boxes/models.h"
+#include "substrate/boxes/refined_mesh.h"
+#include "substrate/boxes/volume.h"
+#include "substrate/effects.h"
+#include "substrate/greens/greens_model.h"
+#include "substrate/models.h"
+
+namespace mbtfm::boxes {
+namespace {
+
+const double kFall = std::pow(2, 1.5);  // of the error at a load's rim when the elements there halve
+constexpr double kAim = 0.9;    // of the tolerance: a second try costs more than what is spared by just reaching it
+constexpr int kMostLevels = 8;  // of refinement: 2^8 times finer than asked for no memory holds
+
+void add_loads(const std::vector<std::vector<NodeWeight>>& loads, const LoadCase& forces,
+               const numerics::NodalColumn& b) {
+  for (const auto& [j, force] : forces) {
+    for (const auto& [node, weight] : loads[j]) {
+      b(node, 0) += weight * force.x;
+      b(node, 1) += weight * force.y;
+    }
+  }
+}
+
+/// Columns of the matrix, those of neighbouring ellipses side by side: along a Z-shaped (Morton) curve of 1024 x 1024.
+std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipses) {
+  const substrate::Extent extent = substrate::extent_of({}, ellipses);
+  const Vec2 size = extent.high_um - extent.low_um;
+  const auto key = [&](int column) {
+    const Vec2 at = ellipses[column / 2].centre_um - extent.low_um;
+    const auto x = static_cast<unsigned>(1023 * at.x / size.x), y = static_cast<unsigned>(1023 * at.y / size.y);
+    unsigned bits = 0;
+    for (unsigned b = 0; b < 10; ++b) bits |= (x >> b & 1) << 2 * b | (y >> b & 1) << (2 * b + 1);
+    return bits;
+  };
+  std::vector<int> columns(2 * ellipses.size());
+  std::iota(columns.begin(), columns.end(), 0);
+  std::stable_sort(columns.begin(), columns.end(), [&](int a, int b) { return key(a) < key(b); });
+  return columns;
+}
+
+class Refined final : public substrate::Substrate {
+ public:
+  Refined(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
+      : material_{gel, substrate::profile_of(parameters.modulus_profile)},
+        parameters_(parameters),
+        threads_(threads),
+        order_(parameters.element == "q1-p0" ? 1 : 2) {}
+
+  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
+                                       const std::vector<substrate::Ellipse>& ellipses) const override {
+    return solve({points_um, ellipses, 2 * static_cast<int>(ellipses.size()), unit_case});
+  }
+
+  std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um,
+                                     const std::vector<substrate::Ellipse>& ellipses,
+                                     const std::vector<Vec2>& forces_nN) const override {
+    substrate::check_forces(ellipses, forces_nN);
+    const LoadCase all = case_of(forces_nN);
+    return vectors_of(solve({points_um, ellipses, 1, [&all](int) { return all; }}));
+  }
+
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN) const override {
+    substrate::check_forces(ellipses, forces_nN);
+    const LoadCase all = case_of(forces_nN);
+    // all axes: the error is a share of the whole displacement, as this part vanishes with 1 - 2 nu
+    const Eigen::MatrixXd field = solve({points_um, ellipses, 1, [&all](int) { return all; }, {0, 1, 2}});
+    std::vector<double> vertical(points_um.size());
+    for (std::size_t i = 0; i < vertical.size(); ++i) vertical[i] = field(3 * static_cast<Eigen::Index>(i) + 2, 0);
+    return vertical;
+  }
+  bool has_vertical() const override { return substrate::asks_for_vertical(parameters_); }
+
+  /// On the first mesh: pictures need no more.
+  substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
+                                const std::vector<Vec2>& forces_nN) const override {
+    check(ellipses);
+    substrate::check_forces(ellipses, forces_nN);
+    const ElasticSystem system = system_for(first_fineness(ellipses.size()), {}, ellipses);
+    std::vector<std::vector<NodeWeight>> loads;
+    for (const substrate::Ellipse& ellipse : ellipses) loads.push_back(system.load_weights(ellipse));
+    std::vector<int> all_nodes(system.n_unknowns() / 3);
+    std::iota(all_nodes.begin(), all_nodes.end(), 0);
+    substrate::VolumeField field;
+    system.factor().solve(
+        1, all_nodes, [&](int, const numerics::NodalColumn& b) { add_loads(loads, case_of(forces_nN), b); },
+        [&](int, const numerics::NodalColumn& u) { field = volume_field(system, material_, u, parameters_.stress); });
+    return field;
+  }
+
+  std::vector<Effect> effects() const override { return substrate::effects_of_model(parameters_).list(); }
+
+  Figures figures() const override {
+    const std::lock_guard lock(mutex_);
+    return figures_;
+  }
+
+ private:
+  /// Columns wanted at points: what loads each, and along which axes the points are asked.
+  struct Request {
+    const std::vector<Vec2>& points_um;
+    const std::vector<substrate::Ellipse>& ellipses;
+    int n_columns;
+    std::function<LoadCase(int)> case_of_column;
+    std::vector<int> axes = {0, 1};
+  };
+
+  /// One mesh, or finer and finer ones until the estimated error is below the tolerance.
+  Eigen::MatrixXd solve(const Request& request) const {
+    substrate::check_points(request.points_um);
+    check(request.ellipses);
+    const auto n_rows = static_cast<Eigen::Index>(request.axes.size() * request.points_um.size());
+    if (n_rows == 0 || request.ellipses.empty()) return Eigen::MatrixXd::Zero(n_rows, request.n_columns);
+    const auto start = std::chrono::steady_clock::now();
+    Fineness fineness = first_fineness(request.ellipses.size());
+    Eigen::MatrixXd columns;
+    std::vector<double> errors;
+    if (parameters_.displacement_tolerance == 0) {
+      columns = solve_on(fineness, request);
+    } else {
+      for (int& halvings : fineness.halvings) --halvings;
+      fineness.growth *= far_step();
+      columns = solve_on(fineness, request);
+      errors = refine_until_right(fineness, request, columns);
+    }
+    note_errors(errors, greens::seconds_since(start));
+    return columns;
+  }
+
+  Fineness first_fineness(std::size_t n_ellipses) const {
+    return {.across = parameters_.elements_across_adhesion,
+            .fewest_elements = parameters_.elements_per_adhesion,
+            .growth = growth(),
+            .halvings = std::vector<int>(n_ellipses, 0)};
+  }
+
+  /// Trilinear elements follow the far field as well as quadratic ones of eight times their side (measured).
+  double growth() const { return order_ == 1 ? parameters_.growth / 8 : parameters_.growth; }
+  /// Far away the error falls as the side to order + 1, near the rims as its power 3/2: there the side may shrink less.
+  double far_step() const { return std::pow(2, 1.5 / (order_ + 1)); }
+
+  /// Halve the elements on the adhesions whose columns are worst, those far away by as much as they matter.
+  /// @return the estimated error of each adhesion's columns
+  std::vector<double> refine_until_right(Fineness& fineness, const Request& request, Eigen::MatrixXd& columns) const {
+    std::vector<double> errors(request.ellipses.size(), std::numeric_limits<double>::infinity());
+    for (int level = 0; level < kMostLevels; ++level) {
+      const std::vector<std::size_t> finer_ones = worst(errors);
+      for (const std::size_t j : finer_ones) ++fineness.halvings[j];
+      fineness.growth /= far_step();
+      Eigen::MatrixXd finer = solve_finer(fineness, request, errors);
+      for (const std::size_t j : finer_ones) {
+        errors[j] = estimated_error(columns, finer, static_cast<Eigen::Index>(j));
+      }
+      columns.swap(finer);
+      if (mean(errors) <= parameters_.displacement_tolerance) return errors;
+    }
+    throw NotSolved(Report{.iterations = kMostLevels,
+                           .last_change = mean(errors),
+                           .reason = "the substrate's error is still estimated as " + brief(mean(errors)) + " after " +
+                                     std::to_string(kMostLevels) +
+                                     " refinements: ask for a larger displacement_tolerance"});
+  }
+
+  /// As many of the largest errors as must fall by q = 2^(3/2) for the mean to reach the tolerance; all where none is
+  /// known yet.
+  std::vector<std::size_t> worst(const std::vector<double>& errors) const {
+    std::vector<std::size_t> order(errors.size());
+    std::iota(order.begin(), order.end(), 0);
+    if (std::isinf(errors[0])) return order;
+    std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) { return errors[a] > errors[b]; });
+    double excess = (mean(errors) - kAim * parameters_.displacement_tolerance) * static_cast<double>(errors.size());
+    std::size_t n = 0;
+    while (n < order.size() && excess > 0) excess -= (1 - 1 / kFall) * errors[order[n++]];
+    order.resize(n);
+    return order;
+  }
+
+  Eigen::MatrixXd solve_finer(const Fineness& fineness, const Request& request,
+                              const std::vector<double>& errors) const {
+    try {
+      return solve_on(fineness, request);
+    } catch (NotSolved& error) {
+      if (std::isfinite(mean(errors))) {
+        error.report.reason += "; the mesh before it has an estimated error of " + brief(mean(errors)) +
+                               " (substrate.displacement_tolerance is " + brief(parameters_.displacement_tolerance) +
+                               ")";
+      }
+      throw;
+    }
+  }
+
+  /// From two meshes of which the finer has half the side. The error falls by q = 2^(3/2), and the finer solution's
+  /// error is orthogonal in energy to the difference (the meshes are nested), so that about
+  /// |difference|² = (q² - 1) |error of the finer|².
+  static double estimated_error(const Eigen::MatrixXd& coarse, const Eigen::MatrixXd& fine, Eigen::Index ellipse) {
+    const bool is_matrix = fine.cols() > 1;
+    const Eigen::Index first = is_matrix ? 2 * ellipse : 0, n = is_matrix ? 2 : 1;
+    const double size = fine.middleCols(first, n).norm();
+    return size == 0 ? 0 : (fine - coarse).middleCols(first, n).norm() / (std::sqrt(kFall * kFall - 1) * size);
+  }
+
+  static double mean(const std::vector<double>& values) {
+    return std::accumulate(values.begin(), values.end(), 0.0) / static_cast<double>(values.size());
+  }
+
+  Eigen::MatrixXd solve_on(const Fineness& fineness, const Request& request) const {
+    const auto start = std::chrono::steady_clock::now();
+    const ElasticSystem system = system_for(fineness, request.points_um, request.ellipses);
+    const double setup_s = greens::seconds_since(start);
+    std::vector<std::vector<NodeWeight>> samples(request.points_um.size()), loads(request.ellipses.size());
+    numerics::parallel_for(static_cast<int>(samples.size()), threads_,
+                           [&](int i) { samples[i] = system.surface_weights(request.points_um[i]); });
+    numerics::parallel_for(static_cast<int>(loads.size()), threads_,
+                           [&](int j) { loads[j] = system.load_weights(request.ellipses[j]); });
+    const std::vector<int> order = request.n_columns == 1 ? std::vector<int>{0} : columns_by_place(request.ellipses);
+    Eigen::MatrixXd columns =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(request.axes.size() * samples.size()), request.n_columns);
+    system.factor().solve(
+        request.n_columns, nodes_of(samples),
+        [&](int k, const numerics::NodalColumn& b) { add_loads(loads, request.case_of_column(order[k]), b); },
+        [&](int k, const numerics::NodalColumn& u) {
+          add_samples(samples, request.axes, u, columns.col(order[k]).data());
+        });
+    note(system, request.ellipses, setup_s);
+    return columns;
+  }
+
+  ElasticSystem system_for(const Fineness& fineness, const std::vector<Vec2>& points_um,
+                           const std::vector<substrate::Ellipse>& ellipses) const {
+    // too few for any mesh of the kind (measured: 250 kB an element of Q2, 25 of Q1); the factor is weighed exactly
+    const double bytes = order_ == 2 ? 1e5 : 1e4;
+    const auto most = static_cast<std::int64_t>(1e9 * allowed_GB(parameters_.memory_limit_GB) / bytes);
+    BlockMesh mesh = refined_mesh(material_, substrate::extent_of(points_um, ellipses), ellipses, fineness,
+                                  substrate::margin_um(material_.gel, parameters_), order_, most, threads_);
+    return {material_,
+            std::move(mesh),
+            {.threads = threads_,
+             .memory_limit_GB = allowed_GB(parameters_.memory_limit_GB),
+             .precision = is_single() ? numerics::Precision::single_ : numerics::Precision::double_}};
+  }
+
+  /// Rounding to single precision changes a column by 1 % at nu = 0.4999 (measured, 250 000 unknowns) and in proportion
+  /// to lambda / mu; at 0.495 the error is the same to 0.001 points as in double precision.
+  bool is_single() const {
+    constexpr double kMostForSingle = 0.495;
+    if (parameters_.precision != "auto") return parameters_.precision == "single";
+    return material_.gel.poisson_ratio <= kMostForSingle;
+  }
+
+  void note(const ElasticSystem& system, const std::vector<substrate::Ellipse>& ellipses, double setup_s) const {
+    std::size_t fewest = system.mesh().cells.size();
+    for (const substrate::Ellipse& ellipse : ellipses) fewest = std::min(fewest, system.touched_cells(ellipse).size());
+    const GridLines& lines = system.mesh().lines;
+    const std::lock_guard lock(mutex_);
+    figures_ = {{"substrate_model", "refined"},
+                {"substrate_element", parameters_.element},
+                {"substrate_precision", std::string(is_single() ? "single" : "double")},
+                {"substrate_thickness_um", material_.gel.thickness_um},
+                {"substrate_unknowns", std::int64_t{system.n_unknowns()}},
+                {"substrate_elements", static_cast<std::int64_t>(system.mesh().cells.size())},
+                {"substrate_fewest_elements_of_an_adhesion", static_cast<std::int64_t>(fewest)},
+                {"substrate_block_x_um", lines.x_um.back() - lines.x_um.front()},
+                {"substrate_block_y_um", lines.y_um.back() - lines.y_um.front()},
+                {"substrate_factor_GB", system.factor().factor_GB()},
+                {"substrate_setup_s", setup_s}};
+  }
+
+  void note_errors(const std::vector<double>& errors, double total_s) const {
+    const std::lock_guard lock(mutex_);
+    if (!errors.empty()) figures_.emplace_back("substrate_estimated_error", mean(errors));
+    figures_.emplace_back("substrate_total_s", total_s);
+  }
+
+  substrate::Material material_;
+  substrate::SubstrateParameters parameters_;
+  int threads_;
+  int order_;
+  mutable std::mutex mutex_;
+  mutable Figures figures_ = {{"substrate_model", "refined"}};  // of the last call
+};
+
+}  // namespace
+
+std::unique_ptr<substrate::Substrate> make_refined(const Gel& gel, const substrate::SubstrateParameters& parameters,
+                                                   int threads) {
+  return std::make_unique<Refined>(gel, parameters, threads);
+}
+
+}  // namespace mbtfm::boxes

@@ -1,0 +1,203 @@
+/// The exact half-space field of each ellipse plus a smooth finite element correction for the bottom and the sides.
+///
+/// u = u_c + w: u_c is the half-space's field, w solves the elastic problem without load on the surface, with w = -u_c
+/// on the bottom and tractions -sigma(u_c) n on the sides. All of that is as smooth as the gel is thick, so a coarse
+/// grid does, and it knows nothing of the adhesions: one factorisation for all scenes that cover the same squares.
+/// Valid for a homogeneous gel with a flat surface; sides about a thickness away from the adhesions at least.
+#include <chrono>
+#include <cmath>
+#include <memory>
+#include <mutex>
+
+#include "substrate/boxes/load_cases.h"
+#include "substrate/boxes/models.h"
+#include "substrate/boxes/split_block.h"
+#include "substrate/effects.h"
+#include "substrate/greens/greens_model.h"
+#include "substrate/models.h"
+
+namespace mbtfm::boxes {
+namespace {
+
+/// Averages the half-space's inner field over an ellipse, a force along x and y at once.
+greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse& ellipse,
+                                       const std::vector<substrate::DiscPoint>& rule,
+                                       const std::array<double, 3>& position) {
+  greens::PointForceField sum;
+  const Vec2 offset = Vec2{position[0], position[1]} - ellipse.centre_um;
+  for (const substrate::DiscPoint& p : rule) {
+    const greens::PointForceField field =
+        greens::cerruti_field(gel, offset.x - p.position.x, offset.y - p.position.y, position[2]);
+    for (int f = 0; f < 2; ++f) {
+      for (int i = 0; i < 3; ++i) {
+        sum.u_um_per_nN[f][i] += p.weight * field.u_um_per_nN[f][i];
+        for (int j = 0; j < 3; ++j) sum.gradient_per_nN[f][i][j] += p.weight * field.gradient_per_nN[f][i][j];
+      }
+    }
+  }
+  return sum;
+}
+
+class Split final : public substrate::Substrate {
+ public:
+  Split(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
+      : gel_(gel), parameters_(parameters), threads_(threads) {}
+
+  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
+                                       const std::vector<substrate::Ellipse>& ellipses) const override {
+    const std::lock_guard lock(mutex_);
+    Eigen::MatrixXd matrix = near_field(points_um, ellipses);
+    if (matrix.size() == 0) return matrix;
+    add_correction(points_um, ellipses, unit_case, {0, 1}, matrix);
+    return matrix;
+  }
+
+  std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um,
+                                     const std::vector<substrate::Ellipse>& ellipses,
+                                     const std::vector<Vec2>& forces_nN) const override {
+    substrate::check_forces(ellipses, forces_nN);
+    if (points_um.empty() || ellipses.empty()) return std::vector<Vec2>(points_um.size());
+    substrate::check_points(points_um);
+    check(ellipses);
+    const std::lock_guard lock(mutex_);
+    std::vector<greens::HalfSpaceEllipse> near;
+    for (const substrate::Ellipse& ellipse : ellipses) near.emplace_back(gel_, ellipse);
+    Eigen::MatrixXd field = Eigen::MatrixXd::Zero(2 * points_um.size(), 1);
+    numerics::parallel_for(static_cast<int>(points_um.size()), threads_, [&](int i) {
+      for (std::size_t j = 0; j < near.size(); ++j) {
+        const greens::Sym2 g = near[j].compliance_um_per_nN(points_um[i]);
+        field(2 * i, 0) += g.xx * forces_nN[j].x + g.xy * forces_nN[j].y;
+        field(2 * i + 1, 0) += g.xy * forces_nN[j].x + g.yy * forces_nN[j].y;
+      }
+    });
+    const LoadCase all = case_of(forces_nN);
+    add_correction(
+        points_um, ellipses, [&all](int) { return all; }, {0, 1}, field);
+    return vectors_of(field);
+  }
+
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN) const override {
+    substrate::check_forces(ellipses, forces_nN);
+    if (points_um.empty() || ellipses.empty()) return std::vector<double>(points_um.size());
+    substrate::check_points(points_um);
+    check(ellipses);
+    const std::lock_guard lock(mutex_);
+    const std::vector<double> near = greens::half_space_vertical_um(gel_, points_um, ellipses, forces_nN, threads_);
+    Eigen::MatrixXd field = Eigen::Map<const Eigen::VectorXd>(near.data(), static_cast<Eigen::Index>(near.size()));
+    const LoadCase all = case_of(forces_nN);
+    add_correction(
+        points_um, ellipses, [&all](int) { return all; }, {2}, field);
+    return {field.data(), field.data() + field.size()};
+  }
+  bool has_vertical() const override { return substrate::asks_for_vertical(parameters_); }
+
+  std::vector<Effect> effects() const override { return substrate::effects_of_model(parameters_).list(); }
+
+  Figures figures() const override {
+    const std::lock_guard lock(mutex_);
+    Figures figures = {{"substrate_model", "split"}, {"substrate_thickness_um", gel_.thickness_um}};
+    if (!block_) return figures;
+    const GridLines& lines = block_->system.mesh().lines;
+    figures.emplace_back("substrate_unknowns", std::int64_t{block_->system.n_unknowns()});
+    figures.emplace_back("substrate_elements", static_cast<std::int64_t>(block_->system.mesh().cells.size()));
+    figures.emplace_back("substrate_block_x_um", lines.x_um.back() - lines.x_um.front());
+    figures.emplace_back("substrate_block_y_um", lines.y_um.back() - lines.y_um.front());
+    figures.emplace_back("substrate_factor_GB", block_->system.factor().factor_GB());
+    if (!parameters_.cache_folder.empty())
+      figures.emplace_back("substrate_cache", block_->system.factor().cache_note());
+    figures.emplace_back("substrate_setup_s", setup_s_);
+    figures.emplace_back("substrate_solve_s", solve_s_);
+    return figures;
+  }
+
+ private:
+  Eigen::MatrixXd near_field(const std::vector<Vec2>& points_um,
+                             const std::vector<substrate::Ellipse>& ellipses) const {
+    return greens::compliance_by_columns(points_um, ellipses, threads_, [this](const substrate::Ellipse& ellipse) {
+      return greens::HalfSpaceEllipse(gel_, ellipse);
+    });
+  }
+
+  const SplitBlock& block_around(const substrate::Extent& scene) const {
+    const Footprint footprint = footprint_of(scene, gel_, parameters_);
+    if (block_ && block_->footprint == footprint) return *block_;
+    block_.reset();  // not two at a time in memory
+    const auto start = std::chrono::steady_clock::now();
+    block_ = make_split_block(footprint, gel_, parameters_, threads_);
+    setup_s_ = greens::seconds_since(start);
+    return *block_;
+  }
+
+  /// Add w at the points, along these axes, to each column, whose forces on ellipses are given by `case_of_column`.
+  template <class CaseOf>
+  void add_correction(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
+                      const CaseOf& case_of_column, const std::vector<int>& axes, Eigen::MatrixXd& columns) const {
+    const SplitBlock& block = block_around(substrate::extent_of(points_um, ellipses));
+    const auto start = std::chrono::steady_clock::now();
+    std::vector<std::vector<NodeWeight>> samples(points_um.size());
+    numerics::parallel_for(static_cast<int>(samples.size()), threads_,
+                           [&](int i) { samples[i] = block.system.surface_weights(points_um[i]); });
+    block.system.factor().solve(
+        static_cast<int>(columns.cols()), nodes_of(samples),
+        [&](int column, const numerics::NodalColumn& b) {
+          for (const auto& [j, force] : case_of_column(column)) add_data(block, ellipses[j], force, b);
+        },
+        [&](int column, const numerics::NodalColumn& w) { add_samples(samples, axes, w, columns.col(column).data()); });
+    solve_s_ = greens::seconds_since(start);
+  }
+
+  /// Right-hand side of w for a force on one ellipse.
+  void add_data(const SplitBlock& block, const substrate::Ellipse& ellipse, Vec2 force,
+                const numerics::NodalColumn& b) const {
+    // the field's nearest singularity seen from bottom and sides is about h away: leaves 1e-5 of it
+    const double ratio = ellipse.semi_major_um / gel_.thickness_um;
+    const int degree = ratio < 0.05 ? 3 : static_cast<int>(std::ceil(std::log(1e-5) / std::log(std::min(0.8, ratio))));
+    const std::vector<substrate::DiscPoint> rule = substrate::ellipse_rule(ellipse, degree);
+    const ElasticSystem& system = block.system;
+    const std::vector<int>& bottom = system.bottom_nodes();
+    Eigen::VectorXd on_bottom(3 * bottom.size());
+    for (std::size_t k = 0; k < bottom.size(); ++k) {
+      const auto field = averaged_field(gel_, ellipse, rule, system.mesh().position_um[bottom[k]]);
+      for (int i = 0; i < 3; ++i) {
+        on_bottom[3 * k + i] = force.x * field.u_um_per_nN[0][i] + force.y * field.u_um_per_nN[1][i];
+      }
+    }
+    // w = -u_c there, on the left side
+    const Eigen::VectorXd data = system.bottom_stiffness() * on_bottom;
+    for (Eigen::Index k = 0; k < data.size(); ++k) b(static_cast<int>(k / 3), static_cast<int>(k % 3)) += data[k];
+
+    const double mu = substrate::shear_modulus_kPa(gel_);
+    const double lambda = 2 * mu * gel_.poisson_ratio / (1 - 2 * gel_.poisson_ratio);
+    for (const SidePoint& point : block.side_points) {
+      const auto field = averaged_field(gel_, ellipse, rule, point.position_um);
+      double g[3][3];
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) {
+          g[i][j] = force.x * field.gradient_per_nN[0][i][j] + force.y * field.gradient_per_nN[1][i][j];
+        }
+      }
+      const int n = point.normal_axis;
+      for (int i = 0; i < 3; ++i) {
+        const double stress = mu * (g[i][n] + g[n][i]) + (i == n ? lambda * (g[0][0] + g[1][1] + g[2][2]) : 0);
+        for (const auto& [node, weight] : point.weights) b(node, i) -= point.area_um2 * weight * stress;
+      }
+    }
+  }
+
+  Gel gel_;
+  substrate::SubstrateParameters parameters_;
+  int threads_;
+  mutable std::mutex mutex_;  // guards the block: made at the first call, kept while scenes cover the same squares
+  mutable std::unique_ptr<SplitBlock> block_;
+  mutable double setup_s_ = 0, solve_s_ = 0;
+};
+
+}  // namespace
+
+std::unique_ptr<substrate::Substrate> make_split(const Gel& gel, const substrate::SubstrateParameters& parameters,
+                                                 int threads) {
+  return std::make_unique<Split>(gel, parameters, threads);
+}
+
+}  // namespace mbtfm::boxes

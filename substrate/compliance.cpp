@@ -1,0 +1,120 @@
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "substrate/effects.h"
+#include "substrate/models.h"
+#include "substrate/response.h"
+
+namespace mbtfm::substrate {
+
+void declare(stage::ParameterList& list, SubstrateParameters& p) {
+  list.table("substrate");
+  list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on",
+           {"half-space", "layer", "split", "refined", "auto"});
+  list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
+           "refined: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is refined "
+           "until it is estimated to have; 0: the first mesh, no error estimated");
+  list.add("modulus_profile", p.modulus_profile,
+           "depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
+           "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
+  list.add(
+      "margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
+      "split, refined: from the adhesions and beads to the sides of the block where the gel's own are far away, in "
+      "gel thicknesses");
+  list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
+           "split: cells of the correction's grid over the gel's thickness");
+  list.add("element", p.element, "refined: finite element", {"q2-p1disc", "q1-p0"});
+  list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
+           "refined: square root of an adhesion's area over the side of the elements that carry it, in the first mesh");
+  list.add("precision", p.precision,
+           "refined: of the factor; auto: single up to a Poisson ratio of 0.495, above it double",
+           {"auto", "single", "double"});
+  list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
+           "refined: elements that touch each adhesion, at least");
+  list.add("growth", p.growth, Range::between(0.1, 10),
+           "refined: largest side of an element over its distance to the nearest adhesion");
+  list.add("side_distance_um", p.side_distance_um, Range::between(1e-3, 1e5),
+           "from the adhesions and beads to the gel's own sides (um); unset: they are far away");
+  list.add("surface_tilt_deg", p.surface_tilt_deg, Range{.low = 0, .high = 90, .excludes_high = true},
+           "of the gel's surface against the image plane; no model takes it, auto says how far it matters");
+  list.add("surface_roughness_um", p.surface_roughness_um, Range::zero_or_size_um(),
+           "root mean square height of the gel's surface about its plane (um); likewise");
+  list.add("cache_folder", p.cache_folder,
+           "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
+  list.add("stress", p.stress, "write the stress inside the gel, too (refined)");
+  list.add("memory_limit_GB", p.memory_limit_GB, Range::between(0, 1e6),
+           "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
+}
+
+void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {
+  if (forces_nN.size() != ellipses.size()) {
+    throw InvalidData("forces", "one for each of " + std::to_string(ellipses.size()) + " ellipses",
+                      std::to_string(forces_nN.size()));
+  }
+  for (std::size_t j = 0; j < forces_nN.size(); ++j) {
+    if (!is_finite(forces_nN[j])) throw InvalidData("force " + std::to_string(j), "finite numbers", "others");
+  }
+}
+
+SharedResponse Substrate::response(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const {
+  return dense_response(compliance_um_per_nN(points_um, ellipses));
+}
+
+std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                              const std::vector<Vec2>& forces_nN) const {
+  check_forces(ellipses, forces_nN);
+  Eigen::VectorXd forces(2 * static_cast<Eigen::Index>(ellipses.size()));
+  for (std::size_t j = 0; j < forces_nN.size(); ++j) {
+    forces[2 * j] = forces_nN[j].x;
+    forces[2 * j + 1] = forces_nN[j].y;
+  }
+  constexpr std::size_t kBlock = 2048;  // points at a time: some MB of matrix
+  std::vector<Vec2> displacements;
+  displacements.reserve(points_um.size());
+  for (std::size_t begin = 0; begin < points_um.size(); begin += kBlock) {
+    const std::size_t end = std::min(begin + kBlock, points_um.size());
+    const std::vector<Vec2> block(points_um.begin() + begin, points_um.begin() + end);
+    const Eigen::VectorXd u = compliance_um_per_nN(block, ellipses) * forces;
+    for (std::size_t i = 0; i < block.size(); ++i) displacements.push_back({u[2 * i], u[2 * i + 1]});
+  }
+  return displacements;
+}
+
+std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,
+                                     const SubstrateParameters& parameters, int threads) {
+  check(gel);
+  std::string names;
+  for (const Model& model : table) {
+    if (model.name == parameters.model) {
+      if (gel.poisson_ratio == 0.5 && !model.takes_incompressible) {
+        throw UsageError("gel.poisson_ratio = 0.5: the model " + model.name +
+                         " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
+                         "or half-space");
+      }
+      if (model.name == "auto") return model.make(gel, parameters, threads);  // decides by the scene
+      return model.make(gel, without_what_is_off(parameters, effects_of_model(parameters)), threads);
+    }
+    names += (names.empty() ? "" : ", ") + model.name;
+  }
+  throw UsageError("substrate.model: expected one of " + names + ", found '" + parameters.model + "'");
+}
+
+std::vector<double> Substrate::vertical_um(const std::vector<Vec2>&, const std::vector<Ellipse>&,
+                                           const std::vector<Vec2>&) const {
+  throw UsageError("effects.vertical_displacement: the model has no displacement: take half-space, split or refined");
+}
+
+VolumeField Substrate::volume(const std::vector<Ellipse>&, const std::vector<Vec2>&) const {
+  throw UsageError("the model knows the gel's surface alone: take the model refined");
+}
+
+bool asks_for_vertical(const SubstrateParameters& parameters) {
+  return parameters.effects.vertical_displacement == "on";
+}
+
+double margin_um(const Gel& gel, const SubstrateParameters& parameters) {
+  return parameters.side_distance_um.value_or(parameters.margin_thicknesses * gel.thickness_um);
+}
+
+}  // namespace mbtfm::substrate

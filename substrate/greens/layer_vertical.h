@@ -1,0 +1,35 @@
+/// How a force along the surface of a layer on a rigid base moves the surface into it.
+///
+/// In Fourier space a traction along the wave vector k moves the surface by w(kh) / (mu k) into the layer, a quarter of
+/// a wave ahead; in space that is
+///
+///   u_z(r) = (F . e) / (2 pi mu) ∫ w(kh) J1(kr) dk,   e = r/|r|
+///
+/// w - (1-2nu)/2, less the half-space's, falls as (kh)² exp(-2kh), so that this part is smooth. w(kh) is solved for in
+/// the layer's own solutions at each k: plane strain, with the base at rest and the surface loaded along itself alone.
+/// Source: Papkovich's general solution, u = 4 (1-nu) psi - grad(z psi + phi) over 2 mu (Barber, Elasticity, ch. 21).
+#pragma once
+
+#include <vector>
+
+#include "substrate/greens/half_space.h"
+
+namespace mbtfm::greens {
+
+/// w(x), x = kh > 0. Tends to (1-2nu)/2, the half-space's.
+double layer_vertical_factor(double poisson_ratio, double x);
+
+class LayerVertical {
+ public:
+  explicit LayerVertical(const Gel& gel);
+  /// Displacement (um) of each point of the surface into the layer.
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN, int threads) const;
+
+ private:
+  double correction(double r) const;  ///< ∫ (w(x) - (1-2nu)/2) J1(x r) dx, r in thicknesses
+  Gel gel_;
+  std::vector<double> values_;  ///< of the correction over r at the Chebyshev nodes of each piece
+};
+
+}  // namespace mbtfm::greens

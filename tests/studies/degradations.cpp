@@ -1,0 +1,455 @@
+/// degradations FOLDER FIRST_SEED [cells] [names], or degradations page TABLE.csv > docs/degradations.md: what a cell's
+/// images go through in a laboratory, and what the program says of it. Each cell is simulated with images, degraded in
+/// one way, run whole (`mbtfm run`) and compared with its truth. A table (CSV) on stdout; `names` are separated by
+/// commas, "sound" is the undegraded one.
+///
+/// A degraded cell is told where the program refuses it, has an open finding, or its error bars hold: at least 90 % of
+/// the tensions' 95 % intervals hold the truth, and the total force lies within three of its standard errors. The truth
+/// is that of the adhesions in view.
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <functional>
+#include <map>
+#include <numbers>
+#include <opencv2/imgproc.hpp>
+#include <random>
+#include <sstream>
+
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/json_record.h"
+#include "pipeline/report/match_fibres.h"
+#include "segment/images/image.h"
+#include "segment/images/png.h"
+#include "tests/support/program.h"
+
+namespace {
+
+using namespace mbtfm;
+using images::Image;
+namespace fs = std::filesystem;
+
+/// A cell's images and settings; what a degradation changes.
+struct Set {
+  images::Image adhesion, actin, relaxed, stressed;
+  std::string settings;  ///< further lines of cell.toml, before its tables
+  std::string pixel_size_um = "0.1", youngs_modulus_kPa = "8.4";
+  bool as_jpeg = false;
+  std::vector<images::Image*> all() { return {&adhesion, &actin, &relaxed, &stressed}; }
+};
+
+cv::Mat mat(const images::Image& image) {
+  return cv::Mat(image.height, image.width, CV_32F, const_cast<float*>(image.pixels.data())).clone();
+}
+
+void put(images::Image& image, const cv::Mat& pixels) {
+  image.width = pixels.cols;
+  image.height = pixels.rows;
+  image.pixels.assign(reinterpret_cast<const float*>(pixels.data),
+                      reinterpret_cast<const float*>(pixels.data) + pixels.total());
+}
+
+/// image(x) becomes image(from(x)); px, 0 at the centre of the first one.
+void warp(images::Image& image, const std::function<Vec2(Vec2)>& from) {
+  cv::Mat x(image.height, image.width, CV_32F), y = x.clone(), warped;
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      const Vec2 p = from({double(i), double(j)});
+      x.at<float>(j, i) = float(p.x);
+      y.at<float>(j, i) = float(p.y);
+    }
+  }
+  cv::remap(mat(image), warped, x, y, cv::INTER_LANCZOS4, cv::BORDER_REFLECT_101);
+  put(image, cv::max(warped, 0));
+}
+
+Vec2 middle(const images::Image& image) { return {0.5 * (image.width - 1), 0.5 * (image.height - 1)}; }
+
+/// What the image shows moves by this linear map about its middle, and a shift (px).
+void move(images::Image& image, Vec2 shift, double growth = 0, double turn_deg = 0, double shear = 0) {
+  const Vec2 c = middle(image);
+  const double t = turn_deg * std::numbers::pi / 180;
+  warp(image, [=](Vec2 p) {
+    const Vec2 d = p - c - shift;  // small: inverse to second order
+    return c + Vec2{d.x * (1 - growth - shear) + t * d.y, d.y * (1 - growth + shear) - t * d.x};
+  });
+}
+
+void blur(images::Image& image, double sigma_px) {
+  cv::Mat blurred;
+  cv::GaussianBlur(mat(image), blurred, {}, sigma_px);
+  put(image, blurred);
+}
+
+void add_noise(images::Image& image, double times, unsigned seed) {
+  cv::Mat pixels = mat(image), high;
+  cv::Laplacian(pixels, high, CV_32F);  // of noise of sd s: s sqrt(20)
+  std::vector<float> sizes;
+  for (int j = 0; j < high.rows; ++j) {
+    for (int i = 0; i < high.cols; ++i) sizes.push_back(std::abs(high.at<float>(j, i)));
+  }
+  std::nth_element(sizes.begin(), sizes.begin() + std::ptrdiff_t(sizes.size() / 2), sizes.end());
+  const double sigma = 1.4826 * sizes[sizes.size() / 2] / std::sqrt(20.0);
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, times * sigma);
+  for (float& p : image.pixels) p = float(std::max(0.0, p + normal(random)));
+}
+
+void saturate(images::Image& image, double share) {
+  std::vector<float> values = image.pixels;
+  const auto at = values.begin() + std::ptrdiff_t((1 - share) * double(values.size()));
+  std::nth_element(values.begin(), at, values.end());
+  for (float& p : image.pixels) p = std::min(p, *at) / *at * 65535;
+}
+
+void crop(Set& set, double left, double right, double top, double bottom) {
+  for (images::Image* image : set.all()) {
+    const cv::Rect box(int(left * image->width), int(top * image->height), int((right - left) * image->width),
+                       int((bottom - top) * image->height));
+    put(*image, mat(*image)(box).clone());
+  }
+}
+
+void transpose(images::Image& image) { put(image, mat(image).t()); }
+
+void mirror(images::Image& image) {
+  cv::Mat flipped;
+  cv::flip(mat(image), flipped, 1);
+  put(image, flipped);
+}
+
+struct Degradation {
+  std::string name, what;
+  std::function<void(Set&, const Set& other)> apply;
+};
+
+std::vector<Degradation> degradations() {
+  const auto stressed = [](auto... motion) { return [=](Set& s, const Set&) { move(s.stressed, motion...); }; };
+  return {
+      {"sound", "nothing", [](Set&, const Set&) {}},
+      {"growth-0.05", "the stressed bead image is 0.05 % larger", stressed(Vec2{}, .0005)},
+      {"growth-0.1", "the stressed bead image is 0.1 % larger", stressed(Vec2{}, .001)},
+      {"growth-minus-0.3", "the stressed bead image is 0.3 % smaller", stressed(Vec2{}, -.003)},
+      {"growth-2", "the stressed bead image is 2 % larger: another objective", stressed(Vec2{}, .02)},
+      {"shear-0.1", "the stressed bead image is sheared by 0.1 %", stressed(Vec2{}, 0., 0., .001)},
+      {"turn-0.3", "the stressed bead image is turned by 0.3 degrees", stressed(Vec2{}, 0., .3)},
+      {"turn-5", "the stressed bead image is turned by 5 degrees", stressed(Vec2{}, 0., 5.)},
+      {"drift", "the stage drifted by (3.4, -1.7) px between the bead images", stressed(Vec2{3.4, -1.7})},
+      {"all-motions", "growth, shear, turn and drift together", stressed(Vec2{3.4, -1.7}, .001, .3, .001)},
+      {"tiles", "the right half of the stressed bead image was stitched 1 px off",
+       [](Set& s, const Set&) {
+         const double half = 0.55 * s.stressed.width;
+         warp(s.stressed, [=](Vec2 p) { return p.x > half ? p - Vec2{1, 0} : p; });
+       }},
+      {"rolling-drift", "the stage swung by 0.5 px while the stressed bead image was scanned",
+       [](Set& s, const Set&) {
+         const double period = s.stressed.height;
+         warp(s.stressed, [=](Vec2 p) { return p - Vec2{0.5 * std::sin(2 * std::numbers::pi * p.y / period), 0}; });
+       }},
+      {"lens", "the stressed bead image was taken through a lens that distorts by 0.1 % at the border",
+       [](Set& s, const Set&) {
+         const Vec2 c = middle(s.stressed);
+         warp(s.stressed, [=](Vec2 p) {
+           const Vec2 d = p - c;
+           return p - .001 * dot(d, d) / dot(c, c) * 2 * d;
+         });
+       }},
+      {"adhesions-3px", "the adhesion channel is shifted by 3 px against the others",
+       [](Set& s, const Set&) {
+         move(s.adhesion, {2.5, -1.7});
+       }},
+      {"adhesions-5px", "the adhesion channel is shifted by 5 px against the others",
+       [](Set& s, const Set&) {
+         move(s.adhesion, {-4, 3});
+       }},
+      {"actin-4px", "the actin channel is shifted by 4 px against the others",
+       [](Set& s, const Set&) {
+         move(s.actin, {3, 2.6});
+       }},
+      {"beads-5px", "both bead images are shifted by 5 px against the cell",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.relaxed, &s.stressed}) move(*i, {4, 3});
+       }},
+      {"beads-turned", "both bead images are turned by 0.5 degrees against the cell",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.relaxed, &s.stressed}) move(*i, {}, 0, .5);
+       }},
+      {"beads-mirrored", "both bead images are mirrored",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.relaxed, &s.stressed}) mirror(*i);
+       }},
+      {"beads-transposed", "rows and columns of both bead images are exchanged",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.relaxed, &s.stressed}) transpose(*i);
+       }},
+      {"beads-exchanged", "the stressed and the relaxed bead image are exchanged",
+       [](Set& s, const Set&) { std::swap(s.relaxed, s.stressed); }},
+      {"beads-of-another-cell", "both bead images are those of another cell",
+       [](Set& s, const Set& o) { s.relaxed = o.relaxed, s.stressed = o.stressed; }},
+      {"stressed-of-another-cell", "the stressed bead image is that of another cell",
+       [](Set& s, const Set& o) { s.stressed = o.stressed; }},
+      {"channels-exchanged", "the adhesion and the actin image are exchanged",
+       [](Set& s, const Set&) { std::swap(s.adhesion, s.actin); }},
+      {"bleed-through", "a third of the actin signal is seen in the adhesion channel",
+       [](Set& s, const Set&) {
+         for (std::size_t k = 0; k < s.adhesion.pixels.size(); ++k) s.adhesion.pixels[k] += .33f * s.actin.pixels[k];
+       }},
+      {"defocus", "the stressed bead image is out of focus (blurred by 1.5 px)",
+       [](Set& s, const Set&) { blur(s.stressed, 1.5); }},
+      {"both-defocused", "both bead images are out of focus (blurred by 2 px)",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.relaxed, &s.stressed}) blur(*i, 2);
+       }},
+      {"noisy-beads", "three times more noise in both bead images",
+       [](Set& s, const Set&) {
+         add_noise(s.relaxed, 3, 1);
+         add_noise(s.stressed, 3, 2);
+       }},
+      {"adhesions-saturated", "the brightest 1 % of the adhesion image are saturated",
+       [](Set& s, const Set&) { saturate(s.adhesion, .01); }},
+      {"actin-saturated", "the brightest 2 % of the actin image are saturated",
+       [](Set& s, const Set&) { saturate(s.actin, .02); }},
+      {"beads-saturated", "the brightest 2 % of both bead images are saturated",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.relaxed, &s.stressed}) saturate(*i, .02);
+       }},
+      {"jpeg", "all images are JPEG files", [](Set& s, const Set&) { s.as_jpeg = true; }},
+      {"cut-one-side", "the border cuts a third of the cell off", [](Set& s, const Set&) { crop(s, 0, .6, 0, 1); }},
+      {"cut-two-sides", "the border cuts the cell on two sides", [](Set& s, const Set&) { crop(s, 0, .62, 0, .62); }},
+      {"uneven-light", "the light of adhesion and actin image falls to a third at the border",
+       [](Set& s, const Set&) {
+         for (images::Image* image : {&s.adhesion, &s.actin}) {
+           const Vec2 c = middle(*image);
+           for (int j = 0; j < image->height; ++j) {
+             for (int i = 0; i < image->width; ++i) {
+               const Vec2 d = Vec2{double(i), double(j)} - c;
+               image->at(i, j) *= float(1 - .67 * dot(d, d) / dot(c, c));
+             }
+           }
+         }
+       }},
+      {"blurred-cell", "adhesion and actin image are out of focus (blurred by 3 px)",
+       [](Set& s, const Set&) {
+         for (images::Image* i : {&s.adhesion, &s.actin}) blur(*i, 3);
+       }},
+      {"fibres-missed", "weak fibres are not found (fibre_start_noise = 60)",
+       [](Set& s, const Set&) { s.settings += "[segment]\nfibre_start_noise = 60\n"; }},
+      {"adhesions-missed", "small and dim adhesions are not found (adhesion_smallest_um2 = 0.8)",
+       [](Set& s, const Set&) { s.settings += "[segment]\nadhesion_smallest_um2 = 0.8\n"; }},
+      {"second-cell", "another cell pulls at the beads in the corner, unseen in the other channels",
+       [](Set& s, const Set&) {
+         const Vec2 c{.12 * s.stressed.width, .12 * s.stressed.height};
+         warp(s.stressed, [=](Vec2 p) {
+           const Vec2 d = p - c;
+           return p - Vec2{5 * std::exp(-dot(d, d) / (2 * 30 * 30)), 0};
+         });
+       }},
+      {"pixel-size", "the pixel size of cell.toml is 30 % too large",
+       [](Set& s, const Set&) { s.pixel_size_um = "0.13"; }},
+      {"modulus-in-pascal", "the modulus is given in Pa", [](Set& s, const Set&) { s.youngs_modulus_kPa = "8400"; }},
+  };
+}
+
+Set read(const fs::path& folder) {
+  return {.adhesion = images::read_image(folder / "paxillin.tif"),
+          .actin = images::read_image(folder / "actin.tif"),
+          .relaxed = images::read_image(folder / "beads_relaxed.tif"),
+          .stressed = images::read_image(folder / "beads_stressed.tif"),
+          .settings = {}};
+}
+
+void write(const fs::path& folder, const Set& set) {
+  const auto image = [&](const std::string& name, const images::Image& i) {
+    if (!set.as_jpeg) return images::write_tiff(folder / (name + ".tif"), i);
+    const float most = *std::ranges::max_element(i.pixels);
+    images::Picture picture{.width = i.width, .height = i.height, .rgb = {}};
+    for (const float p : i.pixels) {
+      for (int c = 0; c < 3; ++c) picture.rgb.push_back(static_cast<std::uint8_t>(255 * p / most));
+    }
+    images::write_jpeg(folder / (name + ".jpg"), picture);
+  };
+  image("paxillin", set.adhesion);
+  image("actin", set.actin);
+  image("beads_relaxed", set.relaxed);
+  image("beads_stressed", set.stressed);
+  std::string images;
+  if (set.as_jpeg) {
+    images =
+        "[images]\nadhesion = \"paxillin.jpg\"\nactin = \"actin.jpg\"\nbeads_relaxed = \"beads_relaxed.jpg\"\n"
+        "beads_stressed = \"beads_stressed.jpg\"\n";
+  }
+  files::write_text(folder / "cell.toml", "pixel_size_um = " + set.pixel_size_um +
+                                              "\n[gel]\nyoungs_modulus_kPa = " + set.youngs_modulus_kPa +
+                                              "\npoisson_ratio = 0.49\nthickness_um = 60\n" + images + set.settings);
+}
+
+constexpr double kTruePixel_um = 0.1;  // whatever cell.toml says
+
+/// Against the truth.
+struct Score {
+  int n_fibres = 0, n_held = 0;
+  double error = 0, total_z = 0;
+};
+
+/// @param view_um  size of the image, whose corner stays where it was: of a cell that it cuts the force found is that
+/// of
+///                 the adhesions in view
+Score score_of(const fs::path& cell, const fs::path& truth, Vec2 view_um) {
+  const auto fibres = [](const fs::path& f) { return files::read_fibres(f / "fibres.csv", f / "fibre_points.csv"); };
+  const std::vector<Fibre> found = fibres(cell / "1_segment"), wanted = fibres(truth);
+  const auto tensions = files::read_tensions(cell / "4_fit/tensions.csv"),
+             true_tensions = files::read_tensions(truth / "tensions.csv");
+  const auto of = [](const std::vector<Tension>& all, int id) {
+    return *std::ranges::find(all, id, &Tension::fibre_id);
+  };
+  Score score;
+  double squares = 0, all = 0;
+  for (const report::FibreMatch& match : report::match_fibres(found, wanted)) {
+    const int id = found[std::size_t(match.found_index)].fibre_id;
+    if (std::ranges::find(tensions, id, &Tension::fibre_id) == tensions.end()) continue;
+    const Tension t = of(tensions, id);
+    const double true_nN = of(true_tensions, wanted[std::size_t(match.true_index)].fibre_id).tension_nN;
+    ++score.n_fibres;
+    score.n_held += t.low_nN.value_or(0) <= true_nN && true_nN <= t.high_nN.value_or(1e300);
+    squares += std::pow(t.tension_nN - true_nN, 2);
+    all += true_nN * true_nN;
+  }
+  score.error = std::sqrt(squares / all);
+  const std::vector<Adhesion> adhesions = files::read_adhesions(truth / "adhesions.csv");
+  double total_nN = 0;
+  for (const AdhesionForce& f : files::read_adhesion_forces(truth / "adhesion_forces.csv")) {
+    const Vec2 place = std::ranges::find(adhesions, f.adhesion_id, &Adhesion::adhesion_id)->position_um;
+    if (place.x < view_um.x && place.y < view_um.y) total_nN += norm(f.force_nN);
+  }
+  const files::JsonRecord fit(cell / "4_fit/fit.json", "a fit");
+  score.total_z = (fit.at("total_force_nN").number() - total_nN) / fit.at("total_force_sigma_nN").number();
+  return score;
+}
+
+std::string open_findings(const fs::path& cell) {
+  const files::JsonRecord run(cell / "run.json", "a run");
+  std::string ids;
+  for (const files::JsonRecord& finding : run.at("findings").list()) {
+    if (finding.at("severity").text() == "note") continue;
+    const std::string id = finding.at("id").text();
+    if (ids.find(id) == ids.npos) ids += (ids.empty() ? "" : "; ") + id;
+  }
+  return ids;
+}
+
+std::string error_line(const std::string& output) {
+  const auto at = output.find("error:");
+  if (at == output.npos) return {};
+  std::string line = output.substr(at + 7, output.find('\n', at) - at - 7);
+  std::ranges::replace(line, '"', '\'');
+  return line;
+}
+
+void study(const Degradation& d, int seed, const fs::path& folder) {
+  const auto simulated = [&](int s) {
+    const fs::path cell = folder / ("cell_" + std::to_string(s));
+    if (!fs::exists(cell / "cell.toml")) {
+      const auto run =
+          test::run_program("mbtfm-simulate --images --quiet --seed " + std::to_string(s) + " --out " + cell.string());
+      if (run.code != 0) std::fprintf(stderr, "%s\n", run.output.c_str());
+    }
+    return cell;
+  };
+  const fs::path truth = simulated(seed) / "truth", cell = folder / (d.name + "_" + std::to_string(seed));
+  Set set = read(simulated(seed));
+  const Set other = read(simulated(seed + 1000));
+  d.apply(set, other);
+  fs::remove_all(cell);
+  fs::create_directories(cell);
+  write(cell, set);
+  const auto run = test::run_program("mbtfm run " + cell.string() + " --threads 1 --quiet");
+  std::printf("%s,%d,%d,", d.name.c_str(), seed, run.code);
+  if (run.code == 0) {
+    const Score s =
+        score_of(cell, truth, kTruePixel_um * Vec2{double(set.adhesion.width), double(set.adhesion.height)});
+    const std::string ids = open_findings(cell);
+    const bool holds =
+        s.n_fibres > 0 && s.n_held >= 0.9 * s.n_fibres - 1 && std::abs(s.total_z) < 3;  // of 20 fibres one by chance
+    std::printf("%d,%d,%.3f,%.2f,%s,%s,\"%s\",\n", s.n_fibres, s.n_held, s.error, s.total_z, holds ? "true" : "false",
+                holds || !ids.empty() ? "true" : "false", ids.c_str());
+  } else {
+    std::printf(",,,,,true,,\"%s\"\n", error_line(run.output).c_str());
+  }
+  std::fflush(stdout);
+}
+
+}  // namespace
+
+namespace {
+
+/// docs/degradations.md, of a table that this program wrote.
+void print_page(const fs::path& file) {
+  const files::CsvTable table(file);
+  std::printf(
+      "# Degraded images\n\n"
+      "What images go through in a laboratory, and what the program says of it. Simulated cells (scenario `u2os`, "
+      "images of\n"
+      "ordinary quality) were degraded in one way each and run as they are (`mbtfm run`). Made by "
+      "`docs/make_degradations.sh`.\n\n"
+      "- **bars hold**: cells of which at least 90 %% of the tensions' 95 %% intervals hold the truth (one fibre more "
+      "may miss,\n"
+      "  as one of twenty does by chance) and the total force lies within three standard errors of the truth. Of a "
+      "cell that\n"
+      "  the border cuts, both are those of the adhesions in view.\n"
+      "- **error**: of the tensions, relative; of two cells the larger, of more the median.\n"
+      "- **open findings** ([list](findings.md)): those of at least half of the cells. A cell with one has no green "
+      "tick.\n\n"
+      "| degradation | what was done | cells | refused | bars hold | error | open findings |\n"
+      "|---|---|---|---|---|---|---|\n");
+  for (const Degradation& d : degradations()) {
+    int n = 0, n_refused = 0, n_held = 0, n_untold = 0;
+    std::vector<double> errors;
+    std::map<std::string, int> findings;
+    for (int row = 0; row < table.n_rows(); ++row) {
+      if (table.text(row, "degradation") != d.name) continue;
+      ++n;
+      n_refused += table.integer(row, "exit_code", 0) != 0;
+      n_held += table.text(row, "bars_hold") == "true";
+      n_untold += table.text(row, "told") != "true";
+      const std::string error = table.text(row, "tension_error");
+      if (!error.empty() && error.find("nan") == error.npos) errors.push_back(std::stod(error));
+      std::istringstream ids(table.text(row, "findings"));
+      for (std::string id; std::getline(ids >> std::ws, id, ';');) ++findings[id];
+    }
+    if (n == 0) continue;
+    std::ranges::sort(errors);
+    std::string names;
+    for (const auto& [id, times] : findings) {
+      if (2 * times >= n) names += (names.empty() ? "`" : ", `") + id + "`";
+    }
+    char error[16] = "–";
+    if (!errors.empty()) std::snprintf(error, sizeof error, "%.2f", errors[errors.size() / 2]);
+    std::printf("| `%s` | %s | %d | %d | %d | %s | %s%s |\n", d.name.c_str(), d.what.c_str(), n, n_refused, n_held,
+                error, names.empty() ? "–" : names.c_str(),
+                n_untold > 0 ? (" **" + std::to_string(n_untold) + " not told**").c_str() : "");
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc < 3) {
+    for (const Degradation& d : degradations()) std::printf("| `%s` | %s |\n", d.name.c_str(), d.what.c_str());
+    return 0;
+  }
+  if (std::string(argv[1]) == "page") {
+    print_page(argv[2]);
+    return 0;
+  }
+  const int first = std::atoi(argv[2]), n = argc > 3 ? std::atoi(argv[3]) : 3;
+  std::string names = argc > 4 ? "," + std::string(argv[4]) + "," : "";
+  std::printf("degradation,cell,exit_code,fibres,held,tension_error,total_z,bars_hold,told,findings,refused\n");
+  for (const Degradation& d : degradations()) {
+    if (!names.empty() && names.find("," + d.name + ",") == names.npos) continue;
+    for (int seed = first; seed < first + n; ++seed) study(d, seed, argv[1]);
+  }
+}

@@ -1,0 +1,251 @@
+/// other_network STUDY [cells] [first seed]: how well tensions are found on other networks than the truth's, 20 nm of
+/// noise. A table (CSV) on stdout.
+///   formulations   the default ensemble beside one mesh in the thesis' formulation
+///   truths         truths of several formulations, beads with and without noise; and, beside the fit as it is, one
+///   that
+///                  weighs the data by what the meshes tell of each adhesion's error
+///   forces         forces of the adhesions on networks of these truths, found and true, and their stated errors
+///   meshes         by the number of meshes, with and without noise: error and processor time
+///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <ctime>
+
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/fit_results.h"
+#include "samples/experiment/experiment.h"
+#include "tests/support/tension_scene.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::tensions;
+
+constexpr double kNoise_um = 0.02;
+
+struct OtherNetwork {
+  experiment::Experiment experiment;
+  Eigen::VectorXd forces_nN;  ///< true, by adhesion
+  std::vector<int> adhesion_ids;
+  tensions::LinearData noisy, exact;  ///< weighted alike
+};
+
+struct Cells {
+  std::uint64_t first = 1, last = 20;
+};
+
+/// Forces of the experiment's tensions on a network of this formulation, as fine as the simulator's.
+Eigen::VectorXd forces_on(const experiment::Experiment& experiment, mesh::NetworkParameters p, std::uint64_t seed) {
+  constexpr std::uint64_t kSeeds = 0x74727565;  // far from those of the fits
+  p.seed = kSeeds + seed;
+  p.edge_length_um = drawing::MechanicsParameters{}.simulation_edge_length_um;
+  Network network = mesh::generate_network(experiment.cell, p).network;
+  for (Link& link : network.links)
+    if (link.fibre_id == 0) link.share *= p.edge_length_um / experiment::kReferenceEdge_um;
+  const cables::CableNetwork cables(std::move(network));
+  std::vector<double> tensions_nN;
+  for (const Tension& t : experiment.tensions) tensions_nN.push_back(t.tension_nN);
+  return cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN));
+}
+
+Eigen::VectorXd forces_of(const experiment::Experiment& experiment) {
+  Eigen::VectorXd forces_nN(2 * static_cast<Eigen::Index>(experiment.forces.size()));
+  for (std::size_t a = 0; a < experiment.forces.size(); ++a)
+    forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)) << experiment.forces[a].force_nN.x,
+        experiment.forces[a].force_nN.y;
+  return forces_nN;
+}
+
+/// @param truth  formulation of the cell's own network; none: the simulator's
+OtherNetwork other_network(std::uint64_t seed, const mesh::NetworkParameters* truth = nullptr) {
+  drawing::ScenarioParameters p;
+  p.seed = seed;
+  OtherNetwork o{
+      .experiment = experiment::simulate(p, 2), .forces_nN = {}, .adhesion_ids = {}, .noisy = {}, .exact = {}};
+  o.forces_nN = truth ? forces_on(o.experiment, *truth, seed) : forces_of(o.experiment);
+  std::vector<Vec2> points;
+  for (const Bead& bead : o.experiment.displacement) points.push_back(bead.position_um);
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& adhesion : o.experiment.cell.adhesions) {
+    ellipses.push_back(substrate::ellipse_of(adhesion));
+    o.adhesion_ids.push_back(adhesion.adhesion_id);
+  }
+  const Eigen::MatrixXd compliance =
+      greens::make_greens(p.gel, {.model = "layer"}, 2)->compliance_um_per_nN(points, ellipses);
+  DisplacementField exact = o.experiment.displacement;
+  if (truth) {
+    const Eigen::VectorXd u_um = compliance * o.forces_nN;
+    for (std::size_t i = 0; i < exact.size(); ++i) {
+      const auto row = 2 * static_cast<Eigen::Index>(i);
+      exact[i].displacement_um = {u_um[row], u_um[row + 1]};
+    }
+  }
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, kNoise_um);
+  DisplacementField noisy = exact;
+  for (std::size_t i = 0; i < noisy.size(); ++i) {
+    const double x = normal(random), y = normal(random);
+    noisy[i].displacement_um += Vec2{x, y};
+    noisy[i].sigma_um = kNoise_um;
+    exact[i].sigma_um = {};  // no error is stated where there is none
+  }
+  o.noisy = tensions::reduce(noisy, substrate::dense_response(compliance), {}, 2, tensions::affine_motions(noisy));
+  o.exact = tensions::reduce(exact, substrate::dense_response(compliance), {}, 2, tensions::affine_motions(exact));
+  return o;
+}
+
+std::vector<cables::CableNetwork> span(const Cell& cell, int n_meshes, mesh::NetworkParameters p = {}) {
+  std::vector<cables::CableNetwork> networks;
+  for (int m = 0; m < n_meshes; ++m) {
+    p.seed = static_cast<std::uint64_t>(m) + 1;
+    networks.emplace_back(mesh::generate_network(cell, p).network);
+  }
+  return networks;
+}
+
+tensions::EnsembleFit fit(const std::vector<cables::CableNetwork>& networks, tensions::LinearData& data,
+                          const OtherNetwork& o, int threads = 2) {
+  tensions::FitParameters parameters;
+  parameters.n_meshes = static_cast<int>(networks.size());
+  return tensions::fit_ensemble(networks, data, o.adhesion_ids, parameters, threads, {});
+}
+
+struct Score {
+  double relative_error = 0;  ///< |t̂ − t| / |t| of the fibres
+  double over_stated = 0;     ///< root mean square of error over stated standard error
+  double coverage = 0;        ///< of the 95 % intervals
+};
+
+Score score(const tensions::EnsembleFit& fit, const OtherNetwork& o) {
+  double error = 0, size = 0, over_stated = 0;
+  int n_covered = 0, n = 0;
+  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i, ++n) {
+    const tensions::Estimate& estimate = fit.tensions_nN[i];
+    const double t = o.experiment.tensions[i].tension_nN;
+    const tensions::Interval interval = tensions::interval_95(estimate);
+    error += std::pow(estimate.value - t, 2);
+    size += t * t;
+    over_stated += estimate.standard_error > 0 ? std::pow((estimate.value - t) / estimate.standard_error, 2) : 0;
+    n_covered += interval.low <= t && t <= interval.high ? 1 : 0;
+  }
+  return {std::sqrt(error / size), std::sqrt(over_stated / n), double(n_covered) / n};
+}
+
+double relative_error(const tensions::EnsembleFit& fit, const OtherNetwork& o) { return score(fit, o).relative_error; }
+
+void formulations(Cells cells) {
+  const mesh::NetworkParameters thesis = test::thesis_network();
+  std::printf("cell,formulation,meshes,relative_error,rms_error_over_stated,coverage\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    OtherNetwork o = other_network(c);
+    for (const bool is_thesis : {false, true}) {
+      const int n_meshes = is_thesis ? 1 : tensions::FitParameters{}.n_meshes;
+      const Score s =
+          score(fit(span(o.experiment.cell, n_meshes, is_thesis ? thesis : mesh::NetworkParameters{}), o.noisy, o), o);
+      std::printf("%d,%s,%d,%.4f,%.3f,%.3f\n", int(c), is_thesis ? "thesis" : "default", n_meshes, s.relative_error,
+                  s.over_stated, s.coverage);
+    }
+  }
+}
+
+using Formulations = std::vector<std::pair<const char*, mesh::NetworkParameters>>;
+
+Formulations true_formulations() {
+  return {{"second neighbours", {}},
+          {"edges", {.link_reach = "neighbours"}},
+          {"edges and rims", {.link_reach = "neighbours", .adhesion_anchor = "rim", .rim_points = 12}},
+          {"edges and centres", {.link_reach = "neighbours", .adhesion_anchor = "centre"}}};
+}
+
+/// Of every adhesion: true force, found force, stated error; and of the cell's total.
+void forces(Cells cells) {
+  std::printf("cell,truth,adhesion_id,connected,true_nN,found_nN,sigma_nN,across_nN,network_nN,edge_um\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    for (const auto& [name, truth] : true_formulations()) {
+      OtherNetwork o = other_network(c, &truth);
+      const tensions::EnsembleFit found = fit(span(o.experiment.cell, tensions::FitParameters{}.n_meshes), o.noisy, o);
+      const tensions::Estimate& total = found.total_force_nN;
+      std::printf("%d,%s,0,0,%.5g,%.5g,%.5g,0,0,0\n", int(c), name, tensions::total_nN(o.forces_nN), total.value,
+                  total.standard_error);
+      const std::vector<AdhesionForce> by_adhesion = forces_of(found, o.experiment.cell);
+      for (std::size_t a = 0; a < by_adhesion.size(); ++a) {
+        const AdhesionForce& f = by_adhesion[a];
+        const Eigen::Vector2d wanted = o.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a));
+        const Eigen::Vector2d got(f.force_nN.x, f.force_nN.y), unit = got.normalized();
+        std::printf("%d,%s,%d,%d,%.5g,%.5g,%.5g,%.5g,%.5g,%.5g\n", int(c), name, f.adhesion_id, int(f.connected),
+                    wanted.norm(), got.norm(), f.sigma_nN.value_or(0), unit[0] * wanted[1] - unit[1] * wanted[0],
+                    found.network_forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm(),
+                    distance_to_boundary_um(o.experiment.cell.outline_um, o.experiment.cell.adhesions[a].position_um));
+      }
+    }
+  }
+}
+
+void truths(Cells cells) {
+  std::printf("cell,truth,noise_nm,relative_error,rms_error_over_stated,coverage,relative_error_if_weighed\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    for (const auto& [name, truth] : true_formulations()) {
+      OtherNetwork o = other_network(c, &truth);
+      const std::vector<cables::CableNetwork> networks = span(o.experiment.cell, tensions::FitParameters{}.n_meshes);
+      for (tensions::LinearData* data : {&o.noisy, &o.exact}) {
+        const tensions::EnsembleFit found = fit(networks, *data, o);
+        const Score s = score(found, o);
+        tensions::LinearData weighed = *data;
+        weighed.reduced = tensions::whitened(found.data, *found.model_error);
+        std::printf("%d,%s,%g,%.4f,%.3f,%.3f,%.4f\n", int(c), name, data == &o.noisy ? 1e3 * kNoise_um : 0,
+                    s.relative_error, s.over_stated, s.coverage, relative_error(fit(networks, weighed, o), o));
+      }
+    }
+  }
+}
+
+void meshes(Cells cells) {
+  std::printf("cell,noise_nm,meshes,relative_error,rms_error_over_stated,coverage,processor_s\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    OtherNetwork o = other_network(c);
+    for (const int n_meshes : {1, 2, 4, 8, 16}) {
+      for (tensions::LinearData* data : {&o.noisy, &o.exact}) {
+        const std::clock_t begin = std::clock();
+        const Score s = score(fit(span(o.experiment.cell, n_meshes), *data, o, 1), o);
+        std::printf("%d,%g,%d,%.4f,%.3f,%.3f,%.2f\n", int(c), data == &o.noisy ? 1e3 * kNoise_um : 0, n_meshes,
+                    s.relative_error, s.over_stated, s.coverage, double(std::clock() - begin) / CLOCKS_PER_SEC);
+      }
+    }
+  }
+}
+
+void parts(Cells cells) {
+  mesh::NetworkParameters fine;
+  fine.edge_length_um = drawing::MechanicsParameters{}.simulation_edge_length_um;
+  std::printf("cell,own_network,meshes_8,meshes_32,exact_meshes_8,exact_meshes_32,exact_meshes_8_of_its_edge\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    OtherNetwork o = other_network(c);
+    const Cell& cell = o.experiment.cell;
+    std::vector<cables::CableNetwork> own;
+    own.emplace_back(o.experiment.network);
+    const std::vector<cables::CableNetwork> eight = span(cell, 8), many = span(cell, 32);
+    std::printf("%d,%.4f,%.4f,%.4f,", int(c), relative_error(fit(own, o.noisy, o), o),
+                relative_error(fit(eight, o.noisy, o), o), relative_error(fit(many, o.noisy, o), o));
+    std::printf("%.4f,%.4f,%.4f\n", relative_error(fit(eight, o.exact, o), o), relative_error(fit(many, o.exact, o), o),
+                relative_error(fit(span(cell, 8, fine), o.exact, o), o));
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::setvbuf(stdout, nullptr, _IOLBF, 1 << 12);
+  Cells cells;
+  if (argc > 3) cells.first = static_cast<std::uint64_t>(std::atoi(argv[3]));
+  cells.last = cells.first + static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 20) - 1;
+  const std::pair<const char*, void (*)(Cells)> studies[] = {
+      {"formulations", formulations}, {"truths", truths}, {"forces", forces}, {"meshes", meshes}, {"parts", parts}};
+  for (const auto& [name, study] : studies) {
+    if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
+    study(cells);
+    return 0;
+  }
+  std::fprintf(stderr, "other_network formulations|truths|forces|meshes|parts [cells] [first seed]\n");
+  return 2;
+}
