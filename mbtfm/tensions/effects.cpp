@@ -13,8 +13,9 @@ Effect robust_loss_effect(const std::string& setting, const std::string& used_lo
       "robust loss", setting, is_robust,
       is_robust ? used_loss +
                       ": the first fit leaves residuals, alone among their neighbours, that Gaussian noise has in one "
-                      "case of twenty"
-                : "the first fit leaves no such residuals alone that are too large for Gaussian noise");
+                      "case of twenty, and they move a tension by a tenth of its standard error or more"
+                : "the first fit leaves no residuals, alone among their neighbours, that are too large for Gaussian "
+                  "noise and that move a tension by a tenth of its standard error");
 }
 
 Effect decide_time_coupling(bool has_frame_before, const std::string& setting) {

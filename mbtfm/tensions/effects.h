@@ -7,7 +7,7 @@
 
 namespace mbtfm::tensions {
 
-/// The loss to ask a fit for: `auto` leaves it to the residuals of the first fit (loss_called_for).
+/// The loss to ask a fit for: `auto` leaves it to the residuals of the first fit (stray_beads).
 std::string loss_of_switch(const std::string& setting, const std::string& robust_kind);
 
 /// Robust loss, once the fit has used this one.

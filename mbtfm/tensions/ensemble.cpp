@@ -304,13 +304,25 @@ struct FirstFit {
   std::string loss;
 };
 
+/// The loss itself, or what the first fit calls for where it is `auto`: huber where stray beads move some tension.
+std::string loss_called_for(const std::string& loss, const LinearData& data, const TensionProblem& problem,
+                            const Trial& trial) {
+  if (loss != "auto") return loss;
+  constexpr double kMatters = 0.1;  // of a standard error
+  const Eigen::VectorXd residual = weighted_residual(data, trial.forces_nN);
+  const std::vector<Eigen::Index> strays = stray_beads(data, residual);
+  const bool matter =
+      !strays.empty() && most_moved_by(strays, data, residual, problem.force_derivatives(trial)) > kMatters;
+  return matter ? "huber" : "squares";
+}
+
 FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
                    const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
                    const Trial* start) {
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
   TensionFit fit = fit_tensions(problem, parameters, threads,
                                 start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
-  const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
+  const std::string loss = loss_called_for(parameters.loss, data, problem, fit.trial);
   if (loss == "squares") return {std::move(fit), loss};
   return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
 }

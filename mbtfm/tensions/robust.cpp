@@ -1,6 +1,7 @@
 #include "mbtfm/tensions/robust.h"
 
 #include <Eigen/Cholesky>
+#include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -168,19 +169,36 @@ bool stands_alone(const LinearData& data, const Eigen::VectorXd& residual, Eigen
 
 }  // namespace
 
-std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual) {
-  if (loss != "auto") return loss;
+std::vector<Eigen::Index> stray_beads(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
   const double scale = robust_scale(data, weighted_residual);
-  if (is_exact(data, scale)) return "squares";
+  if (is_exact(data, scale)) return {};
   constexpr double kChance = 0.05;
   const double limit = scale * std::sqrt(2 * std::log(0.5 * static_cast<double>(data.n_used) / kChance));
-  int n_large = 0, n_alone = 0;
+  std::vector<Eigen::Index> strays;
+  std::size_t n_large = 0;
   for (Eigen::Index i = 0; i < weighted_residual.size(); i += 2) {
     if (data.weight_per_um[i] == 0 || weighted_residual.segment<2>(i).norm() <= limit) continue;
     ++n_large;
-    n_alone += stands_alone(data, weighted_residual, i);
+    if (stands_alone(data, weighted_residual, i)) strays.push_back(i / 2);
   }
-  return 2 * n_alone > n_large ? "huber" : "squares";
+  return 2 * strays.size() > n_large ? strays : std::vector<Eigen::Index>();
+}
+
+double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
+                     const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives) {
+  Eigen::VectorXd residual(2 * strays.size()), weight(2 * strays.size());
+  for (std::size_t k = 0; k < strays.size(); ++k) {
+    residual.segment<2>(2 * static_cast<Eigen::Index>(k)) = weighted_residual.segment<2>(2 * strays[k]);
+    weight.segment<2>(2 * static_cast<Eigen::Index>(k)) = data.weight_per_um.segment<2>(2 * strays[k]);
+  }
+  const Eigen::MatrixXd of_strays = weight.asDiagonal() * data.response->at_points(strays)->displace(force_derivatives);
+  const Eigen::MatrixXd all = numerics::gram(displace(data.reduced, force_derivatives, data.threads));
+  const Eigen::MatrixXd others = all - numerics::gram(of_strays);
+  const Eigen::VectorXd moved =
+      others.completeOrthogonalDecomposition().solve(of_strays.transpose() * residual).cwiseAbs();
+  const Eigen::VectorXd variance = all.completeOrthogonalDecomposition().pseudoInverse().diagonal();
+  const Eigen::VectorXd in_errors = moved.cwiseQuotient(variance.cwiseMax(1e-300).cwiseSqrt());
+  return (variance.array() > 0).select(in_errors, 0).maxCoeff() / robust_scale(data, weighted_residual);
 }
 
 double robust_weight(const std::string& loss, double residual) {

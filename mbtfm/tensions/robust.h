@@ -11,11 +11,17 @@
 
 namespace mbtfm::tensions {
 
-/// The loss itself, or what the residuals call for where it is `auto`: huber where most of those that Gaussian noise
-/// has in less than one case in twenty, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni; r in robust standard deviations),
-/// stand alone: the nearest bead does not go along by half. Else squares: none is that large, or they go together, so
-/// that the model and not the beads are wrong there, and to discount them would explain the still part of the gel only.
-std::string loss_called_for(const std::string& loss, const LinearData& data, const Eigen::VectorXd& weighted_residual);
+/// Beads whose residuals Gaussian noise has in less than one case in twenty, n exp(−r²/2) < 0.05 (Rayleigh, Bonferroni;
+/// r in robust standard deviations), and that stand alone: the nearest bead does not go along by half. None where most
+/// of the large ones go along: then the model and not the beads are wrong there, and to discount them would explain the
+/// still part of the gel only.
+std::vector<Eigen::Index> stray_beads(const LinearData& data, const Eigen::VectorXd& weighted_residual);
+
+/// By how many of its standard errors the tension moves most that does, if these beads lose all their weight; the
+/// forces taken as linear in the tensions. One of two hundred thousand beads moves none.
+/// @param force_derivatives  dR/dt: 2·adhesions × tensions
+double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
+                     const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives);
 
 /// Weight of a bead whose residual has this size, in robust standard deviations; 1 at zero (l1: large there).
 /// squares 1 | huber min(1, k/r), k = 1.500 | tukey (1 − (r/c)²)², c = 5.123 | l1 1/r.

@@ -88,7 +88,8 @@ FitSummary read_fit_summary(const Path& file) {
   FitSummary summary;
   const JsonRecord record(file, "a fit summary as mbtfm-fit writes it", "delete it to run the fit again");
   for_each_member(summary, [&](const char* name, auto& member) { read(record.at(name), member); });
-  for (const auto& [name, value] : record.members()) {
+  for (const auto& [key, value] : record.members()) {
+    const std::string& name = key;  // Clang 14 lets no lambda take a part of a pair
     bool is_named = false;
     for_each_member(summary, [&](const char* known, auto&) { is_named = is_named || name == known; });
     if (name == "error_budget") summary.error_budget = budget_of(value);
