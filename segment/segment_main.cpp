@@ -7,6 +7,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/stage.h"
 #include "segment/cells/cell_rois.h"
 #include "segment/cells/contact_sheet.h"
@@ -245,9 +246,7 @@ void expect_plausible(stage::StageContext& context, const Segmentation& s) {
     if (!is_assumed(a.origin)) areas_um2.push_back(a.area_um2);
   }
   if (areas_um2.empty()) return;
-  const auto middle = areas_um2.begin() + static_cast<std::ptrdiff_t>(areas_um2.size() / 2);
-  std::nth_element(areas_um2.begin(), middle, areas_um2.end());
-  context.expect_plausible("adhesion_area_um2", *middle);
+  context.expect_plausible("adhesion_area_um2", numerics::median_in(areas_um2));
 }
 
 StageReport run(const SegmentParameters& given, stage::StageContext& context) {

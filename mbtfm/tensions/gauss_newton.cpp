@@ -9,6 +9,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::tensions {
 
@@ -48,13 +49,6 @@ double negligible(const TensionProblem& problem, double objective, Search search
   const double whole = objective + 0.5 * data.floor_squared;
   return std::max(part * whole / static_cast<double>(std::max<Eigen::Index>(1, data.n_components)),
                   kRounding * data.target.squaredNorm());
-}
-
-double middle_of(const Eigen::VectorXd& values) {
-  std::vector<double> sorted(values.data(), values.data() + values.size());
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  return *middle;
 }
 
 /// How far each tension may fall in one step.
@@ -117,7 +111,8 @@ Step damped_step(const Trial& trial, const Eigen::MatrixXd& jacobian, const Eige
   // A tension that hardly any bead feels would run away: a thousandth of the middle one's weight
   // damps its steps, but moves no minimum.
   const Eigen::VectorXd scale = straight.diagonal();
-  const Eigen::VectorXd weak = Eigen::VectorXd::Constant(scale.size(), 1e-6 * middle_of(scale) + 1e-300);
+  const Eigen::VectorXd weak = Eigen::VectorXd::Constant(
+      scale.size(), 1e-6 * numerics::median(std::vector(scale.begin(), scale.end())) + 1e-300);
   const Eigen::MatrixXd least = 0.5 * straight + bend + Eigen::MatrixXd(weak.asDiagonal());
   const bool is_convex = least.llt().info() == Eigen::Success;
   const Eigen::MatrixXd H = is_convex ? straight + bend : straight;
@@ -211,10 +206,10 @@ std::optional<Eigen::VectorXd> slack_ones_raised(const Eigen::VectorXd& tensions
     if (!is_slack(tensions_nN, i)) taut.push_back(tensions_nN[i]);
   }
   if (taut.empty() || taut.size() + 1 == static_cast<std::size_t>(tensions_nN.size())) return std::nullopt;
-  std::nth_element(taut.begin(), taut.begin() + static_cast<std::ptrdiff_t>(taut.size() / 2), taut.end());
+  const double middle = numerics::median_in(taut);
   Eigen::VectorXd raised = tensions_nN;
   for (Eigen::Index i = 1; i < raised.size(); ++i) {
-    if (is_slack(tensions_nN, i)) raised[i] = taut[taut.size() / 2];
+    if (is_slack(tensions_nN, i)) raised[i] = middle;
   }
   return raised;
 }

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/numerics/order_statistics.h"
+
 namespace mbtfm::tensions {
 
 NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, const Eigen::VectorXd& forces_nN,
@@ -22,11 +24,9 @@ NoiseLevel noise_level(const DisplacementField& beads, const LinearData& data, c
   const bool has_far = far.size() >= 2 * kFewest;
   std::vector<double>& used = has_far ? far : all;
   if (used.empty()) return {};
-  const auto middle = used.begin() + static_cast<std::ptrdiff_t>(used.size() / 2);
-  std::nth_element(used.begin(), middle, used.end());
   const std::string source = std::to_string(used.size() / 2) +
                              (has_far ? " beads far from the cell" : " beads, too few of them far from the cell");
-  return {.sigma_um = 1.4826 * *middle, .source = source};
+  return {.sigma_um = 1.4826 * numerics::median_in(used), .source = source};
 }
 
 }  // namespace mbtfm::tensions

@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
@@ -211,10 +212,7 @@ double robust_weight(const std::string& loss, double residual) {
 
 double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
   std::vector<double> lengths = used_lengths(data, weighted_residual);
-  if (lengths.empty()) return 0;
-  const auto middle = lengths.begin() + static_cast<std::ptrdiff_t>(lengths.size() / 2);
-  std::nth_element(lengths.begin(), middle, lengths.end());
-  return *middle / std::sqrt(2 * std::log(2.0));
+  return lengths.empty() ? 0 : numerics::median_in(lengths) / std::sqrt(2 * std::log(2.0));
 }
 
 TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <vector>
 
+#include "pipeline/numerics/order_statistics.h"
+
 namespace mbtfm::tractions {
 
 namespace {
@@ -117,9 +119,7 @@ std::optional<double> noise_from_neighbours_um(const DisplacementField& beads) {
     magnitudes.push_back(std::abs(p->residual_um.x));
     magnitudes.push_back(std::abs(p->residual_um.y));
   }
-  const auto middle = magnitudes.begin() + static_cast<std::ptrdiff_t>(magnitudes.size() / 2);
-  std::nth_element(magnitudes.begin(), middle, magnitudes.end());
-  return 1.4826 * *middle;  // the median's of a Gaussian
+  return 1.4826 * numerics::median_in(magnitudes);  // the median's of a Gaussian
 }
 
 }  // namespace mbtfm::tractions

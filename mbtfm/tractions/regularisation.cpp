@@ -7,6 +7,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::tractions {
 
@@ -63,9 +64,7 @@ std::vector<double> lambdas_between(double largest, double smallest) {
 
 double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square) {
   for (double& r : residuals) r = std::abs(r);
-  const auto middle = residuals.begin() + static_cast<std::ptrdiff_t>(residuals.size() / 2);
-  std::nth_element(residuals.begin(), middle, residuals.end());
-  const double deviation = 1.4826 * *middle;  // of a Gaussian
+  const double deviation = 1.4826 * numerics::median_in(residuals);  // of a Gaussian
   const auto n = static_cast<double>(residuals.size());
   return deviation * deviation * n / std::max(n - 2 * degrees + degrees_of_square, 1e-6 * n);
 }

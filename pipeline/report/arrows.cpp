@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/colours.h"
 
 namespace mbtfm::report {
@@ -23,13 +24,6 @@ bool is_inside(const Box& box, Vec2 p) {
 }
 
 }  // namespace
-
-double percentile(std::vector<double> values, double share) {
-  if (values.empty()) return 0;
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
 
 double averaging_side_um(const VectorField& field, const Box& box) {
   const Vec2 size = box.high - box.low;
@@ -72,7 +66,7 @@ ArrowScale arrow_scale(const std::vector<Vec2>& vectors) {
   constexpr double kLongArrow_px = 32;
   std::vector<double> lengths;
   for (const Vec2 v : vectors) lengths.push_back(norm(v));
-  const double top = percentile(lengths, 0.99);
+  const double top = numerics::quantile(lengths, 0.99);
   return {.top = top, .px_per_unit = top > 0 ? kLongArrow_px / top : 0};
 }
 

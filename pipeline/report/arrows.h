@@ -46,7 +46,4 @@ std::string draw_arrows(charts::Chart& map, const VectorField& field, const Arro
 /// What an arrow's length means, as HTML.
 std::string arrow_legend(const ArrowScale& scale, const std::string& unit);
 
-/// The value below which a share (0 to 1) of the values lies; 0 of none.
-double percentile(std::vector<double> values, double share);
-
 }  // namespace mbtfm::report

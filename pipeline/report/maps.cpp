@@ -5,9 +5,10 @@
 #include <algorithm>
 
 #include "pipeline/contract/polyline.h"
+#include "pipeline/files/base64.h"
 #include "pipeline/files/text.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/arrows.h"
-#include "pipeline/report/base64.h"
 #include "pipeline/report/colours.h"
 #include "pipeline/report/hover.h"
 #include "pipeline/report/numbers.h"
@@ -206,7 +207,7 @@ Figure segmentation_map(const CellResults& results) {
       empty_map(is_dark ? Box{results.images->low_um, results.images->high_um} : map_box(results), "Segmentation");
   if (is_dark) {
     map.picture(results.images->low_um, results.images->high_um,
-                "data:image/jpeg;base64," + base64(files::read_text(results.images->file)));
+                "data:image/jpeg;base64," + files::base64(files::read_text(results.images->file)));
   }
   draw_outline(map, results.cell, std::string("fill:none;stroke-width:1.3;stroke:") + (is_dark ? "#ddd" : "#888"));
   // nearly invisible fill: the mouse finds the whole ellipse
@@ -268,7 +269,8 @@ Figure adhesion_map(const CellResults& results) {
     tractions.push_back(norm(force.force_nN) / area_stood_for_um2(*by_id.at(force.adhesion_id)));
     forces.push_back(force.force_nN);
   }
-  const ColourScale colours{.low = 0, .high = round_end(percentile(tractions, 0.98)), .label = "traction (kPa)"};
+  const ColourScale colours{
+      .low = 0, .high = round_end(numerics::quantile(tractions, 0.98)), .label = "traction (kPa)"};
   const ArrowScale scale = arrow_scale(forces);
   for (std::size_t i = 0; i < results.forces.size(); ++i) {
     const Adhesion& adhesion = *by_id.at(results.forces[i].adhesion_id);

@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "pipeline/report/base64.h"
+#include "pipeline/files/base64.h"
 
 namespace mbtfm::report {
 
@@ -64,7 +64,7 @@ std::string html_of(const Table& table, const Download& csv) {
   return "<div class=\"table\">" + html_of(table) +
          fmt::format(
              "<a class=\"download\" download=\"{0}\" href=\"data:text/csv;base64,{1}\">Download {0}</a></div>\n",
-             charts::html_escaped(csv.name), base64(csv.text));
+             charts::html_escaped(csv.name), files::base64(csv.text));
 }
 
 std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs) {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/tension_plot.h"
 
@@ -28,8 +29,7 @@ std::optional<int> common_decimals(const std::vector<FibreRow>& rows) {
     if (const auto half = half_interval_nN(row.tension)) errors.push_back(*half);
   }
   if (errors.empty()) return {};
-  std::nth_element(errors.begin(), errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2), errors.end());
-  return decimals_for(errors[errors.size() / 2]);
+  return decimals_for(numerics::median_in(errors));
 }
 
 std::string interval_cell(const Tension& t, std::optional<int> decimals) {

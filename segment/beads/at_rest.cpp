@@ -5,6 +5,7 @@
 #include <functional>
 #include <opencv2/core.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/plane.h"
 
 namespace mbtfm::beads {
@@ -30,9 +31,9 @@ FieldCell cell_of(const std::vector<int>& beads, const std::vector<Vec2>& positi
   if (beads.empty()) return cell;
   std::vector<double> x, y, off;
   for (const int k : beads) x.push_back(u[k].x), y.push_back(u[k].y);
-  const Vec2 median{quantile(std::move(x), 0.5), quantile(std::move(y), 0.5)};
+  const Vec2 median{numerics::quantile(std::move(x), 0.5), numerics::quantile(std::move(y), 0.5)};
   for (const int k : beads) off.push_back(norm(u[k] - median));
-  cell.spread = quantile(off, 0.5) / 1.18;  // the median length of a two-dimensional normal is 1.18 sd
+  cell.spread = numerics::quantile(off, 0.5) / 1.18;  // the median length of a two-dimensional normal is 1.18 sd
   for (std::size_t at = 0; at < beads.size(); ++at) {
     if (beads.size() >= 4 && off[at] > 3 * 1.18 * cell.spread) continue;
     cell.place += positions[beads[at]];
@@ -62,7 +63,7 @@ RestingField in_squares(const std::vector<Vec2>& positions, const std::vector<Ve
     field.cells.push_back(cell_of(own, positions, u));
     if (own.size() >= 4) spreads.push_back(field.cells.back().spread);
   }
-  field.bead_noise = quantile(std::move(spreads), 0.5);
+  field.bead_noise = numerics::quantile(std::move(spreads), 0.5);
   return field;
 }
 
@@ -108,7 +109,7 @@ struct Search {
 
   Followed from(const std::function<bool(int, int)>& is_in) const {
     std::vector<double> weights(field.cells.size(), 0), misfits;
-    const double typical = quantile(width_of, 0.5);
+    const double typical = numerics::quantile(width_of, 0.5);
     for (int j = 0; j < field.ny; ++j) {
       for (int i = 0; i < field.nx; ++i) {
         const std::size_t k = static_cast<std::size_t>(j) * field.nx + i;
@@ -120,7 +121,7 @@ struct Search {
       if (weights[k] > 0) misfits.push_back(misfit(field.cells[k], result.motion));
     }
     if (misfits.empty()) return result;
-    double widened = std::max(1.0, quantile(std::move(misfits), 0.7) / typical);
+    double widened = std::max(1.0, numerics::quantile(std::move(misfits), 0.7) / typical);
     for (int round = 0; round < 20; ++round, widened = std::max(1.0, 0.7 * widened)) {
       for (std::size_t k = 0; k < weights.size(); ++k) weights[k] = weight(k, result.motion, widened);
       result.motion = fitted(field, weights, centre, scale, typical);
@@ -314,7 +315,7 @@ double largest_about(const std::vector<Vec2>& positions, const std::vector<Vec2>
   std::vector<double> lengths;
   for (std::size_t k = 0; k < positions.size(); ++k)
     lengths.push_back(norm(displacements[k] - motion.at(positions[k])));
-  return quantile(std::move(lengths), 0.99);
+  return numerics::quantile(std::move(lengths), 0.99);
 }
 
 RestingField resting_field(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,

@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::beads {
@@ -211,7 +212,7 @@ std::vector<DetectedBead> find_spots(const Plane& plane, double bead_sigma, doub
   std::vector<double> heights;
   for (const DetectedBead& bead : beads) heights.push_back(bead.brightness);
   // beads of a tenth of a bright one's light are spurious more often than not: halos, bleed-through, dust
-  const double dimmest = 0.1 * quantile(heights, 0.9);
+  const double dimmest = 0.1 * numerics::quantile(heights, 0.9);
   std::erase_if(beads, [&](const DetectedBead& bead) { return bead.brightness < dimmest; });
   constexpr int kRounds = 4;
   std::vector<int> all(beads.size());

@@ -6,6 +6,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::beads {
@@ -73,7 +74,7 @@ std::optional<Vec2> window_shift(const Plane& reference, const Plane& target, Ve
 Vec2 median_of(const std::vector<Vec2>& values) {
   std::vector<double> x, y;
   for (const Vec2 v : values) x.push_back(v.x), y.push_back(v.y);
-  return {quantile(x, 0.5), quantile(y, 0.5)};
+  return {numerics::quantile(x, 0.5), numerics::quantile(y, 0.5)};
 }
 
 std::vector<Vec2> around(const GridField& field, const std::vector<std::optional<Vec2>>& known, int i, int j,
@@ -100,7 +101,7 @@ void clean(GridField& field, std::vector<std::optional<Vec2>> found, Vec2 otherw
       std::vector<double> spread;
       for (const Vec2 other : others) spread.push_back(norm(other - median));
       // their threshold of 2, with a floor of 0.5 px: a steep peak is no outlier
-      if (norm(*before[k] - median) > 2 * (quantile(spread, 0.5) + 0.5)) found[k].reset();
+      if (norm(*before[k] - median) > 2 * (numerics::quantile(spread, 0.5) + 0.5)) found[k].reset();
     }
   }
   for (int j = 0; j < field.ny; ++j) {
@@ -156,7 +157,7 @@ GridField grid_over(const Plane& plane, double spacing) {
 Plane compressed(const Plane& plane) {
   std::vector<double> sample;
   for (std::size_t k = 0; k < plane.values.size(); k += 7) sample.push_back(std::abs(plane.values[k]));
-  const float level = static_cast<float>(std::max(quantile(std::move(sample), 0.9), 1e-6));
+  const float level = static_cast<float>(std::max(numerics::quantile(std::move(sample), 0.9), 1e-6));
   Plane result = plane;
   for (float& value : result.values) value = value / (std::abs(value) + level);
   return result;

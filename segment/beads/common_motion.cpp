@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "segment/beads/plane.h"
 
@@ -40,7 +41,7 @@ double misfit_of(const RestingField& rest, bool is_at_rest, const AffineMotion& 
     if (cell.n_beads == 0 || (is_at_rest && !cell.rests)) continue;
     misfits.push_back(norm(cell.u - motion.at(cell.place)));
   }
-  return quantile(std::move(misfits), 0.5);
+  return numerics::quantile(std::move(misfits), 0.5);
 }
 
 }  // namespace

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/plane.h"
 
 namespace mbtfm::beads {
@@ -279,7 +280,7 @@ void take_noise(FarField& far, const std::vector<Vec2>& positions, const std::ve
   }
   if (sizes.empty()) return;
   far.rms = std::sqrt(squares / static_cast<double>(sizes.size()));
-  far.noise = quantile(std::move(sizes), 0.5) / 0.6745;
+  far.noise = numerics::quantile(std::move(sizes), 0.5) / 0.6745;
 }
 
 /// Beside a cell that is cut the tail has no fit: squares count by the square of their distance from what does not

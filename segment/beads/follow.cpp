@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/local_motion.h"
 
 namespace mbtfm::beads {
@@ -156,7 +157,7 @@ double typical_spread(const std::vector<std::optional<LocalMotion>>& around) {
   for (const auto& local : around) {
     if (local && local->n_beads >= 3) spreads.push_back(local->spread_px);
   }
-  return quantile(std::move(spreads), 0.5);
+  return numerics::quantile(std::move(spreads), 0.5);
 }
 
 int flag_outliers(const Scene& scene, double threshold, std::vector<Track>& tracks) {

@@ -7,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "segment/beads/common_motion.h"
 #include "segment/beads/local_motion.h"
@@ -119,11 +120,11 @@ double scatter_um(const std::vector<Misfit>& misfits) {
   for (const Misfit& m : misfits) {
     if (m.component >= 0) gradients.push_back(m.gradient);
   }
-  const double calm = quantile(std::move(gradients), 0.5);
+  const double calm = numerics::quantile(std::move(gradients), 0.5);
   for (const Misfit& m : misfits) {
     if (m.component >= 0 && m.gradient <= calm) sizes.push_back(m.component);
   }
-  return quantile(std::move(sizes), 0.5) / std::sqrt(std::log(2.0));  // the median of a component pair's rms
+  return numerics::quantile(std::move(sizes), 0.5) / std::sqrt(std::log(2.0));  // the median of a component pair's rms
 }
 
 }  // namespace
@@ -137,7 +138,7 @@ DisplacementField read_given_field(const std::filesystem::path& file, const Trac
   if (lengths.empty()) throw InputError(file.string(), "displacements", "none that is a number", "check the columns");
   const std::vector<Misfit> misfits = misfits_of(field);
   // what a field's curvature between the neighbours may do without being wrong
-  const double floor_um = 0.05 * quantile(lengths, 0.99);
+  const double floor_um = 0.05 * numerics::quantile(lengths, 0.99);
   const double sigma_um = has_sigma ? 0 : scatter_um(misfits);
   for (std::size_t k = 0; k < field.size(); ++k) {
     Bead& bead = field[k];

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/core.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
+
 namespace mbtfm::beads {
 namespace {
 
@@ -77,11 +79,8 @@ std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& othe
     for (std::size_t k = 0; k < misfits.size(); ++k) {
       misfits[k] = length(witnesses[k].u - result.motion.at(witnesses[k].offset));
     }
-    sorted = misfits;
-    const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>((sorted.size() - 1) / 2);
-    std::nth_element(sorted.begin(), middle, sorted.end());
     // the median of a two-dimensional normal's length is 1.18 sd; a fit of three numbers uses up half of six beads
-    result.spread_px = *middle / 1.18 * std::sqrt(n / std::max(1.0, n - 3));
+    result.spread_px = numerics::quantile(misfits, 0.5) / 1.18 * std::sqrt(n / std::max(1.0, n - 3));
     const double limit = 2.5 * std::max(result.spread_px, 0.02);
     for (std::size_t k = 0; k < misfits.size(); ++k) {
       const double most = std::min(1.0, limit / std::max(misfits[k], 1e-9));

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/numerics/order_statistics.h"
+
 namespace mbtfm::beads {
 namespace {
 
@@ -53,7 +55,7 @@ struct Light {
 
 double robust_sd(std::vector<double> values, double middle) {
   for (double& value : values) value = std::abs(value - middle);
-  return std::max(0.02, quantile(std::move(values), 0.5) / 0.6745);  // light is no better known than to 2 %
+  return std::max(0.02, numerics::quantile(std::move(values), 0.5) / 0.6745);  // light is no better known than to 2 %
 }
 
 double log_light(const DetectedBead& bead) { return std::log(std::max(bead.brightness, 1e-6)); }
@@ -68,8 +70,8 @@ Light light_of(const Scene& scene, const std::vector<Track>& tracks) {
       same.push_back(log_light(scene.stressed.beads[b]) - all.back());
     }
   }
-  const double mean = quantile(same, 0.5);
-  const double sd_all = robust_sd(all, quantile(all, 0.5));
+  const double mean = numerics::quantile(same, 0.5);
+  const double sd_all = robust_sd(all, numerics::quantile(all, 0.5));
   return {.mean = mean, .sd = robust_sd(std::move(same), mean), .sd_any = std::numbers::sqrt2 * sd_all};
 }
 
@@ -110,7 +112,7 @@ Vec2 middle_step(const std::vector<Witness>& around, const std::vector<Track>& t
     x.push_back(tracks[witness.bead].found.motion.u.x);
     y.push_back(tracks[witness.bead].found.motion.u.y);
   }
-  return {quantile(std::move(x), 0.5), quantile(std::move(y), 0.5)};
+  return {numerics::quantile(std::move(x), 0.5), numerics::quantile(std::move(y), 0.5)};
 }
 
 Leftover leftover(const Matching& all, int bead, const std::vector<char>& is_free, const Light& light) {

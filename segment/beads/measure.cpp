@@ -4,6 +4,7 @@
 #include <cmath>
 #include <optional>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/beads.h"
 #include "segment/beads/follow.h"
 #include "segment/beads/match.h"
@@ -125,7 +126,7 @@ Dissimilarity dissimilarity(const Scene& scene, double least_similarity, const s
   for (const Track& track : tracks) {
     if (track.is_good()) lacks.push_back(1 - track.found.similarity);
   }
-  return {.median = quantile(std::move(lacks), 0.5),
+  return {.median = numerics::quantile(std::move(lacks), 0.5),
           .noise = std::hypot(scene.relaxed->noise, scene.stressed.noise) / std::sqrt(2.0),
           .granted = 1 - least_similarity};
 }
@@ -182,13 +183,13 @@ void flag_changed_light(const Scene& scene, std::vector<Track>& tracks) {
       around.push_back(std::log(std::max(1e-3, tracks[j].found.gain)));
     if (around.size() < 5) return;
     const double error = std::hypot(found.sigma_px / scene.bead_sigma(), kFloor);
-    deviation[k] = std::abs(std::log(found.gain) - quantile(std::move(around), 0.5)) / error;
+    deviation[k] = std::abs(std::log(found.gain) - numerics::quantile(std::move(around), 0.5)) / error;
   });
   std::vector<double> sizes;
   for (const double size : deviation) {
     if (size > 0) sizes.push_back(size);
   }
-  const double most = kMost * quantile(std::move(sizes), 0.5) / 0.6745;
+  const double most = kMost * numerics::quantile(std::move(sizes), 0.5) / 0.6745;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
     if (tracks[k].is_good() && deviation[k] > most) tracks[k].flag = "ambiguous";
   }

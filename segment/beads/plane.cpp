@@ -6,6 +6,7 @@
 #include <opencv2/core.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::beads {
@@ -80,13 +81,6 @@ void in_strips(int n, int threads, const std::function<void(int, int)>& body) {
                          [&](int strip) { body(strip * kStrip, std::min(n, (strip + 1) * kStrip)); });
 }
 
-double quantile(std::vector<double> values, double p) {
-  if (values.empty()) return 0;
-  const auto nth = values.begin() + static_cast<std::ptrdiff_t>(p * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), nth, values.end());
-  return *nth;
-}
-
 double noise_of(const Plane& plane) {
   // Immerkaer's mask (CVIU 64:300, 1996), the difference of two Laplacians: blind to slopes and curvatures, norm 6
   std::vector<double> high;
@@ -102,7 +96,8 @@ double noise_of(const Plane& plane) {
   }
   // Low quantiles of |normal| (0.385, 0.674, 0.994 sd) stay clear of the beads; a camera that cuts noise off at zero
   // leaves exact zeros, so the larger of them counts.
-  return std::max({quantile(high, 0.3) / 0.3853, high.empty() ? 0 : 0.25 * quantile(high, 0.68) / 0.9945});
+  return std::max(
+      {numerics::quantile(high, 0.3) / 0.3853, high.empty() ? 0 : 0.25 * numerics::quantile(high, 0.68) / 0.9945});
 }
 
 double bead_sigma_of(const Plane& plane) {
@@ -117,7 +112,7 @@ double bead_sigma_of(const Plane& plane) {
       if (sigma > 0) sigmas.push_back(sigma);
     }
   }
-  return quantile(sigmas, 0.5);
+  return numerics::quantile(sigmas, 0.5);
 }
 
 Neighbours::Neighbours(std::vector<Vec2> points, double cell) : points_(std::move(points)), cell_(cell) {

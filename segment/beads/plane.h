@@ -50,7 +50,4 @@ class Neighbours {
 /// Call body(from, to) for strips of 0 … n; the strips do not depend on the threads.
 void in_strips(int n, int threads, const std::function<void(int from, int to)>& body);
 
-/// The p-quantile (0 to 1); 0 of nothing.
-double quantile(std::vector<double> values, double p);
-
 }  // namespace mbtfm::beads

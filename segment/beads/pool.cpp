@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/local_motion.h"
 
 namespace mbtfm::beads {
@@ -58,7 +59,7 @@ ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vec
   for (const Prediction& p : predicted) {
     if (p.misfit >= 0) gradients.push_back(p.gradient);
   }
-  const double calm = quantile(std::move(gradients), 0.5);
+  const double calm = numerics::quantile(std::move(gradients), 0.5);
   ErrorCheck result;
   const auto median_ratio = [&](double scatter) {
     std::vector<double> ratios;
@@ -68,7 +69,7 @@ ErrorCheck check_errors(const std::vector<Prediction>& predicted, const std::vec
       if (predicted[k].misfit < 0 || predicted[k].gradient > calm || !(variance > 0)) continue;
       ratios.push_back(predicted[k].misfit / variance);
     }
-    return quantile(std::move(ratios), 0.5) / std::numbers::ln2;
+    return numerics::quantile(std::move(ratios), 0.5) / std::numbers::ln2;
   };
   result.scale = std::clamp(median_ratio(0), 0.5, 1.5);
   if (median_ratio(0) <= 1) return result;

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/effects.h"
 #include "segment/beads/alignment.h"
 #include "segment/beads/beads.h"
@@ -149,7 +150,7 @@ Tried tried_windows(const Texture& relaxed, const Texture& stressed, double wind
     result.knowledge += 1 / (sigma_px * sigma_px);
   }
   result.is_sound = 3 * sigmas.size() >= 2 * result.measured.tracks.size();
-  result.median_sigma_px = quantile(std::move(sigmas), 0.5);
+  result.median_sigma_px = numerics::quantile(std::move(sigmas), 0.5);
   result.measured.pooling = std::move(*pooling);
   return result;
 }

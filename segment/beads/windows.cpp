@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/beads.h"
 
 namespace mbtfm::beads {
@@ -111,7 +112,8 @@ std::optional<double> variance_scale(const GridField& grid, const Lattice& latti
   std::ranges::sort(checks, {}, &Check::change);
   std::vector<double> ratios;
   for (std::size_t k = 0; k < checks.size() / 2; ++k) ratios.push_back(checks[k].ratio);
-  return quantile(std::move(ratios), 0.5) / std::numbers::ln2;  // the median of a two-dimensional normal's mean square
+  return numerics::quantile(std::move(ratios), 0.5) /
+         std::numbers::ln2;  // the median of a two-dimensional normal's mean square
 }
 
 }  // namespace

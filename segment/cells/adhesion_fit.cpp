@@ -4,6 +4,8 @@
 #include <cmath>
 #include <opencv2/core/utility.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
+
 namespace mbtfm::cells {
 
 namespace {
@@ -311,12 +313,6 @@ std::optional<ShapeEvidence> evidence_of_shape(const cv::Mat& height, const Blur
   return evidence;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 struct LogBrightness {
   double mean, deviation;
 };
@@ -329,10 +325,10 @@ std::optional<LogBrightness> common_brightness(const std::vector<FittedEllipse>&
     if (f.is_settled && f.ellipse.semi_minor > kWide * f.ellipse.blur)
       logarithms.push_back(std::log(f.ellipse.brightness));
   if (logarithms.size() < kFewest) return std::nullopt;
-  const double middle = median(logarithms);
+  const double middle = numerics::median(logarithms);
   for (double& value : logarithms) value = std::abs(value - middle);
   // never surer than a quarter: adhesions of one cell differ by that
-  return LogBrightness{middle, std::max(0.25, 1.4826 * median(logarithms))};
+  return LogBrightness{middle, std::max(0.25, 1.4826 * numerics::median(logarithms))};
 }
 
 }  // namespace

@@ -3,17 +3,12 @@
 #include <algorithm>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
 
 namespace {
-
-double middle_of(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// Of the fibres the middle one's middle height.
 double usual_height(const Ridges& ridges, const std::vector<std::vector<cv::Point2d>>& fibres) {
@@ -21,9 +16,9 @@ double usual_height(const Ridges& ridges, const std::vector<std::vector<cv::Poin
   for (const auto& points : fibres) {
     std::vector<double> of_points;
     for (const cv::Point2d& p : points) of_points.push_back(sample(ridges.strongest, p));
-    heights.push_back(middle_of(std::move(of_points)));
+    heights.push_back(numerics::median(std::move(of_points)));
   }
-  return middle_of(std::move(heights));
+  return numerics::median(std::move(heights));
 }
 
 }  // namespace

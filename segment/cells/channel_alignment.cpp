@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/polyline.h"
+#include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::cells {
 namespace {
@@ -134,10 +135,10 @@ Normal normal_equations(const Model& model, const std::vector<End>& ends, const 
   return sum;
 }
 
-double median_minor_axis_um(std::vector<Adhesion> adhesions) {
-  const auto middle = adhesions.begin() + static_cast<std::ptrdiff_t>(adhesions.size() / 2);
-  std::ranges::nth_element(adhesions, middle, {}, &Adhesion::minor_axis_um);
-  return middle->minor_axis_um;
+double median_minor_axis_um(const std::vector<Adhesion>& adhesions) {
+  std::vector<double> axes_um;
+  for (const Adhesion& a : adhesions) axes_um.push_back(a.minor_axis_um);
+  return numerics::median_in(axes_um);
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <limits>
 #include <optional>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -152,9 +153,7 @@ std::vector<std::vector<double>> costs_of(const std::vector<std::vector<Residual
     least.push_back(std::numeric_limits<double>::infinity());
     for (const Residuals& r : row) least.back() = std::min({least.back(), r.step, r.line});
   }
-  const auto middle = least.begin() + static_cast<std::ptrdiff_t>(least.size() / 2);
-  std::nth_element(least.begin(), middle, least.end());
-  const double variance = std::max(*middle, 1e-30) / static_cast<double>(n_samples - kColumns);
+  const double variance = std::max(numerics::median_in(least), 1e-30) / static_cast<double>(n_samples - kColumns);
   std::vector<std::vector<double>> costs;
   for (const auto& row : residuals) {
     costs.emplace_back();

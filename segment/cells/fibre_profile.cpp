@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -10,12 +11,6 @@ namespace mbtfm::cells {
 namespace {
 
 constexpr double kStep = 0.5;  // px: bilinear samples carry no more
-
-double median_of(std::vector<float>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Column {
   double level;
@@ -32,10 +27,10 @@ Column column_at(const cv::Mat& image, const std::vector<cv::Point2d>& points, d
     values[i] = sample(image, points[i] + (offset / l) * cv::Point2d(-d.y, d.x));
     differences[i] = values[i] - sample(image, points[i]);
   }
-  const auto difference = static_cast<float>(median_of(differences));
+  const auto difference = static_cast<float>(numerics::median_in(differences));
   for (float& d : differences) d = std::abs(d - difference);
-  const double error = 1.4826 * median_of(differences) / std::sqrt(static_cast<double>(values.size()));
-  return {median_of(values), error};
+  const double error = 1.4826 * numerics::median_in(differences) / std::sqrt(static_cast<double>(values.size()));
+  return {numerics::median_in(values), error};
 }
 
 /// Where the profile falls to `level` going out from `middle` in steps of `direction`, in columns from the middle.

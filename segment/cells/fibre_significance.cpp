@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -15,11 +16,9 @@ double significance(const Ridges& ridges, const std::vector<cv::Point2d>& points
   std::vector<double> over_noise;
   for (std::size_t i = 0; i < points.size(); ++i)
     over_noise.push_back(height[i] / std::max<double>(sample(ridges.noise, points[i]), 1e-30));
-  std::vector<double> sorted = over_noise;
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
+  const double most = kMost * numerics::median(over_noise);
   double sum = 0;
-  for (const double h : over_noise) sum += std::min(h, kMost * *middle);
+  for (const double h : over_noise) sum += std::min(h, most);
   const auto n = static_cast<double>(points.size());
   return sum / n * std::sqrt(n / independent_px);
 }
@@ -54,9 +53,8 @@ TextureLines texture_lines(std::vector<double> significances) {
   std::erase_if(significances, [](double s) { return s >= kHardlyTexture || s < kLeast; });
   const auto n = static_cast<double>(significances.size());
   if (significances.empty()) return {kFewest, kUsual};
-  const auto middle = significances.begin() + static_cast<std::ptrdiff_t>(significances.size() / 2);
-  std::nth_element(significances.begin(), middle, significances.end());
-  const double scale = (*middle - kLeast) / std::pow(std::numbers::ln2, 1 / kShape);  // of a median
+  const double scale =
+      (numerics::median_in(significances) - kLeast) / std::pow(std::numbers::ln2, 1 / kShape);  // of a median
   return {n + kFewest, (n * scale + kPrior * kUsual) / (n + kPrior)};
 }
 

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/bright_actin.h"
 #include "segment/cells/fibre_line.h"
 #include "segment/cells/fibre_profile.h"
@@ -160,12 +161,6 @@ struct Judge {
   static constexpr double kFalseBeside = 0.15;
 };
 
-double quantile_of(std::vector<double> values, double q) {
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 /// Those that are more significant than texture, and those beside them that are more significant than the texture that
 /// lies beside fibres by chance.
 std::vector<Candidate> significant(std::vector<Candidate> candidates, const FibreParameters& p) {
@@ -209,7 +204,7 @@ double height_of_cortex(const Judge& judge) {
       heights.push_back(height);
     }
   }
-  return heights.empty() ? std::numeric_limits<double>::infinity() : quantile_of(std::move(heights), 0.5);
+  return heights.empty() ? std::numeric_limits<double>::infinity() : numerics::quantile(std::move(heights), 0.5);
 }
 
 /// All lines that are fibres. Along the edge these are only lines that stand out of the cortex, or are as high as the
@@ -221,19 +216,19 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
     inner.push_back(judge.candidate(trace, judge.p.fibre_edge_um));
     if (!inner.back() || inner.back()->expected_false > judge.p.fibre_false_per_cell) continue;
     heights.push_back(inner.back()->profile.height);
-    ridge_heights.push_back(quantile_of(trace.height, 0.5));
+    ridge_heights.push_back(numerics::quantile(trace.height, 0.5));
   }
   constexpr std::size_t kEnough = 5;  // fewer do not tell what bright and faint are
   constexpr double kHigh = 0.8;       // of the second highest of ten
   double faint = 0, bright = judge.p.fibre_edge_height * height_of_cortex(judge);
   if (heights.size() >= kEnough) {
-    faint = judge.p.fibre_faintest * quantile_of(heights, 0.5);
-    bright = std::min(bright, kHigh * quantile_of(ridge_heights, 0.9));
+    faint = judge.p.fibre_faintest * numerics::quantile(heights, 0.5);
+    bright = std::min(bright, kHigh * numerics::quantile(ridge_heights, 0.9));
   }
   std::vector<Candidate> candidates;
   for (std::size_t i = 0; i < traces.size(); ++i) {
     std::optional<Candidate> whole;
-    if (quantile_of(traces[i].height, 0.5) >= bright) whole = judge.candidate(traces[i], 0);
+    if (numerics::quantile(traces[i].height, 0.5) >= bright) whole = judge.candidate(traces[i], 0);
     if (whole && length_um(whole->points_um) >= 2 * judge.p.fibre_shortest_um)  // ruffles, roots of filopodia: shorter
       candidates.push_back(std::move(*whole));
     else if (inner[i])

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
 
 namespace mbtfm::cells {
 
@@ -36,9 +37,7 @@ cv::Mat disc_median(const cv::Mat& image, int radius) {
       for (int x = 0; x < image.cols; ++x) {
         for (std::size_t k = 0; k < offsets.size(); ++k)
           window[k] = padded.at<float>(y + radius + offsets[k].y, x + radius + offsets[k].x);
-        const auto middle = window.begin() + static_cast<std::ptrdiff_t>(window.size() / 2);
-        std::nth_element(window.begin(), middle, window.end());
-        result.at<float>(y, x) = *middle;
+        result.at<float>(y, x) = numerics::median_in(window);
       }
   });
   return result;
@@ -140,9 +139,7 @@ float quantile(const cv::Mat& values, double q) {
   sorted.reserve(values.total());
   for (int y = 0; y < values.rows; ++y)
     sorted.insert(sorted.end(), values.ptr<float>(y), values.ptr<float>(y) + values.cols);
-  const auto place = sorted.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(sorted.size() - 1));
-  std::nth_element(sorted.begin(), place, sorted.end());
-  return *place;
+  return numerics::quantile(std::move(sorted), q);
 }
 
 double median_within(const cv::Mat& values, const cv::Mat& mask) {

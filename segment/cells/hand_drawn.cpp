@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/candidates.h"
 #include "segment/cells/ellipse.h"
 #include "segment/cells/fibre_ends.h"
@@ -126,9 +127,7 @@ double height_within(const Polygon& area_um, const Adhesion& adhesion, const ima
   const double inside =
       n_inside > 0 ? sum / n_inside : image.at(pixel_at(c.x, image.width), pixel_at(c.y, image.height));
   if (around.empty()) return inside;
-  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-  std::nth_element(around.begin(), middle, around.end());
-  return inside - *middle;
+  return inside - numerics::median_in(around);
 }
 
 /// The words of a selection's name, in small letters.

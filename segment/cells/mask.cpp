@@ -9,6 +9,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/ellipse.h"
 
 namespace mbtfm::cells {
@@ -159,9 +160,7 @@ std::optional<double> level_around(const LabelMask& mask, const Adhesion& a, con
     }
   }
   if (around.empty()) return std::nullopt;
-  const auto middle = around.begin() + static_cast<std::ptrdiff_t>(around.size() / 2);
-  std::nth_element(around.begin(), middle, around.end());
-  return *middle;
+  return numerics::median_in(around);
 }
 
 /// Labels of the parts that are large enough for a cell, the largest first; of a label image those that are there.

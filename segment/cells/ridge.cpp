@@ -6,6 +6,7 @@
 #include <numbers>
 #include <opencv2/imgproc.hpp>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"
 
 namespace mbtfm::cells {
@@ -170,13 +171,6 @@ Picked pick(const std::vector<cv::Mat>& responses, const cv::Mat& is_free, int f
   return picked;
 }
 
-/// The q-quantile; reorders the values.
-float quantile_of(std::vector<float>& values, double q) {
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(q * static_cast<double>(values.size()));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 /// Magnitudes at the free places of a disc.
 void collect(const cv::Mat& magnitude, const cv::Mat& is_free, cv::Point2d centre, double radius,
              std::vector<float>& values) {
@@ -206,9 +200,11 @@ float spread_at(const Picked& picked, cv::Point2d centre, double radius, std::ve
   spreads.clear();
   for (const cv::Mat& magnitude : picked.magnitude) {
     collect(magnitude, picked.is_free, centre, reach, values);
-    spreads.push_back(quantile_of(values, kTail) / static_cast<float>(kNormalTail));
+    spreads.push_back(
+        numerics::of_rank_in(values, static_cast<std::size_t>(kTail * static_cast<double>(values.size()))) /
+        static_cast<float>(kNormalTail));
   }
-  return quantile_of(spreads, 0.25);
+  return numerics::of_rank_in(spreads, spreads.size() / 4);
 }
 
 }  // namespace

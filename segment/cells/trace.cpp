@@ -6,6 +6,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/cells/grid.h"
 #include "segment/cells/trace_join.h"
 
@@ -197,24 +198,18 @@ std::vector<Step> seeds_of(const Ridges& ridges, const cv::Mat& is_inside, const
   return seeds;
 }
 
-double height_at(std::vector<double> values, double share) {
-  const auto place = values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
-  std::nth_element(values.begin(), place, values.end());
-  return *place;
-}
-
 /// How many points to cut from the front: up to where the height first reaches a share of the plateau behind it, and
 /// the share of the whole line's that it may fall to.
 std::size_t faded_points(const std::vector<double>& height, const TraceRule& rule) {
   if (height.empty()) return 0;
   const std::size_t window = std::min(height.size(), static_cast<std::size_t>(rule.end_window_px));
-  const double whole = rule.follow_share * height_at(height, 0.5);
+  const double whole = rule.follow_share * numerics::quantile(height, 0.5);
   std::size_t n = 0;
   while (n < height.size() && height[n] < whole) ++n;
   const std::size_t first = n, last = std::min(height.size(), first + window);
   if (first == last) return n;
   const auto from = height.begin() + static_cast<std::ptrdiff_t>(first);
-  const double plateau = height_at({from, from + static_cast<std::ptrdiff_t>(last - first)}, 0.75);
+  const double plateau = numerics::quantile(std::vector(from, from + static_cast<std::ptrdiff_t>(last - first)), 0.75);
   while (n < last && height[n] < rule.end_level * plateau) ++n;
   return n;
 }

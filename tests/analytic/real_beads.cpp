@@ -8,6 +8,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "segment/beads/plane.h"
 #include "segment/beads/track.h"
 #include "tests/support/mat_tracks.h"
@@ -84,7 +85,7 @@ TEST(RealBeads, a_cell_that_the_border_cuts_moves_nothing_beyond_its_reach) {
 Vec2 median_of(const std::vector<Vec2>& values) {
   std::vector<double> x, y;
   for (const Vec2 v : values) x.push_back(v.x), y.push_back(v.y);
-  return {quantile(x, 0.5), quantile(y, 0.5)};
+  return {numerics::quantile(x, 0.5), numerics::quantile(y, 0.5)};
 }
 
 std::vector<Vec2> less_median(std::vector<Vec2> values) {

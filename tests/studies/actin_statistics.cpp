@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "pipeline/contract/polyline.h"
+#include "pipeline/numerics/order_statistics.h"
 #include "samples/drawing/geometry.h"
 #include "segment/cells/fibre_profile.h"
 #include "segment/cells/fibre_scales.h"
@@ -34,12 +35,6 @@ drawing::Nucleus ellipse(Vec2 centre_px, Vec2 radii_px, double pixel_um) {
 }
 
 constexpr double kFwhm = 2.3548;
-
-double quantile_of(std::vector<double> values, double q) {
-  if (values.empty()) return std::nan("");
-  std::ranges::sort(values);
-  return values[static_cast<std::size_t>(q * static_cast<double>(values.size() - 1) + 0.5)];
-}
 
 /// By name; the order of the table is that of the names.
 using Statistics = std::map<std::string, double>;
@@ -144,13 +139,13 @@ void add_fibre_statistics(const Scene& s, Statistics& result) {
   result["01 fibres"] = static_cast<double>(s.cell.fibres.size());
   result["02 length by area of the cell (um/um2)"] = total / s.area_um2;
   result["03 share of the cell covered"] = covered / s.area_um2;
-  result["04 height over ground, 10 %"] = quantile_of(contrast, 0.1);
-  result["05 height over ground, median"] = quantile_of(contrast, 0.5);
-  result["06 height over ground, 90 %"] = quantile_of(contrast, 0.9);
-  result["07 variation of height along a fibre"] = quantile_of(variation, 0.5);
-  result["08 width, median (um)"] = quantile_of(width, 0.5);
-  result["09 to the next peak, 25 % (um)"] = quantile_of(spacing, 0.25);
-  result["10 to the next peak, median (um)"] = quantile_of(spacing, 0.5);
+  result["04 height over ground, 10 %"] = numerics::quantile(contrast, 0.1);
+  result["05 height over ground, median"] = numerics::quantile(contrast, 0.5);
+  result["06 height over ground, 90 %"] = numerics::quantile(contrast, 0.9);
+  result["07 variation of height along a fibre"] = numerics::quantile(variation, 0.5);
+  result["08 width, median (um)"] = numerics::quantile(width, 0.5);
+  result["09 to the next peak, 25 % (um)"] = numerics::quantile(spacing, 0.25);
+  result["10 to the next peak, median (um)"] = numerics::quantile(spacing, 0.5);
 }
 
 /// Brightness outside of the outline over that inside, by distance.
@@ -208,7 +203,8 @@ void add_nucleus(const Scene& s, const std::optional<drawing::Nucleus>& nucleus,
       if (d < 0.9) over.push_back(s.image.at<float>(y, x) - s.dark);
       if (d > 1.3 && d < 1.8) beside.push_back(s.image.at<float>(y, x) - s.dark);
     }
-  result["20 brightness over the nucleus, over that beside it"] = quantile_of(over, 0.5) / quantile_of(beside, 0.5);
+  result["20 brightness over the nucleus, over that beside it"] =
+      numerics::quantile(over, 0.5) / numerics::quantile(beside, 0.5);
 }
 
 Statistics statistics_of(const Picture& picture) {
@@ -270,8 +266,8 @@ void print(const std::vector<std::string>& groups, const std::map<std::string, s
         if (s.contains(name)) values.push_back(s.at(name));
       char text[64] = "–";
       if (!values.empty())
-        std::snprintf(text, sizeof text, "%.3g (%.3g … %.3g)", quantile_of(values, 0.5), quantile_of(values, 0),
-                      quantile_of(values, 1));
+        std::snprintf(text, sizeof text, "%.3g (%.3g … %.3g)", numerics::quantile(values, 0.5),
+                      numerics::quantile(values, 0), numerics::quantile(values, 1));
       std::printf(" %-22s", text);
     }
   }

@@ -6,8 +6,8 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/base64.h"
 #include "pipeline/report/arrows.h"
-#include "pipeline/report/base64.h"
 #include "pipeline/report/colours.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/findings.h"
@@ -90,12 +90,12 @@ TEST(Report, forces_that_balance_have_no_net_force) {
 
 TEST(Report, base64_is_rfc_4648s) {
   // RFC 4648, section 10
-  EXPECT_EQ(base64(""), "");
-  EXPECT_EQ(base64("f"), "Zg==");
-  EXPECT_EQ(base64("fo"), "Zm8=");
-  EXPECT_EQ(base64("foo"), "Zm9v");
-  EXPECT_EQ(base64("foob"), "Zm9vYg==");
-  EXPECT_EQ(base64("\xff\xfe\xfd"), "//79");
+  EXPECT_EQ(files::base64(""), "");
+  EXPECT_EQ(files::base64("f"), "Zg==");
+  EXPECT_EQ(files::base64("fo"), "Zm8=");
+  EXPECT_EQ(files::base64("foo"), "Zm9v");
+  EXPECT_EQ(files::base64("foob"), "Zm9vYg==");
+  EXPECT_EQ(files::base64("\xff\xfe\xfd"), "//79");
 }
 
 TEST(Report, round_steps_are_one_two_five) {
