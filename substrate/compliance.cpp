@@ -69,9 +69,14 @@ std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um
     forces[2 * j] = forces_nN[j].x;
     forces[2 * j + 1] = forces_nN[j].y;
   }
-  constexpr std::size_t kBlock = 2048;  // points at a time: some MB of matrix
   std::vector<Vec2> displacements;
   displacements.reserve(points_um.size());
+  if (is_large(points_um, ellipses)) {
+    const Eigen::VectorXd u = response(points_um, ellipses)->displace(forces);
+    for (Eigen::Index row = 0; row < u.size(); row += 2) displacements.push_back({u[row], u[row + 1]});
+    return displacements;
+  }
+  constexpr std::size_t kBlock = 2048;  // points at a time: some MB of matrix
   for (std::size_t begin = 0; begin < points_um.size(); begin += kBlock) {
     const std::size_t end = std::min(begin + kBlock, points_um.size());
     const std::vector<Vec2> block(points_um.begin() + begin, points_um.begin() + end);

@@ -34,13 +34,26 @@ bool is_inside(const Ellipse& e, Vec2 point) {
   return std::hypot(dot(offset, along) / e.semi_major_um, cross(along, offset) / e.semi_minor_um) <= 1;
 }
 
-Vec2 traction_kPa(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN, Vec2 point) {
-  Vec2 sum;
-  for (std::size_t j = 0; j < ellipses.size(); ++j) {
-    if (!is_inside(ellipses[j], point)) continue;
-    sum += 1 / (std::numbers::pi * ellipses[j].semi_major_um * ellipses[j].semi_minor_um) * forces_nN[j];
+/// By square between the lines, x first: the tractions of the ellipses that its middle lies in.
+std::vector<Vec2> tractions_kPa(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN,
+                                const std::vector<double>& x, const std::vector<double>& y) {
+  const std::size_t columns = x.size() - 1;
+  std::vector<Vec2> tractions(columns * (y.size() - 1));
+  const auto square_of = [](const std::vector<double>& lines, double at) {
+    const auto after = std::upper_bound(lines.begin(), lines.end(), at) - lines.begin();
+    return static_cast<std::size_t>(std::clamp<std::ptrdiff_t>(after - 1, 0, std::ssize(lines) - 2));
+  };
+  for (std::size_t k = 0; k < ellipses.size(); ++k) {
+    const Ellipse& e = ellipses[k];
+    const Vec2 traction = 1 / (std::numbers::pi * e.semi_major_um * e.semi_minor_um) * forces_nN[k];
+    const double reach = e.semi_major_um;
+    for (std::size_t j = square_of(y, e.centre_um.y - reach); j <= square_of(y, e.centre_um.y + reach); ++j) {
+      for (std::size_t i = square_of(x, e.centre_um.x - reach); i <= square_of(x, e.centre_um.x + reach); ++i) {
+        if (is_inside(e, {0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])})) tractions[j * columns + i] += traction;
+      }
+    }
   }
-  return sum;
+  return tractions;
 }
 
 }  // namespace
@@ -77,12 +90,12 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
     }
   }
   const int columns = static_cast<int>(x.size()) - 1;
-  const int n_cells = columns * (static_cast<int>(y.size()) - 1);
-  for (int cell = 0; cell < n_cells; ++cell) {
+  const std::vector<Vec2> tractions = tractions_kPa(ellipses, forces_nN, x, y);
+  for (int cell = 0; cell < static_cast<int>(tractions.size()); ++cell) {
     const int i = cell % columns, j = cell / columns;
     const int first = j * (columns + 1) + i, next = first + columns + 1;
     for (const int corner : {first, first + 1, next + 1, next}) grid.cells.push_back(corner);
-    const Vec2 t = traction_kPa(ellipses, forces_nN, {0.5 * (x[i] + x[i + 1]), 0.5 * (y[j] + y[j + 1])});
+    const Vec2 t = tractions[static_cast<std::size_t>(cell)];
     for (const double value : {t.x, t.y, 0.0}) grid.cell_arrays[0].values.push_back(value);
   }
   files::write_grid_vtu(file, grid);

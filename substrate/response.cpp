@@ -45,11 +45,14 @@ SharedResponse dense_response(MatrixXd compliance_um_per_nN, int threads) {
   return std::make_shared<Dense>(std::move(compliance_um_per_nN), threads);
 }
 
+bool is_large(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) {
+  constexpr double kLargestDense = 5e7;  // numbers: 0.4 GB
+  return 4.0 * static_cast<double>(points_um.size()) * static_cast<double>(ellipses.size()) > kLargestDense;
+}
+
 SharedResponse pointwise_response(const Substrate& model, const std::vector<Vec2>& points_um,
                                   const std::vector<Ellipse>& ellipses, int threads) {
-  constexpr double kLargestDense = 5e7;  // numbers: 0.4 GB
-  const double numbers = 4.0 * static_cast<double>(points_um.size()) * static_cast<double>(ellipses.size());
-  if (numbers > kLargestDense) return blocked_response(model, points_um, ellipses, threads);
+  if (is_large(points_um, ellipses)) return blocked_response(model, points_um, ellipses, threads);
   return dense_response(model.compliance_um_per_nN(points_um, ellipses), threads);
 }
 

@@ -39,7 +39,10 @@ SharedResponse dense_response(Eigen::MatrixXd compliance_um_per_nN, int threads 
 SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>& points_um,
                                 const std::vector<Ellipse>& ellipses, int threads);
 
-/// Dense up to 0.4 GB, blocked beyond.
+/// Whether the matrix would take more than 0.4 GB.
+bool is_large(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses);
+
+/// Dense, but blocked where it is large.
 SharedResponse pointwise_response(const Substrate& model, const std::vector<Vec2>& points_um,
                                   const std::vector<Ellipse>& ellipses, int threads);
 

@@ -19,9 +19,11 @@ struct Root {
   Eigen::Index n_felt = 0;
 };
 
+/// Of a normal matrix: what of its trace before anything was taken off it is rounding.
+constexpr double kRounding = 1e-13;
+
 /// @param trace  of the normal matrix before anything was taken off it: its rounding stays
 Root root_of(Eigen::MatrixXd A, double trace, int threads) {
-  constexpr double kRounding = 1e-13;  // of a normal matrix
   const Eigen::VectorXd diagonal = A.diagonal();
   const double least = kRounding * std::max(trace, 1e-300);
   numerics::mirror_upper(A);  // Cholesky takes the upper half: the lower one keeps it for a second try
@@ -35,6 +37,18 @@ Root root_of(Eigen::MatrixXd A, double trace, int threads) {
   const Eigen::Index n_felt = (A.diagonal().array().square() > 4 * least).count();
   numerics::clear_below_diagonal(A);
   return {std::move(A), n_felt};
+}
+
+/// The root of UᵀU − FFᵀ.
+Root root_less(const Eigen::MatrixXd& U, const Eigen::MatrixXd& F, int threads) {
+  const double trace = U.squaredNorm(), least = kRounding * std::max(trace, 1e-300);
+  Eigen::MatrixXd root = U;
+  const bool is_definite = numerics::downdate_upper(root, F.transpose());
+  if (is_definite && root.diagonal().cwiseAbs2().minCoeff() > 4 * least) return {std::move(root), U.cols()};
+  root.setZero();
+  numerics::add_upper_gram(U, root, threads);
+  numerics::add_upper_gram(F.transpose(), root, threads, -1);
+  return root_of(std::move(root), trace, threads);
 }
 
 /// (MᵀW²M + Λ)⁻¹, by rank. With Λ motions of different units go together: each counts as a multiple of itself.
@@ -52,16 +66,15 @@ Eigen::MatrixXd inverse_of_motions(const LinearData& data, const Eigen::VectorXd
   return inverse_of_motions(data.motions.transpose() * (weight.asDiagonal() * data.motions), data.motion_precision);
 }
 
-/// Take off a Gram matrix Gᵀ W² P G, on and above its diagonal, what these motions explain of G.
+/// F with FFᵀ what these motions explain of a Gram matrix Gᵀ W² P G.
 /// @param inverse  of their own square, Λ included
-void take_off(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
-              const Eigen::MatrixXd& inverse, Eigen::MatrixXd& gram) {
-  if (motions.cols() == 0) return;
+Eigen::MatrixXd explained_by(const LinearData& data, const Eigen::VectorXd& weight, const Eigen::MatrixXd& motions,
+                             const Eigen::MatrixXd& inverse) {
+  if (motions.cols() == 0) return Eigen::MatrixXd(data.response->cols(), 0);
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(inverse);
   const Eigen::VectorXd root = eigen.eigenvalues().cwiseMax(0).cwiseSqrt();
   const Eigen::MatrixXd unit = motions * (eigen.eigenvectors() * root.asDiagonal());
-  const Eigen::MatrixXd pulled = data.response->pull_back(weight.asDiagonal() * unit);
-  numerics::add_upper_gram(pulled.transpose(), gram, data.threads, -1);
+  return data.response->pull_back(weight.asDiagonal() * unit);
 }
 
 struct Explained {
@@ -78,16 +91,14 @@ Explained explained(const LinearData& data, const Eigen::VectorXd& weight, const
   return {.target = target, .floor_squared = std::max(0.0, weighted.dot(u) - target.squaredNorm())};
 }
 
-/// From A = Gᵀ W² P G = Cᵀ C and y = C⁻ᵀ Gᵀ W² P u.
-/// @param trace  of A before anything was taken off it
-void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Eigen::MatrixXd A, double trace) {
-  auto [root, n_felt] = root_of(std::move(A), trace, data.threads);
-  auto [target, floor_squared] = explained(data, weight, root, data.displacement_um);
-  data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root)),
+/// From C with Gᵀ W² P G = Cᵀ C, and y = C⁻ᵀ Gᵀ W² P u.
+void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Root C) {
+  auto [target, floor_squared] = explained(data, weight, C.U, data.displacement_um);
+  data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(C.U)),
                   .target = std::move(target),
                   .floor_squared = floor_squared,
                   .n_components = data.n_used,
-                  .n_felt = n_felt,
+                  .n_felt = C.n_felt,
                   .is_upper = true};
 }
 
@@ -138,11 +149,10 @@ void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd pr
 void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
   const Eigen::VectorXd weight = squared_weights(data);
   const Eigen::MatrixXd beside = less_motion(data, motions);
-  const Eigen::MatrixXd& root = *data.reduced.compliance;
-  Eigen::MatrixXd A = Eigen::MatrixXd::Zero(root.cols(), root.cols());
-  numerics::add_upper_gram(root, A, data.threads);
-  const double trace = A.diagonal().sum();
-  take_off(data, weight, beside, inverse_of_motions(motions.transpose() * (weight.asDiagonal() * beside), {}), A);
+  Root root = root_less(
+      *data.reduced.compliance,
+      explained_by(data, weight, beside, inverse_of_motions(motions.transpose() * (weight.asDiagonal() * beside), {})),
+      data.threads);
   const Eigen::Index before = data.motions.cols(), n = motions.cols();
   data.n_used -= n;
   data.motions.conservativeResize(motions.rows(), before + n);
@@ -156,7 +166,7 @@ void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
     data.forces_by_motion.rightCols(n).setZero();
   }
   data.motion_inverse = inverse_of_motions(data, weight);
-  set_reduced(data, weight, std::move(A), trace);
+  set_reduced(data, weight, std::move(root));
 }
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
@@ -191,8 +201,9 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   data.motion_inverse = inverse_of_motions(data, weight);
   Eigen::MatrixXd A = data.response->upper_gram(weight);
   const double trace = A.diagonal().sum();
-  take_off(data, weight, data.motions, data.motion_inverse, A);
-  set_reduced(data, weight, std::move(A), trace);
+  numerics::add_upper_gram(explained_by(data, weight, data.motions, data.motion_inverse).transpose(), A, data.threads,
+                           -1);
+  set_reduced(data, weight, root_of(std::move(A), trace, data.threads));
 }
 
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {

@@ -7,6 +7,7 @@
 
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/dense.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/effects.h"
 #include "substrate/greens/half_space.h"
@@ -64,17 +65,26 @@ struct Step {
 
 Step step_of(const LinearData& data, const Trial& trial, const Eigen::MatrixXd& derivatives,
              const Eigen::MatrixXd& placement) {
-  const Eigen::VectorXd weight = squared_weights(data);
-  Eigen::MatrixXd B(data.displacement_um.size(), 3 + derivatives.cols());
-  B << placement, data.response->displace(derivatives);
+  std::vector<Eigen::Index> free;  // not at its bound
   for (Eigen::Index i = 0; i < derivatives.cols(); ++i) {
-    if (trial.tensions_nN[i] <= 0) B.col(3 + i).setZero();  // at its bound
+    if (trial.tensions_nN[i] > 0) free.push_back(i);
   }
-  B = less_motion(data, std::move(B));
-  const Eigen::MatrixXd weighted = weight.asDiagonal() * B;
-  const Eigen::MatrixXd inverse = (weighted.transpose() * B).completeOrthogonalDecomposition().pseudoInverse();
-  const Eigen::VectorXd found = inverse * (weighted.transpose() * residual_um(data, trial.forces_nN));
-  return {.value = found.head<3>(), .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
+  const Eigen::MatrixXd of_free = derivatives(Eigen::all, free);
+  // all by way of the forces: beads × tensions are too many numbers
+  Eigen::MatrixXd weighted(placement.rows(), 4);
+  weighted << less_motion(data, placement), residual_um(data, trial.forces_nN);
+  weighted = squared_weights(data).asDiagonal() * weighted;
+  const Eigen::MatrixXd pulled = of_free.transpose() * data.response->pull_back(weighted);
+  const Eigen::Index n = 3 + of_free.cols();
+  Eigen::MatrixXd H(n, n);
+  H.topLeftCorner<3, 3>() = placement.transpose() * weighted.leftCols<3>();
+  H.bottomLeftCorner(of_free.cols(), 3) = pulled.leftCols<3>();
+  H.topRightCorner(3, of_free.cols()) = pulled.leftCols<3>().transpose();
+  H.bottomRightCorner(of_free.cols(), of_free.cols()) = numerics::gram(displace(data.reduced, of_free, data.threads));
+  Eigen::VectorXd g(n);
+  g << placement.transpose() * weighted.col(3), pulled.col(3);
+  const Eigen::MatrixXd inverse = H.completeOrthogonalDecomposition().pseudoInverse();
+  return {.value = (inverse * g).head<3>(), .sigma = (noise_variance(data) * inverse.diagonal().head<3>()).cwiseSqrt()};
 }
 
 double mean_semi_minor_um(const Cell& cell) {

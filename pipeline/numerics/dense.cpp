@@ -1,6 +1,8 @@
 #include "pipeline/numerics/dense.h"
 
 #include <algorithm>
+#include <cmath>
+#include <vector>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/parallel.h"
@@ -132,6 +134,27 @@ bool upper_cholesky(MatrixXd& A, int threads) {
         dgemm_("T", "N", &begin, &count, &rows, &kLess, panel, &n, strip, &n, &kOne, &A(next, next + begin), &n);
       dsyrk_("U", "T", &count, &rows, &kLess, strip, &n, &kOne, &A(next + begin, next + begin), &n);
     });
+  }
+  return true;
+}
+
+bool downdate_upper(Eigen::MatrixXd& U, Eigen::MatrixXd B) {
+  std::vector<double> cosine(static_cast<std::size_t>(U.rows())), sine(cosine.size());
+  for (Eigen::Index b = 0; b < B.rows(); ++b) {
+    // column by column, which takes the rotations of all rows above
+    for (Eigen::Index j = 0; j < U.cols(); ++j) {
+      double* column = U.col(j).data();
+      double x = B(b, j);
+      for (Eigen::Index k = 0; k < j; ++k) {
+        column[k] = (column[k] - sine[static_cast<std::size_t>(k)] * x) / cosine[static_cast<std::size_t>(k)];
+        x = cosine[static_cast<std::size_t>(k)] * x - sine[static_cast<std::size_t>(k)] * column[k];
+      }
+      const double rest = (column[j] - x) * (column[j] + x);
+      if (!(rest > 0)) return false;
+      cosine[static_cast<std::size_t>(j)] = std::sqrt(rest) / column[j];
+      sine[static_cast<std::size_t>(j)] = x / column[j];
+      column[j] = std::sqrt(rest);
+    }
   }
   return true;
 }

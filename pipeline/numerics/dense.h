@@ -29,6 +29,11 @@ void clear_below_diagonal(Eigen::MatrixXd& square);
 /// @return whether A is positive definite; if not, its upper half is spoiled
 bool upper_cholesky(Eigen::MatrixXd& A, int threads = 1);
 
+/// UᵀU − BᵀB = VᵀV: U becomes V, by one hyperbolic rotation for each of its rows and each of the few rows of B (Golub &
+/// Van Loan, Matrix Computations, 4th ed., 6.5.4).
+/// @return whether the difference is positive definite; if not, U is spoiled
+bool downdate_upper(Eigen::MatrixXd& U, Eigen::MatrixXd B);
+
 /// B = U B for the upper triangle U.
 void multiply_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
 

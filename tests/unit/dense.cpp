@@ -79,6 +79,19 @@ TEST_P(Dense, the_bits_are_the_same_for_any_number_of_threads) {
   }
 }
 
+TEST_P(Dense, a_downdated_factor_is_that_of_the_difference) {
+  const int n = GetParam();
+  const MatrixXd B = numbers(3, n, 10);
+  MatrixXd A = numerics::gram(numbers(n + 5, n, 11)) + MatrixXd::Identity(n, n);
+  MatrixXd factor = A + B.transpose().lazyProduct(B);
+  ASSERT_TRUE(numerics::upper_cholesky(factor) && numerics::upper_cholesky(A));
+  numerics::clear_below_diagonal(factor);
+  numerics::clear_below_diagonal(A);
+  EXPECT_TRUE(numerics::downdate_upper(factor, B));
+  EXPECT_LE((factor - A).norm(), 1e-12 * n * A.norm());
+  if (n > 0) EXPECT_FALSE(numerics::downdate_upper(A, 2 * A.topRows(1)));
+}
+
 INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 300, 700));
 
 TEST(DenseCholesky, a_matrix_that_is_not_positive_is_told_and_its_lower_half_kept) {
