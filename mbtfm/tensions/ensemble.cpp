@@ -301,7 +301,7 @@ void add_estimates(EnsembleFit& all, bool is_cut) {
 
 struct FirstFit {
   TensionFit fit;
-  std::string loss;
+  Loss loss = Loss::squares;
 };
 
 FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
@@ -310,8 +310,8 @@ FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const 
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
   TensionFit fit = fit_tensions(problem, parameters, threads,
                                 start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
-  const std::string loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
-  if (loss == "squares") return {std::move(fit), loss};
+  const Loss loss = loss_called_for(parameters.loss, data, weighted_residual(data, fit.trial.forces_nN));
+  if (loss == Loss::squares) return {std::move(fit), loss};
   return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
 }
 
@@ -330,10 +330,10 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
 
 /// The beads' own variance, or the misfit's where the data are too few to tell it or the loss is a robust one.
 double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
-                                   const std::string& loss) {
+                                   Loss loss) {
   constexpr Eigen::Index kEnough = 50;  // known to 20 %
   const bool is_told = data.n_used - data.reduced.n_felt >= kEnough;
-  return loss == "squares" && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
+  return loss == Loss::squares && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
 }
 
 }  // namespace
