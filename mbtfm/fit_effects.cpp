@@ -14,7 +14,7 @@ namespace {
 
 /// The fit again, with other networks, data or loss. From the same start as a run that has the effect from the first.
 EnsembleFit fit_again(const FittedCell& c, const std::vector<cables::CableNetwork>& networks, LinearData data,
-                      const std::string& loss, int threads) {
+                      std::optional<Loss> loss, int threads) {
   FitParameters parameters = c.parameters.fit;
   parameters.loss = loss;
   parameters.bootstrap = 0;
@@ -27,51 +27,52 @@ LinearData unweighted(LinearData data) {
   return data;
 }
 
-std::optional<Change> change_by_gel(const std::string& name, const FittedCell& c,
+std::optional<Change> change_by_gel(EffectKind kind, const FittedCell& c,
                                     const substrate::SubstrateParameters& parameters, int threads) {
   const auto gel = choice::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.data;
   with.response = gel->response(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
-  return change_between(name, c.fit,
+  return change_between(kind, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> with_base(const Effect& e, const FittedCell& c, int threads) {
   substrate::SubstrateParameters parameters = c.parameters.substrate;
-  parameters.model = "auto";
-  parameters.effects.finite_thickness = "on";
-  return change_by_gel(e.name, c, parameters, threads);
+  parameters.model = substrate::ModelKind::automatic;
+  parameters.effects.finite_thickness = Switch::on;
+  return change_by_gel(e.kind, c, parameters, threads);
 }
 
 std::optional<Change> with_sides(const Effect& e, const FittedCell& c, int threads) {
   substrate::SubstrateParameters parameters = c.parameters.substrate;
   if (!parameters.side_distance_um) return {};
-  parameters.model = "auto";
-  parameters.effects.finite_sides = "on";
-  if (parameters.effects.finite_thickness == "off") parameters.effects.finite_thickness = "auto";
-  return change_by_gel(e.name, c, parameters, threads);
+  parameters.model = substrate::ModelKind::automatic;
+  parameters.effects.finite_sides = Switch::on;
+  Switch& base = parameters.effects.finite_thickness;
+  if (base == Switch::off) base = Switch::automatic;
+  return change_by_gel(e.kind, c, parameters, threads);
 }
 
 /// Where the effect's number bounds the change of the field, and so of the forces that displace the gel as far. A
 /// graded gel's own solution is off by some per cent, more than a grading that is left out.
 std::optional<Change> bounded_by_number(const Effect& e) {
   if (!e.number) return {};
-  return Change{.effect = e.name, .by_tension_nN = {}, .at_most = e.number};
+  return Change{.effect = e.kind, .by_tension_nN = {}, .at_most = e.number};
 }
 
 std::optional<Change> with_elasticity(const Effect& e, const FittedCell& c, int threads) {
   const auto elastic = of_cables(c.networks, c.parameters.cables);
-  return change_between(e.name, c.fit, fit_again(c, elastic, c.data, c.parameters.fit.loss, threads));
+  return change_between(e.kind, c.fit, fit_again(c, elastic, c.data, c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> with_loss(const Effect& e, const FittedCell& c, int threads) {
-  return change_between(e.name, c.fit, fit_again(c, c.networks, c.data, c.parameters.fit.robust_kind, threads));
+  return change_between(e.kind, c.fit, fit_again(c, c.networks, c.data, c.parameters.fit.robust_kind, threads));
 }
 
 std::optional<Change> with_motion(const Effect& e, const FittedCell& c, int threads) {
   LinearData with = c.data;
   add_motions(with, affine_motions(c.inputs.beads));
-  return change_between(e.name, c.fit,
+  return change_between(e.kind, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }
 
@@ -80,7 +81,7 @@ std::optional<Change> with_forces_beyond(const Effect& e, const FittedCell& c, i
   if (cuts_of(c.cell).empty()) return {};
   LinearData with = unweighted(c.data);
   allow_forces_beyond(with, c.cell, c.parameters.gel);
-  return change_between(e.name, c.fit, fit_again(c, c.networks, std::move(with), c.parameters.fit.loss, threads));
+  return change_between(e.kind, c.fit, fit_again(c, c.networks, std::move(with), c.parameters.fit.loss, threads));
 }
 
 /// What it changes of the network's tension.
@@ -89,27 +90,45 @@ std::optional<Change> with_fibres(const Effect& e, const FittedCell& c, int thre
   const auto networks = of_cables(
       span_ensemble(mesh::generate_network(c.cell, c.parameters.network).network, c.cell, c.parameters, threads),
       c.networks.front().parameters());
-  return change_between(e.name, c.fit, fit_again(c, networks, c.data, c.parameters.fit.loss, threads));
+  return change_between(e.kind, c.fit, fit_again(c, networks, c.data, c.parameters.fit.loss, threads));
 }
 
 std::optional<Change> change_with(const Effect& e, const FittedCell& c, int threads) {
-  if (e.name == "stress fibres") return with_fibres(e, c, threads);
-  if (e.name == "finite thickness") return with_base(e, c, threads);
-  if (e.name == "finite sides") return with_sides(e, c, threads);
-  if (e.name == "depth-graded gel" || e.name == "uneven surface") return bounded_by_number(e);
-  if (e.name == "elasticity of cables") return with_elasticity(e, c, threads);
-  if (e.name == "robust loss") return with_loss(e, c, threads);
-  if (e.name == kCommonMotion) return with_motion(e, c, threads);
-  if (e.name == kBeyondCut) return with_forces_beyond(e, c, threads);
-  return {};
+  switch (e.kind) {
+    case EffectKind::stress_fibres:
+      return with_fibres(e, c, threads);
+    case EffectKind::finite_thickness:
+      return with_base(e, c, threads);
+    case EffectKind::finite_sides:
+      return with_sides(e, c, threads);
+    case EffectKind::depth_graded_gel:
+    case EffectKind::uneven_surface:
+      return bounded_by_number(e);
+    case EffectKind::cable_elasticity:
+      return with_elasticity(e, c, threads);
+    case EffectKind::robust_loss:
+      return with_loss(e, c, threads);
+    case EffectKind::common_motion:
+      return with_motion(e, c, threads);
+    case EffectKind::beyond_cut:
+      return with_forces_beyond(e, c, threads);
+    default:
+      return {};
+  }
 }
 
 /// Of those that change no tension, or of which nothing is known.
-std::string in_words(const std::string& name) {
-  if (name == "vertical displacement") return "would change no tension: nothing along the surface depends on it";
-  if (name == "time coupling") return "would change no tension but by the fit's tolerance: only where the fit begins";
-  if (name == kBeyondCut) return "would change no tension: the image shows the whole cell";
-  return "would change nothing that can be told: there is no datum of it";
+std::string in_words(EffectKind kind) {
+  switch (kind) {
+    case EffectKind::vertical_displacement:
+      return "would change no tension: nothing along the surface depends on it";
+    case EffectKind::time_coupling:
+      return "would change no tension but by the fit's tolerance: only where the fit begins";
+    case EffectKind::beyond_cut:
+      return "would change no tension: the image shows the whole cell";
+    default:
+      return "would change nothing that can be told: there is no datum of it";
+  }
 }
 
 }  // namespace
@@ -140,7 +159,7 @@ std::vector<Change> explain(std::vector<Effect>& effects, const FittedCell& cell
   for (Effect& effect : effects) {
     if (effect.is_on) continue;
     const std::optional<Change> change = change_with(effect, cell, threads);
-    effect.would_change = change ? sentence(*change, cell.fit) : in_words(effect.name);
+    effect.would_change = change ? sentence(*change, cell.fit) : in_words(effect.kind);
     if (!change) continue;
     effect.change = relative(*change, cell.fit);
     changes.push_back(*change);

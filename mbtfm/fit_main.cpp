@@ -91,7 +91,7 @@ cables::CableParameters inelastic(cables::CableParameters cables) {
 /// The tensions found may stretch cables that those of the start did not. @returns whether elasticity was switched on
 bool was_left_out_wrongly(Effect& elasticity, const cables::CableNetwork& network, const Trial& answer,
                           const FitStageParameters& p) {
-  if (elasticity.is_on || elasticity.setting != "auto") return false;
+  if (elasticity.is_on || elasticity.setting != Switch::automatic) return false;
   const double share = cables::stretch_share(network.network(), answer.equilibrium, p.cables.axial_stiffness_nN);
   if (share <= p.effects.effect_tolerance) return false;
   elasticity.is_on = true;
@@ -117,8 +117,9 @@ ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data, const std:
                       const FitInputs& inputs, const substrate::Substrate& substrate, const FitStageParameters& p,
                       bool is_placed, int threads) {
   const Figures figures = substrate.figures();
-  const bool lacks_base = std::find(figures.begin(), figures.end(),
-                                    Figures::value_type{"substrate_model", std::string("half-space")}) != figures.end();
+  const bool lacks_base =
+      std::find(figures.begin(), figures.end(),
+                Figures::value_type{"substrate_model", name_of(substrate::ModelKind::half_space)}) != figures.end();
   return error_budget({.fit = fit,
                        .data = data,
                        .networks = networks,
@@ -214,10 +215,10 @@ std::optional<CrossValidation> cross_validation_of(const EnsembleFit& fit, const
 Effect take_state_of(FitInputs& inputs, LinearData& data,
                      const std::function<LinearData(const DisplacementField&)>& data_of, bool is_series,
                      const stage::EffectSwitches& effects, const Gel& gel, int threads) {
-  if (is_series && effects.beads_under_load == "on")
+  if (is_series && effects.beads_under_load == Switch::on)
     throw UsageError("beads_under_load = on takes no time series: all frames share the beads' places at rest");
   if (is_series)
-    return stage::decided(kBeadsUnderLoad, effects.beads_under_load, false,
+    return stage::decided(EffectKind::beads_under_load, effects.beads_under_load, false,
                           "all frames of a series share the beads' places at rest");
   double area_um2 = 0;
   for (const Adhesion& a : inputs.cell.adhesions) area_um2 += a.area_um2;
@@ -289,7 +290,7 @@ StageReport fit(const FitStageParameters& given, stage::StageContext& context) {
   const Cell cell = inputs.cell;
   check_place(inputs.beads, cell);
   std::vector<SeriesFrame> series = read_series_of(context);
-  if (!series.empty() && p.fit.substrate == "per-evaluation")
+  if (!series.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   Effect fibres = cables::take_fibres(inputs.cell, p.effects.stress_fibres);
   check_fibres(inputs, fibres, context.inputs_.at("network"));
@@ -338,12 +339,12 @@ StageReport fit(const FitStageParameters& given, stage::StageContext& context) {
   if (!elasticity.is_on) take_cables(inelastic(p.cables));
   context.progress(0.35, "placing the cell on the beads");
   const DisplacementField in_state = inputs.beads;
-  const bool can_be_shifted = p.effects.channel_shift != "auto" || !has_candidates(cell);
+  const bool can_be_shifted = p.effects.channel_shift != Switch::automatic || !has_candidates(cell);
   PlacedCell place = place_cell(inputs.cell, networks.front(), in_state, data, data_of, p.gel, p.fit, start,
-                                can_be_shifted ? p.effects.channel_shift : "off", context.threads);
+                                can_be_shifted ? p.effects.channel_shift : Switch::off, context.threads);
   if (!can_be_shifted)
     place.effect = stage::decided(
-        kChannelShift, p.effects.channel_shift, false,
+        EffectKind::channel_shift, p.effects.channel_shift, false,
         "candidates for adhesions have no place of their own: their lattice would be found, not the cell");
   data = std::move(place.data);
   if (place.effect.is_on) {
@@ -356,7 +357,7 @@ StageReport fit(const FitStageParameters& given, stage::StageContext& context) {
     return fit_ensemble(
         networks, data, adhesion_ids, p.fit, context.threads,
         [&](double f, std::string_view what) { context.progress(0.4 + (series.empty() ? 0.5 : 0.2) * f, what); },
-        p.fit.substrate == "per-evaluation"
+        p.fit.substrate == TrialDisplacement::per_evaluation
             ? solved_misfit(*substrate, points_of(inputs.beads), ellipses_of(inputs.cell), data)
             : SolvedMisfit{},
         &start);

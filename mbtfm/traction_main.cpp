@@ -63,8 +63,9 @@ StageReport run(const TractionStageParameters& p, stage::StageContext& context) 
   files::write_figures(context.output_beside("out", ".json"), summary_of(r, sums));
   if (r.scan) {
     write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
-    write_lambda_picture(context.output_beside("out", "_lambda.svg"), r,
-                         p.traction.lambda_um_per_kPa ? "as given" : "by " + p.traction.lambda_by);
+    write_lambda_picture(
+        context.output_beside("out", "_lambda.svg"), r,
+        p.traction.lambda_um_per_kPa ? "as given" : std::string("by ") + name_of(p.traction.lambda_by));
   }
   if (!inputs.adhesions.empty()) {
     files::write_adhesion_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces, inputs.adhesions,
@@ -73,8 +74,9 @@ StageReport run(const TractionStageParameters& p, stage::StageContext& context) 
   context.progress(1, "done");
 
   StageReport report;
-  report.summary = p.traction.method + ": total force " + brief(sums.total_force_nN) + " nN, strain energy " +
-                   brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " + brief(r.relative_l2);
+  report.summary = name_of(p.traction.method) + std::string(": total force ") + brief(sums.total_force_nN) +
+                   " nN, strain energy " + brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " +
+                   brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
   if (assumed_um) {
     report.summary +=
@@ -89,8 +91,8 @@ StageReport run(const TractionStageParameters& p, stage::StageContext& context) 
     report.summary += "; WARNING: the tractions push outward everywhere: are stressed and relaxed swapped?";
   }
   report.figures = summary_of(r, sums);
-  const bool is_layer = p.traction.gel_model == "layer";
-  report.effects = {stage::decided("finite thickness", is_layer ? "on" : "off", is_layer,
+  const bool is_layer = p.traction.gel_model == GelModel::layer;
+  report.effects = {stage::decided(EffectKind::finite_thickness, switched(is_layer), is_layer,
                                    is_layer ? "layer on a rigid base" : "half-space, as gel_model asks")};
   return report;
 }

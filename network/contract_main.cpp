@@ -81,7 +81,7 @@ int main(int argc, char** argv) {
       argc, argv, [](const ContractParameters& parameters, stage::StageContext& context) {
         const Path tensions_file = context.input("tensions");
         cables::CableParameters cable_parameters = parameters.cables;
-        Effect elasticity = stage::decided("elasticity of cables", parameters.effects.cable_elasticity, true,
+        Effect elasticity = stage::decided(EffectKind::cable_elasticity, parameters.effects.cable_elasticity, true,
                                            "one contraction: to ask for it would cost as much as to have it");
         if (!elasticity.is_on) cable_parameters.axial_stiffness_nN = 0;
         const cables::CableNetwork cables(files::read_network(context.input("network")), cable_parameters);

@@ -231,10 +231,15 @@ int compare(const CommandLine& line) {
   return kDone;
 }
 
+struct FolderArgument {
+  const char *name, *meaning;
+};
+constexpr FolderArgument kCell = {"CELL", "a cell folder"}, kFolder = {"FOLDER", "a folder of cell folders"};
+
 CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name, const std::string& purpose,
-                      const std::string& folder) {
+                      const FolderArgument& folder) {
   CLI::App* command = app.add_subcommand(name, purpose);
-  command->add_option(folder, line.folder, folder == "CELL" ? "a cell folder" : "a folder of cell folders")->required();
+  command->add_option(folder.name, line.folder, folder.meaning)->required();
   command->add_option("--threads", line.threads, "processors to use")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
@@ -281,11 +286,11 @@ int start(int argc, char** argv) {
       "marked), "
       "5 cannot write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, "
       "130 interrupted, 128 + n killed by signal n.");
-  CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", "CELL");
+  CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
   run_command->add_flag("--explain", line.explain, "fit anew and say what each effect that is off would change");
-  CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", "FOLDER");
+  CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   batch_command
@@ -297,16 +302,16 @@ int start(int argc, char** argv) {
   batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
   batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
   CLI::App* verify_command =
-      add_command(app, line, "verify", "hash all inputs and outputs anew: as run.json tells?", "CELL");
+      add_command(app, line, "verify", "hash all inputs and outputs anew: as run.json tells?", kCell);
   CLI::App* repeat_command =
-      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", "CELL");
+      add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", kCell);
   repeat_command->add_option("--out", line.out, "the new cell folder")->required();
   repeat_command->add_option("--inputs", line.inputs, "where the inputs are; default: beside run.json");
   repeat_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
       ->capture_default_str();
-  CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", "FOLDER");
+  CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", kFolder);
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
-  CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", "CELL");
+  CLI::App* cost_command = add_command(app, line, "cost", "what accuracy costs in time, for this cell", kCell);
   cost_command->add_option("MORE", line.more_cells, "further cells, over all of which the errors are taken");
   cost_command->add_option("--out", line.out, "folder of cost.csv, cost.svg and cost.md; default: CELL/cost");
   cost_command->add_option("--budget", line.budget_min, "no run is begun after this (minutes)")
@@ -318,7 +323,7 @@ int start(int argc, char** argv) {
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
   cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
       ->capture_default_str();
-  add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", "CELL");
+  add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", kCell);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

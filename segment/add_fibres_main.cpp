@@ -1,4 +1,5 @@
 /// mbtfm-add-fibres: the fibres of a segmentation and those that the beads call for, as ImageJ selections to run with.
+#include <set>
 #include <string>
 
 #include "pipeline/contract/errors.h"
@@ -19,9 +20,9 @@ void declare(stage::ParameterList& list, AddFibresParameters& parameters) {
 Vec2 centre_of_adhesion(const std::vector<Roi>& rois, int adhesion_id, const std::string& file) {
   constexpr double kCentre_px = 0.5;
   const std::string id = " " + std::to_string(adhesion_id), name = "adhesion" + id;
+  const std::set<std::string> names = {name, "anchor" + id, "candidate" + id};
   for (const Roi& roi : rois) {
-    const bool is_it = roi.name == name || roi.name == "anchor" + id || roi.name == "candidate" + id;
-    if (is_it && roi.points_px.size() == 2)
+    if (names.contains(roi.name) && roi.points_px.size() == 2)
       return 0.5 * (roi.points_px[0] + roi.points_px[1]) - Vec2{kCentre_px, kCentre_px};
   }
   throw InputError(file, "an ellipse called '" + name + "'", "none",

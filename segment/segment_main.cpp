@@ -276,7 +276,7 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
     images::write_png(context.output("out", "contact_sheet.png"),
                       draw_contact_sheet(adhesion, actin, parameters, drawn));
   StageReport report =
-      parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), parameters.candidates.adhesions == "auto");
+      parameters.cell == 0 ? report_of(cells) : report_of(cells.front(), !parameters.candidates.adhesions);
   add_drawn_by_hand(report, drawn);
   return report;
 }

@@ -113,7 +113,7 @@ std::vector<Finding> findings_of(const Tracking& tracking) {
   const auto add = [&](std::optional<Finding> found) {
     if (found) findings.push_back(std::move(*found));
   };
-  if (tracking.windows.is_on && tracking.windows.setting == "auto") {
+  if (tracking.windows.is_on && tracking.windows.setting == Switch::automatic) {
     add(noticed(FindingKind::tracked_by_correlation, 1,
                 "Windows of " + brief(tracking.window_um) + " um were followed: " + tracking.windows.why + "."));
   }
@@ -140,7 +140,7 @@ StageReport report_of(const Tracking& tracking, double pixel_size_um) {
                         {"far_field_residual_um", tracking.far_field_rms_um},
                         {"noise_um", tracking.noise_um},
                         {"scatter_um", tracking.scatter_um},
-                        {"method", std::string(word_of(has_windows ? TrackMethod::correlation : TrackMethod::beads))},
+                        {"method", std::string(name_of(has_windows ? TrackMethod::correlation : TrackMethod::beads))},
                         {"window_sigma_um", tracking.window_um},
                         {"bead_size_ratio", tracking.size_ratio},
                         {"bead_size_ratio_sigma", tracking.size_ratio_sigma}};

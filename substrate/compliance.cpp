@@ -10,8 +10,7 @@ namespace mbtfm::substrate {
 
 void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
-  list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on",
-           {"half-space", "layer", "split", "refined", "auto"});
+  list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on");
   list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
            "refined: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is refined "
            "until it is estimated to have; 0: the first mesh, no error estimated");
@@ -24,12 +23,11 @@ void declare(stage::ParameterList& list, SubstrateParameters& p) {
       "gel thicknesses");
   list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
            "split: cells of the correction's grid over the gel's thickness");
-  list.add("element", p.element, "refined: finite element", {"q2-p1disc", "q1-p0"});
+  list.add("element", p.element, "refined: finite element");
   list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
            "refined: square root of an adhesion's area over the side of the elements that carry it, in the first mesh");
   list.add("precision", p.precision,
-           "refined: of the factor; auto: single up to a Poisson ratio of 0.495, above it double",
-           {"auto", "single", "double"});
+           "refined: of the factor; auto: single up to a Poisson ratio of 0.495, above it double");
   list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
            "refined: elements that touch each adhesion, at least");
   list.add("growth", p.growth, Range::between(0.1, 10),
@@ -89,20 +87,19 @@ std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um
 std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,
                                      const SubstrateParameters& parameters, int threads) {
   check(gel);
-  std::string names;
-  for (const Model& model : table) {
-    if (model.name == parameters.model) {
-      if (gel.poisson_ratio == 0.5 && !model.takes_incompressible) {
-        throw UsageError("gel.poisson_ratio = 0.5: the model " + model.name +
-                         " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
-                         "or half-space");
-      }
-      if (model.name == "auto") return model.make(gel, parameters, threads);  // decides by the scene
-      return model.make(gel, without_what_is_off(parameters, effects_of_model(parameters)), threads);
-    }
-    names += (names.empty() ? "" : ", ") + model.name;
+  const auto model = std::ranges::find(table, parameters.model, &Model::kind);
+  if (model == table.end()) {
+    std::string names;
+    for (const Model& known : table) names += (names.empty() ? "" : ", ") + std::string(name_of(known.kind));
+    throw UsageError("substrate.model: expected one of " + names + ", found '" + name_of(parameters.model) + "'");
   }
-  throw UsageError("substrate.model: expected one of " + names + ", found '" + parameters.model + "'");
+  if (gel.poisson_ratio == 0.5 && !model->takes_incompressible) {
+    throw UsageError("gel.poisson_ratio = 0.5: the model " + std::string(name_of(model->kind)) +
+                     " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
+                     "or half-space");
+  }
+  if (model->kind == ModelKind::automatic) return model->make(gel, parameters, threads);  // decides by the scene
+  return model->make(gel, without_what_is_off(parameters, effects_of_model(parameters)), threads);
 }
 
 std::vector<double> Substrate::vertical_um(const std::vector<Vec2>&, const std::vector<Ellipse>&,
@@ -115,7 +112,7 @@ VolumeField Substrate::volume(const std::vector<Ellipse>&, const std::vector<Vec
 }
 
 bool asks_for_vertical(const SubstrateParameters& parameters) {
-  return parameters.effects.vertical_displacement == "on";
+  return parameters.effects.vertical_displacement == Switch::on;
 }
 
 double margin_um(const Gel& gel, const SubstrateParameters& parameters) {

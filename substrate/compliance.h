@@ -9,8 +9,10 @@
 #include <vector>
 
 #include "pipeline/contract/cell.h"
+#include "pipeline/contract/gel.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/report.h"
+#include "pipeline/numerics/cholesky.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/parameters.h"
 
@@ -25,10 +27,29 @@ struct Ellipse {
 };
 Ellipse ellipse_of(const Adhesion& adhesion);
 
+enum class ModelKind {
+  half_space,  ///< neither base nor sides
+  layer,       ///< the base
+  split,       ///< sides, too, by finite elements of what is smooth
+  refined,     ///< all, by finite elements refined at the adhesions
+  automatic    ///< the cheapest that has the effects that are on
+};
+constexpr auto words(ModelKind) { return std::array{"half-space", "layer", "split", "refined", "auto"}; }
+constexpr ModelKind kind_of(GelModel model) {
+  return model == GelModel::layer ? ModelKind::layer : ModelKind::half_space;
+}
+
+/// Of the model refined.
+enum class FiniteElement {
+  q2_p1disc,  ///< stable as nu -> 1/2
+  q1_p0       ///< cheaper, and several times less accurate
+};
+constexpr auto words(FiniteElement) { return std::array{"q2-p1disc", "q1-p0"}; }
+
 struct SubstrateParameters {
-  std::string model = "auto";            ///< how, not what: the cheapest that has the effects that are on
-  double displacement_tolerance = 0.02;  ///< a third of the beads' noise in good experiments
-  std::string modulus_profile = {};      ///< empty: youngs_modulus_kPa at every depth
+  ModelKind model = ModelKind::automatic;  ///< how, not what
+  double displacement_tolerance = 0.02;    ///< a third of the beads' noise in good experiments
+  std::string modulus_profile = {};        ///< empty: youngs_modulus_kPa at every depth
 
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
@@ -36,11 +57,12 @@ struct SubstrateParameters {
   int cells_per_thickness = 2;  ///< 0.1 % of a column at 2, 0.03 % at 3 (it is smooth over h)
 
   // refined
-  std::string element = "q2-p1disc";      ///< stable as nu -> 1/2; q1-p0 is cheaper and several times less accurate
+  FiniteElement element = FiniteElement::q2_p1disc;
   double elements_across_adhesion = 1.4;  ///< square root of its area over their side: 2 % of a column; 1 % at 2
-  std::string precision = "auto";         ///< half the memory and time where the last digits do not matter
-  int elements_per_adhesion = 4;          ///< that touch each adhesion at least: the thesis' rule
-  double growth = 4;                      ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
+  /// Single: half the memory and time where the last digits do not matter. Unset: by Poisson's ratio.
+  std::optional<numerics::Precision> precision = {};
+  int elements_per_adhesion = 4;  ///< that touch each adhesion at least: the thesis' rule
+  double growth = 4;              ///< their side over the distance to the adhesion: 2 costs twice and gains 5 %
 
   std::optional<double> side_distance_um = {};  ///< a gel is centimetres wide: its sides are far away
   double surface_tilt_deg = 0;                  ///< gels are cast level to a fraction of a degree

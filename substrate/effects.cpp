@@ -10,37 +10,41 @@ void require_of_effects(bool holds, const std::string& message) {
 }
 
 void check_data(const SubstrateParameters& p) {
-  require_of_effects(p.effects.finite_sides != "on" || p.side_distance_um,
+  require_of_effects(p.effects.finite_sides != Switch::on || p.side_distance_um,
                      "finite_sides = on: expected substrate.side_distance_um, where the gel's sides are, found none");
-  require_of_effects(p.effects.depth_graded_gel != "on" || !p.modulus_profile.empty(),
+  require_of_effects(p.effects.depth_graded_gel != Switch::on || !p.modulus_profile.empty(),
                      "depth_graded_gel = on: expected substrate.modulus_profile, found none");
 }
 
 GelEffects effects_of_model(const SubstrateParameters& p) {
   check_data(p);
-  const std::string as_model = "as the model " + p.model + " has it";
-  const bool has_base = p.model != "half-space", has_sides = p.model == "split" || p.model == "refined";
-  const auto row = [&](const char* name, const char* key, const std::string& setting, bool can_on, bool can_off,
-                       bool is_on, const std::string& why) {
-    require_of_effects(setting != "on" || can_on,
-                       std::string(key) + " = on: the model '" + p.model + "' has none: take another, or auto");
-    require_of_effects(setting != "off" || can_off,
-                       std::string(key) + " = off: the model '" + p.model + "' cannot leave it out");
-    return stage::decided(name, setting, is_on, why);
+  const std::string model = name_of(p.model);
+  const std::string as_model = "as the model " + model + " has it";
+  const bool has_base = p.model != ModelKind::half_space;
+  const bool has_sides = p.model == ModelKind::split || p.model == ModelKind::refined;
+  const auto row = [&](EffectKind kind, const char* key, Switch setting, bool can_on, bool can_off, bool is_on,
+                       const std::string& why) {
+    require_of_effects(setting != Switch::on || can_on,
+                       std::string(key) + " = on: the model '" + model + "' has none: take another, or auto");
+    require_of_effects(setting != Switch::off || can_off,
+                       std::string(key) + " = off: the model '" + model + "' cannot leave it out");
+    return stage::decided(kind, setting, is_on, why);
   };
-  const bool is_graded = !p.modulus_profile.empty() && p.effects.depth_graded_gel != "off";
-  if (is_graded && p.model != "refined") {
-    throw UsageError("substrate.modulus_profile: the model '" + p.model +
+  const bool is_graded = !p.modulus_profile.empty() && p.effects.depth_graded_gel != Switch::off;
+  if (is_graded && p.model != ModelKind::refined) {
+    throw UsageError("substrate.modulus_profile: the model '" + model +
                      "' holds for one modulus at every depth: take the model refined or auto, or switch "
                      "effects.depth_graded_gel off");
   }
+  using enum EffectKind;
   return {
-      row(kThickness, "finite_thickness", p.effects.finite_thickness, has_base, !has_base, has_base, as_model),
-      row(kSides, "finite_sides", p.effects.finite_sides, has_sides, true, has_sides && p.side_distance_um, as_model),
-      row(kGrading, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
-      row(kVertical, "vertical_displacement", p.effects.vertical_displacement, true, true, asks_for_vertical(p),
-          asks_for_vertical(p) ? "asked for" : "not asked for"),
-      stage::decided(kSurface, "auto", false, as_model + ": level and smooth")};
+      row(finite_thickness, "finite_thickness", p.effects.finite_thickness, has_base, !has_base, has_base, as_model),
+      row(finite_sides, "finite_sides", p.effects.finite_sides, has_sides, true, has_sides && p.side_distance_um,
+          as_model),
+      row(depth_graded_gel, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
+      row(vertical_displacement, "vertical_displacement", p.effects.vertical_displacement, true, true,
+          asks_for_vertical(p), asks_for_vertical(p) ? "asked for" : "not asked for"),
+      stage::decided(uneven_surface, Switch::automatic, false, as_model + ": level and smooth")};
 }
 
 SubstrateParameters without_what_is_off(SubstrateParameters p, const GelEffects& effects) {

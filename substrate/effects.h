@@ -16,13 +16,6 @@ struct GelEffects {
 /// What the named model takes into account. @throws UsageError where a switch asks for something else
 GelEffects effects_of_model(const SubstrateParameters& parameters);
 
-// The names of the effects, for people.
-inline constexpr const char* kThickness = "finite thickness";
-inline constexpr const char* kSides = "finite sides";
-inline constexpr const char* kGrading = "depth-graded gel";
-inline constexpr const char* kVertical = "vertical displacement";
-inline constexpr const char* kSurface = "uneven surface";
-
 /// @throws UsageError "effects.<message>" where it does not hold
 void require_of_effects(bool holds, const std::string& message);
 /// A switch that is on needs its datum. @throws UsageError

@@ -1,4 +1,4 @@
-/// The models by name: each in its own file, listed once in a table.
+/// The models: each in its own file, listed once in a table.
 #pragma once
 
 #include <memory>
@@ -9,13 +9,12 @@
 namespace mbtfm::substrate {
 
 struct Model {
-  std::string name;
+  ModelKind kind;
   std::unique_ptr<Substrate> (*make)(const Gel& gel, const SubstrateParameters& parameters, int threads);
   bool takes_incompressible = false;  ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
 };
 
-/// @throws UsageError where no model of the table has the name or it takes no incompressible gel, InvalidData as
-/// check(gel)
+/// @throws UsageError where the table has no such model or it takes no incompressible gel, InvalidData as check(gel)
 std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,
                                      const SubstrateParameters& parameters, int threads);
 

@@ -137,20 +137,23 @@ void write_result(stage::StageContext& context, const substrate::Substrate& mode
 
 StageReport run(const Parameters& given, stage::StageContext& context) {
   Parameters parameters = given;
-  std::string& vertical = parameters.substrate.effects.vertical_displacement;
-  if (vertical == "auto" && !context.has_input("points")) vertical = "on";  // a surface in space has three components
+  Switch& vertical = parameters.substrate.effects.vertical_displacement;
+  if (vertical == Switch::automatic && !context.has_input("points"))
+    vertical = Switch::on;  // a surface in space has three components
   const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   const Load load = read_load(context);
   context.progress(0.1, "solving for the substrate");
   StageReport report;
   write_result(context, *model, load, report.figures);
-  report.summary = std::to_string(load.ellipses.size()) + " loaded patches, model " + parameters.substrate.model;
+  report.summary =
+      std::to_string(load.ellipses.size()) + " loaded patches, model " + name_of(parameters.substrate.model);
   report.figures.emplace_back("n_loads", static_cast<std::int64_t>(load.ellipses.size()));
   for (const auto& figure : model->figures()) report.figures.push_back(figure);
   report.effects = model->effects();
   for (Effect& e : report.effects) {
-    if (e.name != "vertical displacement" || given.substrate.effects.vertical_displacement != "auto") continue;
-    e.setting = "auto";
+    if (e.kind != EffectKind::vertical_displacement) continue;
+    if (given.substrate.effects.vertical_displacement != Switch::automatic) continue;
+    e.setting = Switch::automatic;
     if (e.is_on) e.why = "a surface in space is written";
   }
   return report;

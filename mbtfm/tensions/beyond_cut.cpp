@@ -272,24 +272,25 @@ ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& 
   const double density = beads_per_um2(beads);
   if (density <= 0) return {};
   const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
-  ForcesBeyond found = allow_forces_beyond(
-      data, places,
-      greens::make_greens(gel, {.model = "layer"}, data.threads)->compliance_um_per_nN(data.position_um, places),
-      std::abs(signed_area_um2(cell.outline_um)));
+  ForcesBeyond found =
+      allow_forces_beyond(data, places,
+                          greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+                              ->compliance_um_per_nN(data.position_um, places),
+                          std::abs(signed_area_um2(cell.outline_um)));
   allow_own_forces(data, cell, found);
   return found;
 }
 
 bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell) {
   const bool has_cut = !cuts_of(cell).empty();
-  if (switches.beyond_cut == "on" && !has_cut)
+  if (switches.beyond_cut == Switch::on && !has_cut)
     throw UsageError("effects.beyond_cut = \"on\": the image's border does not cut this cell (outline.csv, is_cut)");
-  return has_cut && switches.beyond_cut != "off";
+  return has_cut && switches.beyond_cut != Switch::off;
 }
 
-Effect beyond_cut_effect(const std::string& setting, const Cell& cell, const std::optional<ForcesBeyond>& found) {
+Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<ForcesBeyond>& found) {
   const double cut_um = length_um(cuts_of(cell));
-  return stage::decided(kBeyondCut, setting, cut_um > 0,
+  return stage::decided(EffectKind::beyond_cut, setting, cut_um > 0,
                         cut_um == 0 ? "the image shows the whole cell"
                         : found     ? "the image cuts the cell along " + brief(cut_um) + " um; forces at " +
                                       std::to_string(found->n_places) + " places beyond, of " +

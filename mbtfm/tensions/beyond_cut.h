@@ -63,10 +63,9 @@ void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found);
 /// less than the intensity is known to).
 ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing = {});
 
-inline constexpr const char* kBeyondCut = "forces beyond the cut";
 /// @throws UsageError where it is switched on and the cell has no cut
 bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell);
 /// @param found  none where it is off
-Effect beyond_cut_effect(const std::string& setting, const Cell& cell, const std::optional<ForcesBeyond>& found);
+Effect beyond_cut_effect(Switch setting, const Cell& cell, const std::optional<ForcesBeyond>& found);
 
 }  // namespace mbtfm::tensions

@@ -95,11 +95,11 @@ CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementFiel
           .rms_um = std::sqrt(2.0) * moved.norm() / std::sqrt(std::max(1.0, static_cast<double>(moved.size())))};
 }
 
-bool allows_common_motion(const stage::EffectSwitches& switches) { return switches.common_motion != "off"; }
+bool allows_common_motion(const stage::EffectSwitches& switches) { return switches.common_motion != Switch::off; }
 
-Effect common_motion_effect(const std::string& setting, const std::optional<FoundMotion>& found) {
+Effect common_motion_effect(Switch setting, const std::optional<FoundMotion>& found) {
   return stage::decided(
-      kCommonMotion, setting, true,
+      EffectKind::common_motion, setting, true,
       found ? "found with the tensions: " + sentence_of(*found) : "as told: the beads at rest lie still");
 }
 

@@ -48,12 +48,11 @@ struct CurvedMotion {
 };
 CurvedMotion curved_motion_beside(const LinearData& data, const DisplacementField& beads, const EnsembleFit& fit);
 
-inline constexpr const char* kCommonMotion = "common motion";
 /// Always on but where it is switched off: a motion too small to be noticed still shifts the total force by some of its
 /// standard errors, and what it costs where there is none is little (docs/effects.md).
 bool allows_common_motion(const stage::EffectSwitches& switches);
 /// @param found  none where it is off
-Effect common_motion_effect(const std::string& setting, const std::optional<FoundMotion>& found);
+Effect common_motion_effect(Switch setting, const std::optional<FoundMotion>& found);
 /// Of fit.json.
 Figures figures_of(const FoundMotion& found);
 

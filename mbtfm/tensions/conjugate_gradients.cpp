@@ -21,7 +21,7 @@ class Minimisation {
   bool is_exhausted() const { return fit_.n_evaluations >= parameters_.max_evaluations; }
 
   Eigen::VectorXd gradient() {
-    if (parameters_.gradients == "exact") return problem_.gradient(fit_.trial);
+    if (parameters_.gradients == Gradients::exact) return problem_.gradient(fit_.trial);
     fit_.n_evaluations += 2 * problem_.n_tensions();
     return problem_.finite_difference_gradient(fit_.trial, threads_);
   }

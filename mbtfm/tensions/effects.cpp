@@ -2,25 +2,25 @@
 
 namespace mbtfm::tensions {
 
-std::string loss_of_switch(const std::string& setting, const std::string& robust_kind) {
-  if (setting == "auto") return "auto";
-  return setting == "on" ? robust_kind : "squares";
+std::optional<Loss> loss_of_switch(Switch setting, Loss robust_kind) {
+  if (setting == Switch::automatic) return std::nullopt;
+  return setting == Switch::on ? robust_kind : Loss::squares;
 }
 
-Effect robust_loss_effect(const std::string& setting, const std::string& used_loss) {
-  const bool is_robust = used_loss != "squares";
-  return stage::decided(
-      "robust loss", setting, is_robust,
-      is_robust ? used_loss +
+Effect robust_loss_effect(Switch setting, Loss used_loss) {
+  const bool is_robust = used_loss != Loss::squares;
+  const std::string why =
+      is_robust ? std::string(name_of(used_loss)) +
                       ": the first fit leaves residuals, alone among their neighbours, that Gaussian noise has in one "
                       "case of twenty, and they move a tension by a tenth of its standard error or more"
                 : "the first fit leaves no residuals, alone among their neighbours, that are too large for Gaussian "
-                  "noise and that move a tension by a tenth of its standard error");
+                  "noise and that move a tension by a tenth of its standard error";
+  return stage::decided(EffectKind::robust_loss, setting, is_robust, why);
 }
 
-Effect decide_time_coupling(bool has_frame_before, const std::string& setting) {
-  Effect effect =
-      stage::decided("time coupling", setting, has_frame_before ? 1 : 0, 0, "number of frames before this one:");
+Effect decide_time_coupling(bool has_frame_before, Switch setting) {
+  Effect effect = stage::decided(EffectKind::time_coupling, setting, has_frame_before ? 1 : 0, 0,
+                                 "number of frames before this one:");
   effect.is_on = effect.is_on && has_frame_before;
   return effect;
 }

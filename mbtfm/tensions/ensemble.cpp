@@ -301,19 +301,19 @@ void add_estimates(EnsembleFit& all, bool is_cut) {
 
 struct FirstFit {
   TensionFit fit;
-  std::string loss;
+  Loss loss = Loss::squares;
 };
 
-/// The loss itself, or what the first fit calls for where it is `auto`: huber where stray beads move some tension.
-std::string loss_called_for(const std::string& loss, const LinearData& data, const TensionProblem& problem,
-                            const Trial& trial) {
-  if (loss != "auto") return loss;
+/// The loss itself, or what the first fit calls for where it is unset: huber where stray beads move some tension.
+Loss loss_called_for(std::optional<Loss> loss, const LinearData& data, const TensionProblem& problem,
+                     const Trial& trial) {
+  if (loss) return *loss;
   constexpr double kMatters = 0.1;  // of a standard error
   const Eigen::VectorXd residual = weighted_residual(data, trial.forces_nN);
   const std::vector<Eigen::Index> strays = stray_beads(data, residual);
   const bool matter =
       !strays.empty() && most_moved_by(strays, data, residual, problem.force_derivatives(trial)) > kMatters;
-  return matter ? "huber" : "squares";
+  return matter ? Loss::huber : Loss::squares;
 }
 
 FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
@@ -322,8 +322,8 @@ FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const 
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
   TensionFit fit = fit_tensions(problem, parameters, threads,
                                 start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
-  const std::string loss = loss_called_for(parameters.loss, data, problem, fit.trial);
-  if (loss == "squares") return {std::move(fit), loss};
+  const Loss loss = loss_called_for(parameters.loss, data, problem, fit.trial);
+  if (loss == Loss::squares) return {std::move(fit), loss};
   return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
 }
 
@@ -342,10 +342,10 @@ std::vector<MeshForces> forces_at_mean(const EnsembleFit& all) {
 
 /// The beads' own variance, or the misfit's where the data are too few to tell it or the loss is a robust one.
 double variance_beside_model_error(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
-                                   const std::string& loss) {
+                                   Loss loss) {
   constexpr Eigen::Index kEnough = 50;  // known to 20 %
   const bool is_told = data.n_used - data.reduced.n_felt >= kEnough;
-  return loss == "squares" && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
+  return loss == Loss::squares && is_told ? noise_variance(data) : misfit_variance(data, forces_nN, n_tensions, loss);
 }
 
 }  // namespace

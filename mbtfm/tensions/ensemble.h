@@ -65,7 +65,7 @@ struct EnsembleFit {
   double network_bias = 0;                ///< of its tension, relative: by forces that bend within its error
   double variance = 0;                    ///< of a component of `data`: see misfit_variance
   ReducedData data;                       ///< as the loss weighs it
-  std::string loss;                       ///< that the first fit called for
+  Loss loss = Loss::squares;              ///< that the first fit called for
   std::optional<ModelError> model_error;  ///< that two meshes or more tell
   std::vector<MeshFit> meshes;
   Report report;  ///< converged where every fit is

@@ -310,7 +310,7 @@ VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int th
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : in.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const auto field = [&](const Gel& gel) {
-    return greens::make_greens(gel, {.model = "layer"}, threads)
+    return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads)
         ->response(points, ellipses)
         ->displace(in.fit.forces_nN);
   };

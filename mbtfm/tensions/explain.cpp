@@ -8,7 +8,7 @@
 
 namespace mbtfm::tensions {
 
-Change change_between(const std::string& effect, const EnsembleFit& without, const EnsembleFit& with) {
+Change change_between(EffectKind effect, const EnsembleFit& without, const EnsembleFit& with) {
   const Eigen::VectorXd before = values_of(without);
   return {effect, values_of(with).head(before.size()) - before};
 }
@@ -35,7 +35,7 @@ void write_changes(const std::filesystem::path& file, const std::vector<Change>&
   files::CsvText csv({"effect", "fibre_id", "change_nN"});
   for (const Change& change : changes) {
     for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i) {
-      csv.add(change.effect).add(fit.fibre_ids[static_cast<std::size_t>(i)]).add(change.by_tension_nN[i]);
+      csv.add(name_of(change.effect)).add(fit.fibre_ids[static_cast<std::size_t>(i)]).add(change.by_tension_nN[i]);
       csv.end_row();
     }
   }

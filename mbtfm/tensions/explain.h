@@ -11,12 +11,12 @@
 namespace mbtfm::tensions {
 
 struct Change {
-  std::string effect;
+  EffectKind effect;
   Eigen::VectorXd by_tension_nN;       ///< with the effect, less without; empty where only a bound is known
   std::optional<double> at_most = {};  ///< |change| / |t|, where only that is known
 };
 
-Change change_between(const std::string& effect, const EnsembleFit& without, const EnsembleFit& with);
+Change change_between(EffectKind effect, const EnsembleFit& without, const EnsembleFit& with);
 
 /// |change| / |t| over the fibres, or of the network where there are none.
 double relative(const Change& change, const EnsembleFit& fit);

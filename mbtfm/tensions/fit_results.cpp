@@ -143,8 +143,8 @@ FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitI
             {"tension_error_from_mesh_nN", std::sqrt(mesh_part)},
             {"n_beads", std::int64_t(inputs.beads.size())},
             {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
-            {"method", parameters.method},
-            {"loss", fit.loss},
+            {"method", name_of(parameters.method)},
+            {"loss", name_of(fit.loss)},
             {"reason", fit.report.reason}};
   if (fit.cut) {
     const Interval interval = interval_95(fit.cut->magnitude_nN);

@@ -197,7 +197,7 @@ void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen
 
 PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
-                      const Trial& start, const std::string& setting, int threads) {
+                      const Trial& start, Switch setting, int threads) {
   const stage::Stopwatch watch;
   constexpr double kFarthest_um = 5;  // filters are off by a micrometre at most, a stage that comes back by some
   constexpr double kLinear = 0.25;    // semi-minor axes: what its square adds is as a shift by an eighth of that
@@ -209,10 +209,10 @@ PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, con
   const auto off = [&](const std::string& why) {
     result.placement = none;
     result.data = std::move(data);
-    result.effect = stage::decided(kChannelShift, setting, false, why);
+    result.effect = stage::decided(EffectKind::channel_shift, setting, false, why);
     return result;
   };
-  if (setting == "off") return off("as told: cell and beads lie on each other");
+  if (setting == Switch::off) return off("as told: cell and beads lie on each other");
   FitParameters rough = parameters;
   rough.tolerance = std::max(rough.tolerance, 0.02);  // the pattern of the forces is all that is asked for
   LinearData there = data;
@@ -227,13 +227,13 @@ PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, con
         placement_motions(gel, ellipses, fit.trial.forces_nN, there.position_um, model_um, none.centre_um, threads);
     const Step step = step_of(there, fit.trial, problem.force_derivatives(fit.trial), motions);
     const double length_um = step.value.head<2>().norm(), sigma_um = std::max(step.sigma[0], step.sigma[1]);
-    if (setting == "auto" && !(sigma_um < 0.5 * width_um)) {
+    if (setting == Switch::automatic && !(sigma_um < 0.5 * width_um)) {
       return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));
     }
     if (length_um < kLinear * width_um) {
       result.data = std::move(there);
       add_motions(result.data, motions);
-      result.effect = stage::decided(kChannelShift, setting, true, "found with the tensions");
+      result.effect = stage::decided(EffectKind::channel_shift, setting, true, "found with the tensions");
       result.effect.seconds = watch.seconds();
       return result;
     }

@@ -66,8 +66,6 @@ struct PlacedCell {
 /// The data of these beads.
 using DataOf = std::function<LinearData(const DisplacementField&)>;
 
-inline constexpr const char* kChannelShift = "channel shift";
-
 /// Gauss–Newton over shift and turn on one network, tensions fitted at each place, until what is left is linear.
 ///
 /// auto: off where the beads tell the shift to worse than half the adhesions' mean semi-minor axis, within which the
@@ -76,7 +74,7 @@ inline constexpr const char* kChannelShift = "channel shift";
 /// @param start  a trial with these data
 PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
-                      const Trial& start, const std::string& setting, int threads);
+                      const Trial& start, Switch setting, int threads);
 
 /// What came of it beside the fit: shift x, y (um) and turn (rad) with standard errors.
 struct FoundPlacement {

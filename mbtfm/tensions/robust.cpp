@@ -28,7 +28,7 @@ std::vector<double> used_lengths(const LinearData& data, const Eigen::VectorXd& 
   return lengths;
 }
 
-Eigen::VectorXd weights_of(const std::string& loss, const Eigen::VectorXd& residual, double scale) {
+Eigen::VectorXd weights_of(Loss loss, const Eigen::VectorXd& residual, double scale) {
   Eigen::VectorXd weights(residual.size() / 2);
   for (Eigen::Index i = 0; i < weights.size(); ++i) {
     weights[i] = robust_weight(loss, residual.segment<2>(2 * i).norm() / scale);
@@ -101,7 +101,7 @@ Eigen::VectorXd times(const BeadJacobian& J, const Eigen::VectorXd& s, int threa
 }
 
 /// The robust fit of the linearised problem r − J s, s >= low: the weights it ends with.
-Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& residual, const BeadJacobian& J,
+Eigen::VectorXd linear_weights(Loss loss, const Eigen::VectorXd& residual, const BeadJacobian& J,
                                const Eigen::VectorXd& low, double scale, int threads) {
   Eigen::VectorXd step = Eigen::VectorXd::Zero(J.cols());
   Eigen::VectorXd weights = weights_of(loss, residual, scale);
@@ -119,7 +119,7 @@ Eigen::VectorXd linear_weights(const std::string& loss, const Eigen::VectorXd& r
 }
 
 TensionFit fit_with_loss(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
-                         const FitParameters& parameters, int threads, TensionFit fit, const std::string& loss,
+                         const FitParameters& parameters, int threads, TensionFit fit, Loss loss,
                          std::optional<double> fixed_scale) {
   constexpr int kMaxRounds = 20;      // each halves the change at least
   constexpr double kSettled = 0.022;  // of a standard error, mean over the directions: a tenth along one of twenty
@@ -202,12 +202,18 @@ double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& 
   return (variance.array() > 0).select(in_errors, 0).maxCoeff() / robust_scale(data, weighted_residual);
 }
 
-double robust_weight(const std::string& loss, double residual) {
-  if (loss == "squares") return 1;
-  if (loss == "huber") return residual <= kHuber ? 1 : kHuber / residual;
-  if (loss == "tukey") return residual < kTukey ? std::pow(1 - std::pow(residual / kTukey, 2), 2) : 0;
-  if (loss == "l1") return 1 / std::max(residual, kSmallest);
-  throw UsageError("fit: unknown loss '" + loss + "'");
+double robust_weight(Loss loss, double residual) {
+  switch (loss) {
+    case Loss::squares:
+      return 1;
+    case Loss::huber:
+      return residual <= kHuber ? 1 : kHuber / residual;
+    case Loss::tukey:
+      return residual < kTukey ? std::pow(1 - std::pow(residual / kTukey, 2), 2) : 0;
+    case Loss::l1:
+      return 1 / std::max(residual, kSmallest);
+  }
+  throw InternalError("unknown loss");
 }
 
 double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual) {
@@ -216,21 +222,20 @@ double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_resi
 }
 
 TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
-                          const FitParameters& parameters, const std::string& loss, int threads, TensionFit first) {
-  const std::string begin = loss == "tukey" ? "huber" : loss;
+                          const FitParameters& parameters, Loss loss, int threads, TensionFit first) {
+  const Loss begin = loss == Loss::tukey ? Loss::huber : loss;
   TensionFit fit = fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(first), begin, {});
-  if (loss != "tukey") return fit;
+  if (loss != Loss::tukey) return fit;
   const double scale = robust_scale(data, weighted_residual(data, fit.trial.forces_nN));
-  return fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), "tukey", scale);
+  return fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), Loss::tukey, scale);
 }
 
-double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
-                       const std::string& loss) {
+double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions, Loss loss) {
   const Eigen::VectorXd residual = weighted_residual(data, forces_nN);
   const auto degrees = static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
   double variance = residual.squaredNorm() / degrees;
   const double scale = robust_scale(data, residual);
-  if (loss != "squares" && scale > 0) {
+  if (loss != Loss::squares && scale > 0) {
     double psi_squared = 0, slope = 0, weight = 0;
     const std::vector<double> lengths = used_lengths(data, residual);
     for (const double length : lengths) {

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "mbtfm/tensions/linear_data.h"
@@ -28,7 +27,7 @@ double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& 
 /// k and c keep 95 % efficiency where the noise is Gaussian in the plane (Maronna, Martin & Yohai, Robust Statistics,
 /// 2006, 6.4, solved for two dimensions); l1 keeps 79 %. A bead's residual is a vector: the weight follows its length,
 /// so that nothing depends on the axes.
-double robust_weight(const std::string& loss, double residual);
+double robust_weight(Loss loss, double residual);
 
 /// Standard deviation of a component that the middle of the residuals tells: median of |r_b| / 1.1774 (Rayleigh).
 double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual);
@@ -39,12 +38,11 @@ double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_resi
 /// @param first  the fit by least squares
 /// @return the last fit
 TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
-                          const FitParameters& parameters, const std::string& loss, int threads, TensionFit first);
+                          const FitParameters& parameters, Loss loss, int threads, TensionFit first);
 
 /// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where
 /// the beads state their errors; else the same from the asymptotic variance of the loss (Maronna et al., 10.3):
 /// s² <psi²/2> / <(psi' + psi/r)/2>² <w>.
-double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions,
-                       const std::string& loss);
+double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions, Loss loss);
 
 }  // namespace mbtfm::tensions

@@ -2,18 +2,15 @@
 
 #include <numeric>
 
-#include "pipeline/contract/errors.h"
-
 namespace mbtfm::tensions {
 
 void declare(stage::ParameterList& list, FitParameters& p) {
   list.table("fit");
-  list.add("method", p.method, "how the tensions are found", {"gauss-newton", "blockwise-cg", "plain-cg"});
-  list.add("gradients", p.gradients, "of the conjugate gradient methods", {"exact", "finite-difference"});
+  list.add("method", p.method, "how the tensions are found");
+  list.add("gradients", p.gradients, "of the conjugate gradient methods");
   list.add("robust_kind", p.robust_kind, "what a bead's residual costs where the effect robust_loss is on",
-           {"huber", "tukey", "l1"});
-  list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial",
-           {"compliance", "per-evaluation"});
+           {Loss::huber, Loss::tukey, Loss::l1});
+  list.add("substrate", p.substrate, "how a trial's displacements come about; per-evaluation: solved for each trial");
   list.add("region_um", p.region_um, Range::zero_or_size_um(),
            "beads further than this outside the outline are left out of the fit (um); unset: none is");
   list.add("n_meshes", p.n_meshes, Range::between(1, 1000),
@@ -38,19 +35,17 @@ void declare(stage::ParameterList& list, FitParameters& p) {
 
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start,
                         Search search) {
-  if (parameters.method == "gauss-newton") return fit_gauss_newton(problem, parameters, start, search);
+  if (parameters.method == FitMethod::gauss_newton) return fit_gauss_newton(problem, parameters, start, search);
   std::vector<int> all(problem.n_tensions());
   std::iota(all.begin(), all.end(), 0);
-  if (parameters.method == "plain-cg") {
+  if (parameters.method == FitMethod::plain_cg) {
     return fit_conjugate_gradients(problem, parameters, threads, start, {{.tensions = all, .n_steps = 10}});
   }
-  if (parameters.method == "blockwise-cg") {  // thesis 3.2.5: one step on the network, ten on the fibres
-    const std::vector<int> fibres(all.begin() + 1, all.end());
-    std::vector<Block> blocks = {{.tensions = {0}, .n_steps = 1}};
-    if (!fibres.empty()) blocks.push_back({.tensions = fibres, .n_steps = 10});
-    return fit_conjugate_gradients(problem, parameters, threads, start, blocks);
-  }
-  throw UsageError("fit: unknown method '" + parameters.method + "'");
+  // thesis 3.2.5: one step on the network, ten on the fibres
+  const std::vector<int> fibres(all.begin() + 1, all.end());
+  std::vector<Block> blocks = {{.tensions = {0}, .n_steps = 1}};
+  if (!fibres.empty()) blocks.push_back({.tensions = fibres, .n_steps = 10});
+  return fit_conjugate_gradients(problem, parameters, threads, start, blocks);
 }
 
 }  // namespace mbtfm::tensions

@@ -11,12 +11,33 @@
 
 namespace mbtfm::tensions {
 
+/// Gauss–Newton converges in about ten steps; the others are kept for comparison.
+enum class FitMethod { gauss_newton, blockwise_cg, plain_cg };
+constexpr auto words(FitMethod) { return std::array{"gauss-newton", "blockwise-cg", "plain-cg"}; }
+
+enum class Gradients {
+  exact,
+  finite_difference  ///< as in the thesis, one equilibrium a tension and side
+};
+constexpr auto words(Gradients) { return std::array{"exact", "finite-difference"}; }
+
+/// What a bead's residual costs: see robust.h.
+enum class Loss { squares, huber, tukey, l1 };
+constexpr auto words(Loss) { return std::array{"squares", "huber", "tukey", "l1"}; }
+
+/// How a trial's displacements come about.
+enum class TrialDisplacement {
+  compliance,     ///< by one matrix a cell
+  per_evaluation  ///< solved for each trial: as in the thesis, for comparison
+};
+constexpr auto words(TrialDisplacement) { return std::array{"compliance", "per-evaluation"}; }
+
 struct FitParameters {
-  std::string method = "gauss-newton";   ///< converges in about ten steps; the others are kept for comparison
-  std::string gradients = "exact";       ///< finite-difference: as in the thesis, one equilibrium a tension and side
-  std::string loss = "auto";             ///< as the switch robust_loss says: auto, squares, or robust_kind
-  std::string robust_kind = "huber";     ///< one minimum, and 95 % efficient where the noise is Gaussian after all
-  std::string substrate = "compliance";  ///< one matrix a cell; per-evaluation: as in the thesis, for comparison
+  FitMethod method = FitMethod::gauss_newton;
+  Gradients gradients = Gradients::exact;
+  std::optional<Loss> loss = {};   ///< as the switch robust_loss says; unset: what the residuals call for
+  Loss robust_kind = Loss::huber;  ///< one minimum, and 95 % efficient where the noise is Gaussian after all
+  TrialDisplacement substrate = TrialDisplacement::compliance;
   std::optional<double> region_um = {};  ///< unset: all beads, as the field far away still tells of the forces
   int n_meshes = 2;  ///< the fewest that tell the model's error; more take 7 % off that of the tensions (validation.md)
   double tolerance = 1e-8;      ///< relative change of the tensions at which the fit stops; with noise it stops before
@@ -54,7 +75,6 @@ enum class Search {
 };
 
 /// @param start  a trial of this problem: see scaled_to_data(), uniform_start()
-/// @throws UsageError for a method it does not know
 TensionFit fit_tensions(const TensionProblem& problem, const FitParameters& parameters, int threads, const Trial& start,
                         Search search = Search::best);
 

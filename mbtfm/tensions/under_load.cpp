@@ -38,23 +38,24 @@ DisplacementField under_load(DisplacementField beads) {
 
 BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
                         const std::function<LinearData(const DisplacementField&)>& data_of, double size_um,
-                        double tolerance, const std::string& setting, const Carried& carried) {
+                        double tolerance, Switch setting, const Carried& carried) {
+  constexpr EffectKind kKind = EffectKind::beads_under_load;
   constexpr double kVeryStrong = 10;
   constexpr double kHopeless = -100;  // estimates of -230 to -450 were -350 to -470
   const stage::Stopwatch watch;
   BeadsOfState result{.beads = at_rest, .data = std::move(data), .effect = {}};
   const double largest = largest_displacement_um(at_rest);
-  if (setting == "off" || (setting == "auto" && !(largest > tolerance * size_um))) {
-    result.effect = stage::decided(kBeadsUnderLoad, setting, largest / size_um, tolerance,
+  if (setting == Switch::off || (setting == Switch::automatic && !(largest > tolerance * size_um))) {
+    result.effect = stage::decided(kKind, setting, largest / size_um, tolerance,
                                    "over the size of an adhesion the largest displacement is");
     return result;
   }
-  if (setting == "auto" && carried) {  // the exact answer costs as much as all that went before
+  if (setting == Switch::automatic && carried) {  // the exact answer costs as much as all that went before
     const Eigen::VectorXd there = result.data.displacement_um - carried(result.data);
     const double estimate = evidence_of(result.data, result.data.reduced, floor_squared_of(result.data, there));
     if (estimate < kHopeless) {
       result.effect =
-          stage::decided(kBeadsUnderLoad, setting, estimate, kHopeless,
+          stage::decided(kKind, setting, estimate, kHopeless,
                          "twice the logarithm of the odds, estimated with the forces that explain the beads at rest, "
                          "is");
       result.effect.seconds = watch.seconds();
@@ -65,7 +66,7 @@ BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
   LinearData loaded = data_of(moved);
   const double evidence = evidence_of(result.data, loaded.reduced, loaded.reduced.floor_squared);
   result.effect =
-      stage::decided(kBeadsUnderLoad, setting, evidence, kVeryStrong,
+      stage::decided(kKind, setting, evidence, kVeryStrong,
                      "twice the logarithm of the odds, by what independent forces of the adhesions leave, is");
   result.effect.seconds = watch.seconds();
   if (!result.effect.is_on) return result;

@@ -19,8 +19,6 @@ namespace mbtfm::tensions {
 /// Each bead where it lies under load.
 DisplacementField under_load(DisplacementField beads);
 
-inline constexpr const char* kBeadsUnderLoad = "beads under load";
-
 /// The beads in the state that explains them better, and their data.
 struct BeadsOfState {
   DisplacementField beads;
@@ -41,6 +39,6 @@ using Carried = std::function<Eigen::VectorXd(const LinearData&)>;
 /// @param size_um  of an adhesion; where no bead moves by `tolerance` of it, both states are the same
 BeadsOfState take_state(const DisplacementField& at_rest, LinearData data,
                         const std::function<LinearData(const DisplacementField&)>& data_of, double size_um,
-                        double tolerance, const std::string& setting, const Carried& carried = {});
+                        double tolerance, Switch setting, const Carried& carried = {});
 
 }  // namespace mbtfm::tensions

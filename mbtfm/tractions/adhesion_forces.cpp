@@ -120,7 +120,7 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
     throw InvalidData("displacement", "more beads than the " + std::to_string(inputs.adhesions.size()) + " adhesions",
                       std::to_string(inputs.beads.size()));
   }
-  const auto gel = greens::make_greens(inputs.gel, {.model = parameters.gel_model}, threads);
+  const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const WeightedBeads beads = weighted(inputs.beads);
@@ -150,7 +150,8 @@ Reconstruction reconstruct_adhesion_forces(const TractionInputs& inputs, const T
                         .moment_nN_um = 0});
   }
   r.sensitivities.resize(ellipses.size());
-  const auto alone = greens::make_greens(inputs.gel, {.model = parameters.gel_model}, 1);  // one column a thread
+  const auto alone =
+      greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, 1);  // one column a thread
   numerics::parallel_for(static_cast<int>(ellipses.size()), threads, [&](int a) {
     const auto i = static_cast<std::size_t>(a);
     r.sensitivities[i] = sensitivity(*alone, beads, G, normal_matrix, pulled, forces_nN[i], ellipses[i], a, parameters);

@@ -115,7 +115,7 @@ std::vector<Vec2> square_centres(const Polygon& outline, double side_um) {
 Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const TractionParameters& parameters,
                                         int threads) {
   if (inputs.adhesions.empty()) throw UsageError("trpf: --adhesions is missing or holds none");
-  const auto gel = greens::make_greens(inputs.gel, {.model = parameters.gel_model}, threads);
+  const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
   std::vector<substrate::Ellipse> points, ellipses;
   double area = 0;
   for (const Adhesion& a : inputs.adhesions) {
@@ -124,7 +124,7 @@ Reconstruction reconstruct_point_forces(const TractionInputs& inputs, const Trac
     area += a.area_um2 / static_cast<double>(inputs.adhesions.size());
   }
   Reconstruction r;
-  r.lambda_unit = "um_per_nN";
+  r.lambda_unit = LambdaUnit::um_per_nN;
   // sum of F² over adhesions of area a stands for a times the integral of t²
   const Model model{.compliance = [&](const std::vector<Vec2>& at) { return gel->compliance_um_per_nN(at, points); },
                     .n_loads = points.size(),
@@ -161,7 +161,7 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
   if (centres.empty()) throw UsageError("bem: no element of element_um fits into the outline");
   check(inputs.gel);
   const greens::Layer layer(inputs.gel);
-  const bool is_layer = parameters.gel_model == "layer";
+  const bool is_layer = parameters.gel_model == GelModel::layer;
   const auto compliance = [&](const std::vector<Vec2>& at) {
     Eigen::MatrixXd G(2 * at.size(), 2 * centres.size());
     numerics::parallel_for(static_cast<int>(centres.size()), threads, [&](int j) {
@@ -177,9 +177,9 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
   };
   const double area = parameters.element_um * parameters.element_um;
   Reconstruction r;
-  r.lambda_unit = "um_per_kPa";
+  r.lambda_unit = LambdaUnit::um_per_kPa;
   // sum of t² over elements of area a stands for the integral of t² over a
-  const auto gel = greens::make_greens(inputs.gel, {.model = parameters.gel_model}, threads);
+  const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
   const Model model{.compliance = compliance,
                     .n_loads = centres.size(),
                     .truth = even_forces(inputs, *gel),

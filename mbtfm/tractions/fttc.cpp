@@ -59,7 +59,7 @@ LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver) {
 }
 
 LatticeOptions lattice_options(const TractionParameters& p, int threads) {
-  return {.model = p.gel_model == "layer" ? greens::GelModel::layer : greens::GelModel::half_space,
+  return {.model = p.gel_model,
           .spacing_um = p.spacing_um,
           .padding = p.padding,
           .basis = Basis::waves,
@@ -106,17 +106,17 @@ Reconstruction reconstruct_fttc(const TractionInputs& inputs, const TractionPara
   const LatticeProblem problem(inputs.beads, inputs.gel, lattice_options(parameters, threads));
   if (problem.data_squared() == 0) return reconstruction_of_nothing(problem, inputs);
   Reconstruction r;
-  r.lambda_unit = "um_per_kPa";
+  r.lambda_unit = LambdaUnit::um_per_kPa;
   TikhonovSolver solver(problem);
   r.scan = scan_lambda(problem, solver);
   r.lambda = parameters.lambda_um_per_kPa.value_or(chosen_lambda(*r.scan, parameters.lambda_by));
   r.length_um = *r.lambda * inputs.gel.youngs_modulus_kPa;
   constexpr double kTolerance = 1e-3;  // in energy: far below any error bar
   solver.solve(*r.lambda, kTolerance);
-  const ReadOut read_out = parameters.read_out == "cells" ? ReadOut::cells : ReadOut::points;
   const WaveField waves = solver.solution();
   const NodeField displacements = problem.displaced(waves);
-  r.patches = patches_of(problem, tractions_kPa(problem, waves, read_out, parameters.gaussian_um), displacements);
+  r.patches =
+      patches_of(problem, tractions_kPa(problem, waves, parameters.read_out, parameters.gaussian_um), displacements);
   double misfit = 0;
   for (const double d : problem.residuals(displacements)) misfit += d * d;
   r.relative_l2 = std::sqrt(misfit / problem.data_squared());

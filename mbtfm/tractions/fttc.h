@@ -10,12 +10,6 @@ namespace mbtfm::tractions {
 /// The criteria over the lambdas that this problem can tell apart. @param solver  of the problem's data: left near one
 LambdaScan scan_lambda(const LatticeProblem& problem, TikhonovSolver& solver);
 
-/// How the tractions of a lattice are read out.
-enum class ReadOut {
-  points,  ///< at the nodes, as Butler et al. 2002
-  cells    ///< their mean over the cell around each node: sums of traction times area are forces
-};
-
 LatticeOptions lattice_options(const TractionParameters& parameters, int threads);
 
 /// The nodes of the field, rows first. @param displacements  of the box

@@ -100,7 +100,7 @@ charts::Axis risk_axis(const RiskScale& scale) {
 
 void write_lambda_picture(const Path& file, const Reconstruction& r, const std::string& chosen_by) {
   const LambdaScan& scan = *r.scan;
-  const Units units{.lambda = r.lambda_unit == "um_per_nN" ? "µm/nN" : "µm/kPa",
+  const Units units{.lambda = r.lambda_unit == LambdaUnit::um_per_nN ? "µm/nN" : "µm/kPa",
                     .length_um_per_lambda = *r.length_um / *r.lambda};
   const Refinement fine(scan.points);
   const RiskScale scale(scan.risk);

@@ -12,7 +12,7 @@
 namespace mbtfm::tractions {
 
 struct LatticeOptions {
-  greens::GelModel model = greens::GelModel::layer;
+  GelModel model = GelModel::layer;
   std::optional<double> spacing_um;  ///< unset: that of beads on a lattice, half the mean distance of scattered ones
   double padding = 1.5;              ///< periods over the field's size; 1: the field is periodic itself
   Basis basis = Basis::waves;

@@ -171,21 +171,25 @@ double largest_curvature(const LambdaScan& scan) {
 
 }  // namespace
 
-double chosen_lambda(const LambdaScan& scan, const std::string& criterion) {
-  if (criterion == "risk") return scan.by_risk;
-  if (criterion == "gcv") return scan.by_gcv;
-  if (criterion == "l-curve" && !scan.by_l_curve) {
-    throw NotSolved({.converged = false,
-                     .iterations = 0,
-                     .last_change = 0,
-                     .reason = "the L-curve of these data has no corner (its largest curvature is " +
-                               brief(largest_curvature(scan)) + ", a corner has " + brief(kLeastCurvature) +
-                               " at least): set lambda_by = risk, which takes lambda " + brief(scan.by_risk) +
-                               " here; it aims at the tractions, and needs no corner"});
+double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion) {
+  switch (criterion) {
+    case LambdaCriterion::risk:
+      return scan.by_risk;
+    case LambdaCriterion::gcv:
+      return scan.by_gcv;
+    case LambdaCriterion::evidence:
+      return scan.by_evidence;
+    case LambdaCriterion::l_curve:
+      break;
   }
-  if (criterion == "l-curve") return *scan.by_l_curve;
-  if (criterion == "evidence") return scan.by_evidence;
-  throw UsageError("traction: unknown criterion '" + criterion + "'");
+  if (scan.by_l_curve) return *scan.by_l_curve;
+  throw NotSolved({.converged = false,
+                   .iterations = 0,
+                   .last_change = 0,
+                   .reason = "the L-curve of these data has no corner (its largest curvature is " +
+                             brief(largest_curvature(scan)) + ", a corner has " + brief(kLeastCurvature) +
+                             " at least): set lambda_by = risk, which takes lambda " + brief(scan.by_risk) +
+                             " here; it aims at the tractions, and needs no corner"});
 }
 
 }  // namespace mbtfm::tractions

@@ -6,6 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/words.h"
+
 namespace mbtfm::tractions {
 
 /// The minimum of |u − G t|² + lambda² |t|² for one lambda, in the weights that the data carry.
@@ -31,8 +33,8 @@ struct LambdaScan {
   std::string variance_source;
 };
 
-/// The criteria's names, as parameters spell them.
-inline const std::vector<std::string> kCriteria = {"risk", "gcv", "l-curve", "evidence"};
+enum class LambdaCriterion { risk, gcv, l_curve, evidence };
+constexpr auto words(LambdaCriterion) { return std::array{"risk", "gcv", "l-curve", "evidence"}; }
 
 /// @param points           at least 5, evenly spaced in log lambda, falling
 /// @param n_data           components of displacement
@@ -47,7 +49,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
 double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square);
 
 /// @throws NotSolved where the criterion is the L-curve and has no corner; it says which criterion to take
-double chosen_lambda(const LambdaScan& scan, const std::string& criterion);
+double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion);
 
 /// Quantities of the scan between its points too, as the criteria see them: by splines through to(value).
 struct Refinement {

@@ -18,7 +18,7 @@ double sinc(double x) { return x == 0 ? 1 : std::sin(x) / x; }
 
 /// The mean of the compliance over the rectangle of wave numbers around zero that has no wave but the zero one. The
 /// half-space's 1/k is integrable there: k dk dphi cancels it. By symmetry only the mean of along and across is left.
-double mean_around_zero(const Gel& gel, greens::GelModel model, double side_x_per_um, double side_y_per_um) {
+double mean_around_zero(const Gel& gel, GelModel model, double side_x_per_um, double side_y_per_um) {
   constexpr int kAngles = 16, kRadii = 64;  // midpoints: to 1e-4, of one wave among thousands
   double sum = 0;
   for (const auto& [half, other] :
@@ -36,18 +36,17 @@ double mean_around_zero(const Gel& gel, greens::GelModel model, double side_x_pe
   return 4 * sum / (side_x_per_um * side_y_per_um);
 }
 
-double zero_wave_um_per_kPa(const Gel& gel, greens::GelModel model, Surroundings surroundings, double step_x,
-                            double step_y) {
+double zero_wave_um_per_kPa(const Gel& gel, GelModel model, Surroundings surroundings, double step_x, double step_y) {
   if (surroundings == Surroundings::open) return mean_around_zero(gel, model, step_x, step_y);
   // A periodic half-space yields to a mean traction without end: its mean displacement tells nothing, and 0 says so.
-  if (model == greens::GelModel::half_space) return 0;
+  if (model == GelModel::half_space) return 0;
   return gel.thickness_um / substrate::shear_modulus_kPa(gel);  // simple shear: (8) as k -> 0
 }
 
 }  // namespace
 
-SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, greens::GelModel model, const Lattice& lattice,
-                                 Surroundings surroundings, Basis basis) {
+SurfaceSpectrum::SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
+                                 Basis basis) {
   const int n_x = lattice.n_columns, n_y = lattice.n_rows;
   const int n_half = n_x / 2 + 1;
   const Eigen::Index n_waves = static_cast<Eigen::Index>(n_half) * n_y;

@@ -22,7 +22,7 @@ enum class Basis {
 /// The compliance of every stored wave of a lattice, in the frame of its wave vector.
 class SurfaceSpectrum {
  public:
-  SurfaceSpectrum(const Gel& gel, greens::GelModel model, const Lattice& lattice, Surroundings surroundings,
+  SurfaceSpectrum(const Gel& gel, GelModel model, const Lattice& lattice, Surroundings surroundings,
                   Basis basis = Basis::waves);
 
   const Eigen::ArrayXd& along_um_per_kPa() const { return along_; }  ///< by wave

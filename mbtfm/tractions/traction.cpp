@@ -14,9 +14,9 @@ namespace mbtfm::tractions {
 
 void declare(stage::ParameterList& list, TractionParameters& p) {
   list.table("traction");
-  list.add("method", p.method, "how the tractions are found", {"fttc", "sparse", "trpf", "bem", "adhesion-forces"});
-  list.add("gel_model", p.gel_model, "elastic model of the gel", {"layer", "half-space"});
-  list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)", kCriteria);
+  list.add("method", p.method, "how the tractions are found");
+  list.add("gel_model", p.gel_model, "elastic model of the gel");
+  list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)");
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12),
            "regularisation, fixed: |u − G t|² + lambda² |t|² over a lattice (um/kPa); unset: by the criterion");
   list.add("spacing_um", p.spacing_um, Range::mesh_um(),
@@ -24,8 +24,7 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
            "scattered ones");
   list.add("padding", p.padding, Range::between(1, 8),
            "fttc, sparse: period over the field's size; 1: the field is periodic itself");
-  list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them",
-           {"cells", "points"});
+  list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them");
   list.add("gaussian_um", p.gaussian_um, Range::zero_or_size_um(),
            "fttc: the tractions are smoothed by this Gaussian (um)");
   list.add("element_um", p.element_um, Range::mesh_um(), "bem: side of the elements that cover the cell (um)");
@@ -41,12 +40,19 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
 }
 
 Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
-  if (parameters.method == "fttc") return reconstruct_fttc(inputs, parameters, threads);
-  if (parameters.method == "sparse") return reconstruct_sparse(inputs, parameters, threads);
-  if (parameters.method == "trpf") return reconstruct_point_forces(inputs, parameters, threads);
-  if (parameters.method == "bem") return reconstruct_elements(inputs, parameters, threads);
-  if (parameters.method == "adhesion-forces") return reconstruct_adhesion_forces(inputs, parameters, threads);
-  throw UsageError("traction: unknown method '" + parameters.method + "'");
+  switch (parameters.method) {
+    case TractionMethod::fttc:
+      return reconstruct_fttc(inputs, parameters, threads);
+    case TractionMethod::sparse:
+      return reconstruct_sparse(inputs, parameters, threads);
+    case TractionMethod::trpf:
+      return reconstruct_point_forces(inputs, parameters, threads);
+    case TractionMethod::bem:
+      return reconstruct_elements(inputs, parameters, threads);
+    case TractionMethod::adhesion_forces:
+      return reconstruct_adhesion_forces(inputs, parameters, threads);
+  }
+  throw InternalError("unknown method");
 }
 
 namespace {
@@ -113,7 +119,7 @@ std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches,
   return forces;
 }
 
-Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::string& gel_model, int threads) {
+Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads) {
   const auto n_beads = static_cast<double>(inputs.beads.size());
   numerics::expect_room_for({.what = "the compliance of the adhesions",
                              .count = n_beads,
@@ -124,7 +130,8 @@ Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::s
   for (const Bead& b : inputs.beads) points.push_back(b.position_um);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  return greens::make_greens(inputs.gel, {.model = gel_model}, threads)->compliance_um_per_nN(points, ellipses);
+  return greens::make_greens(inputs.gel, {.model = substrate::kind_of(gel_model)}, threads)
+      ->compliance_um_per_nN(points, ellipses);
 }
 
 Vec2 direction_of(Vec2 force_nN) {
@@ -235,7 +242,7 @@ Figures summary_of(const Reconstruction& r, const TractionSums& sums) {
                      {"moment_yy_nN_um", sums.moment_nN_um[1][1]},
                      {"summed_over", sums.where},
                      {"relative_l2", r.relative_l2}};
-  if (r.lambda) figures.emplace_back("lambda_" + r.lambda_unit, *r.lambda);
+  if (r.lambda) figures.emplace_back("lambda_" + std::string(name_of(r.lambda_unit)), *r.lambda);
   if (r.length_um) figures.emplace_back("lambda_length_um", *r.length_um);
   if (r.scan && r.lambda && r.length_um) {
     const double scale = *r.length_um / *r.lambda;

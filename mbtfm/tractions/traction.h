@@ -1,4 +1,4 @@
-/// Standard traction reconstructions from bead displacements, by name, and what is summed up of them.
+/// Standard traction reconstructions from bead displacements, and what is summed up of them.
 #pragma once
 
 #include <optional>
@@ -16,17 +16,27 @@
 
 namespace mbtfm::tractions {
 
+enum class TractionMethod { fttc, sparse, trpf, bem, adhesion_forces };
+constexpr auto words(TractionMethod) { return std::array{"fttc", "sparse", "trpf", "bem", "adhesion-forces"}; }
+
+/// How the tractions of a lattice are read out.
+enum class ReadOut {
+  cells,  ///< their mean over the cell around each node: sums of traction times area are forces
+  points  ///< at the nodes, as Butler et al. 2002
+};
+constexpr auto words(ReadOut) { return std::array{"cells", "points"}; }
+
 struct TractionParameters {
-  std::string method = "fttc";
-  std::string gel_model = "layer";          ///< gels are some tens of um thick: a cell feels the base
-  std::string lambda_by = "risk";           ///< aims at the tractions; the others at the displacements
-  std::optional<double> lambda_um_per_kPa;  ///< fixed instead
-  std::optional<double> spacing_um;         ///< of the lattice
-  double padding = 1.5;                     ///< neighbours' images half a field away: their dipole fields are small
-  std::string read_out = "cells";           ///< sums of traction times area are forces
-  double gaussian_um = 0;                   ///< regularisation smooths already
-  double element_um = 2;                    ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
-  double grow_um = 1.5;                     ///< smoothed tractions spill over an adhesion's rim by about that
+  TractionMethod method = TractionMethod::fttc;
+  GelModel gel_model = GelModel::layer;               ///< gels are some tens of um thick: a cell feels the base
+  LambdaCriterion lambda_by = LambdaCriterion::risk;  ///< aims at the tractions; the others at the displacements
+  std::optional<double> lambda_um_per_kPa;            ///< fixed instead
+  std::optional<double> spacing_um;                   ///< of the lattice
+  double padding = 1.5;  ///< neighbours' images half a field away: their dipole fields are small
+  ReadOut read_out = ReadOut::cells;
+  double gaussian_um = 0;  ///< regularisation smooths already
+  double element_um = 2;   ///< bem: the finest that some 10 000 beads of 20 nm noise tell apart
+  double grow_um = 1.5;    ///< smoothed tractions spill over an adhesion's rim by about that
   // adhesion-forces: errors of an ellipse whose effect on its force is reported, as segmentations have them
   double shift_error_um = 0.3;
   double size_error = 0.2;
@@ -58,13 +68,17 @@ struct Sensitivity {
   double angle_nN = 0;                             ///< turned
 };
 
+/// Of a penalty on tractions, and of one on forces.
+enum class LambdaUnit { um_per_kPa, um_per_nN };
+constexpr auto words(LambdaUnit) { return std::array{"um_per_kPa", "um_per_nN"}; }
+
 struct Reconstruction {
   std::vector<Patch> patches;
   std::vector<AdhesionForce> forces;       ///< by adhesion, where there are any
   std::vector<Sensitivity> sensitivities;  ///< by adhesion, adhesion-forces only
   std::optional<LambdaScan> scan;
-  std::optional<double> lambda;     ///< in the method's own unit
-  std::string lambda_unit;          ///< um_per_kPa, um_per_nN
+  std::optional<double> lambda;  ///< in the method's own unit
+  LambdaUnit lambda_unit = LambdaUnit::um_per_kPa;
   std::optional<double> length_um;  ///< lambda times E, per area: the same for every method
   double relative_l2 = 0;           ///< |u − model| / |u| at the beads, weighted
   Report report{.converged = true, .iterations = 0, .last_change = 0, .reason = {}};
@@ -93,7 +107,7 @@ std::vector<AdhesionForce> forces_by_adhesion(const std::vector<Patch>& patches,
                                               double grow_um);
 
 /// Displacements of the beads by a force of one spread evenly over each adhesion: 2·beads × 2·adhesions.
-Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, const std::string& gel_model, int threads);
+Eigen::MatrixXd even_forces_um_per_nN(const TractionInputs& inputs, GelModel gel_model, int threads);
 
 /// Along which the error of a force's magnitude is taken: the force, or x where there is none.
 Vec2 direction_of(Vec2 force_nN);

@@ -72,8 +72,7 @@ void declare(stage::ParameterList& list, CableParameters& p) {
   list.add("max_iterations", p.max_iterations, Range::between(1, 1e7),
            "steps at most; unset: " + std::to_string(CableParameters::kNewtonSteps) + " of Newton's method, " +
                std::to_string(CableParameters::kConjugateSteps) + " of conjugate gradients");
-  list.add("contraction", p.contraction, "how the equilibrium is found; conjugate-gradient: as in the thesis, slow",
-           {"newton", "conjugate-gradient"});
+  list.add("contraction", p.contraction, "how the equilibrium is found; conjugate-gradient: as in the thesis, slow");
 }
 
 struct CableNetwork::Impl {
@@ -158,20 +157,20 @@ Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, co
   double force = 0, largest_share = 0;
   for (const Cable& cable : cables) force = std::max(force, cable.tension_nN);
   for (const Link& link : impl_->network.links) largest_share = std::max(largest_share, link.share);
-  const auto method = impl_->parameters.contraction == "newton" ? Contraction::newton : Contraction::conjugate_gradient;
   const double axial_stiffness = largest_share * impl_->parameters.axial_stiffness_nN;
-  Minimum minimum =
-      minimise(impl_->free, cables, std::move(positions), start.empty() ? Start::cold : Start::warm,
-               {.method = method,
-                .eps_um = impl_->rounding().eps_um,
-                .edge_length_um = impl_->mean_rest_length_um,
-                .force_nN = force > 0 ? force : axial_stiffness,
-                .weakest = weakest(tensions_nN),
-                .force_tolerance_nN = std::max(force_tolerance.value_or(impl_->parameters.force_tolerance) * force,
-                                               kStretchRounding * axial_stiffness),
-                .is_polished = !force_tolerance,
-                .max_iterations = impl_->parameters.max_iterations.value_or(
-                    method == Contraction::newton ? CableParameters::kNewtonSteps : CableParameters::kConjugateSteps)});
+  Minimum minimum = minimise(
+      impl_->free, cables, std::move(positions), start.empty() ? Start::cold : Start::warm,
+      {.method = impl_->parameters.contraction,
+       .eps_um = impl_->rounding().eps_um,
+       .edge_length_um = impl_->mean_rest_length_um,
+       .force_nN = force > 0 ? force : axial_stiffness,
+       .weakest = weakest(tensions_nN),
+       .force_tolerance_nN = std::max(force_tolerance.value_or(impl_->parameters.force_tolerance) * force,
+                                      kStretchRounding * axial_stiffness),
+       .is_polished = !force_tolerance,
+       .max_iterations = impl_->parameters.max_iterations.value_or(impl_->parameters.contraction == Contraction::newton
+                                                                       ? CableParameters::kNewtonSteps
+                                                                       : CableParameters::kConjugateSteps)});
   Equilibrium result;
   for (std::size_t k = 0; k < cables.size(); ++k) {
     const Pull p = pull(cables[k], minimum.spans_um[k], impl_->rounding());

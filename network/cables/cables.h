@@ -20,6 +20,9 @@
 
 namespace mbtfm::cables {
 
+enum class Contraction { newton, conjugate_gradient };
+constexpr auto words(Contraction) { return std::array{"newton", "conjugate-gradient"}; }
+
 struct CableParameters {
   static constexpr int kNewtonSteps = 500;           ///< ordinary cells take 20 to 40, only fibres pulling some 70
   static constexpr int kConjugateSteps = 1'000'000;  ///< ordinary cells take 7 000 to 200 000
@@ -28,7 +31,7 @@ struct CableParameters {
   double smoothing = 1e-5;              ///< eps in mean rest lengths: far below what the forces can tell
   double force_tolerance = 1e-9;        ///< largest net force on a free vertex, relative to the largest tension
   std::optional<int> max_iterations{};  ///< or kNewtonSteps, kConjugateSteps
-  std::string contraction = "newton";   ///< newton | conjugate-gradient
+  Contraction contraction = Contraction::newton;
 };
 void declare(stage::ParameterList& list, CableParameters& parameters);
 

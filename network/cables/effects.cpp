@@ -7,12 +7,12 @@
 
 namespace mbtfm::cables {
 
-Effect take_fibres(Cell& cell, const std::string& setting) {
-  if (setting == "on" && cell.fibres.empty()) {
+Effect take_fibres(Cell& cell, Switch setting) {
+  if (setting == Switch::on && cell.fibres.empty()) {
     throw InvalidData("effects.stress_fibres = on", "a stress fibre in fibres.csv", "none");
   }
   const Effect effect =
-      stage::decided("stress fibres", setting, static_cast<double>(cell.fibres.size()), 0, "number found:");
+      stage::decided(EffectKind::stress_fibres, setting, static_cast<double>(cell.fibres.size()), 0, "number found:");
   if (!effect.is_on) cell.fibres.clear();
   return effect;
 }
@@ -30,12 +30,13 @@ double stretch_share(const Network& network, const Equilibrium& equilibrium, dou
 
 Effect decide_elasticity(const CableNetwork& cables, const std::vector<double>& tensions_nN,
                          const stage::EffectSwitches& switches) {
-  constexpr const char* kName = "elasticity of cables";
-  if (switches.cable_elasticity != "auto") return stage::decided(kName, switches.cable_elasticity, true, "as asked");
+  constexpr EffectKind kKind = EffectKind::cable_elasticity;
+  if (switches.cable_elasticity != Switch::automatic)
+    return stage::decided(kKind, switches.cable_elasticity, true, "as asked");
   const stage::Stopwatch watch;
   const double share =
       stretch_share(cables.network(), cables.equilibrium(tensions_nN), cables.parameters().axial_stiffness_nN);
-  Effect effect = stage::decided(kName, "auto", share, switches.effect_tolerance,
+  Effect effect = stage::decided(kKind, Switch::automatic, share, switches.effect_tolerance,
                                  "where all cables pull alike, the share of their force that resists stretching is");
   effect.seconds = watch.seconds();
   return effect;

@@ -1,7 +1,6 @@
 /// Whether a scene calls for stress fibres in its network, and for cables that resist being stretched.
 #pragma once
 
-#include <string>
 #include <vector>
 
 #include "network/cables/cables.h"
@@ -12,7 +11,7 @@ namespace mbtfm::cables {
 
 /// Stress fibres: where the cell has any. Takes them out of the cell where they are off.
 /// @throws InvalidData where they are switched on and there are none
-Effect take_fibres(Cell& cell, const std::string& setting);
+Effect take_fibres(Cell& cell, Switch setting);
 
 /// Part of all cables' force by which they resist being longer than at rest: 0 where elasticity changes nothing.
 double stretch_share(const Network& network, const Equilibrium& equilibrium, double axial_stiffness_nN);

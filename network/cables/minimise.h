@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "network/cables/cable_energy.h"
+#include "network/cables/cables.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/numerics/block_cholesky.h"
 
@@ -24,8 +25,6 @@ struct FreeVertices {
       to.add_diagonal(std::max(a, b), block);
   }
 };
-
-enum class Contraction { newton, conjugate_gradient };
 
 struct MinimiseOptions {
   Contraction method = Contraction::newton;

@@ -71,7 +71,7 @@ class Builder {
   }
 
  private:
-  bool has_rims() const { return parameters_.adhesion_anchor == "rim"; }
+  bool has_rims() const { return parameters_.adhesion_anchor == AdhesionAnchor::rim; }
 
   double rim_edge_um(const Adhesion& adhesion) const {
     return std::min(edge_, perimeter_um(adhesion) / parameters_.rim_points);
@@ -84,7 +84,7 @@ class Builder {
       for (std::size_t i = 0; i < rim.size(); i += 2) frame_.size.refine(rim[i], rim_edge_um(a));
     }
     for (const Fibre& f : cell_.fibres) {
-      if (parameters_.free_fibre_ends != "width") break;
+      if (parameters_.free_fibre_ends != FreeFibreEnds::width) break;
       if (!f.start_adhesion_id) frame_.size.refine(f.points_um.front(), f.width_um);
       if (!f.end_adhesion_id) frame_.size.refine(f.points_um.back(), f.width_um);
     }
@@ -282,7 +282,7 @@ class Builder {
     }
     std::sort(knots.begin(), knots.end());
     const int fewest = knots.size() == 1 ? 6 : knots.size() == 2 ? 2 : 1;  // a closed line needs three vertices
-    const double jitter = parameters_.seeds == "regular" ? 0 : kBoundaryJitter;
+    const double jitter = parameters_.seeds == Seeds::regular ? 0 : kBoundaryJitter;
     Chain chain{.is_closed = true};
     for (std::size_t i = 0; i < knots.size(); ++i) {
       const Knot& knot = knots[i];

@@ -53,10 +53,10 @@ class Shares {
     // in a regular triangulation an edge of length h has the dual width h / sqrt(3)
     const double regular_width = parameters.edge_length_um / std::sqrt(3.0);
     for (const Edge& e : edges_) {
-      of_edge_.push_back(parameters.link_weights == "width" ? dual_width_um(points_, e) / regular_width : 1);
+      of_edge_.push_back(parameters.link_weights == LinkWeights::width ? dual_width_um(points_, e) / regular_width : 1);
     }
     of_reaching_.assign(edges_.size(), 0);
-    if (parameters.link_reach == "second-neighbours") hand_on();
+    if (parameters.link_reach == LinkReach::second_neighbours) hand_on();
     for (double& share : of_edge_) share = std::max(kSmallestShare, share);
   }
 

@@ -130,22 +130,19 @@ void declare(stage::ParameterList& list, NetworkParameters& parameters) {
   list.add("edge_growth", parameters.edge_growth, Range{.low = 0.05, .high = 1},
            "growth of the edge length with distance from what is resolved finer");
   list.add("seed", parameters.seed, "of the first placement of the vertices");
-  list.add("seeds", parameters.seeds, "first placement of the vertices", {"regular", "jittered", "poisson"});
+  list.add("seeds", parameters.seeds, "first placement of the vertices");
   list.add("link_weights", parameters.link_weights,
            "tension and stiffness of the actin network's links: the same for all, or by the width of material each "
-           "stands for",
-           {"equal", "width"});
+           "stands for");
   list.add("link_reach", parameters.link_reach,
            "what the actin network's links join: vertices at the two ends of an edge, or also those across from each "
-           "other at one, so that links run in twelve directions rather than six",
-           {"neighbours", "second-neighbours"});
+           "other at one, so that links run in twelve directions rather than six");
   list.add("adhesion_anchor", parameters.adhesion_anchor,
            "what an adhesion holds: its rim, which the mesh resolves; every vertex that happens to lie in its ellipse; "
-           "or the one at its centre",
-           {"rim", "ellipse", "centre"});
+           "or the one at its centre");
   list.add("rim_points", parameters.rim_points, Range::between(3, 1000), "vertices round an adhesion's rim, at least");
   list.add("free_fibre_ends", parameters.free_fibre_ends,
-           "edge length where a fibre ends freely: as elsewhere, or the fibre's width", {"point", "width"});
+           "edge length where a fibre ends freely: as elsewhere, or the fibre's width");
 }
 
 GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& parameters) {
@@ -166,7 +163,7 @@ GeneratedNetwork generate_network(const Cell& cell, const NetworkParameters& par
   result.network.vertices_um = mesh.points_um;
   result.network.adhesion_id = frame.adhesion_id;
   result.network.adhesion_id.resize(mesh.points_um.size(), 0);
-  if (parameters.adhesion_anchor != "centre") hold_adhesions(cell, frame, result.network);
+  if (parameters.adhesion_anchor != AdhesionAnchor::centre) hold_adhesions(cell, frame, result.network);
   hold_cut(cell, frame, result.network);
   result.network.links = links_of(frame, mesh, parameters);
   leave_out_loose_vertices(result.network);

@@ -317,7 +317,7 @@ class Relaxation {
 
 }  // namespace
 
-RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, const std::string& seeds, Random& random) {
+RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, Seeds seeds, Random& random) {
   refine_where_lines_are_close(frame);
   expect_room_for_mesh(frame.size, boundary);
   std::vector<Vec2> points = frame.points_um;

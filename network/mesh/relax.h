@@ -25,6 +25,6 @@ struct RelaxedMesh {
 /// Sources: Chen & Holst, Comput. Methods Appl. Mech. Eng. 200:967 (2011), centroidal patch triangulation; Persson &
 /// Strang, SIAM Review 46:329 (2004), for h and the sliding. Constrained edges and walls are ours.
 /// @throws InvalidData where lines of the frame cross, OutOfMemory
-RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, const std::string& seeds, Random& random);
+RelaxedMesh fill_and_relax(Frame frame, const Boundary& boundary, Seeds seeds, Random& random);
 
 }  // namespace mbtfm::mesh

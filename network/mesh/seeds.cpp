@@ -136,9 +136,9 @@ std::vector<Vec2> poisson_discs(const Frame& frame, Random& random) {
 
 }  // namespace
 
-std::vector<Vec2> places_of_seeds(const Frame& frame, const std::string& kind, Random& random) {
-  if (kind == "poisson") return poisson_discs(frame, random);
-  return lattice(frame, kind == "regular" ? 0 : kJitter, random);
+std::vector<Vec2> places_of_seeds(const Frame& frame, Seeds kind, Random& random) {
+  if (kind == Seeds::poisson) return poisson_discs(frame, random);
+  return lattice(frame, kind == Seeds::regular ? 0 : kJitter, random);
 }
 
 }  // namespace mbtfm::mesh

@@ -3,12 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdlib>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <set>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/contract/words.h"
 #include "pipeline/files/json.h"
 
 namespace mbtfm::charts {
@@ -23,39 +26,40 @@ constexpr double kTextSize_px = 13, kTextWidth_px = 7.4;  // the width is that o
 
 ordered_json signal(const std::string& expression) { return {{"signal", expression}}; }
 
+ordered_json number_list(const std::string& text) {
+  ordered_json numbers = ordered_json::array();
+  for (std::size_t i = 0; i < text.size(); i = std::min(text.find_first_of(" ,", i), text.size() - 1) + 1)
+    numbers.push_back(std::stod(text.substr(i)));
+  return numbers;
+}
+
 /// CSS of SVG by the names that Vega gives it.
 ordered_json properties(const std::string& style) {
-  static const std::map<std::string, std::string> kNames = {
-      {"fill", "fill"},
-      {"fill-opacity", "fillOpacity"},
-      {"opacity", "opacity"},
-      {"stroke", "stroke"},
-      {"stroke-dasharray", "strokeDash"},
-      {"stroke-linecap", "strokeCap"},
-      {"stroke-linejoin", "strokeJoin"},
-      {"stroke-opacity", "strokeOpacity"},
-      {"stroke-width", "strokeWidth"},
+  struct Property {
+    const char* name;
+    ordered_json (*value)(const std::string&);
+  };
+  const auto text = [](const std::string& value) { return ordered_json(value); };
+  const auto number = [](const std::string& value) { return ordered_json(std::stod(value)); };
+  static const std::map<std::string, Property> kProperties = {
+      {"fill", {"fill", text}},
+      {"fill-opacity", {"fillOpacity", number}},
+      {"opacity", {"opacity", number}},
+      {"stroke", {"stroke", text}},
+      {"stroke-dasharray", {"strokeDash", number_list}},
+      {"stroke-linecap", {"strokeCap", text}},
+      {"stroke-linejoin", {"strokeJoin", text}},
+      {"stroke-opacity", {"strokeOpacity", number}},
+      {"stroke-width", {"strokeWidth", number}},
   };
   ordered_json result = ordered_json::object();
   for (std::size_t at = 0; at < style.size();) {
     const std::size_t end = std::min(style.find(';', at), style.size()), colon = style.find(':', at);
     if (colon < end) {
-      const auto name = kNames.find(style.substr(at, colon - at));
+      const auto property = kProperties.find(style.substr(at, colon - at));
       const std::string value = style.substr(colon + 1, end - colon - 1);
-      if (name != kNames.end() && value != "none") {
-        const bool is_text = name->second == "fill" || name->second == "stroke" || name->second == "strokeCap" ||
-                             name->second == "strokeJoin";
-        if (name->second == "strokeDash") {
-          ordered_json lengths = ordered_json::array();
-          for (std::size_t i = 0; i < value.size(); i = std::min(value.find_first_of(" ,", i), value.size() - 1) + 1)
-            lengths.push_back(std::stod(value.substr(i)));
-          result[name->second] = lengths;
-        } else if (is_text) {
-          result[name->second] = value;
-        } else {
-          result[name->second] = std::stod(value);
-        }
-      }
+      if (property != kProperties.end() && value != "none")
+        result[property->second.name] = property->second.value(value);
     }
     at = end + 1;
   }
@@ -204,11 +208,11 @@ std::vector<ordered_json> stops_of(const ordered_json& bars) {
 /// What all rows share goes from them into the mark.
 ordered_json mark_of(Kind kind, const std::string& data, ordered_json& rows) {
   ordered_json update = place_of(kind);
+  static const std::set<std::string> kPlaces = {"x", "y", "x2", "y2"};
   std::vector<std::string> names;
   for (const ordered_json& row : rows) {
     for (const auto& [name, value] : row.items()) {
-      const bool is_place = name == "x" || name == "y" || name == "x2" || name == "y2";
-      if (!is_place && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
+      if (!kPlaces.contains(name) && std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
     }
   }
   for (const std::string& name : names) {
@@ -248,12 +252,17 @@ void add_marks(ordered_json& spec, const std::vector<Mark>& marks, std::size_t f
   spec["data"].push_back({{"name", data}, {"values", rows}});
 }
 
+/// Where an axis is drawn.
+enum class Side { x, y, upper_x };
+constexpr auto words(Side) { return std::array{"x", "y", "x2"}; }
+
 /// Signals that say where the frame's steps lie while xdom (ydom) is shown.
-void add_axis_signals(ordered_json& spec, const std::string& name, const Axis& axis) {
+void add_axis_signals(ordered_json& spec, Side side, const Axis& axis) {
+  const std::string name = name_of(side);
   const bool is_log = axis.scale == Scale::logarithmic;
   const auto scaled = [&](double value) { return is_log ? std::log(value) : value; };
   const auto shown = [&](int i) { return fmt::format(fmt::runtime(is_log ? "log({}dom[{}])" : "{}dom[{}]"), name, i); };
-  const std::string length = name == "x" ? "width" : "-height", zero = name == "x" ? "" : "height + ";
+  const std::string length = side == Side::x ? "width" : "-height", zero = side == Side::x ? "" : "height + ";
   const std::string span = "(" + shown(1) + " - " + shown(0) + ")";
   spec["signals"].push_back({{"name", name + "dom"}, {"value", {axis.low, axis.high}}});
   spec["signals"].push_back(
@@ -264,26 +273,21 @@ void add_axis_signals(ordered_json& spec, const std::string& name, const Axis& a
        {"update", fmt::format("{} * {} / {}", length, (scaled(axis.high) - scaled(axis.low)) / kSteps, span)}});
 }
 
-ordered_json scale_of(const std::string& name, const Axis& axis, const ordered_json& domain) {
-  return {{"name", name},     {"type", axis.scale == Scale::logarithmic ? "log" : "linear"},
-          {"domain", domain}, {"range", name == "y" ? "height" : "width"},
-          {"zero", false},    {"nice", false}};
+ordered_json scale_of(Side side, const Axis& axis, const ordered_json& domain) {
+  return {{"name", name_of(side)}, {"type", axis.scale == Scale::logarithmic ? "log" : "linear"},
+          {"domain", domain},      {"range", side == Side::y ? "height" : "width"},
+          {"zero", false},         {"nice", false}};
 }
 
-ordered_json axis_of(const std::string& scale, const char* orient, const Axis& axis) {
-  const bool is_upright = scale == "y";
-  ordered_json result = {{"scale", scale},
-                         {"orient", orient},
-                         {"title", axis.label},
-                         {"grid", scale != "x2"},
-                         {"gridColor", "#e3e5e8"},
-                         {"domain", false},
-                         {"tickColor", "#444"},
-                         {"labelFontSize", kTextSize_px},
-                         {"titleFontSize", kTextSize_px},
-                         {"titleFontWeight", "normal"},
-                         {"labelColor", "#1a1d21"},
-                         {"titleColor", "#1a1d21"},
+ordered_json axis_of(Side side, const Axis& axis) {
+  const bool is_upright = side == Side::y;
+  constexpr std::array kOrients = {"bottom", "left", "top"};
+  ordered_json result = {{"scale", name_of(side)},        {"orient", kOrients.at(static_cast<std::size_t>(side))},
+                         {"title", axis.label},           {"grid", side != Side::upper_x},
+                         {"gridColor", "#e3e5e8"},        {"domain", false},
+                         {"tickColor", "#444"},           {"labelFontSize", kTextSize_px},
+                         {"titleFontSize", kTextSize_px}, {"titleFontWeight", "normal"},
+                         {"labelColor", "#1a1d21"},       {"titleColor", "#1a1d21"},
                          {"labelOverlap", true}};
   if (axis.names.empty()) {
     result["tickCount"] = signal(is_upright ? "max(3, height / 50)" : "max(3, width / 80)");
@@ -325,8 +329,8 @@ std::string Chart::vega() const {
                          {"top", kTop_px + (second_factor_ > 0 ? kUpperAxis_px : 0)},
                          {"bottom", kBottom_px}}},
                        {"signals", ordered_json::array()},
-                       {"scales", {scale_of("x", x_, signal("xdom")), scale_of("y", y_, signal("ydom"))}},
-                       {"axes", {axis_of("x", "bottom", x_), axis_of("y", "left", y_)}},
+                       {"scales", {scale_of(Side::x, x_, signal("xdom")), scale_of(Side::y, y_, signal("ydom"))}},
+                       {"axes", {axis_of(Side::x, x_), axis_of(Side::y, y_)}},
                        {"data", ordered_json::array()},
                        {"marks", ordered_json::array()}};
   if (are_scales_same_) {
@@ -335,13 +339,13 @@ std::string Chart::vega() const {
         {{"name", "height"}, {"update", fmt::format("width * {}", std::abs((y_.high - y_.low) / (x_.high - x_.low)))}});
   }
   spec["signals"].push_back({{"name", "arrow_scale"}, {"update", fmt::format("width / {}", kFrameWidth_px)}});
-  add_axis_signals(spec, "x", x_);
-  add_axis_signals(spec, "y", y_);
+  add_axis_signals(spec, Side::x, x_);
+  add_axis_signals(spec, Side::y, y_);
   if (second_factor_ > 0) {
     const Axis second{second_label_, x_.low, x_.high, x_.scale};
     spec["scales"].push_back(
-        scale_of("x2", second, signal(fmt::format("[{0} * xdom[0], {0} * xdom[1]]", second_factor_))));
-    spec["axes"].push_back(axis_of("x2", "top", second));
+        scale_of(Side::upper_x, second, signal(fmt::format("[{0} * xdom[0], {0} * xdom[1]]", second_factor_))));
+    spec["axes"].push_back(axis_of(Side::upper_x, second));
   }
   for (std::size_t first = 0, last = 0; first < marks_.size(); first = last) {
     for (last = first; last < marks_.size() && go_together(marks_[first], marks_[last]); ++last) continue;

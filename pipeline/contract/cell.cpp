@@ -5,58 +5,14 @@
 #include <limits>
 #include <numbers>
 
-#include "pipeline/contract/errors.h"
-
 namespace mbtfm {
 
-std::string_view name_of(FibreType type) {
-  switch (type) {
-    case FibreType::dorsal:
-      return "dorsal";
-    case FibreType::arc:
-      return "arc";
-    case FibreType::ventral:
-      return "ventral";
-    case FibreType::edge:
-      return "edge";
-  }
-  throw InternalError("unknown fibre type");
-}
-
 int n_held_ends(FibreType type) { return type == FibreType::arc ? 0 : type == FibreType::dorsal ? 1 : 2; }
-
-std::string_view name_of(AdhesionOrigin origin) {
-  switch (origin) {
-    case AdhesionOrigin::image:
-      return "image";
-    case AdhesionOrigin::drawn:
-      return "drawn";
-    case AdhesionOrigin::anchor:
-      return "anchor";
-    case AdhesionOrigin::candidate:
-      return "candidate";
-  }
-  throw InternalError("unknown origin of an adhesion");
-}
-
-std::optional<AdhesionOrigin> adhesion_origin_of(std::string_view name) {
-  for (const AdhesionOrigin origin : kAdhesionOrigins) {
-    if (name_of(origin) == name) return origin;
-  }
-  return std::nullopt;
-}
 
 double area_stood_for_um2(const Adhesion& adhesion) {
   // a disc that touches its six neighbours covers pi / sqrt(12) of its cell
   constexpr double kCellOverDisc = 1.1026577908435840990;
   return adhesion.origin == AdhesionOrigin::candidate ? kCellOverDisc * adhesion.area_um2 : adhesion.area_um2;
-}
-
-std::optional<FibreType> fibre_type_of(std::string_view name) {
-  for (const FibreType type : kFibreTypes) {
-    if (name_of(type) == name) return type;
-  }
-  return std::nullopt;
 }
 
 Polygon ellipse_corners(const Adhesion& adhesion, int n_corners) {

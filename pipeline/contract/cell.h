@@ -9,16 +9,14 @@
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
+#include "pipeline/contract/words.h"
 
 namespace mbtfm {
 
 /// Where an adhesion comes from: found in an image or a mask of one; drawn by hand; put where a fibre drawn by hand
 /// must be held and no adhesion is; or put where one may be, because nothing shows the adhesions.
 enum class AdhesionOrigin { image, drawn, anchor, candidate };
-inline constexpr AdhesionOrigin kAdhesionOrigins[] = {AdhesionOrigin::image, AdhesionOrigin::drawn,
-                                                      AdhesionOrigin::anchor, AdhesionOrigin::candidate};
-std::string_view name_of(AdhesionOrigin origin);
-std::optional<AdhesionOrigin> adhesion_origin_of(std::string_view name);
+constexpr auto words(AdhesionOrigin) { return std::array{"image", "drawn", "anchor", "candidate"}; }
 /// Nobody has seen it: it is an anchor or a candidate.
 inline bool is_assumed(AdhesionOrigin origin) {
   return origin == AdhesionOrigin::anchor || origin == AdhesionOrigin::candidate;
@@ -44,9 +42,8 @@ double area_stood_for_um2(const Adhesion& adhesion);
 /// Hotulainen & Lappalainen (2006): dorsal fibres end on an adhesion with one end, arcs with none, ventral with both.
 /// An edge fibre is held at both ends, too, and runs along a free piece of the outline.
 enum class FibreType { dorsal, arc, ventral, edge };
+constexpr auto words(FibreType) { return std::array{"dorsal", "arc", "ventral", "edge"}; }
 inline constexpr FibreType kFibreTypes[] = {FibreType::dorsal, FibreType::arc, FibreType::ventral, FibreType::edge};
-std::string_view name_of(FibreType type);
-std::optional<FibreType> fibre_type_of(std::string_view name);
 /// How many of its ends the type says are held.
 int n_held_ends(FibreType type);
 

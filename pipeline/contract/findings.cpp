@@ -165,11 +165,6 @@ const KindOfFinding& properties_of(FindingKind kind) {
   return *found;
 }
 
-const char* name_of(Severity severity) {
-  static constexpr const char* kNames[] = {"note", "caution", "bad"};
-  return kNames[static_cast<std::size_t>(severity)];
-}
-
 bool is_open(const Finding& finding) { return finding.severity != Severity::note; }
 
 bool has_open(const std::vector<Finding>& findings) { return std::ranges::any_of(findings, is_open); }

@@ -7,6 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/words.h"
+
 namespace mbtfm {
 
 enum class Severity {
@@ -14,6 +16,8 @@ enum class Severity {
   caution,  ///< open: the results may be off by more than their error bars say
   bad       ///< open: what it names must not be used
 };
+
+constexpr auto words(Severity) { return std::array{"note", "caution", "bad"}; }
 
 enum class FindingKind {
   // any stage
@@ -84,7 +88,6 @@ struct Finding {
   std::string reason, remedy;
 };
 
-const char* name_of(Severity severity);
 bool is_open(const Finding& finding);
 bool has_open(const std::vector<Finding>& findings);
 

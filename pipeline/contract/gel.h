@@ -3,6 +3,8 @@
 
 #include <optional>
 
+#include "pipeline/contract/words.h"
+
 namespace mbtfm {
 
 struct Gel {
@@ -12,6 +14,10 @@ struct Gel {
   // standard errors, where the user knows them: the error budget then has a part for the gel
   std::optional<double> youngs_modulus_sigma_kPa{}, poisson_ratio_sigma{}, thickness_sigma_um{};
 };
+
+/// What is taken for the gel: a layer on a rigid base, or so thick that the base does not matter.
+enum class GelModel { layer, half_space };
+constexpr auto words(GelModel) { return std::array{"layer", "half-space"}; }
 
 /// State what must hold of a value. @throws InvalidData naming the element and the finding.
 void check(const Gel& gel);

@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "pipeline/contract/effects.h"
 #include "pipeline/contract/findings.h"
 
 namespace mbtfm {
@@ -20,19 +21,6 @@ struct Report {
   int iterations = 0;
   double last_change = 0;
   std::string reason;  ///< one sentence; where not converged: the likely cause and the numbers that tell
-};
-
-/// An effect of the physics that a scene may or may not call for: what became of it in this run (see effects.h).
-struct Effect {
-  std::string name;
-  std::string setting = "auto";  ///< its switch: auto, on, off
-  bool is_on = false;
-  std::optional<double> number = {};  ///< what leaving it out would cost, where that was asked; on above the threshold
-  std::optional<double> threshold = {};
-  std::string why;
-  double seconds = 0;                 ///< spent on it, its own question included
-  std::optional<double> change = {};  ///< of the tensions were it on, relative; where that was asked (--explain)
-  std::string would_change = {};      ///< the same in a sentence
 };
 
 using Value = std::variant<bool, std::int64_t, double, std::string>;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "pipeline/contract/errors.h"
@@ -65,9 +66,10 @@ double parse_accuracy(const std::string& text) {
   try {
     std::size_t end = 0;
     const double number = std::stod(text, &end);
-    const std::string unit = text.substr(end);
-    const double share = unit == "%" || unit == " %" ? number / 100 : number;
-    if ((unit.empty() || unit == "%" || unit == " %") && share > 0 && share < 1) return share;
+    static const std::map<std::string, double> kUnits = {{"", 1}, {"%", 100}, {" %", 100}};
+    const auto unit = kUnits.find(text.substr(end));
+    const double share = unit == kUnits.end() ? 0 : number / unit->second;
+    if (share > 0 && share < 1) return share;
   } catch (const std::logic_error&) {
     // said below
   }

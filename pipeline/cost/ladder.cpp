@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "pipeline/contract/numbers.h"
 #include "pipeline/cost/presets.h"
@@ -41,16 +42,16 @@ void add_slow(std::vector<Rung>& rungs) {
 }  // namespace
 
 bool needs_images(const Rung& rung) {
-  return std::any_of(rung.settings.begin(), rung.settings.end(), [](const runner::Setting& setting) {
-    return setting.table == "segment" || setting.table == "track";
-  });
+  static const std::set<std::string> kOfImages = {"segment", "track"};
+  return std::any_of(rung.settings.begin(), rung.settings.end(),
+                     [](const runner::Setting& setting) { return kOfImages.contains(setting.table); });
 }
 
 std::vector<Rung> ladder(Extent extent) {
   // The costly ones come last: where time runs out, they are what lacks.
   std::vector<Rung> rungs = {{.knob = kAsItIs, .value = ""}};
   const auto add_preset = [&](const char* name) {
-    rungs.push_back({.knob = "preset", .value = name, .settings = preset_named(name).settings});
+    rungs.push_back({.knob = kPreset, .value = name, .settings = preset_named(name).settings});
   };
   add_preset("fast");
   for (const char* binning : {"4", "3", "2"}) {

@@ -23,6 +23,7 @@ bool needs_images(const Rung& rung);
 enum class Extent { quick, whole };  ///< whole: those that take minutes, too
 
 inline constexpr const char* kAsItIs = "as it is";
+inline constexpr const char* kPreset = "preset";
 
 /// The cell as it is comes first, then knob by knob, rungs from coarse to fine.
 std::vector<Rung> ladder(Extent extent);

@@ -250,7 +250,7 @@ Study measure(const fs::path& cell, const StudyOptions& options) {
   Scratch scratch(cell, options);
   Study study{.reference = "the truth", .has_images = scratch.has_images(), .measurements = {}};
   for (Rung& rung : ladder(options.extent)) {
-    if (scratch.has_images() || rung.knob == "preset" || !needs_images(rung))
+    if (scratch.has_images() || rung.knob == kPreset || !needs_images(rung))
       study.measurements.push_back({.rung = std::move(rung)});
   }
   std::vector<std::vector<Run>> runs(study.measurements.size());

@@ -54,7 +54,7 @@ std::vector<Adhesion> read_adhesions(const Path& file) {
                       .eccentricity = table.number(row, "eccentricity", share_of_one()),
                       .mean_intensity = table.number(row, "mean_intensity")};
     if (table.has("origin")) {
-      const auto origin = adhesion_origin_of(table.text(row, "origin"));
+      const auto origin = named<AdhesionOrigin>(table.text(row, "origin"));
       if (!origin) table.fail(row, "origin", "image, drawn, anchor or candidate");
       adhesions[row].origin = *origin;
     }
@@ -84,7 +84,7 @@ std::vector<Fibre> read_fibres(const Path& fibres_file, const Path& points_file)
   std::vector<Fibre> fibres(table.n_rows());
   std::map<int, int> index_of;
   for (int row = 0; row < table.n_rows(); ++row) {
-    const auto type = fibre_type_of(table.text(row, "type"));
+    const auto type = named<FibreType>(table.text(row, "type"));
     if (!type) table.fail(row, "type", "dorsal, arc, ventral or edge");
     fibres[row] = {.fibre_id = table.integer(row, "fibre_id", 1),
                    .type = *type,

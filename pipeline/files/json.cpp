@@ -15,7 +15,7 @@ nlohmann::ordered_json json_of(const Figures& figures) {
 }
 
 nlohmann::ordered_json json_of(const Effect& e) {
-  nlohmann::ordered_json json = {{"name", e.name}, {"switch", e.setting}, {"on", e.is_on}};
+  nlohmann::ordered_json json = {{"name", name_of(e.kind)}, {"switch", name_of(e.setting)}, {"on", e.is_on}};
   if (e.number) json["number"] = *e.number;
   if (e.threshold) json["threshold"] = *e.threshold;
   json["why"] = e.why;
@@ -32,18 +32,20 @@ std::optional<double> number_in(const JsonRecord& record, const char* key) {
   return member ? std::optional(member->number()) : std::nullopt;
 }
 
-Severity severity_of(const JsonRecord& value) {
-  for (const Severity severity : {Severity::note, Severity::caution, Severity::bad}) {
-    if (value.text() == name_of(severity)) return severity;
-  }
-  value.fail("note, caution or bad");
+template <Worded E>
+E value_of(const JsonRecord& record) {
+  const std::optional<E> value = named<E>(record.text());
+  if (value) return *value;
+  std::string expected;
+  for (const char* word : words(E{})) expected += (expected.empty() ? "one of " : ", ") + std::string(word);
+  record.fail(expected);
 }
 
 }  // namespace
 
 Effect effect_of(const JsonRecord& record) {
-  return {.name = record.at("name").text(),
-          .setting = record.at("switch").text(),
+  return {.kind = value_of<EffectKind>(record.at("name")),
+          .setting = value_of<Switch>(record.at("switch")),
           .is_on = record.at("on").is_true(),
           .number = number_in(record, "number"),
           .threshold = number_in(record, "threshold"),
@@ -65,7 +67,7 @@ nlohmann::ordered_json json_of(const Finding& f) {
 
 Finding finding_of(const JsonRecord& record) {
   return {.id = record.at("id").text(),
-          .severity = severity_of(record.at("severity")),
+          .severity = value_of<Severity>(record.at("severity")),
           .text = record.at("text").text(),
           .number = number_in(record, "number"),
           .threshold = number_in(record, "threshold"),

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <functional>
 #include <memory>
 #include <string>
@@ -41,6 +42,7 @@ class NodalColumn {
 /// How the numbers of the factor are kept. `single_`: 7 digits, of which the condition of the matrix takes its share;
 /// half the memory, nearly twice the speed.
 enum class Precision { single_, double_ };
+constexpr auto words(Precision) { return std::array{"single", "double"}; }
 
 struct FactorOptions {
   int threads = 1;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "pipeline/contract/stage_state.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/tension_plot.h"
@@ -134,8 +135,8 @@ std::vector<std::string> on_outputs(const Provenance& provenance) {
   std::vector<std::string> sentences;
   std::string given;
   for (const StageLine& stage : provenance.stages) {
-    if (stage.state == "given") given += (given.empty() ? "" : ", ") + stage.name;
-    if (stage.state == "replaced")
+    if (named<StageState>(stage.state) == StageState::given) given += (given.empty() ? "" : ", ") + stage.name;
+    if (named<StageState>(stage.state) == StageState::replaced)
       sentences.push_back("The outputs of " + stage.name + " are not its own: " + stage.why + ".");
   }
   if (!given.empty())
@@ -175,7 +176,8 @@ std::string item_of(const Finding& f) {
 /// Stages that ran and asked: without one there is nothing that a tick could stand for.
 bool was_asked(const Provenance& provenance) {
   return std::ranges::any_of(provenance.stages, [](const StageLine& stage) {
-    return stage.name == "fit" && (stage.state == "run" || stage.state == "up to date");
+    const auto state = named<StageState>(stage.state);
+    return stage.name == "fit" && (state == StageState::must_run || state == StageState::up_to_date);
   });
 }
 

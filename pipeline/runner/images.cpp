@@ -11,45 +11,48 @@
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
 
+namespace {
+
+struct ImageKey {
+  const char* key;
+  std::string ImageNames::*member;
+  const char* meaning;
+};
+using N = ImageNames;
+constexpr ImageKey kImages[] = {
+    {"adhesion", &N::adhesion,
+     "image of the adhesions: a file name or glob in the cell folder; without a file of the default name, forces are "
+     "placed on candidates (segment.adhesions)"},
+    {"actin", &N::actin, "image of the actin"},
+    {"beads_stressed", &N::beads_stressed, "image of the beads while the cell pulls"},
+    {"beads_relaxed", &N::beads_relaxed, "image of the beads after the cell was removed"},
+    {"outline_roi", &N::outline_roi, "ImageJ area used as the cell's outline, where the file is there"},
+    {"adhesion_rois", &N::adhesion_rois, "ImageJ areas used as adhesions, where the file is there"},
+    {"fibre_rois", &N::fibre_rois, "ImageJ lines used as fibres, where the file is there"},
+    {"outline_mask", &N::outline_mask,
+     "mask or label image of the cell (TIFF or PNG), used as its outline, where the file is there"},
+    {"adhesion_mask", &N::adhesion_mask,
+     "mask or label image used as adhesions, where the file is there; with segment.adhesions = pattern the adhesive "
+     "pattern"},
+    {"displacement", &N::displacement,
+     "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]"}};
+
+}  // namespace
+
 void declare(stage::ParameterList& list, ImageNames& names) {
   list.table("images");
-  list.add(
-      "adhesion", names.adhesion,
-      "image of the adhesions: a file name or glob in the cell folder; without a file of the default name, forces are "
-      "placed on candidates (segment.adhesions)");
-  list.add("actin", names.actin, "image of the actin");
-  list.add("beads_stressed", names.beads_stressed, "image of the beads while the cell pulls");
-  list.add("beads_relaxed", names.beads_relaxed, "image of the beads after the cell was removed");
-  list.add("outline_roi", names.outline_roi, "ImageJ area used as the cell's outline, where the file is there");
-  list.add("adhesion_rois", names.adhesion_rois, "ImageJ areas used as adhesions, where the file is there");
-  list.add("fibre_rois", names.fibre_rois, "ImageJ lines used as fibres, where the file is there");
-  list.add("outline_mask", names.outline_mask,
-           "mask or label image of the cell (TIFF or PNG), used as its outline, where the file is there");
-  list.add(
-      "adhesion_mask", names.adhesion_mask,
-      "mask or label image used as adhesions, where the file is there; with segment.adhesions = pattern the adhesive "
-      "pattern");
-  list.add("displacement", names.displacement,
-           "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]");
+  for (const ImageKey& image : kImages) list.add(image.key, names.*image.member, image.meaning);
 }
 
 const std::string& name_of_image(const ImageNames& names, const std::string& key) {
-  if (key == "adhesion") return names.adhesion;
-  if (key == "actin") return names.actin;
-  if (key == "beads_stressed") return names.beads_stressed;
-  if (key == "beads_relaxed") return names.beads_relaxed;
-  if (key == "displacement") return names.displacement;
-  if (key == "outline_roi") return names.outline_roi;
-  if (key == "adhesion_rois") return names.adhesion_rois;
-  if (key == "outline_mask") return names.outline_mask;
-  if (key == "adhesion_mask") return names.adhesion_mask;
-  MBTFM_ASSERT(key == "fibre_rois");
-  return names.fibre_rois;
+  const auto image = std::ranges::find(kImages, key, &ImageKey::key);
+  MBTFM_ASSERT(image != std::end(kImages));
+  return names.*image->member;
 }
 
 std::vector<ImageInput> images_of(const Stage& stage, const ImageNames& names) {
-  if (stage.name != "track" || names.displacement.empty()) return stage.images;
-  return {{"displacement", "displacement"}};
+  if (!stage.instead || name_of_image(names, stage.instead->key).empty()) return stage.images;
+  return {*stage.instead};
 }
 
 ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) {

@@ -211,22 +211,6 @@ std::vector<std::string> inputs_of(const Stage& stage, const fs::path& cell, con
   return names;
 }
 
-std::string name_of(StageState state) {
-  switch (state) {
-    case StageState::up_to_date:
-      return "up to date";
-    case StageState::given:
-      return "given";
-    case StageState::replaced:
-      return "replaced";
-    case StageState::not_asked:
-      return "not asked for";
-    case StageState::must_run:
-      return "run";
-  }
-  throw InternalError("unknown stage state");
-}
-
 StageSurroundings surroundings_of(const Stage& stage, const CellNow& now, const std::optional<StageRecord>& record) {
   std::vector<std::string> outputs = stage.writes;
   if (record) {

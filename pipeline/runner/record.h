@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/stage_state.h"
 #include "pipeline/runner/hash_cache.h"
 #include "pipeline/runner/images.h"
 #include "pipeline/runner/settings.h"
@@ -63,19 +64,11 @@ Settings read_settings(const std::filesystem::path& toml_file, const std::vector
 /// files of earlier stages.
 std::vector<std::string> inputs_of(const Stage& stage, const std::filesystem::path& cell, const ImageNames& images);
 
-enum class StageState {
-  up_to_date,  ///< this version made the outputs from these inputs and settings
-  given,       ///< the user put the outputs there
-  replaced,    ///< the user changed outputs of ours: they are kept
-  not_asked,   ///< left out by --only
-  must_run
-};
 struct StageStatus {
   StageState state = StageState::must_run;
   std::string why;
   bool keeps_frames = false;  ///< must run for single frames of a time series alone: the others still hold
 };
-std::string name_of(StageState state);
 
 /// A cell as it is now.
 struct CellNow {

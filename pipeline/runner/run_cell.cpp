@@ -47,7 +47,7 @@ std::vector<std::string> command_of(const Stage& stage, const fs::path& cell, co
   add("threads", std::to_string(threads));
   add("record", record_file_of(cell, stage).string());
   if (options.is_quiet) command.push_back("--quiet");
-  if (options.explain && stage.name == "fit") command.push_back("--explain");
+  if (options.explain && stage.explains) command.push_back("--explain");
   return command;
 }
 
@@ -149,7 +149,7 @@ CellRun::Present CellRun::present(const Stage& stage) {
   now.surroundings = surroundings_of(
       stage, {.cell = cell_, .images = images_, .settings = settings_, .hashes = hashes_, .version = options_.version},
       now.record);
-  const bool is_explained = options_.explain && stage.name == "fit";
+  const bool is_explained = options_.explain && stage.explains;
   now.status = is_explained || contains_name(options_.redo, stage.name)
                    ? StageStatus{StageState::must_run, "asked for"}
                    : status_of(stage, now.record, now.surroundings);
@@ -202,7 +202,7 @@ void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& ou
     outcome.status = now.status;
     if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
     outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
-    say(stage, name_of(now.status.state) + ": " + now.status.why);
+    say(stage, name_of(now.status.state) + std::string(": ") + now.status.why);
   });
 }
 

@@ -17,7 +17,7 @@ using nlohmann::ordered_json;
 
 namespace {
 
-constexpr const char* kNotRun = "not run";
+constexpr const char *kNotRun = "not run", *kFailed = "failed";  // beside the words of StageState
 
 /// None where there is none: a link, which the next one replaces, is none of ours.
 std::optional<files::JsonRecord> open_run_record(const fs::path& cell) {
@@ -35,7 +35,7 @@ std::optional<files::JsonRecord> entry_of(const std::optional<files::JsonRecord>
 }
 
 std::string state_of(const StageOutcome& outcome) {
-  if (outcome.failure) return "failed";
+  if (outcome.failure) return kFailed;
   if (outcome.was_run) return name_of(StageState::must_run);
   return outcome.status.state == StageState::must_run ? kNotRun : name_of(outcome.status.state);
 }
@@ -107,10 +107,11 @@ bool is_done_state(const std::string& state) {
 /// Of entries that stage_entry made.
 bool is_done_entry(const ordered_json& entry) { return is_done_state(entry.at("state")); }
 
-std::string outcome_of(const ordered_json& entries) {
-  const auto has_failed = [](const ordered_json& entry) { return entry.at("state") == "failed"; };
-  if (std::any_of(entries.begin(), entries.end(), has_failed)) return "failed";
-  return std::all_of(entries.begin(), entries.end(), is_done_entry) ? "done" : "unfinished";
+RunOutcome outcome_of(const ordered_json& entries) {
+  const auto has_failed = [](const ordered_json& entry) { return entry.at("state") == kFailed; };
+  if (std::any_of(entries.begin(), entries.end(), has_failed)) return RunOutcome::failed;
+  const bool is_done = std::all_of(entries.begin(), entries.end(), is_done_entry);
+  return is_done ? RunOutcome::done : RunOutcome::unfinished;
 }
 
 }  // namespace
@@ -135,7 +136,7 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["program"] = "mbtfm";
   run["version"] = options.version;
   run["cell"] = fs::weakly_canonical(cell).filename().string();
-  run["outcome"] = outcome_of(entries);
+  run["outcome"] = name_of(outcome_of(entries));
   run["threads"] = options.threads;
   if (!options.preset.empty()) run["preset"] = options.preset;
   run["converged"] =

@@ -7,6 +7,10 @@
 
 namespace mbtfm::runner {
 
+/// How a run ended.
+enum class RunOutcome { done, failed, unfinished };
+constexpr auto words(RunOutcome) { return std::array{"done", "failed", "unfinished"}; }
+
 /// Merge the records of all stages, and what became of them in this run, to run.json. Of stages that this run was not
 /// asked for, it keeps what an earlier one told.
 /// @throws OutputError

@@ -31,6 +31,7 @@ const std::vector<Stage>& stages() {
       {.name = "track",
        .folder = "2_track",
        .images = {{"stressed", "beads_stressed"}, {"relaxed", "beads_relaxed"}},
+       .instead = ImageInput{"displacement", "displacement"},
        .optional_images = {},
        .arguments = {},
        .output = {"out", "2_track"},
@@ -68,7 +69,8 @@ const std::vector<Stage>& stages() {
        .tables = {"", "gel", "network", "cables", "substrate", "fit", "checks"},
        .effects = {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
                    "common_motion", "beads_under_load", "channel_shift", "beyond_cut", "cable_elasticity",
-                   "robust_loss", "time_coupling", "effect_tolerance"}},
+                   "robust_loss", "time_coupling", "effect_tolerance"},
+       .explains = true},
   };
   return list;
 }

@@ -1,6 +1,7 @@
 /// The stages of a cell, in the order they run: what each reads, writes and depends on.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -25,6 +26,7 @@ struct Stage {
   std::string name;    ///< the executable is mbtfm-<name>
   std::string folder;  ///< of its outputs and its record
   std::vector<ImageInput> images;
+  std::optional<ImageInput> instead = {};   ///< of the images, where [images] names it
   std::vector<ImageInput> optional_images;  ///< used where they are there
   std::vector<PathArgument> arguments;      ///< further inputs that earlier stages write
   PathArgument output;
@@ -34,6 +36,7 @@ struct Stage {
   std::vector<std::string> series;             ///< globs: files that it writes in some cases only, as of a time series
   std::vector<std::string> tables;   ///< of cell.toml that its result depends on; empty: above the first table
   std::vector<std::string> effects;  ///< keys of [effects] that it depends on
+  bool explains = false;             ///< what is off would change: it takes --explain
 };
 
 const std::vector<Stage>& stages();

@@ -11,6 +11,7 @@
 #include "pipeline/files/names.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/runner/run_record.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -18,11 +19,14 @@ using nlohmann::ordered_json;
 
 namespace {
 
+enum class FileKind { input, output };
+constexpr auto words(FileKind) { return std::array{"input", "output"}; }
+
 /// A file that run.json names.
 struct KnownFile {
   std::string stage;
-  std::string kind;  ///< "input" or "output"
-  fs::path path;     ///< relative to the cell folder
+  FileKind kind = FileKind::input;
+  fs::path path;  ///< relative to the cell folder
   std::string sha256;
 };
 
@@ -33,9 +37,8 @@ files::JsonRecord open_run_json(const fs::path& file) {
 }
 
 /// A stage's record lists files relative to its folder; of what the user gave, a hash by path in the cell folder.
-void add_files(const std::string& kind, const Stage& stage, const files::JsonRecord& entry,
-               std::vector<KnownFile>& files) {
-  const auto all = entry.find(kind + "s");
+void add_files(FileKind kind, const Stage& stage, const files::JsonRecord& entry, std::vector<KnownFile>& files) {
+  const auto all = entry.find(name_of(kind) + std::string("s"));
   if (!all) return;
   if (all->json().is_object()) {
     for (const auto& [path, sha256] : all->members()) files.push_back({stage.name, kind, path, sha256.text()});
@@ -53,10 +56,10 @@ std::vector<KnownFile> files_in(const files::JsonRecord& run, const fs::path& ru
   for (const Stage& stage : stages()) {
     const auto entry = run.at("stages").find(stage.name);
     if (!entry) continue;
-    add_files("input", stage, *entry, files);
-    add_files("output", stage, *entry, files);
+    add_files(FileKind::input, stage, *entry, files);
+    add_files(FileKind::output, stage, *entry, files);
     for (const KnownFile& file : files) {
-      if (file.stage == stage.name && file.kind == "output")
+      if (file.stage == stage.name && file.kind == FileKind::output)
         output_file(run_json.parent_path(), stage, file.path, run_json.string());
     }
   }
@@ -94,7 +97,8 @@ bool may_be_read(const fs::path& name, const fs::path& folder, const std::vector
 
 void compare(const KnownFile& known, const fs::path& folder, const std::vector<fs::path>& images, Verification& found) {
   ++found.n_files;
-  const std::string name = known.path.generic_string(), role = " (" + known.kind + " of " + known.stage + ")";
+  const std::string name = known.path.generic_string(),
+                    role = std::string(" (") + name_of(known.kind) + " of " + known.stage + ")";
   const fs::path file = files::file_shown_as(folder, name);
   if (!may_be_read(file.lexically_relative(folder), folder, images)) {
     found.differences.push_back(name + " is outside of the cell folder, and no setting names it: not read" + role);
@@ -107,7 +111,7 @@ void compare(const KnownFile& known, const fs::path& folder, const std::vector<f
 
 bool is_output(const KnownFile& file, const std::vector<KnownFile>& files) {
   return std::any_of(files.begin(), files.end(),
-                     [&](const KnownFile& other) { return other.kind == "output" && other.path == file.path; });
+                     [&](const KnownFile& other) { return other.kind == FileKind::output && other.path == file.path; });
 }
 
 bool is_given(const std::optional<files::JsonRecord>& entry) {
@@ -163,8 +167,9 @@ void prepare(const files::JsonRecord& run, const std::vector<KnownFile>& files, 
   for (const auto& [key, file] : images_in(run, inputs)) images.push_back(file);
   Verification of_inputs;
   for (const KnownFile& file : files) {
-    const bool was_given = file.kind == "output" && is_given(run, file.stage);
-    if (was_given || (file.kind == "input" && !is_output(file, files))) compare(file, inputs, images, of_inputs);
+    const bool was_given = file.kind == FileKind::output && is_given(run, file.stage);
+    if (was_given || (file.kind == FileKind::input && !is_output(file, files)))
+      compare(file, inputs, images, of_inputs);
   }
   if (!of_inputs.differences.empty()) {
     throw InputError(inputs.string(), "the inputs of the run", of_inputs.differences.front(),
@@ -172,7 +177,7 @@ void prepare(const files::JsonRecord& run, const std::vector<KnownFile>& files, 
   }
   fs::create_directories(out);
   for (const KnownFile& file : files) {
-    if (file.kind != "output" || !is_given(run, file.stage)) continue;
+    if (file.kind != FileKind::output || !is_given(run, file.stage)) continue;
     fs::create_directories((out / file.path).parent_path());
     fs::copy_file(inputs / file.path, out / file.path);
   }
@@ -209,7 +214,8 @@ Verification repeat_run(const fs::path& run_json, const fs::path& inputs, const 
   files::check_cell_folder(inputs);
   const files::JsonRecord run = open_run_json(run_json);
   const std::string outcome = run.text_or("outcome", "unknown"), version = run.text_or("version", "unknown");
-  if (outcome != "done") throw InputError(run_json.string(), "a run that ended", "outcome '" + outcome + "'");
+  if (named<RunOutcome>(outcome) != RunOutcome::done)
+    throw InputError(run_json.string(), "a run that ended", "outcome '" + outcome + "'");
   if (fs::exists(fs::symlink_status(out)))
     throw InputError(out.string(), "a new folder to repeat the run in", "one that is there");
   if (version != options.version) note("the run is of version " + version + ", this is " + options.version);
@@ -218,7 +224,7 @@ Verification repeat_run(const fs::path& run_json, const fs::path& inputs, const 
   run_cell(out, options);
   Verification found;
   for (const KnownFile& file : files) {
-    if (file.kind == "output") compare(file, out, {}, found);
+    if (file.kind == FileKind::output) compare(file, out, {}, found);
   }
   return found;
 }

@@ -10,7 +10,7 @@ namespace {
 
 struct Key {
   std::string name;
-  std::string EffectSwitches::*member;
+  Switch EffectSwitches::*member;
   std::string meaning;
 };
 
@@ -57,35 +57,34 @@ void declare(ParameterList& list, EffectSwitches& values, const std::vector<std:
   list.table("effects");
   const auto is_named = [&](const std::string& name) { return std::ranges::find(names, name) != names.end(); };
   for (const Key& key : switches()) {
-    if (is_named(key.name)) list.add(key.name, values.*key.member, key.meaning, {"auto", "on", "off"});
+    if (is_named(key.name)) list.add(key.name, values.*key.member, key.meaning);
   }
   if (!is_named(kTolerance)) return;
   list.add(kTolerance, values.effect_tolerance, Range{.low = 0, .high = 1, .excludes_low = true},
            "what leaving an effect out may change, as a share of the displacement");
 }
 
-Effect decided(const std::string& name, const std::string& setting, double number, double threshold,
-               const std::string& found) {
+Effect decided(EffectKind kind, Switch setting, double number, double threshold, const std::string& found) {
   const bool is_above = number > threshold;
-  Effect effect = decided(name, setting, is_above,
+  Effect effect = decided(kind, setting, is_above,
                           found + " " + brief(number) + (is_above ? ", above " : ", not above ") + brief(threshold));
   effect.number = number;
   effect.threshold = threshold;
   return effect;
 }
 
-Effect decided(const std::string& name, const std::string& setting, bool is_called_for, const std::string& why) {
-  return {.name = name,
+Effect decided(EffectKind kind, Switch setting, bool is_called_for, const std::string& why) {
+  return {.kind = kind,
           .setting = setting,
-          .is_on = setting == "auto" ? is_called_for : setting == "on",
+          .is_on = setting == Switch::automatic ? is_called_for : setting == Switch::on,
           .number = {},
           .threshold = {},
           .why = why};
 }
 
 std::string line_of(const Effect& effect) {
-  std::string line = effect.name + ": " + (effect.is_on ? "on" : "off");
-  line += effect.setting == "auto" ? " (auto)" : " (as switched)";
+  std::string line = name_of(effect.kind) + std::string(": ") + (effect.is_on ? "on" : "off");
+  line += effect.setting == Switch::automatic ? " (auto)" : " (as switched)";
   line += ": " + effect.why;
   if (effect.seconds > 0) line += "; " + brief(effect.seconds) + " s";
   if (!effect.would_change.empty()) line += "; on, it " + effect.would_change;

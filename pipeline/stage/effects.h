@@ -9,25 +9,25 @@
 #include <string>
 #include <vector>
 
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/effects.h"
 #include "pipeline/stage/parameters.h"
 
 namespace mbtfm::stage {
 
 struct EffectSwitches {
-  std::string stress_fibres = "auto";
-  std::string finite_thickness = "auto";
-  std::string finite_sides = "auto";
-  std::string depth_graded_gel = "auto";
-  std::string vertical_displacement = "auto";
-  std::string drift_affine = "auto";
-  std::string common_motion = "auto";
-  std::string beads_under_load = "auto";
-  std::string channel_shift = "auto";
-  std::string beyond_cut = "auto";
-  std::string cable_elasticity = "auto";
-  std::string robust_loss = "auto";
-  std::string time_coupling = "auto";
+  Switch stress_fibres = Switch::automatic;
+  Switch finite_thickness = Switch::automatic;
+  Switch finite_sides = Switch::automatic;
+  Switch depth_graded_gel = Switch::automatic;
+  Switch vertical_displacement = Switch::automatic;
+  Switch drift_affine = Switch::automatic;
+  Switch common_motion = Switch::automatic;
+  Switch beads_under_load = Switch::automatic;
+  Switch channel_shift = Switch::automatic;
+  Switch beyond_cut = Switch::automatic;
+  Switch cable_elasticity = Switch::automatic;
+  Switch robust_loss = Switch::automatic;
+  Switch time_coupling = Switch::automatic;
   double effect_tolerance = 0.01;  ///< a tenth of the tensions' usual error bars: what is left out then does not show
 };
 
@@ -39,10 +39,9 @@ std::vector<std::string> effect_keys();
 
 /// Whether an effect is on: as its switch says or, where that is `auto`, where `number` exceeds `threshold`.
 /// @param found  what the number is, in words before it: "the base changes the field by"
-Effect decided(const std::string& name, const std::string& setting, double number, double threshold,
-               const std::string& found);
+Effect decided(EffectKind kind, Switch setting, double number, double threshold, const std::string& found);
 /// The same where the scene either calls for it or does not.
-Effect decided(const std::string& name, const std::string& setting, bool is_called_for, const std::string& why);
+Effect decided(EffectKind kind, Switch setting, bool is_called_for, const std::string& why);
 
 /// "finite sides: off (auto): sides at 2.5 thicknesses change the field by 0.025, ...; 0.2 s"
 std::string line_of(const Effect& effect);

@@ -52,6 +52,8 @@ std::string nearest(const std::vector<std::string>& known, std::string_view name
   return closest == known.end() ? std::string() : *closest;
 }
 
+std::string did_you_mean(const std::string& word) { return "did you mean '" + word + "'?"; }
+
 std::string in_table(const Parameter& p) { return (p.table.empty() ? "" : "[" + p.table + "] ") + p.name; }
 
 /// What a value must be: "a number > 0", "true or false", "one of a, b".
@@ -62,10 +64,11 @@ std::string expectation(const Parameter& p) {
                                [&](std::optional<int>*) { return describe("an integer", p.range); },
                                [&](std::uint64_t*) { return std::string("an integer >= 0"); },
                                [&](bool*) { return std::string("true or false"); },
-                               [&](std::string*) {
-                                 std::string names;
-                                 for (const auto& c : p.choices) names += (names.empty() ? "one of " : ", ") + c;
-                                 return names.empty() ? std::string("a text") : names;
+                               [&](std::string*) { return std::string("a text"); },
+                               [&](const Choice& choice) {
+                                 std::string words;
+                                 for (const auto& w : choice.words) words += (words.empty() ? "one of " : ", ") + w;
+                                 return words;
                                }},
                     p.member);
 }
@@ -101,21 +104,31 @@ bool try_set(Parameter& p, const std::string& text) {
                                  return true;
                                },
                                [&](std::string* member) {
-                                 const auto& c = p.choices;
-                                 if (!c.empty() && std::find(c.begin(), c.end(), text) == c.end()) return false;
                                  *member = text;
+                                 return true;
+                               },
+                               [&](const Choice& choice) {
+                                 const auto word = std::ranges::find(choice.words, text);
+                                 if (word == choice.words.end()) return false;
+                                 choice.set(static_cast<std::size_t>(word - choice.words.begin()));
                                  return true;
                                }},
                     p.member);
 }
 
-std::string unit_slip(const Parameter& p, const std::string& text) {
+/// What was probably meant: another unit, or a word of which less than half is misspelt.
+std::string likely_slip(const Parameter& p, const std::string& text) {
+  if (const auto* choice = std::get_if<Choice>(&p.member)) {
+    const std::string word = nearest(choice->words, text);
+    const bool is_alike = 2 * edit_distance(word, text) < static_cast<int>(word.size());
+    return is_alike ? did_you_mean(word) : "";
+  }
   double value = 0;
-  return read_number(text, value) ? mbtfm::unit_slip(p.name, value, p.range) : std::string();
+  return read_number(text, value) ? unit_slip(p.name, value, p.range) : "";
 }
 
 std::string advice_on(const Parameter& p, const std::string& text) {
-  const std::string slip = unit_slip(p, text);
+  const std::string slip = likely_slip(p, text);
   return slip.empty() ? p.meaning : slip + " (" + p.meaning + ")";
 }
 
@@ -146,7 +159,7 @@ std::string spelled(const toml::node& node, const std::string& where) {
 
 std::string unknown_key_hint(const std::vector<std::string>& known, std::string_view key) {
   const std::string closest = nearest(known, key);
-  return closest.empty() ? "" : "did you mean '" + closest + "'?";
+  return closest.empty() ? "" : did_you_mean(closest);
 }
 
 }  // namespace
@@ -187,9 +200,14 @@ void ParameterList::add(std::string name, std::uint64_t& member, std::string mea
 void ParameterList::add(std::string name, bool& member, std::string meaning) {
   add(parameter(std::move(name), member, Range::any(), std::move(meaning)));
 }
-void ParameterList::add(std::string name, std::string& member, std::string meaning, std::vector<std::string> choices) {
-  Parameter p = parameter(std::move(name), member, Range::any(), std::move(meaning));
-  p.choices = std::move(choices);
+void ParameterList::add(std::string name, std::string& member, std::string meaning) {
+  add(parameter(std::move(name), member, Range::any(), std::move(meaning)));
+}
+void ParameterList::add(std::string name, std::string meaning, Choice choice) {
+  Parameter p;
+  p.name = std::move(name);
+  p.member = std::move(choice);
+  p.meaning = std::move(meaning);
   add(std::move(p));
 }
 
@@ -239,7 +257,7 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
 
 void set_from_text(Parameter& p, const std::string& text) {
   if (!try_set(p, text)) {
-    const std::string slip = unit_slip(p, text);
+    const std::string slip = likely_slip(p, text);
     throw UsageError("--" + p.name + ": expected " + expectation(p) + ", found '" + text + "'" +
                      (slip.empty() ? "" : "; " + slip));
   }
@@ -253,7 +271,8 @@ std::string to_text(const Parameter& p) {
                  [](int* m) { return std::to_string(*m); },
                  [](std::optional<int>* m) { return *m ? std::to_string(**m) : std::string(); },
                  [](std::uint64_t* m) { return std::to_string(*m); },
-                 [](bool* m) { return std::string(*m ? "true" : "false"); }, [](std::string* m) { return *m; }},
+                 [](bool* m) { return std::string(*m ? "true" : "false"); }, [](std::string* m) { return *m; },
+                 [](const Choice& choice) { return choice.words.at(choice.get()); }},
       p.member);
 }
 

@@ -2,8 +2,10 @@
 /// and from it come the flags, the tables of cell.toml, --help, the parameter page and the provenance.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <optional>
 #include <string>
 #include <variant>
@@ -11,17 +13,25 @@
 
 #include "pipeline/contract/gel.h"
 #include "pipeline/contract/range.h"
+#include "pipeline/contract/words.h"
 
 namespace mbtfm::stage {
+
+/// A member of an enumeration with words: which of those allowed it is.
+struct Choice {
+  std::vector<std::string> words;
+  std::function<std::size_t()> get;
+  std::function<void(std::size_t)> set;
+};
 
 struct Parameter {
   std::string table;  ///< of cell.toml; empty: above the first table
   std::string name;   ///< key in the table, and the flag --name
-  std::variant<double*, std::optional<double>*, int*, std::optional<int>*, std::uint64_t*, bool*, std::string*> member;
+  std::variant<double*, std::optional<double>*, int*, std::optional<int>*, std::uint64_t*, bool*, std::string*, Choice>
+      member;
   Range range;
-  std::vector<std::string> choices;  ///< of a string; empty: any
-  std::string meaning;               ///< one sentence, with the unit
-  std::string default_value;         ///< as printed
+  std::string meaning;        ///< one sentence, with the unit
+  std::string default_value;  ///< as printed
   bool is_required = false;
   bool is_set = false;
 };
@@ -37,7 +47,13 @@ class ParameterList {
   void add(std::string name, std::optional<int>& member, Range range, std::string meaning);
   void add(std::string name, std::uint64_t& member, std::string meaning);
   void add(std::string name, bool& member, std::string meaning);
-  void add(std::string name, std::string& member, std::string meaning, std::vector<std::string> choices = {});
+  void add(std::string name, std::string& member, std::string meaning);
+  /// One of the words of its type, or of those `allowed`.
+  template <Worded E>
+  void add(std::string name, E& member, std::string meaning, const std::vector<E>& allowed = values_of<E>());
+  /// The same, or "auto" where it stays unset.
+  template <Worded E>
+  void add(std::string name, std::optional<E>& member, std::string meaning);
   /// The parameter added last has no default.
   void required() { parameters_.back().is_required = true; }
 
@@ -46,6 +62,7 @@ class ParameterList {
 
  private:
   void add(Parameter parameter);
+  void add(std::string name, std::string meaning, Choice choice);
   std::string table_;
   std::vector<Parameter> parameters_;
 };
@@ -66,5 +83,33 @@ void check_complete(const ParameterList& list);
 std::string to_markdown(const ParameterList& list);
 
 void declare(ParameterList& list, Gel& gel);
+
+// --- implementation of the templates
+
+template <class Member, class Value>
+Choice choice_of(Member& member, std::vector<std::string> words, const std::vector<Value>& values) {
+  return {
+      .words = std::move(words),
+      .get = [&member, values] { return static_cast<std::size_t>(std::ranges::find(values, member) - values.begin()); },
+      .set = [&member, values](std::size_t k) { member = values.at(k); }};
+}
+
+template <Worded E>
+void ParameterList::add(std::string name, E& member, std::string meaning, const std::vector<E>& allowed) {
+  std::vector<std::string> words;
+  for (const E value : allowed) words.emplace_back(name_of(value));
+  add(std::move(name), std::move(meaning), choice_of(member, std::move(words), allowed));
+}
+
+template <Worded E>
+void ParameterList::add(std::string name, std::optional<E>& member, std::string meaning) {
+  std::vector<std::string> words = {name_of(Switch::automatic)};
+  std::vector<std::optional<E>> values = {std::nullopt};
+  for (const E value : values_of<E>()) {
+    words.emplace_back(name_of(value));
+    values.emplace_back(value);
+  }
+  add(std::move(name), std::move(meaning), choice_of(member, std::move(words), values));
+}
 
 }  // namespace mbtfm::stage

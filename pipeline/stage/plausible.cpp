@@ -28,15 +28,17 @@ const PlausibleQuantity& quantity_of(std::string_view id) {
 
 /// "kPa" of "youngs_modulus_kPa"; empty where the name has no unit.
 std::string unit_of(std::string_view id) {
-  for (const char* unit : {"kPa", "um2", "um", "nN"}) {
-    if (id.ends_with(std::string("_") + unit)) return unit;
+  constexpr std::pair<const char*, const char*> kUnits[] = {
+      {"_per_um2", "per um²"}, {"_kPa", "kPa"}, {"_um2", "um²"}, {"_um", "um"}, {"_nN", "nN"}};
+  for (const auto& [suffix, unit] : kUnits) {
+    if (id.ends_with(suffix)) return unit;
   }
-  return id.ends_with("_per_um2") ? "per um²" : "";
+  return {};
 }
 
 std::string with_unit(std::string_view id, const std::string& number) {
   const std::string unit = unit_of(id);
-  return number + (unit.empty() ? "" : " " + (unit == "um2" ? "um²" : unit));
+  return number + (unit.empty() ? "" : " " + unit);
 }
 /// Six digits: 8400, not 8.4e+03.
 std::string with_unit(std::string_view id, double value) {

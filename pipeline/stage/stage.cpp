@@ -35,6 +35,15 @@ struct CommandLine {
   bool is_quiet = false, only_check = false, only_parameters = false, only_version = false;
 };
 
+/// " (one of a, b, c)"; empty where the parameter is no choice.
+std::string words_in(const Parameter& p) {
+  const auto* choice = std::get_if<Choice>(&p.member);
+  if (choice == nullptr) return {};
+  std::string words;
+  for (const std::string& word : choice->words) words += (words.empty() ? " (one of " : ", ") + word;
+  return words + ")";
+}
+
 void add_options(CLI::App& app, CommandLine& line, const StageDescription& description, const ParameterList& list) {
   for (const FileArgument& file : description.files) {
     const bool is_output = file.kind == FileArgument::Kind::output || file.kind == FileArgument::Kind::output_folder;
@@ -54,7 +63,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
   app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
   app.add_flag("--version", line.only_version, "print the version");
   for (const Parameter& p : list.all()) {
-    std::string meaning = p.meaning;
+    std::string meaning = p.meaning + words_in(p);
     if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
     const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
     if (std::holds_alternative<bool*>(p.member)) {
@@ -120,9 +129,12 @@ nlohmann::ordered_json parameters_of(const ParameterList& list) {
   for (const Parameter& p : list.all()) {
     auto& table = p.table.empty() ? json : json[p.table];
     table[p.name] = std::visit(
-        [](auto* member) -> nlohmann::ordered_json {
-          if constexpr (std::is_same_v<decltype(member), std::optional<double>*> ||
-                        std::is_same_v<decltype(member), std::optional<int>*>) {
+        [&](const auto& member) -> nlohmann::ordered_json {
+          using Member = std::decay_t<decltype(member)>;
+          if constexpr (std::is_same_v<Member, Choice>) {
+            return to_text(p);
+          } else if constexpr (std::is_same_v<Member, std::optional<double>*> ||
+                               std::is_same_v<Member, std::optional<int>*>) {
             return *member ? nlohmann::ordered_json(**member) : nlohmann::ordered_json();
           } else {
             return *member;

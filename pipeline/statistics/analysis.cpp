@@ -117,7 +117,7 @@ void warn_of_pseudo_replication(const Measure& m, std::vector<std::string>& warn
         "{}{}: {} and {} {} differ where each counts for itself (p = {}), not with the cell as the unit (p = {}): to "
         "claim the former would be pseudo-replication.",
         prefix_of(by_value.within), m.sample.name, kind_for_people(by_value.group_a), kind_for_people(by_value.group_b),
-        m.sample.each, charts::readable(*by_value.p_holm), charts::readable(smallest)));
+        name_of(m.sample.each), charts::readable(*by_value.p_holm), charts::readable(smallest)));
   }
 }
 
@@ -127,7 +127,9 @@ std::string prefix_of(const std::string& condition) {
   return condition.empty() ? "" : kind_for_people(condition) + ": ";
 }
 
-std::string kind_for_people(const std::string& kind) { return kind == "arc" ? "transverse arc" : kind; }
+std::string kind_for_people(const std::string& kind) {
+  return named<FibreType>(kind) == FibreType::arc ? "transverse arc" : kind;
+}
 
 std::vector<const Measure*> Analysis::measures() const {
   std::vector<const Measure*> all = {&tensions, &adhesion_forces, &adhesion_areas};

@@ -8,18 +8,6 @@
 
 namespace mbtfm::statistics {
 
-const char* name_of(Unit unit) {
-  switch (unit) {
-    case Unit::observation:
-      return "observation";
-    case Unit::cell_median:
-      return "cell median";
-    case Unit::cell:
-      break;
-  }
-  return "cell";
-}
-
 namespace {
 
 struct Group {
@@ -30,7 +18,8 @@ struct Group {
 
 /// Groups that one question compares.
 struct Family {
-  std::string question, within;
+  Question question = Question::between_kinds;
+  std::string within;
   std::vector<Group> groups;
 };
 
@@ -42,8 +31,7 @@ std::vector<Observation> medians_by_cell(const std::vector<Observation>& observa
   return medians;
 }
 
-Comparison blank(const Sample& sample, const Family& family, const char* test, Unit unit, const Group& a,
-                 const Group* b) {
+Comparison blank(const Sample& sample, const Family& family, Test test, Unit unit, const Group& a, const Group* b) {
   return {.column = sample.column,
           .question = family.question,
           .within = family.within,
@@ -73,7 +61,7 @@ void add_rank_tests(const Sample& sample, const Family& family, Unit unit, std::
   std::vector<std::vector<double>> values;
   for (const Group& g : family.groups) values.push_back(values_of(g.values));
   if (family.groups.size() > 2) {
-    Comparison all = blank(sample, family, "Kruskal-Wallis", unit, all_of(family.groups), nullptr);
+    Comparison all = blank(sample, family, Test::kruskal_wallis, unit, all_of(family.groups), nullptr);
     const TestResult h = kruskal_wallis(values);
     all.statistic = h.statistic;
     all.degrees = static_cast<double>(values.size()) - 1;
@@ -84,7 +72,7 @@ void add_rank_tests(const Sample& sample, const Family& family, Unit unit, std::
   }
   for (std::size_t i = 0; i < values.size(); ++i) {
     for (std::size_t k = i + 1; k < values.size(); ++k) {
-      Comparison pair = blank(sample, family, "Mann-Whitney", unit, family.groups[i], &family.groups[k]);
+      Comparison pair = blank(sample, family, Test::mann_whitney, unit, family.groups[i], &family.groups[k]);
       const TestResult u = mann_whitney(values[i], values[k]);
       pair.statistic = u.statistic;
       pair.p_value = u.p_value;
@@ -117,13 +105,13 @@ void add_clustered_tests(const Sample& sample, const Family& family, std::vector
   for (const Group& g : family.groups) pointers.push_back(&g);
   if (pointers.size() > 2) {
     const double cells = n_cells_of(all.values), q = static_cast<double>(pointers.size()) - 1;
-    Comparison c = blank(sample, family, "clustered rank sum", Unit::cell, all, nullptr);
+    Comparison c = blank(sample, family, Test::clustered_rank_sum, Unit::cell, all, nullptr);
     c.degrees = cells - q;
     add(std::move(c), pointers);
   }
   for (std::size_t i = 0; i < pointers.size(); ++i) {
     for (std::size_t k = i + 1; k < pointers.size(); ++k) {
-      Comparison c = blank(sample, family, "clustered rank sum", Unit::cell, *pointers[i], pointers[k]);
+      Comparison c = blank(sample, family, Test::clustered_rank_sum, Unit::cell, *pointers[i], pointers[k]);
       c.degrees = n_cells_of(all_of({*pointers[i], *pointers[k]}).values) - 1;
       const double n_pairs = static_cast<double>(c.n_a) * c.n_b;
       c.effect =
@@ -151,7 +139,7 @@ void add_model_tests(const Sample& sample, const Family& family, const SampleMod
     Eigen::MatrixXd contrasts(n_groups - 1, model.fit.mean.size());
     for (Eigen::Index g = 1; g < n_groups; ++g) contrasts.row(g - 1) = difference(g, 0);
     const FTest f = test_all_zero(model.fit, contrasts);
-    Comparison all = blank(sample, family, "mixed model", Unit::cell, all_of(family.groups), nullptr);
+    Comparison all = blank(sample, family, Test::mixed_model, Unit::cell, all_of(family.groups), nullptr);
     all.statistic = f.f;
     all.degrees = f.denominator_degrees;
     all.p_value = f.p_value;
@@ -159,7 +147,7 @@ void add_model_tests(const Sample& sample, const Family& family, const SampleMod
   }
   for (Eigen::Index i = 0; i < n_groups; ++i) {
     for (Eigen::Index k = i + 1; k < n_groups; ++k) {
-      Comparison pair = blank(sample, family, "mixed model", Unit::cell, family.groups[static_cast<std::size_t>(i)],
+      Comparison pair = blank(sample, family, Test::mixed_model, Unit::cell, family.groups[static_cast<std::size_t>(i)],
                               &family.groups[static_cast<std::size_t>(k)]);
       const Contrast c = contrast_of(model.fit, difference(i, k));
       pair.statistic = c.t;
@@ -203,14 +191,16 @@ Family with_medians(Family family) {
 std::vector<Family> families_of(const Sample& sample) {
   std::vector<Family> families;
   for (int c = 0; c < sample.n_conditions() && sample.n_kinds() > 1; ++c) {
-    Family family{.question = "between kinds", .within = sample.conditions[static_cast<std::size_t>(c)], .groups = {}};
+    Family family{
+        .question = Question::between_kinds, .within = sample.conditions[static_cast<std::size_t>(c)], .groups = {}};
     for (int k = 0; k < sample.n_kinds(); ++k)
       family.groups.push_back(
           {sample.kinds[static_cast<std::size_t>(k)], sample.group_of(c, k), sample.of_group(c, k)});
     families.push_back(std::move(family));
   }
   for (int k = 0; k < sample.n_kinds() && sample.n_conditions() > 1; ++k) {
-    Family family{.question = "between conditions", .within = sample.kinds[static_cast<std::size_t>(k)], .groups = {}};
+    Family family{
+        .question = Question::between_conditions, .within = sample.kinds[static_cast<std::size_t>(k)], .groups = {}};
     for (int c = 0; c < sample.n_conditions(); ++c)
       family.groups.push_back(
           {sample.conditions[static_cast<std::size_t>(c)], sample.group_of(c, k), sample.of_group(c, k)});

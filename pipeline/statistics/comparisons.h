@@ -12,13 +12,19 @@ namespace mbtfm::statistics {
 /// What is counted as one observation. The fibres of a cell are not independent of each other: tests by observation
 /// overstate the evidence; those of one median a cell, and those with the cell for the cluster, do not.
 enum class Unit { observation, cell_median, cell };
-const char* name_of(Unit unit);
+constexpr auto words(Unit) { return std::array{"observation", "cell median", "cell"}; }
+
+enum class Question { between_kinds, between_conditions };
+constexpr auto words(Question) { return std::array{"between kinds", "between conditions"}; }
+
+enum class Test { kruskal_wallis, mann_whitney, clustered_rank_sum, mixed_model };
+constexpr auto words(Test) { return std::array{"Kruskal-Wallis", "Mann-Whitney", "clustered rank sum", "mixed model"}; }
 
 struct Comparison {
-  std::string column;    ///< what is compared: Sample::column
-  std::string question;  ///< "between kinds", "between conditions"
-  std::string within;    ///< the condition, or the kind, that all groups share
-  std::string test;
+  std::string column;  ///< what is compared: Sample::column
+  Question question = Question::between_kinds;
+  std::string within;  ///< the condition, or the kind, that all groups share
+  Test test = Test::mann_whitney;
   Unit unit = Unit::observation;
   std::string group_a, group_b;  ///< group_b empty: all groups together
   int n_a = 0, n_b = 0;          ///< observations

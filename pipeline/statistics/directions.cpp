@@ -85,20 +85,6 @@ class NearBeads {
 
 }  // namespace
 
-std::string_view name_of(Relation relation) {
-  switch (relation) {
-    case Relation::adhesion_fibre:
-      return "adhesion-fibre";
-    case Relation::fibre_displacement:
-      return "fibre-displacement";
-    case Relation::model_measured:
-      return "model-measured";
-    case Relation::without_fibres_measured:
-      break;
-  }
-  return "without fibres-measured";
-}
-
 std::string_view full_name_of(Relation relation) {
   switch (relation) {
     case Relation::adhesion_fibre:

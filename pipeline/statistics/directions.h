@@ -15,7 +15,9 @@ namespace mbtfm::statistics {
 enum class Relation { adhesion_fibre, fibre_displacement, model_measured, without_fibres_measured };
 inline constexpr Relation kRelations[] = {Relation::adhesion_fibre, Relation::fibre_displacement,
                                           Relation::model_measured, Relation::without_fibres_measured};
-std::string_view name_of(Relation relation);
+constexpr auto words(Relation) {
+  return std::array{"adhesion-fibre", "fibre-displacement", "model-measured", "without fibres-measured"};
+}
 /// For people: "adhesion and fibre".
 std::string_view full_name_of(Relation relation);
 /// 90 or 180.

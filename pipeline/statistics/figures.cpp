@@ -29,8 +29,8 @@ double largest_of(const Sample& sample) {
   return largest > 0 ? largest : 1;
 }
 
-std::string counts(const std::vector<Observation>& own, const std::string& each) {
-  return fmt::format("{} {}, {} cells", own.size(), each, n_cells_of(own));
+std::string counts(const std::vector<Observation>& own, Observed each) {
+  return fmt::format("{} {}, {} cells", own.size(), name_of(each), n_cells_of(own));
 }
 
 /// Where a condition's column is drawn beside the kind's place.
@@ -61,7 +61,7 @@ std::string counts_by_kind(const Sample& sample) {
     n += (kind == 0 ? "" : ", ") + std::to_string(own.size());
     cells += (kind == 0 ? "" : ", ") + std::to_string(n_cells_of(own));
   }
-  return "n = " + n + " " + sample.each + " of " + cells + " cells";
+  return "n = " + n + " " + name_of(sample.each) + " of " + cells + " cells";
 }
 
 std::size_t n_keys_of(const Sample& sample) { return sample.n_conditions() > 1 ? sample.conditions.size() : 0; }
@@ -75,8 +75,8 @@ void add_condition_keys(charts::Chart& chart, const Sample& sample) {
       cells.insert(o.cell);
       ++n;
     }
-    chart.key(fmt::format("{}: {} {}, {} cells", sample.conditions[static_cast<std::size_t>(c)], n, sample.each,
-                          cells.size()),
+    chart.key(fmt::format("{}: {} {}, {} cells", sample.conditions[static_cast<std::size_t>(c)], n,
+                          name_of(sample.each), cells.size()),
               condition_colour(c));
   }
 }

@@ -35,18 +35,21 @@ constexpr Force kForces[] = {{"total_force_nN", &FitSummary::total_force_nN},
                              {"fibre_force_nN", &FitSummary::fibre_force_nN},
                              {"network_force_nN", &FitSummary::network_force_nN}};
 struct Size {
-  const char* column;
+  const char *column, *unit;
   double CellFigures::*member;
 };
-constexpr Size kSizes[] = {{"n_adhesions", &CellFigures::n_adhesions},
-                           {"adhesion_area_um2", &CellFigures::adhesion_area_um2},
-                           {"cell_area_um2", &CellFigures::cell_area_um2},
-                           {"n_fibres", &CellFigures::n_fibres}};
+constexpr Size kSizes[] = {{"n_adhesions", "adhesion", &CellFigures::n_adhesions},
+                           {"adhesion_area_um2", "µm² of adhesion", &CellFigures::adhesion_area_um2},
+                           {"cell_area_um2", "µm² of cell", &CellFigures::cell_area_um2},
+                           {"n_fibres", "fibre", &CellFigures::n_fibres}};
 
 std::optional<Correlation> correlate(const Study& study, int condition, const Force& force, const Size& size,
                                      const std::vector<CellWeights>& draws) {
+  const bool is_of_total = force.member == &FitSummary::total_force_nN;
   Correlation c{.force = force.column,
                 .size = size.column,
+                .size_unit = size.unit,
+                .is_of_total = is_of_total,
                 .condition = study.conditions[static_cast<std::size_t>(condition)],
                 .x = {},
                 .y = {},
@@ -56,7 +59,7 @@ std::optional<Correlation> correlate(const Study& study, int condition, const Fo
   std::map<int, std::pair<double, double>> products;
   for (std::size_t i = 0; i < study.cells.size(); ++i) {
     if (study.cells[i].condition != condition) continue;
-    if (force.member != &FitSummary::total_force_nN && !is_network_known(study.cells[i])) continue;
+    if (!is_of_total && !is_network_known(study.cells[i])) continue;
     const int cell = static_cast<int>(i);
     c.cells.push_back(cell);
     c.x.push_back(figures_of(study.cells[i]).*size.member);

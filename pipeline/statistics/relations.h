@@ -14,6 +14,8 @@ namespace mbtfm::statistics {
 /// A.2).
 struct Correlation {
   std::string force, size;  ///< columns of cells.csv
+  std::string size_unit;    ///< for people: what one more of is counted
+  bool is_of_total = false;
   std::string condition;
   std::vector<double> x, y;
   std::vector<int> cells;  ///< indices into Study::cells

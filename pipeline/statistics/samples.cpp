@@ -7,12 +7,12 @@
 namespace mbtfm::statistics {
 namespace {
 
-Sample empty_sample(const Study& study, std::string column, std::string name, std::string unit, std::string each,
+Sample empty_sample(const Study& study, std::string column, std::string name, std::string unit, Observed each,
                     std::vector<std::string> kinds) {
   return {.column = std::move(column),
           .name = std::move(name),
           .unit = std::move(unit),
-          .each = std::move(each),
+          .each = each,
           .kinds = std::move(kinds),
           .conditions = study.conditions,
           .values = {}};
@@ -74,7 +74,7 @@ Sample sample_tensions(const Study& study) {
   for (const FibreType type : kFibreTypes) {
     if (counted_type(study, type) == type) kinds.emplace_back(name_of(type));
   }
-  Sample sample = empty_sample(study, "tension_nN", "tension", "nN", "fibres", kinds);
+  Sample sample = empty_sample(study, "tension_nN", "tension", "nN", Observed::fibres, kinds);
   for (const MeasuredFibre& f : measured_fibres(study)) {
     add(sample, *f.cell, static_cast<int>(f.cell - study.cells.data()),
         static_cast<int>(counted_type(study, f.fibre->type)), f.tension->tension_nN, standard_error_nN(*f.tension));
@@ -83,7 +83,7 @@ Sample sample_tensions(const Study& study) {
 }
 
 Sample sample_adhesion_forces(const Study& study) {
-  Sample sample = empty_sample(study, "adhesion_force_nN", "force", "nN", "adhesions", kConnection);
+  Sample sample = empty_sample(study, "adhesion_force_nN", "force", "nN", Observed::adhesions, kConnection);
   for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double) {
     add(sample, cell, i, f.connected ? 0 : 1, norm(f.force_nN), f.sigma_nN);
   });
@@ -91,7 +91,7 @@ Sample sample_adhesion_forces(const Study& study) {
 }
 
 Sample sample_adhesion_areas(const Study& study) {
-  Sample sample = empty_sample(study, "adhesion_area_um2", "area", "µm²", "adhesions", kConnection);
+  Sample sample = empty_sample(study, "adhesion_area_um2", "area", "µm²", Observed::adhesions, kConnection);
   for_each_adhesion(study, [&](const StudyCell& cell, int i, const AdhesionForce& f, double area_um2) {
     add(sample, cell, i, f.connected ? 0 : 1, area_um2, 0.0);
   });
@@ -110,7 +110,7 @@ std::vector<Sample> sample_cells(const Study& study) {
                                        &FitSummary::network_surface_tension_nN_per_um}};
   std::vector<Sample> samples;
   for (const Quantity& q : kQuantities) {
-    Sample sample = empty_sample(study, q.column, q.name, q.unit, "cells", {"cell"});
+    Sample sample = empty_sample(study, q.column, q.name, q.unit, Observed::cells, {"cell"});
     sample.is_never_negative = q.member != &FitSummary::fibre_force_nN;  // a difference: total less network
     for (std::size_t i = 0; i < study.cells.size(); ++i) {
       if (q.member != &FitSummary::total_force_nN && !is_network_known(study.cells[i])) continue;

@@ -9,11 +9,14 @@
 
 namespace mbtfm::statistics {
 
+enum class Observed { fibres, adhesions, cells };
+constexpr auto words(Observed) { return std::array{"fibres", "adhesions", "cells"}; }
+
 /// `group` of an observation is condition · n kinds + kind; `cell` is its index in the study.
 struct Sample {
   std::string column;      ///< of the tables, with its unit: tension_nN
   std::string name, unit;  ///< for people
-  std::string each;        ///< what is observed, plural: fibres, adhesions, cells
+  Observed each = Observed::fibres;
   std::vector<std::string> kinds, conditions;
   std::vector<Observation> values;
   int n_without_error = 0;  ///< observations whose error is not known: that of the others is taken, or zero if none is

@@ -13,8 +13,8 @@ using charts::readable;
 std::string p_text(double p) { return p < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", p); }
 
 std::string plural_of(const Sample& sample, const std::string& kind) {
-  if (sample.each == "cells") return "cells";
-  return kind == "arc" ? "transverse arcs" : kind + " " + sample.each;
+  if (sample.each == Observed::cells) return name_of(sample.each);
+  return named<FibreType>(kind) == FibreType::arc ? "transverse arcs" : kind + " " + name_of(sample.each);
 }
 
 /// A sentence begins so, for people: "Control: ventral fibres".
@@ -37,15 +37,16 @@ std::string mean_text(const Summary& s, const Measure& m) {
 std::vector<std::string> means(const Measure& m) {
   std::vector<std::string> list;
   if (m.summaries.empty()) {
-    list.push_back(fmt::format("No {} of {} is known: nothing can be said of it.", m.sample.name, m.sample.each));
+    list.push_back(
+        fmt::format("No {} of {} is known: nothing can be said of it.", m.sample.name, name_of(m.sample.each)));
   }
   for (const Summary& s : m.summaries) {
     std::string text = fmt::format("{}the mean {} of {} is {}", prefix_of(s.condition), m.sample.name,
                                    plural_of(m.sample, s.kind), mean_text(s, m));
     text += fmt::format(", the cell being the unit ({} cells", s.n_cells);
-    if (m.sample.each != "cells") text += fmt::format(", {} {}", s.n, m.sample.each);
+    if (m.sample.each != Observed::cells) text += fmt::format(", {} {}", s.n, name_of(m.sample.each));
     text += ")";
-    if (m.sample.each != "cells" && s.typical_error && s.n > 2) {
+    if (m.sample.each != Observed::cells && s.typical_error && s.n > 2) {
       text += fmt::format("; they scatter by {} {}, of which {} {} remain without the error of their measurement",
                           charts::readable(*s.plain.standard_deviation), m.sample.unit,
                           charts::readable(s.without_error->standard_deviation), m.sample.unit);
@@ -55,7 +56,7 @@ std::vector<std::string> means(const Measure& m) {
   return list;
 }
 
-const Comparison* same_pair(const Measure& m, const Comparison& c, const std::string& test) {
+const Comparison* same_pair(const Measure& m, const Comparison& c, Test test) {
   const auto at = std::find_if(m.comparisons.begin(), m.comparisons.end(), [&](const Comparison& o) {
     return o.test == test && o.unit == Unit::cell && o.question == c.question && o.within == c.within &&
            o.group_a == c.group_a && o.group_b == c.group_b;
@@ -72,26 +73,26 @@ int n_different(const std::vector<Summary>& summaries, std::string Summary::*mem
 
 /// A sentence for each question that no test with the cell for the unit could answer.
 void add_unanswered(const Measure& m, Findings& findings) {
-  const auto add = [&](const std::string& question, const std::string& who) {
+  const auto add = [&](Question question, const std::string& who) {
     const bool is_answered = std::any_of(m.comparisons.begin(), m.comparisons.end(), [&](const Comparison& c) {
-      return c.question == question && c.test == "mixed model";
+      return c.question == question && c.test == Test::mixed_model;
     });
     if (is_answered) return;
     findings.sentences.push_back(fmt::format("Whether the {} of {} differs between {} cannot be said: {}.",
-                                             m.sample.name, m.sample.each, who,
+                                             m.sample.name, name_of(m.sample.each), who,
                                              m.model ? "each needs values of two cells" : m.obstacle));
   };
   if (n_different(m.summaries, &Summary::kind) > 1)
-    add("between kinds", m.sample.column == "tension_nN" ? "types" : "connected and unconnected ones");
-  if (n_different(m.summaries, &Summary::condition) > 1) add("between conditions", "conditions");
+    add(Question::between_kinds, m.sample.each == Observed::fibres ? "types" : "connected and unconnected ones");
+  if (n_different(m.summaries, &Summary::condition) > 1) add(Question::between_conditions, "conditions");
 }
 
 /// A sentence for each pair that the mixed model compares, with those that clearly differ or with the others.
 void add_differences(const Measure& m, Findings& findings) {
   add_unanswered(m, findings);
   for (const Comparison& c : m.comparisons) {
-    if (c.test != "mixed model" || c.group_b.empty() || !c.interval) continue;
-    const bool is_of_kinds = c.question == "between kinds";
+    if (c.test != Test::mixed_model || c.group_b.empty() || !c.interval) continue;
+    const bool is_of_kinds = c.question == Question::between_kinds;
     // the larger one first
     const bool is_turned = c.effect < 0;
     const std::string& larger = is_turned ? c.group_b : c.group_a;
@@ -114,14 +115,16 @@ void add_differences(const Measure& m, Findings& findings) {
         fmt::format(" (difference {} {} [95 % CI {} to {}]; mixed model, t({}) = {}, {}",
                     charts::readable(std::abs(c.effect)), m.sample.unit, charts::readable(low), charts::readable(high),
                     charts::readable(*c.degrees), charts::readable(std::abs(c.statistic)), p_text(*c.p_holm));
-    const Comparison* ranks = same_pair(m, c, m.sample.each == "cells" ? "Mann-Whitney" : "clustered rank sum");
+    const Comparison* ranks =
+        same_pair(m, c, m.sample.each == Observed::cells ? Test::mann_whitney : Test::clustered_rank_sum);
     if (ranks != nullptr)
-      text += fmt::format("; {}, {}", m.sample.each == "cells" ? "Mann–Whitney" : "clustered rank-sum test",
+      text += fmt::format("; {}, {}", m.sample.each == Observed::cells ? "Mann–Whitney" : "clustered rank-sum test",
                           p_text(*ranks->p_holm));
     const int cells_a = is_turned ? c.cells_b : c.cells_a, cells_b = is_turned ? c.cells_a : c.cells_b;
     text += fmt::format("; {} and {} cells", cells_a, cells_b);
-    if (m.sample.each != "cells")
-      text += fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, m.sample.each);
+    if (m.sample.each != Observed::cells)
+      text +=
+          fmt::format(", {} and {} {}", is_turned ? c.n_b : c.n_a, is_turned ? c.n_a : c.n_b, name_of(m.sample.each));
     (is_clear ? findings.sentences : findings.unclear).push_back(capitalised(text + ")."));
   }
 }
@@ -144,14 +147,10 @@ std::vector<std::string> shares(const Analysis& analysis, const StudyParameters&
 std::vector<std::string> lines(const Analysis& analysis) {
   std::vector<std::string> list;
   for (const Correlation& c : analysis.correlations) {
-    if (c.force != "total_force_nN") continue;
-    const std::string by = c.size == "n_adhesions"         ? "adhesion"
-                           : c.size == "adhesion_area_um2" ? "µm² of adhesion"
-                           : c.size == "cell_area_um2"     ? "µm² of cell"
-                                                           : "fibre";
+    if (!c.is_of_total) continue;
     const std::string error = c.line.slope_error ? " ± " + charts::readable(*c.line.slope_error) : "";
     std::string text = fmt::format("{}the total force is {}{} nN for each {} ({}", prefix_of(c.condition),
-                                   charts::readable(c.line.slope), error, by,
+                                   charts::readable(c.line.slope), error, c.size_unit,
                                    c.line.slope_error ? fmt::format("{} cells", c.line.n) : "a single cell: no error");
     if (c.line.correlation) text += ", r = " + charts::readable(*c.line.correlation);
     list.push_back(capitalised(text + ")."));

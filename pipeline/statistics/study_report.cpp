@@ -80,7 +80,7 @@ report::Table tests_table(const Measure& m) {
                       {}};
   for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
-    table.rows.push_back({charts::html_escaped(t.within), t.test, name_of(t.unit),
+    table.rows.push_back({charts::html_escaped(t.within), name_of(t.test), name_of(t.unit),
                           charts::html_escaped(is_pair ? t.group_a + " – " + t.group_b : t.group_a),
                           is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
                           is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
@@ -231,8 +231,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   std::string tests;
   for (const Measure* m : analysis.measures()) {
     if (!m->comparisons.empty())
-      tests +=
-          report::folded("Tests of the " + m->sample.name + " of " + m->sample.each, report::html_of(tests_table(*m)));
+      tests += report::folded("Tests of the " + m->sample.name + " of " + name_of(m->sample.each),
+                              report::html_of(tests_table(*m)));
   }
   body += report::section("Tests", tests + kHowToRead);
   body += report::section("Cells", with_file(cells_table(study), "cells.csv"));

@@ -204,7 +204,13 @@ std::string tests_csv(const Analysis& analysis) {
   for (const Measure* m : analysis.measures()) {
     for (const Comparison& t : m->comparisons) {
       const bool is_pair = !t.group_b.empty();
-      csv.add(t.column).add(t.question).add(t.within).add(t.test).add(name_of(t.unit)).add(t.group_a).add(t.group_b);
+      csv.add(t.column)
+          .add(name_of(t.question))
+          .add(t.within)
+          .add(name_of(t.test))
+          .add(name_of(t.unit))
+          .add(t.group_a)
+          .add(t.group_b);
       csv.add(t.n_a).add(is_pair ? std::optional(t.n_b) : std::nullopt);
       csv.add(t.cells_a).add(is_pair ? std::optional(t.cells_b) : std::nullopt);
       csv.add(t.statistic).add(t.degrees).add(t.p_value).add(t.p_holm);

@@ -86,11 +86,11 @@ DrawnCell draw_cell(const CellParameters& parameters, const TensionParameters& t
   sketch.parameters = parameters;
   sketch.centre_um = {0.5 * field_um, 0.5 * field_um};
   DrawnCell drawn;
-  if (parameters.layout == "spread") {
+  if (parameters.layout == Layout::spread) {
     drawn.tensions_nN = draw_spread(sketch, tension, seed);
-  } else if (parameters.layout == "dense") {
+  } else if (parameters.layout == Layout::dense) {
     drawn.tensions_nN = draw_dense(sketch, tension, seed);
-  } else if (parameters.layout == "ring") {
+  } else if (parameters.layout == Layout::ring) {
     draw_ring(sketch);
     drawn.tensions_nN.assign(sketch.fibres.size(), tension.dorsal_median_nN);
   } else {

@@ -69,13 +69,13 @@ images::Image through_the_field(const images::Image& focused, double stray_photo
 }  // namespace
 
 MicroscopeParameters at_quality(MicroscopeParameters m) {
-  if (m.image_quality == "good") {
+  if (m.image_quality == ImageQuality::good) {
     m.protein_photons *= 3;
     m.bead_photons *= 3;
     m.haze *= 0.5;
     m.haze_tail *= 0.5;
     m.unevenness *= 0.5;
-  } else if (m.image_quality == "poor") {
+  } else if (m.image_quality == ImageQuality::poor) {
     m.protein_photons /= 3;
     m.bead_photons /= 3;
     m.haze *= 2;

@@ -11,8 +11,7 @@ namespace fs = std::filesystem;
 namespace {
 
 void declare_cell(stage::ParameterList& list, CellParameters& p) {
-  list.add("layout", p.layout, "spread: a cell at random; dense: with bundles of fibres; ring, line: regular ones",
-           {"spread", "dense", "ring", "line"});
+  list.add("layout", p.layout, "spread: a cell at random; dense: with bundles of fibres; ring, line: regular ones");
   list.add("diameter_um", p.diameter_um, Range::size_um(), "diameter of the cell (um)");
   list.add("n_corners", p.n_corners, Range::between(3, 50), "adhesion-rich corners of the outline");
   list.add("corner_jitter", p.corner_jitter, Range::between(0, 0.4), "scatter of the corners' radii, relative");
@@ -99,7 +98,7 @@ void declare_tension(stage::ParameterList& list, TensionParameters& p) {
 
 void declare_microscope(stage::ParameterList& list, MicroscopeParameters& p) {
   list.add("image_size_px", p.image_size_px, Range::between(16, 8192), "width and height of the images (pixels)");
-  list.add("image_quality", p.image_quality, "light, haze and sharpness of the images", {"good", "ordinary", "poor"});
+  list.add("image_quality", p.image_quality, "light, haze and sharpness of the images");
   list.add("psf_sigma_um", p.psf_sigma_um, Range::size_um(), "standard deviation of the point-spread function (um)");
   list.add("haze", p.haze, Range::zero_or_factor(), "light from out of focus over light in focus");
   list.add("haze_sigma_um", p.haze_sigma_um, Range::size_um(), "how far that light spreads (um)");
@@ -171,8 +170,7 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   declare_tension(list, p.tension);
   list.add("simulation_edge_length_um", p.mechanics.simulation_edge_length_um, Range::mesh_um(),
            "mean cable length of the simulation's network (um)");
-  list.add("simulation_substrate", p.mechanics.simulation_substrate, "model of the gel in the simulation",
-           {"layer", "half-space"});
+  list.add("simulation_substrate", p.mechanics.simulation_substrate, "model of the gel in the simulation");
   declare_microscope(list, p.microscope);
 }
 

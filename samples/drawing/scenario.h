@@ -12,10 +12,17 @@
 
 namespace mbtfm::drawing {
 
+enum class Layout {
+  spread,  ///< fibres well apart, at random
+  dense,   ///< in bundles
+  ring,    ///< regular, for known answers
+  line     ///< likewise
+};
+constexpr auto words(Layout) { return std::array{"spread", "dense", "ring", "line"}; }
+
 /// What the cell looks like. Defaults: a spread U2OS cell on fibronectin, as in thesis 3.4.
 struct CellParameters {
-  /// spread: fibres well apart, at random; dense: in bundles; ring and line: regular, for known answers
-  std::string layout = "spread";
+  Layout layout = Layout::spread;
   double diameter_um = 66;             ///< mean, over the corners
   int n_corners = 9;                   ///< adhesion-rich corners with concave arcs between them
   double corner_jitter = 0.1;          ///< of a corner's radius, relative (standard deviation)
@@ -91,15 +98,18 @@ struct TensionParameters {
 
 /// The simulation's own mechanics, finer than what a reconstruction uses.
 struct MechanicsParameters {
-  double simulation_edge_length_um = 0.9;      ///< of its network: well below the 1.5 um of a reconstruction
-  std::string simulation_substrate = "layer";  ///< the Green's function of the finite layer: exact
+  double simulation_edge_length_um = 0.9;           ///< of its network: well below the 1.5 um of a reconstruction
+  GelModel simulation_substrate = GelModel::layer;  ///< the Green's function of the finite layer: exact
 };
+
+enum class ImageQuality { good, ordinary, poor };
+constexpr auto words(ImageQuality) { return std::array{"good", "ordinary", "poor"}; }
 
 /// The microscope and its camera.
 struct MicroscopeParameters {
   double pixel_size_um = 0.1;  ///< 60x to 63x on a 6.5 um camera
   int image_size_px = 1024;    ///< the field is square
-  std::string image_quality = "ordinary";
+  ImageQuality image_quality = ImageQuality::ordinary;
   double psf_sigma_um = 0.13;    ///< 0.21 · 560 nm / NA 0.9 … 1.2, slightly out of focus
   double haze = 0.35;            ///< light from out of focus, relative to that in focus
   double haze_sigma_um = 3;      ///< how far it spreads

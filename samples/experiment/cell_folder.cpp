@@ -19,7 +19,8 @@ std::string to_toml(const stage::ParameterList& list, const std::vector<std::str
     if (!table.empty()) text += "\n[" + table + "]\n";
     for (const stage::Parameter& p : list.all()) {
       if (p.table != table || stage::to_text(p).empty()) continue;  // not set
-      const bool is_text = std::holds_alternative<std::string*>(p.member);
+      const bool is_text =
+          std::holds_alternative<std::string*>(p.member) || std::holds_alternative<stage::Choice>(p.member);
       text += p.name + " = " + (is_text ? '"' + stage::to_text(p) + '"' : stage::to_text(p)) + "\n";
     }
   }

@@ -54,7 +54,7 @@ std::string affine_in_words(const CommonMotion& c) {
 }
 
 MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
-                         double width, double height, const std::string& setting, double tolerance, double large) {
+                         double width, double height, Switch setting, double tolerance, double large) {
   const stage::Stopwatch watch;
   const WholeMotion whole =
       whole_motion(positions, displacements, corner, width, height, {Drift::translation, Drift::affine});
@@ -72,15 +72,15 @@ MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<V
                         0.5 * misfit_of(whole.rest, affine.is_at_rest, shifted.drift);
   result.is_affine = affine.is_at_rest && reach / unit > threshold;
   const CommonMotion found = as_found(whole.rest, shifted, affine, true);
-  if (setting != "auto") {
-    result.affine = stage::decided(kAffineDrift, setting, true, "as asked");
+  if (setting != Switch::automatic) {
+    result.affine = stage::decided(EffectKind::affine_drift, setting, true, "as asked");
   } else if (!affine.is_at_rest) {
-    result.affine = stage::decided(kAffineDrift, setting, false, "no place is at rest that would show it");
+    result.affine = stage::decided(EffectKind::affine_drift, setting, false, "no place is at rest that would show it");
   } else if (whole.rest.is_cut() && !result.is_large) {
-    result.affine = stage::decided(kAffineDrift, setting, false,
+    result.affine = stage::decided(EffectKind::affine_drift, setting, false,
                                    affine_in_words(found) + " may be the pull of a cell that the border cuts");
   } else {
-    result.affine = stage::decided(kAffineDrift, setting, reach / unit, threshold,
+    result.affine = stage::decided(EffectKind::affine_drift, setting, reach / unit, threshold,
                                    affine_in_words(found) + " displace the border, over the largest displacement, by");
   }
   result.affine.seconds = watch.seconds();

@@ -9,8 +9,6 @@
 
 namespace mbtfm::beads {
 
-inline constexpr const char* kAffineDrift = "affine drift";  ///< the effect's name
-
 struct MotionTaken {
   AffineMotion motion;  ///< what is taken off
   CommonMotion common;  ///< what was found, in the unit of the positions for um
@@ -22,13 +20,11 @@ struct MotionTaken {
   int n_moving = 0;       ///< squares of the picture that do not rest
 };
 
-/// Find it; `setting` is auto, on or off.
-///
-/// auto: turn, growth and shear are taken off where they displace the border by more than the tolerance, of the largest
-/// displacement, and are no noise: their chi² of four numbers is above 16.3, which one picture in 370 has by chance, as
-/// often as a normal number has three standard deviations.
+/// automatic: turn, growth and shear are taken off where they displace the border by more than the tolerance, of the
+/// largest displacement, and are no noise: their chi² of four numbers is above 16.3, which one picture in 370 has by
+/// chance, as often as a normal number has three standard deviations.
 MotionTaken motion_taken(const std::vector<Vec2>& positions, const std::vector<Vec2>& displacements, Vec2 corner,
-                         double width, double height, const std::string& setting, double tolerance, double large);
+                         double width, double height, Switch setting, double tolerance, double large);
 
 /// "a turn of 0.3 +- 0.001 degrees, growth of ..."
 std::string affine_in_words(const CommonMotion& common);

@@ -58,7 +58,7 @@ int flag_outliers(const std::vector<std::optional<LocalMotion>>& around, double 
       // The floor is what a field's curvature within the reach may do without being wrong.
       if (misfit <= threshold * std::hypot(spread, tracks[k].found.sigma_px) + 0.3) continue;
     }
-    tracks[k].flag = "neighbours disagree";
+    tracks[k].flag = TrackFlag::neighbours_disagree;
     ++n_outliers;
   }
   return n_outliers;
@@ -73,7 +73,7 @@ void follow_grid(const Scene& scene, const GridField& grid, double least_similar
     const double moved = norm(track.found.motion.u - guess.u);
     // further than two bead widths from the guess a registration has caught another bead
     if (track.found.is_converged && track.found.similarity > least_similarity && moved < 4 * scene.bead_sigma()) {
-      track.flag.clear();
+      track.flag = TrackFlag::none;
     }
   });
 }
@@ -116,7 +116,7 @@ void follow_neighbours(const Scene& scene, const TrackParameters& parameters, Su
     int n_found = 0;
     for (std::size_t k = 0; k < tracks.size(); ++k) {
       if (!found[k]) continue;
-      tracks[k] = {.found = *found[k], .flag = {}};
+      tracks[k] = {.found = *found[k], .flag = TrackFlag::none};
       ++n_found;
     }
     update(scene, tracks, surroundings);

@@ -33,7 +33,7 @@ bool is_missing(std::string text) {
 }
 
 double scale_of(const TrackParameters& parameters) {
-  if (parameters.length_unit == "um") return 1;
+  if (parameters.length_unit == LengthUnit::um) return 1;
   if (parameters.pixel_size_um) return *parameters.pixel_size_um;
   throw UsageError("length_unit = px needs pixel_size_um: give it in cell.toml or as --pixel_size_um");
 }
@@ -49,7 +49,7 @@ struct GivenField {
 GivenField read_rows(const std::filesystem::path& file, const TrackParameters& p) {
   const files::CsvTable table(with_commas(files::read_text(file)), file.string());
   table.require({p.x_column, p.y_column, p.ux_column, p.uy_column});
-  const double scale = scale_of(p), first = p.length_unit == "px" ? 0.5 : 0;
+  const double scale = scale_of(p), first = p.length_unit == LengthUnit::px ? 0.5 : 0;
   const Range within = Range::between(-kFarthest_um / scale, kFarthest_um / scale);
   GivenField given{.field = {}, .has_sigma = table.has(p.sigma_column)};
   std::set<std::pair<double, double>> taken;
@@ -185,7 +185,9 @@ GivenMotion take_affine_off(DisplacementField& field, const TrackParameters& par
   }
   constexpr std::size_t kFewest = 100;  // squares enough that a motion of six numbers is no chance
   if (positions.size() < kFewest || !(last.x > first.x) || !(last.y > first.y)) {
-    return {.common = {}, .affine = stage::decided(kAffineDrift, "auto", false, "too few places would show it")};
+    return {
+        .common = {},
+        .affine = stage::decided(EffectKind::affine_drift, Switch::automatic, false, "too few places would show it")};
   }
   const MotionTaken all = motion_taken(positions, displacements, first, last.x - first.x, last.y - first.y,
                                        parameters.drift_affine, parameters.effect_tolerance, 0);

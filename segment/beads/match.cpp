@@ -149,7 +149,7 @@ Matching matching(const Scene& scene, const std::vector<Track>& tracks, double s
   all.leftover_of.assign(tracks.size(), -1);
   std::vector<int> beads;
   for (int k = 0; k < scene.n_beads(); ++k) {
-    if (tracks[k].is_good() || tracks[k].flag == "edge") continue;
+    if (tracks[k].is_good() || tracks[k].flag == TrackFlag::edge) continue;
     all.leftover_of[k] = static_cast<int>(beads.size());
     beads.push_back(k);
   }

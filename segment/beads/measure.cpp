@@ -102,7 +102,7 @@ std::optional<Track> measured_alone(const Scene& scene, int bead, const Motion& 
   const Registered found =
       registered(scene.relaxed->image, scene.stressed.image.spline, place, there, scene.narrow, others);
   if (!found.is_converged || norm(found.motion.u - there.u) > scene.bead_sigma()) return std::nullopt;
-  return Track{.found = found, .flag = {}, .others = others};
+  return Track{.found = found, .flag = TrackFlag::none, .others = others};
 }
 
 /// How far the picture's beads are from looking the same in both images.
@@ -191,7 +191,7 @@ void flag_changed_light(const Scene& scene, std::vector<Track>& tracks) {
   }
   const double most = kMost * numerics::quantile(std::move(sizes), 0.5) / 0.6745;
   for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (tracks[k].is_good() && deviation[k] > most) tracks[k].flag = "ambiguous";
+    if (tracks[k].is_good() && deviation[k] > most) tracks[k].flag = TrackFlag::ambiguous;
   }
 }
 
@@ -215,12 +215,12 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     const Motion& forward = track.found.motion;
     const Vec2 there = scene.position(k) + forward.u;
     if (!is_inside(scene.stressed.image.plane, there, 2 * scene.bead_sigma())) {
-      track.flag = "edge";
+      track.flag = TrackFlag::edge;
       return;
     }
     const auto back = inverse(forward);
     if (!back) {
-      track.flag = "ambiguous";
+      track.flag = TrackFlag::ambiguous;
       return;
     }
     Others others = track.others.value_or(Others{});
@@ -232,7 +232,7 @@ void check_backwards(const Scene& scene, std::vector<Track>& tracks) {
     const double granted = 0.5 + 4 * track.found.sigma_px;
     if (missed > granted) {  // then the way back's own error, too, is granted
       const double sigma = std::hypot(track.found.sigma_px, returned(with_error).sigma_px);
-      if (missed > 0.5 + 4 * sigma) track.flag = "ambiguous";
+      if (missed > 0.5 + 4 * sigma) track.flag = TrackFlag::ambiguous;
     }
     // Both ways see the same noise: what they differ by is what the registration itself is unsure of.
     track.found.sigma_px = std::hypot(track.found.sigma_px, missed / 2);
@@ -258,7 +258,7 @@ void check_claims(const Scene& scene, std::vector<Track>& tracks) {
     }
   });
   for (std::size_t k = 0; k < tracks.size(); ++k) {
-    if (is_taken[k]) tracks[k].flag = "ambiguous";
+    if (is_taken[k]) tracks[k].flag = TrackFlag::ambiguous;
   }
 }
 
@@ -270,7 +270,7 @@ void measure(const Scene& scene, double least_similarity, std::vector<Track>& tr
   const Dissimilarity allowed = dissimilarity(scene, least_similarity, tracks);
   look_again(scene, allowed, guesses, tracks);
   for (Track& track : tracks) {
-    if (track.is_good() && !allowed.is_same(track)) track.flag = "no partner";
+    if (track.is_good() && !allowed.is_same(track)) track.flag = TrackFlag::no_partner;
   }
   flag_changed_light(scene, tracks);
 }
@@ -286,7 +286,7 @@ void recover(const Scene& scene, double least_similarity, std::vector<Track>& tr
     if (!spots[k]) continue;
     // a bead keeps its shape, however steep the field
     starts[k] = {.u = scene.stressed.positions[*spots[k]] - scene.position(k)};
-    all[k].flag.clear();
+    all[k].flag = TrackFlag::none;
     matched.push_back(k);
   }
   const Spots stressed = expected_spots(scene, all, starts, matched);

@@ -3,7 +3,6 @@
 
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "pipeline/numerics/parallel.h"
 #include "segment/beads/registration.h"
@@ -41,12 +40,16 @@ struct Scene {
 };
 Scene scene_of(std::shared_ptr<const Side> relaxed, Side stressed, int threads);
 
-/// A bead's track; it counts as long as `flag` is empty.
+/// What is wrong with a track.
+enum class TrackFlag { none, no_partner, ambiguous, edge, neighbours_disagree };
+constexpr auto words(TrackFlag) { return std::array{"", "no partner", "ambiguous", "edge", "neighbours disagree"}; }
+
+/// A bead's track; it counts as long as it has no flag.
 struct Track {
   Registered found;
-  std::string flag = "no partner";
+  TrackFlag flag = TrackFlag::no_partner;
   std::optional<Others> others = {};  ///< whose pictures were taken away
-  bool is_good() const { return flag.empty(); }
+  bool is_good() const { return flag == TrackFlag::none; }
 };
 
 /// Call body(k) for each bead of the relaxed image.

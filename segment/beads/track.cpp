@@ -23,8 +23,6 @@
 namespace mbtfm::beads {
 namespace {
 
-constexpr const char* kCorrelationWindows = "correlation windows";  // the effect's name
-
 /// @param least_px  that makes the right peak stand out: sixteen beads
 int search_window(double least_px, const TrackParameters& parameters, double pixel_size_um) {
   double needed = std::max(64.0, least_px);
@@ -35,13 +33,6 @@ int search_window(double least_px, const TrackParameters& parameters, double pix
   int window = 32;
   while (window < needed) window *= 2;
   return window;
-}
-
-TrackMethod method_of(const TrackParameters& parameters) {
-  for (const auto& [method, word] : kTrackMethods) {
-    if (parameters.method == word) return method;
-  }
-  throw UsageError("track.method is " + parameters.method);
 }
 
 void require_numbers(const images::Image& image, const char* which) {
@@ -64,7 +55,7 @@ struct Measured {
 };
 
 /// What moved the good beads together, px. @param setting  as of TrackParameters::drift_affine
-MotionTaken motion_of_all(const Measured& measured, const std::string& setting, double tolerance) {
+MotionTaken motion_of_all(const Measured& measured, Switch setting, double tolerance) {
   const Scene& scene = *measured.scene;
   std::vector<Vec2> positions, displacements;
   for (int k = 0; k < scene.n_beads(); ++k) {
@@ -90,7 +81,7 @@ void flag_turned_out(const Scene& scene, const Turn& turn, std::vector<Track>& t
   for (int k = 0; k < scene.n_beads(); ++k) {
     const Vec2 there = turn.of(scene.position(k) + tracks[k].found.motion.u);
     const double inside = std::min({there.x, there.y, plane.width - 1 - there.x, plane.height - 1 - there.y});
-    if (inside < margin) tracks[k].flag = "edge";
+    if (inside < margin) tracks[k].flag = TrackFlag::edge;
   }
 }
 
@@ -212,17 +203,13 @@ Tracking tracking_of(const Measured& measured, const MotionTaken& all, double pi
     result.field.push_back({.position_um = pixel_size_um * (place + Vec2{0.5, 0.5}),
                             .displacement_um = pixel_size_um * (found.u - all.motion.at(place)),
                             .sigma_um = pixel_size_um * found.sigma_px,
-                            .flag = tracks[k].flag});
+                            .flag = name_of(tracks[k].flag)});
     if (tracks[k].is_good()) ++result.n_good;
   }
   return result;
 }
 
 }  // namespace
-
-const char* word_of(TrackMethod method) {
-  return std::ranges::find(kTrackMethods, method, &std::pair<TrackMethod, const char*>::first)->second;
-}
 
 void declare(stage::ParameterList& list, TrackParameters& p) {
   list.table("");
@@ -234,11 +221,8 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add(
       "stressed_last", p.stressed_last, {.low = 0},
       "last stressed_time, or stressed_page, of a time series, each tracked against the relaxed image; 0: one image");
-  std::vector<std::string> methods;
-  for (const auto& [method, word] : kTrackMethods) methods.emplace_back(word);
   list.add("method", p.method,
-           "what is followed: single beads, or the texture in windows (correlation); auto: windows where beads fail",
-           methods);
+           "what is followed: single beads, or the texture in windows (correlation); auto: windows where beads fail");
   list.add("detection_snr", p.detection_snr, Range::factor(), "height of a bead over the noise (standard deviations)");
   list.add("largest_displacement_um", p.largest_displacement_um, Range::between(0, 100),
            "how far to look for a bead, after the drift (um); 0: 32 pixels, further where beads are sparse");
@@ -255,13 +239,13 @@ void declare(stage::ParameterList& list, TrackParameters& p) {
   list.add("sigma_column", p.sigma_column,
            "column of --displacement: standard error of a component; where there is none, from the neighbours");
   list.add("length_unit", p.length_unit,
-           "of --displacement: um, or px (0 at the centre of the first pixel, of pixel_size_um)", {"um", "px"});
+           "of --displacement: um, or px (0 at the centre of the first pixel, of pixel_size_um)");
 }
 
 RelaxedBeads::RelaxedBeads(const images::Image& relaxed, const TrackParameters& parameters, int threads)
     : relaxed_(relaxed), parameters_(parameters), threads_(threads) {
   require_numbers(relaxed, "relaxed");
-  const TrackMethod method = method_of(parameters);
+  const TrackMethod method = parameters.method;
   const double rough_background = 12;  // px: six sigmas of an ordinary bead; set from the bead itself afterwards
   const double bead_sigma = bead_sigma_of(without_background(relaxed, rough_background));
   if (method != TrackMethod::correlation) {
@@ -294,16 +278,17 @@ Tracking RelaxedBeads::track(const images::Image& stressed, double pixel_size_um
 Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_size_um,
                                     const Progress& progress) const {
   const auto by = [&](TrackMethod method) { return track_by(method, stressed, pixel_size_um, progress); };
-  const TrackMethod method = method_of(parameters_);
+  const TrackMethod method = parameters_.method;
   if (method != TrackMethod::automatic) {
     Tracking result = by(method);
     const bool is_on = method == TrackMethod::correlation;
-    result.windows = stage::decided(kCorrelationWindows, is_on ? "on" : "off", is_on, "as asked");
+    result.windows = stage::decided(EffectKind::correlation_windows, switched(is_on), is_on, "as asked");
     return result;
   }
   try {
     Tracking result = by(TrackMethod::beads);
-    result.windows = stage::decided(kCorrelationWindows, "auto", false, "single beads can be followed");
+    result.windows =
+        stage::decided(EffectKind::correlation_windows, Switch::automatic, false, "single beads can be followed");
     return result;
   } catch (const NotFollowed& beads) {
     const stage::Stopwatch watch;
@@ -313,7 +298,7 @@ Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_
     } catch (const NotFollowed&) {
       throw beads;
     }
-    result->windows = stage::decided(kCorrelationWindows, "auto", true,
+    result->windows = stage::decided(EffectKind::correlation_windows, Switch::automatic, true,
                                      "single beads cannot be followed: of " + beads.element + " " + beads.expected +
                                          " were expected, " + beads.found + " found");
     result->windows.seconds = watch.seconds();
@@ -323,14 +308,12 @@ Tracking RelaxedBeads::track_by_any(const images::Image& stressed, double pixel_
 
 Tracking RelaxedBeads::track_by(TrackMethod method, const images::Image& stressed, double pixel_size_um,
                                 const Progress& progress) const {
-  const auto as = [&](const std::string& setting) {
-    return track_as(method, setting, stressed, pixel_size_um, progress);
-  };
-  if (parameters_.drift_affine != "auto") return as(parameters_.drift_affine);
+  const auto as = [&](Switch setting) { return track_as(method, setting, stressed, pixel_size_um, progress); };
+  if (parameters_.drift_affine != Switch::automatic) return as(parameters_.drift_affine);
   std::optional<Tracking> unturned;
   std::exception_ptr refused;
   try {
-    unturned = as("auto");
+    unturned = as(Switch::automatic);
   } catch (const ExchangedImages&) {
     throw;
   } catch (const InvalidData&) {  // turned so far that its beads are not met with again?
@@ -340,9 +323,9 @@ Tracking RelaxedBeads::track_by(TrackMethod method, const images::Image& stresse
   constexpr double kSmall_rad = 0.01;
   if (unturned && !(unturned->affine.is_on && std::abs(unturned->common.turn_rad) > kSmall_rad)) return *unturned;
   try {
-    Tracking turned = as("on");
+    Tracking turned = as(Switch::on);
     turned.affine = stage::decided(
-        turned.affine.name, "auto", true,
+        turned.affine.kind, Switch::automatic, true,
         "unturned, the images do not fit together; with " + affine_in_words(turned.common) + " taken off they do");
     return turned;
   } catch (const ExchangedImages&) {
@@ -353,8 +336,8 @@ Tracking RelaxedBeads::track_by(TrackMethod method, const images::Image& stresse
   }
 }
 
-Tracking RelaxedBeads::track_as(TrackMethod method, const std::string& setting, const images::Image& stressed,
-                                double pixel_size_um, const Progress& progress) const {
+Tracking RelaxedBeads::track_as(TrackMethod method, Switch setting, const images::Image& stressed, double pixel_size_um,
+                                const Progress& progress) const {
   const auto tell = [&](double fraction, const char* what) {
     if (progress) progress(fraction, what);
   };
@@ -362,7 +345,7 @@ Tracking RelaxedBeads::track_as(TrackMethod method, const std::string& setting, 
   const Plane& plane = by_beads ? side_->image.plane : texture_->plane;
   const double spot_sigma = by_beads ? side_->bead_sigma : texture_->spot_sigma_px;
   std::optional<Turn> turn;
-  if (setting == "on") {
+  if (setting == Switch::on) {
     tell(0, "turning the image back");
     const Plane light = by_beads ? without_background(stressed, background_sigma(spot_sigma))
                                  : texture_of(stressed, spot_sigma, "stressed").plane;
@@ -403,10 +386,10 @@ std::string RelaxedBeads::remedy(const images::Image& stressed, double pixel_siz
     }
   };
   std::vector<std::string> found;
-  if (method_of(parameters_) != TrackMethod::automatic && helps([](auto& p) { p.method = "auto"; })) {
+  if (parameters_.method != TrackMethod::automatic && helps([](auto& p) { p.method = TrackMethod::automatic; })) {
     found.push_back("track.method = auto");
   }
-  if (parameters_.drift_affine == "off" && helps([](auto& p) { p.drift_affine = "auto"; })) {
+  if (parameters_.drift_affine == Switch::off && helps([](auto& p) { p.drift_affine = Switch::automatic; })) {
     found.push_back("effects.drift_affine = auto: one image is turned against the other");
   }
   const double further_um = 0.25 * std::min(stressed.width, stressed.height) * pixel_size_um;

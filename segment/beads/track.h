@@ -20,20 +20,25 @@ enum class TrackMethod {
   beads,       ///< each bead by itself
   correlation  ///< the texture in windows on a lattice, whatever it shows
 };
-inline constexpr std::pair<TrackMethod, const char*> kTrackMethods[] = {
-    {TrackMethod::automatic, "auto"}, {TrackMethod::beads, "beads"}, {TrackMethod::correlation, "correlation"}};
-const char* word_of(TrackMethod method);
+constexpr auto words(TrackMethod) { return std::array{"auto", "beads", "correlation"}; }
+
+/// Of a displacement field from elsewhere.
+enum class LengthUnit {
+  um,
+  px  ///< 0 at the centre of the first pixel
+};
+constexpr auto words(LengthUnit) { return std::array{"um", "px"}; }
 
 struct TrackParameters {
   std::optional<double> pixel_size_um;  ///< unset: from the images' own calibration
   images::PlaneChoice stressed_plane;   ///< of a time series the first
   images::PlaneChoice relaxed_plane;
-  int stressed_last = 0;               ///< of a time series the last time or page; 0: a single image
-  std::string method = "auto";         ///< of kTrackMethods: single beads know most where they can be told apart
+  int stressed_last = 0;                        ///< of a time series the last time or page; 0: a single image
+  TrackMethod method = TrackMethod::automatic;  ///< single beads know most where they can be told apart
   double detection_snr = 5;            ///< below 5 sd of the noise, chance maxima of a 1024² image become beads
   double largest_displacement_um = 0;  ///< beyond it a match is not looked for; 0: a quarter of a search window
-  /// on, off or auto: a stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too
-  std::string drift_affine = "off";
+  /// A stage drifts; a dish put back on it is turned, a gel swells, a stage tilts or heats, too.
+  Switch drift_affine = Switch::off;
   bool may_push = false;           ///< a gel that is pushed outward is no sign of exchanged images
   double effect_tolerance = 0.01;  ///< auto: what displaces the border by less, of the largest displacement, stays
   double least_similarity = 0.6;   ///< correlation of a bead's neighbourhoods below which it is no match
@@ -41,7 +46,7 @@ struct TrackParameters {
   // a displacement field from elsewhere
   std::string x_column = "x_um", y_column = "y_um", ux_column = "ux_um", uy_column = "uy_um";
   std::string sigma_column = "sigma_um";  ///< need not be there
-  std::string length_unit = "um";
+  LengthUnit length_unit = LengthUnit::um;
 };
 void declare(stage::ParameterList& list, TrackParameters& parameters);
 
@@ -143,7 +148,7 @@ class RelaxedBeads {
   Tracking track_by_any(const images::Image& stressed, double pixel_size_um, const Progress& progress) const;
   Tracking track_by(TrackMethod method, const images::Image& stressed, double pixel_size_um,
                     const Progress& progress) const;
-  Tracking track_as(TrackMethod method, const std::string& setting, const images::Image& stressed, double pixel_size_um,
+  Tracking track_as(TrackMethod method, Switch setting, const images::Image& stressed, double pixel_size_um,
                     const Progress& progress) const;
   std::string remedy(const images::Image& stressed, double pixel_size_um) const;
   images::Image relaxed_;

@@ -8,30 +8,13 @@
 
 namespace mbtfm::cells {
 
-std::string_view name_of(AdhesionSource source) {
-  switch (source) {
-    case AdhesionSource::image:
-      return "image";
-    case AdhesionSource::pattern:
-      return "pattern";
-    case AdhesionSource::fibre_ends:
-      return "fibre-ends";
-    case AdhesionSource::cell:
-      return "cell";
-  }
-  throw InternalError("unknown source of adhesions");
-}
-
 void declare(stage::ParameterList& list, CandidateParameters& p) {
   list.table("segment");
-  std::vector<std::string> choices = {"auto"};
-  for (const AdhesionSource source : kAdhesionSources) choices.emplace_back(name_of(source));
   list.add(
       "adhesions", p.adhesions,
       "where adhesions are; image: as the adhesion image, a mask or ROIs show them; pattern: candidates all over the "
       "adhesion mask, which says where adhesion is possible; fibre-ends: candidates at the ends of the fibres; cell: "
-      "there and along the rim of the cell; auto: image where there is one, else cell",
-      choices);
+      "there and along the rim of the cell; auto: image where there is one, else cell");
   list.add("candidate_spacing_um", p.candidate_spacing_um, Range::size_um(),
            "distance of neighbouring candidates for adhesions, and their diameter (um)");
   list.add("candidate_band_um", p.candidate_band_um, Range::size_um(),
@@ -41,18 +24,16 @@ void declare(stage::ParameterList& list, CandidateParameters& p) {
 }
 
 AdhesionSource source_of(const CandidateParameters& p, bool shows_adhesions, bool has_mask) {
-  if (p.adhesions == "auto") return shows_adhesions ? AdhesionSource::image : AdhesionSource::cell;
-  const auto source = std::ranges::find(kAdhesionSources, p.adhesions, [](AdhesionSource s) { return name_of(s); });
-  MBTFM_ASSERT(source != std::end(kAdhesionSources));
-  if (*source == AdhesionSource::image && !shows_adhesions)
+  if (!p.adhesions) return shows_adhesions ? AdhesionSource::image : AdhesionSource::cell;
+  if (p.adhesions == AdhesionSource::image && !shows_adhesions)
     throw UsageError(
         "adhesions = image: no adhesion image, no adhesion mask and no adhesions drawn by hand are given; give one, or "
         "set adhesions = cell");
-  if (*source == AdhesionSource::pattern && !has_mask)
+  if (p.adhesions == AdhesionSource::pattern && !has_mask)
     throw UsageError(
         "adhesions = pattern: no adhesion mask is given, which says where the pattern is; name it as adhesion_mask in "
         "[images] or as --adhesion-mask");
-  return *source;
+  return *p.adhesions;
 }
 
 std::vector<Vec2> hexagonal_lattice(Vec2 low_um, Vec2 high_um, double spacing_um, Placement placement) {

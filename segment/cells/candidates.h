@@ -2,8 +2,6 @@
 #pragma once
 
 #include <optional>
-#include <string>
-#include <string_view>
 #include <vector>
 
 #include "pipeline/contract/cell.h"
@@ -19,12 +17,11 @@ enum class AdhesionSource {
   fibre_ends,  ///< at the ends of the fibres
   cell         ///< there, and along the rim of the cell
 };
-inline constexpr AdhesionSource kAdhesionSources[] = {AdhesionSource::image, AdhesionSource::pattern,
-                                                      AdhesionSource::fibre_ends, AdhesionSource::cell};
-std::string_view name_of(AdhesionSource source);
+constexpr auto words(AdhesionSource) { return std::array{"image", "pattern", "fibre-ends", "cell"}; }
 
 struct CandidateParameters {
-  std::string adhesions = "auto";  ///< as they are seen, if anything shows them; else on the whole cell's rim
+  std::optional<AdhesionSource> adhesions =
+      {};  ///< unset: as they are seen, if anything shows them; else on the whole cell's rim
   /// Beads lie some 1 um apart and a force's field falls off within its own size: forces nearer than two such
   /// distances cannot be told apart.
   double candidate_spacing_um = 2;
@@ -34,7 +31,7 @@ struct CandidateParameters {
 };
 void declare(stage::ParameterList& list, CandidateParameters& parameters);
 
-/// The source that the parameters name; of `auto` the image where anything shows the adhesions, else the cell.
+/// The source that the parameters name; else the image where anything shows the adhesions, else the cell.
 /// @throws UsageError where the source that they name is not there
 AdhesionSource source_of(const CandidateParameters& parameters, bool shows_adhesions, bool has_mask);
 

@@ -145,7 +145,7 @@ std::vector<std::string> words_of(const std::string& name) {
 /// The program's own anchors and candidates, given back by hand, stay what they are.
 AdhesionOrigin stated_origin(const std::string& name) {
   for (const std::string& word : words_of(name)) {
-    const std::optional<AdhesionOrigin> origin = adhesion_origin_of(word);
+    const std::optional<AdhesionOrigin> origin = named<AdhesionOrigin>(word);
     if (origin && is_assumed(*origin)) return *origin;
   }
   return AdhesionOrigin::drawn;
@@ -155,9 +155,9 @@ AdhesionOrigin stated_origin(const std::string& name) {
 std::optional<FibreType> stated_type(const rois::Roi& roi, const std::string& where) {
   std::optional<FibreType> type;
   for (const std::string& word : words_of(roi.name)) {
-    const std::optional<FibreType> named = fibre_type_of(word);
-    if (named && type && *named != *type) throw InputError(where, "one fibre type in its name", "two");
-    if (named) type = named;
+    const std::optional<FibreType> stated = named<FibreType>(word);
+    if (stated && type && *stated != *type) throw InputError(where, "one fibre type in its name", "two");
+    if (stated) type = stated;
   }
   const bool is_type = roi.group >= 1 && roi.group <= static_cast<int>(std::size(kFibreTypes));
   if (!type && is_type) type = kFibreTypes[roi.group - 1];

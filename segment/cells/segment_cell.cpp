@@ -25,7 +25,7 @@ void declare(stage::ParameterList& list, SegmentParameters& p) {
   declare(list, p.actin_plane, "actin", "the actin image");
   list.add("align_channels", p.align_channels,
            "move fibres and outline to where the adhesion image has them; auto: where fibre ends tell a shift",
-           {"auto", "off"});
+           {Switch::automatic, Switch::off});
   list.add("contact_sheet", p.contact_sheet,
            "draw contact_sheet.png, overlays over the values of one or two of these parameters: name=a,b,c name=d,e");
   declare(list, p.adhesions);
@@ -89,7 +89,7 @@ void align(Segmentation& s, CellOutline& outline, std::vector<TracedFibre>& trac
   std::vector<Fibre> fibres;
   for (const TracedFibre& t : traced) fibres.push_back(t.fibre);
   s.alignment = align_channels(fibres, adhesions);
-  if (!s.alignment || p.align_channels == "off" || !s.alignment->is_significant()) return;
+  if (!s.alignment || p.align_channels == Switch::off || !s.alignment->is_significant()) return;
   s.is_aligned = true;
   const auto move = [&](auto& points) {
     for (Vec2& point : points) point = s.alignment->of(point);

@@ -23,8 +23,8 @@ struct SegmentParameters {
   int binning = 1;                      ///< to be quick: everything that is found becomes coarser with the pixels
   int cell = 1;                         ///< most images are of one cell
   images::PlaneChoice adhesion_plane, actin_plane;
-  std::string align_channels = "auto";  ///< actin on adhesions
-  std::string contact_sheet;            ///< none: it takes a segmentation for each of its pictures
+  Switch align_channels = Switch::automatic;  ///< actin on adhesions
+  std::string contact_sheet;                  ///< none: it takes a segmentation for each of its pictures
   AdhesionParameters adhesions;
   CandidateParameters candidates;
   FibreParameters fibres;

@@ -252,40 +252,6 @@ void write_name(Writer& out, std::size_t header2, const std::string& name) {
 
 }  // namespace
 
-std::string_view name_of(RoiShape shape) {
-  switch (shape) {
-    case RoiShape::polygon:
-      return "a polygon";
-    case RoiShape::freehand:
-      return "a freehand area";
-    case RoiShape::traced:
-      return "a traced area";
-    case RoiShape::rectangle:
-      return "a rectangle";
-    case RoiShape::oval:
-      return "an oval";
-    case RoiShape::ellipse:
-      return "an ellipse";
-    case RoiShape::composite:
-      return "a composite selection";
-    case RoiShape::line:
-      return "a straight line";
-    case RoiShape::polyline:
-      return "a segmented line";
-    case RoiShape::freehand_line:
-      return "a freehand line";
-    case RoiShape::angle:
-      return "an angle";
-    case RoiShape::point:
-      return "a point selection";
-    case RoiShape::text:
-      return "a text";
-    case RoiShape::image:
-      return "an image";
-  }
-  throw InternalError("unknown shape of a ROI");
-}
-
 bool is_area(RoiShape shape) { return shape <= RoiShape::composite; }
 bool is_line(RoiShape shape) { return shape >= RoiShape::line && shape <= RoiShape::freehand_line; }
 

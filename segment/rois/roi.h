@@ -35,7 +35,11 @@ enum class RoiShape {
   image
 };
 /// As ImageJ's tool bar calls it, for messages: "a polygon".
-std::string_view name_of(RoiShape shape);
+constexpr auto words(RoiShape) {
+  return std::array{"a polygon",  "a freehand area",       "a traced area",   "a rectangle",      "an oval",
+                    "an ellipse", "a composite selection", "a straight line", "a segmented line", "a freehand line",
+                    "an angle",   "a point selection",     "a text",          "an image"};
+}
 bool is_area(RoiShape shape);
 bool is_line(RoiShape shape);
 

@@ -57,7 +57,7 @@ class Refined final : public substrate::Substrate {
       : material_{gel, substrate::profile_of(parameters.modulus_profile)},
         parameters_(parameters),
         threads_(threads),
-        order_(parameters.element == "q1-p0" ? 1 : 2) {}
+        order_(parameters.element == substrate::FiniteElement::q1_p0 ? 1 : 2) {}
 
   Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
                                        const std::vector<substrate::Ellipse>& ellipses) const override {
@@ -256,7 +256,7 @@ class Refined final : public substrate::Substrate {
   /// to lambda / mu; at 0.495 the error is the same to 0.001 points as in double precision.
   bool is_single() const {
     constexpr double kMostForSingle = 0.495;
-    if (parameters_.precision != "auto") return parameters_.precision == "single";
+    if (parameters_.precision) return parameters_.precision == numerics::Precision::single_;
     return material_.gel.poisson_ratio <= kMostForSingle;
   }
 
@@ -266,7 +266,7 @@ class Refined final : public substrate::Substrate {
     const GridLines& lines = system.mesh().lines;
     const std::lock_guard lock(mutex_);
     figures_ = {{"substrate_model", "refined"},
-                {"substrate_element", parameters_.element},
+                {"substrate_element", name_of(parameters_.element)},
                 {"substrate_precision", std::string(is_single() ? "single" : "double")},
                 {"substrate_thickness_um", material_.gel.thickness_um},
                 {"substrate_unknowns", std::int64_t{system.n_unknowns()}},

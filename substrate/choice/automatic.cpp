@@ -36,13 +36,15 @@ SceneSize size_of(const std::vector<Vec2>& points_um, const std::vector<substrat
   return size;
 }
 
-std::string model_for(const Gel& gel, const substrate::SubstrateParameters& p, const substrate::GelEffects& effects) {
-  if (effects.grading.is_on) return "refined";
+substrate::ModelKind model_for(const Gel& gel, const substrate::SubstrateParameters& p,
+                               const substrate::GelEffects& effects) {
+  using enum substrate::ModelKind;
+  if (effects.grading.is_on) return refined;
   if (effects.sides.is_on) {
     const double elements = *p.side_distance_um / gel.thickness_um * p.cells_per_thickness;
-    return elements >= 2 ? "split" : "refined";
+    return elements >= 2 ? split : refined;
   }
-  return effects.thickness.is_on ? "layer" : "half-space";
+  return effects.thickness.is_on ? layer : half_space;
 }
 
 class Automatic final : public substrate::Substrate {
@@ -88,7 +90,7 @@ class Automatic final : public substrate::Substrate {
   substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
                                 const std::vector<Vec2>& forces_nN) const override {
     substrate::SubstrateParameters parameters = parameters_;
-    parameters.model = "refined";  // the one that has an inside
+    parameters.model = substrate::ModelKind::refined;  // the one that has an inside
     return make_substrate(gel_, parameters, threads_)->volume(ellipses, forces_nN);
   }
   std::vector<Effect> effects() const override {
@@ -119,7 +121,7 @@ class Automatic final : public substrate::Substrate {
     substrate::SubstrateParameters parameters = substrate::without_what_is_off(parameters_, effects_);
     parameters.model = model_for(gel_, parameters, effects_);
     stage::EffectSwitches decided;  // as the model has them: the switches are obeyed by now
-    decided.vertical_displacement = effects_.vertical.is_on ? "on" : "off";
+    decided.vertical_displacement = switched(effects_.vertical.is_on);
     parameters.effects = decided;
     model_ = make_substrate(gel_, parameters, threads_);
     return *model_;

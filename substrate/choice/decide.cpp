@@ -35,32 +35,34 @@ double grading_number(const Gel& gel, const substrate::SubstrateParameters& p) {
 }
 
 Effect decide_sides(const Gel& gel, const substrate::SubstrateParameters& p) {
-  const std::string& setting = p.effects.finite_sides;
+  const Switch setting = p.effects.finite_sides;
   if (!p.side_distance_um)
-    return stage::decided(substrate::kSides, setting, false, "no side_distance_um: they are far away");
+    return stage::decided(EffectKind::finite_sides, setting, false, "no side_distance_um: they are far away");
   const double distance = *p.side_distance_um / gel.thickness_um;
-  return stage::decided(substrate::kSides, setting, std::exp(-1.48 * distance), p.effects.effect_tolerance,
+  return stage::decided(EffectKind::finite_sides, setting, std::exp(-1.48 * distance), p.effects.effect_tolerance,
                         "at " + brief(distance) + " thicknesses they change the field by");
 }
 
 Effect decide_grading(const Gel& gel, const substrate::SubstrateParameters& p) {
-  const std::string& setting = p.effects.depth_graded_gel;
+  const Switch setting = p.effects.depth_graded_gel;
   if (p.modulus_profile.empty())
-    return stage::decided(substrate::kGrading, setting, false, "no modulus_profile: one modulus throughout");
-  return stage::decided(substrate::kGrading, setting, grading_number(gel, p), p.effects.effect_tolerance,
+    return stage::decided(EffectKind::depth_graded_gel, setting, false, "no modulus_profile: one modulus throughout");
+  return stage::decided(EffectKind::depth_graded_gel, setting, grading_number(gel, p), p.effects.effect_tolerance,
                         "the moduli change the field by at most");
 }
 
 Effect decide_thickness(const Gel& gel, const substrate::SubstrateParameters& p, double scene_um) {
   return stage::decided(
-      substrate::kThickness, p.effects.finite_thickness, thickness_number(gel, scene_um), p.effects.effect_tolerance,
+      EffectKind::finite_thickness, p.effects.finite_thickness, thickness_number(gel, scene_um),
+      p.effects.effect_tolerance,
       "with a scene " + brief(scene_um / gel.thickness_um) + " thicknesses wide the base changes the field by");
 }
 
 Effect decide_vertical(const substrate::SubstrateParameters& p) {
-  const std::string& setting = p.effects.vertical_displacement;
-  return stage::decided(substrate::kVertical, setting, false,
-                        setting == "on" ? "asked for" : "not asked for, and nothing along the surface depends on it");
+  const Switch setting = p.effects.vertical_displacement;
+  return stage::decided(
+      EffectKind::vertical_displacement, setting, false,
+      setting == Switch::on ? "asked for" : "not asked for, and nothing along the surface depends on it");
 }
 
 double surface_number(const substrate::SubstrateParameters& p, double adhesion_radius_um) {
@@ -72,11 +74,12 @@ double surface_number(const substrate::SubstrateParameters& p, double adhesion_r
 /// No model has it.
 Effect decide_surface(const substrate::SubstrateParameters& p, const SceneSize& scene) {
   if (p.surface_tilt_deg == 0 && p.surface_roughness_um == 0) {
-    return stage::decided(substrate::kSurface, "auto", false,
+    return stage::decided(EffectKind::uneven_surface, Switch::automatic, false,
                           "level and smooth: no surface_tilt_deg, no surface_roughness_um");
   }
-  Effect effect = stage::decided(substrate::kSurface, "auto", surface_number(p, scene.adhesion_radius_um),
-                                 p.effects.effect_tolerance, "tilt and unevenness change the field by at most");
+  Effect effect =
+      stage::decided(EffectKind::uneven_surface, Switch::automatic, surface_number(p, scene.adhesion_radius_um),
+                     p.effects.effect_tolerance, "tilt and unevenness change the field by at most");
   if (effect.is_on) effect.why += "; but no model has it: results are off by as much";
   effect.is_on = false;
   return effect;
@@ -90,11 +93,12 @@ substrate::GelEffects decide(const Gel& gel, const substrate::SubstrateParameter
                                 decide_vertical(p), decide_surface(p, scene)};
   for (const Effect& needs_block : {effects.sides, effects.grading}) {
     if (!needs_block.is_on || effects.thickness.is_on) continue;
+    const std::string name = name_of(needs_block.kind);
     substrate::require_of_effects(
-        effects.thickness.setting != "off",
-        "finite_thickness = off, yet " + needs_block.name + " is on, whose gel has a base: switch both off or neither");
+        effects.thickness.setting != Switch::off,
+        "finite_thickness = off, yet " + name + " is on, whose gel has a base: switch both off or neither");
     effects.thickness.is_on = true;
-    effects.thickness.why += "; on for " + needs_block.name + ", whose gel has a base";
+    effects.thickness.why += "; on for " + name + ", whose gel has a base";
   }
   return effects;
 }

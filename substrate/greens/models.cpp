@@ -7,8 +7,9 @@ namespace mbtfm::greens {
 
 std::unique_ptr<substrate::Substrate> make_greens(const Gel& gel, const substrate::SubstrateParameters& parameters,
                                                   int threads) {
-  return substrate::make_from({{"half-space", make_half_space, true}, {"layer", make_layer, true}}, gel, parameters,
-                              threads);
+  return substrate::make_from(
+      {{substrate::ModelKind::half_space, make_half_space, true}, {substrate::ModelKind::layer, make_layer, true}}, gel,
+      parameters, threads);
 }
 
 }  // namespace mbtfm::greens

@@ -5,8 +5,6 @@
 
 namespace mbtfm::greens {
 
-enum class GelModel { half_space, layer };
-
 /// Displacement (um) by a wave of unit traction (1 kPa), along and across its wave vector.
 struct WaveCompliance {
   double along_um_per_kPa = 0, across_um_per_kPa = 0;

@@ -174,8 +174,8 @@ TEST(Criteria, do_not_depend_on_the_unit_of_the_displacements) {
   const MatrixXd G = ring_of_bells(2);
   const VectorXd u = G * some_tractions() + noise_of(0.5, kN, 3);
   const LambdaScan one = judged(G, u, 0.25), other = judged(G, 1000 * u, 1e6 * 0.25);
-  for (const char* criterion : {"risk", "gcv", "evidence"}) {
-    EXPECT_NEAR(chosen_lambda(other, criterion) / chosen_lambda(one, criterion), 1, 1e-9) << criterion;
+  for (const LambdaCriterion criterion : {LambdaCriterion::risk, LambdaCriterion::gcv, LambdaCriterion::evidence}) {
+    EXPECT_NEAR(chosen_lambda(other, criterion) / chosen_lambda(one, criterion), 1, 1e-9) << name_of(criterion);
   }
   EXPECT_EQ(one.by_l_curve.has_value(), other.by_l_curve.has_value());
 }

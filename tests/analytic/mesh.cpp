@@ -38,13 +38,14 @@ TEST(Mesh, quality_is_one_for_an_equilateral_and_zero_for_a_flat_triangle) {
 
 // Poisson discs come to rest as patches of lattice, whose borders cost quality (docs/theory.md): the bar of any mesh.
 TEST(Mesh, unit_circle_is_as_good_as_distmesh_makes_it) {
-  for (const auto& [seeds, mean] : {std::pair{"jittered", 0.985}, {"regular", 0.985}, {"poisson", 0.95}}) {
+  for (const auto& [seeds, mean] :
+       {std::pair{Seeds::jittered, 0.985}, {Seeds::regular, 0.985}, {Seeds::poisson, 0.95}}) {
     for (const double edge : {0.1, 0.05}) {
       for (const std::uint64_t seed : {1, 2, 3, 4, 5}) {
         const GeneratedNetwork generated =
             generate_network(disc(400), {.edge_length_um = edge, .seed = seed, .seeds = seeds});
-        EXPECT_GE(generated.mean_quality, mean) << seeds << ", edge " << edge << " seed " << seed;
-        EXPECT_GE(generated.worst_quality, 0.5) << seeds << ", edge " << edge << " seed " << seed;
+        EXPECT_GE(generated.mean_quality, mean) << name_of(seeds) << ", edge " << edge << " seed " << seed;
+        EXPECT_GE(generated.worst_quality, 0.5) << name_of(seeds) << ", edge " << edge << " seed " << seed;
       }
     }
   }
@@ -52,7 +53,8 @@ TEST(Mesh, unit_circle_is_as_good_as_distmesh_makes_it) {
 
 TEST(Mesh, disc_and_square_obey_eulers_formula) {
   for (const Cell& cell : {disc(100), square(2)}) {
-    const GeneratedNetwork generated = generate_network(cell, {.edge_length_um = 0.15, .link_reach = "neighbours"});
+    const GeneratedNetwork generated =
+        generate_network(cell, {.edge_length_um = 0.15, .link_reach = LinkReach::neighbours});
     const int n_vertices = static_cast<int>(generated.network.vertices_um.size());
     const int n_edges = static_cast<int>(generated.network.links.size());
     EXPECT_EQ(n_vertices - n_edges + generated.n_triangles, 1);
@@ -74,7 +76,8 @@ TEST(Mesh, holes_are_left_out) {
   Cell cell = square(4);
   cell.holes_um = {{{0.5, 0.5}, {1.5, 0.5}, {1.5, 1.5}, {0.5, 1.5}}, {{2, 2}, {2, 3.5}, {3.5, 3.5}, {3.5, 2}}};
   for (const double edge : {0.1, 0.3}) {
-    const GeneratedNetwork generated = generate_network(cell, {.edge_length_um = edge, .link_reach = "neighbours"});
+    const GeneratedNetwork generated =
+        generate_network(cell, {.edge_length_um = edge, .link_reach = LinkReach::neighbours});
     // vertices lie on the sides and corners, as the square's above
     EXPECT_NEAR(generated.area_um2, 16 - 1 - 2.25, 1e-9) << "edge " << edge;
     const int n_vertices = static_cast<int>(generated.network.vertices_um.size());
@@ -92,8 +95,8 @@ TEST(Mesh, edges_grow_from_what_is_resolved_no_faster_than_wanted) {
   a.area_um2 = std::numbers::pi * 0.16;
   cell.adhesions = {a};
   NetworkParameters p;
-  p.adhesion_anchor = "rim";
-  p.link_reach = "neighbours";
+  p.adhesion_anchor = AdhesionAnchor::rim;
+  p.link_reach = LinkReach::neighbours;
   for (const double growth : {0.15, 0.3}) {
     p.edge_growth = growth;
     const Network net = generate_network(cell, p).network;
@@ -147,9 +150,9 @@ TEST(Mesh, edges_along_an_adhesions_rim_enclose_its_area) {
 TEST(Mesh, sheet_of_even_surface_tension_is_at_rest_inside) {
   // Links weighted by width are minus the gradient of the area, which inner vertices do not change; what they hand on
   // to second neighbours exerts no force. So the forces on inner vertices cancel to rounding, and none is clipped here.
-  for (const std::string reach : {"neighbours", "second-neighbours"}) {
+  for (const LinkReach reach : values_of<LinkReach>()) {
     const GeneratedNetwork generated =
-        generate_network(disc(400), {.edge_length_um = 0.1, .link_weights = "width", .link_reach = reach});
+        generate_network(disc(400), {.edge_length_um = 0.1, .link_weights = LinkWeights::width, .link_reach = reach});
     const Network& net = generated.network;
     std::vector<Vec2> force(net.vertices_um.size());
     for (const Link& link : net.links) {
@@ -160,7 +163,7 @@ TEST(Mesh, sheet_of_even_surface_tension_is_at_rest_inside) {
     int n_inner = 0;
     for (std::size_t v = 0; v < force.size(); ++v) {
       if (norm(net.vertices_um[v]) > 0.8) continue;
-      EXPECT_NEAR(norm(force[v]), 0, 1e-12) << "vertex " << v << ", " << reach;
+      EXPECT_NEAR(norm(force[v]), 0, 1e-12) << "vertex " << v << ", " << name_of(reach);
       ++n_inner;
     }
     EXPECT_GT(n_inner, 100);
@@ -212,13 +215,13 @@ TEST(Mesh, second_neighbours_of_a_regular_triangulation_pull_evenly_in_twelve_di
 
 TEST(Mesh, mean_width_is_that_of_a_regular_triangulation) {
   // Widths times lengths of all links fill twice the area: the sheet's tension does not depend on the edge length.
-  for (const std::string reach : {"neighbours", "second-neighbours"}) {
+  for (const LinkReach reach : values_of<LinkReach>()) {
     for (const double edge : {0.05, 0.1, 0.2}) {
-      const GeneratedNetwork generated =
-          generate_network(disc(400), {.edge_length_um = edge, .link_weights = "width", .link_reach = reach});
+      const GeneratedNetwork generated = generate_network(
+          disc(400), {.edge_length_um = edge, .link_weights = LinkWeights::width, .link_reach = reach});
       double sum = 0;
       for (const Link& link : generated.network.links) sum += link.share * link.rest_length_um * edge / std::sqrt(3.0);
-      EXPECT_NEAR(sum, 2 * generated.area_um2, 1e-3 * generated.area_um2) << reach << ", edge " << edge;
+      EXPECT_NEAR(sum, 2 * generated.area_um2, 1e-3 * generated.area_um2) << name_of(reach) << ", edge " << edge;
     }
   }
 }

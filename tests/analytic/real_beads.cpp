@@ -63,7 +63,7 @@ TEST(RealBeads, a_cell_that_the_border_cuts_moves_nothing_beyond_its_reach) {
   const auto file = kBeads.parent_path() / "real/adhesions_and_beads/bead_a.tif";
   if (!std::filesystem::exists(file)) GTEST_SKIP() << file << " is not here";
   TrackParameters parameters;
-  parameters.drift_affine = "auto";
+  parameters.drift_affine = Switch::automatic;
   const images::Image stressed = images::read_image(file, {.page = 1}), relaxed = images::read_image(file, {.page = 2});
   constexpr double kPixel_um = 0.02025;
   for (const bool is_exchanged : {false, true}) {  // no false word of exchanged images, either way round
@@ -98,7 +98,7 @@ TEST(RealBeads, weak_beads_on_a_mottled_ground_are_followed_by_windows_as_image_
   const auto folder = kBeads / "axon";
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
   TrackParameters parameters;
-  parameters.drift_affine = "auto";
+  parameters.drift_affine = Switch::automatic;
   const Tracking tracking = track_beads(images::read_image(folder / "beads_relaxed.tif"),
                                         images::read_image(folder / "beads_stressed.tif"), 1.0, parameters, 2);
   EXPECT_TRUE(tracking.windows.is_on);
@@ -139,7 +139,7 @@ TEST(RealBeads, a_growth_cone_moves_its_gel_as_published_tracks_say) {
   if (!std::filesystem::exists(folder)) GTEST_SKIP() << folder << " is not here";
   constexpr double kPixel_um = 0.116;
   TrackParameters parameters;
-  parameters.drift_affine = "auto";
+  parameters.drift_affine = Switch::automatic;
   const Tracking tracking = track_beads(images::read_image(folder / "image1.tif"),
                                         images::read_image(folder / "image2.tif"), kPixel_um, parameters, 2);
   EXPECT_FALSE(tracking.windows.is_on);
@@ -211,7 +211,7 @@ TEST_F(TurnedBeads, are_refused_as_shifted_ones_and_followed_as_turned_ones) {
   EXPECT_THROW(track_beads(images_[0], images_[1], 1.0), InvalidData);
   {
     TrackParameters parameters;
-    parameters.drift_affine = "on";
+    parameters.drift_affine = Switch::on;
     const Tracking tracking = track_beads(images_[0], images_[1], 1.0, parameters, 2);
     EXPECT_NEAR(tracking.common.turn_rad * 180 / std::numbers::pi, 10, 0.01);
     EXPECT_GE(tracking.n_good, 0.85 * static_cast<double>(tracking.field.size()));  // the others have left

@@ -74,7 +74,7 @@ TEST(TensionFit, finite_differences_see_a_slack_fibre_begin_to_pull) {
 TEST(TensionFit, blockwise_conjugate_gradients_find_the_noise_free_tensions) {
   const TensionScene scene = tension_scene("case_21", 1000, 0, 4);
   FitParameters parameters{.max_evaluations = 1500};
-  parameters.method = "blockwise-cg";
+  parameters.method = FitMethod::blockwise_cg;
   // The thesis' stopping rule leaves more than this (fig. 3.4); conjugate gradients with exact gradients get here in
   // some hundred evaluations.
   EXPECT_LE(relative_error(fit(scene, parameters), scene), 1e-3);
@@ -83,11 +83,11 @@ TEST(TensionFit, blockwise_conjugate_gradients_find_the_noise_free_tensions) {
 TEST(TensionFit, all_methods_end_at_the_same_minimum_and_Gauss_Newton_is_there_first) {
   const TensionScene scene = tension_scene("case_21", 1000, 0.05, 5);
   const TensionFit newton = fit(scene, {});
-  for (const char* method : {"plain-cg", "blockwise-cg"}) {
+  for (const FitMethod method : {FitMethod::plain_cg, FitMethod::blockwise_cg}) {
     const TensionFit other = fit(scene, {.method = method, .max_evaluations = 1500});
     // a hundredth of a bead's variance: a tenth of a standard error
-    EXPECT_NEAR(other.trial.objective, newton.trial.objective, 0.01) << method;
-    EXPECT_LT(5 * newton.n_evaluations, other.n_evaluations) << method;
+    EXPECT_NEAR(other.trial.objective, newton.trial.objective, 0.01) << name_of(method);
+    EXPECT_LT(5 * newton.n_evaluations, other.n_evaluations) << name_of(method);
   }
 }
 
@@ -218,7 +218,7 @@ TEST(NoiseLevel, is_the_standard_deviation_of_a_component_far_from_the_cell_what
 
 /// Variance of least squares over that of this loss, of many beads whose residuals are Gaussian in the plane:
 /// <(psi' + psi/r)/2>² / <psi²/2> over Rayleigh's distribution of their lengths, where by parts the slope is <psi r/2>.
-double efficiency(const std::string& loss) {
+double efficiency(Loss loss) {
   constexpr double kStep = 1e-3;
   double slope = 0, psi_squared = 0;
   for (double r = kStep / 2; r < 10; r += kStep) {
@@ -230,19 +230,19 @@ double efficiency(const std::string& loss) {
 }
 
 TEST(RobustLoss, costs_the_efficiency_it_says_where_the_noise_is_Gaussian_in_the_plane) {
-  EXPECT_NEAR(efficiency("squares"), 1, 1e-6);
-  EXPECT_NEAR(efficiency("huber"), 0.95, 5e-4);  // what is stated, to its last digit
-  EXPECT_NEAR(efficiency("tukey"), 0.95, 5e-4);
-  EXPECT_NEAR(efficiency("l1"), std::numbers::pi / 4, 5e-4);
+  EXPECT_NEAR(efficiency(Loss::squares), 1, 1e-6);
+  EXPECT_NEAR(efficiency(Loss::huber), 0.95, 5e-4);  // what is stated, to its last digit
+  EXPECT_NEAR(efficiency(Loss::tukey), 0.95, 5e-4);
+  EXPECT_NEAR(efficiency(Loss::l1), std::numbers::pi / 4, 5e-4);
 }
 
 TEST(RobustLoss, lets_one_bead_pull_no_harder_than_a_bound) {
   // w r: rises no more beyond huber's bound, and comes back to zero for tukey
   for (const double r : {2.0, 10.0, 1e6}) {
-    EXPECT_NEAR(r * robust_weight("huber", r), 100 * robust_weight("huber", 100), 1e-9);
-    EXPECT_NEAR(r * robust_weight("l1", r), 1, 1e-9);
+    EXPECT_NEAR(r * robust_weight(Loss::huber, r), 100 * robust_weight(Loss::huber, 100), 1e-9);
+    EXPECT_NEAR(r * robust_weight(Loss::l1, r), 1, 1e-9);
   }
-  EXPECT_EQ(robust_weight("tukey", 10), 0);
+  EXPECT_EQ(robust_weight(Loss::tukey, 10), 0);
 }
 
 TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
@@ -258,12 +258,12 @@ TEST(RobustLoss, states_the_variance_that_its_efficiency_leaves) {
   data.response = substrate::dense_response(Eigen::MatrixXd::Zero(2 * kBeads, 2));
   data.n_used = 2 * kBeads;
   const Eigen::VectorXd no_forces = Eigen::VectorXd::Zero(2);
-  for (const std::string loss : {"squares", "huber", "tukey"}) {
+  for (const Loss loss : {Loss::squares, Loss::huber, Loss::tukey}) {
     double weights = 0;
     for (Eigen::Index b = 0; b < kBeads; ++b)
       weights += robust_weight(loss, data.displacement_um.segment<2>(2 * b).norm() / 0.2) / kBeads;
     const double variance = misfit_variance(data, no_forces, 1, loss) / weights;
-    EXPECT_NEAR(variance * efficiency(loss) / 0.04, 1, 4 * 2 / std::sqrt(1.0 * kBeads)) << loss;
+    EXPECT_NEAR(variance * efficiency(loss) / 0.04, 1, 4 * 2 / std::sqrt(1.0 * kBeads)) << name_of(loss);
   }
 }
 

@@ -89,7 +89,7 @@ TEST(Track, a_dish_put_back_turned_is_turned_back) {
     const auto pair =
         draw_bead_pair(peaks, {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = {4, -7}, .seed = 3});
     TrackParameters parameters;
-    parameters.drift_affine = "on";
+    parameters.drift_affine = Switch::on;
     const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
     EXPECT_NEAR(tracking.common.turn_rad, turn_rad, 2e-4);  // 0.04 px at the border
     EXPECT_NEAR(tracking.common.drift_um.x, 4, 0.02);
@@ -108,7 +108,7 @@ struct Similarity {
 
 Tracking tracked_similarity(const test::BeadPair& pair) {
   TrackParameters parameters;
-  parameters.drift_affine = "on";
+  parameters.drift_affine = Switch::on;
   return track_beads(pair.relaxed, pair.stressed, 1.0, parameters, 2);
 }
 

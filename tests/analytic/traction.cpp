@@ -19,10 +19,10 @@ namespace {
 using test::ellipse_scene;
 using test::EllipseScene;
 
-TractionParameters half_space(const std::string& method = "fttc") {
+TractionParameters half_space(TractionMethod method = TractionMethod::fttc) {
   TractionParameters parameters;
   parameters.method = method;
-  parameters.gel_model = "half-space";
+  parameters.gel_model = GelModel::half_space;
   return parameters;
 }
 
@@ -51,7 +51,7 @@ TEST(SurfaceSpectrum, its_waves_add_up_to_the_field_of_a_loaded_disc) {
   for (const double nu : {0.0, 0.3, 0.4999}) {
     const Gel gel{.youngs_modulus_kPa = 5, .poisson_ratio = nu, .thickness_um = 4};
     const Lattice lattice{.origin_um = {}, .spacing_um = 0.25, .n_columns = 480, .n_rows = 450};
-    const SurfaceSpectrum spectrum(gel, greens::GelModel::layer, lattice, Surroundings::periodic);
+    const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
     const WaveTransform transform(lattice.n_columns, lattice.n_rows);
     const double radius = 3;
     const Vec2 centre = lattice.position_um(240, 220);
@@ -89,8 +89,8 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
     // waves of 200 um down to the shortest of a lattice of 0.1 um
     for (double length_um = 200; length_um > 0.14; length_um /= 1.1) {
       const double k = 2 * std::numbers::pi / length_um;
-      const greens::WaveCompliance layer = greens::wave_compliance(gel, greens::GelModel::layer, k);
-      const greens::WaveCompliance half = greens::wave_compliance(gel, greens::GelModel::half_space, k);
+      const greens::WaveCompliance layer = greens::wave_compliance(gel, GelModel::layer, k);
+      const greens::WaveCompliance half = greens::wave_compliance(gel, GelModel::half_space, k);
       ASSERT_TRUE(std::isfinite(layer.along_um_per_kPa) && std::isfinite(layer.across_um_per_kPa));
       furthest = std::max({furthest, std::abs(layer.along_um_per_kPa / half.along_um_per_kPa - 1),
                            std::abs(layer.across_um_per_kPa / half.across_um_per_kPa - 1)});
@@ -104,9 +104,8 @@ TEST(SurfaceSpectrum, a_thick_layer_is_finite_and_tends_to_the_half_space) {
 TEST(SurfaceSpectrum, an_even_traction_shears_a_layer_as_a_very_long_wave_does) {
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 30};
   const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
-  const SurfaceSpectrum spectrum(gel, greens::GelModel::layer, lattice, Surroundings::periodic);
-  const greens::WaveCompliance longest =
-      greens::wave_compliance(gel, greens::GelModel::layer, 1e-6);  // of 2e5 thicknesses
+  const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic);
+  const greens::WaveCompliance longest = greens::wave_compliance(gel, GelModel::layer, 1e-6);  // of 2e5 thicknesses
   EXPECT_NEAR(spectrum.across_um_per_kPa()[0] / longest.across_um_per_kPa, 1, 1e-6);
   EXPECT_NEAR(spectrum.along_um_per_kPa()[0] / longest.along_um_per_kPa, 1, 1e-6);
 }
@@ -115,7 +114,7 @@ TEST(SurfaceSpectrum, a_loaded_cell_turned_by_a_quarter_displaces_the_same_turne
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.45, .thickness_um = 30};
   const Lattice lattice{.origin_um = {}, .spacing_um = 1, .n_columns = 32, .n_rows = 32};
   for (const Basis basis : {Basis::waves, Basis::cells}) {
-    const SurfaceSpectrum spectrum(gel, greens::GelModel::layer, lattice, Surroundings::periodic, basis);
+    const SurfaceSpectrum spectrum(gel, GelModel::layer, lattice, Surroundings::periodic, basis);
     const WaveTransform transform(32, 32);
     const auto displaced = [&](Eigen::ArrayXd NodeField::*component) {
       NodeField load = transform.no_field();
@@ -149,7 +148,7 @@ TEST(LatticeProblem, states_the_variance_of_weighted_data_that_show_nothing_but_
   }
   const LatticeProblem problem(
       beads, {.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-      {.model = greens::GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+      {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
   EXPECT_GT(static_cast<double>(problem.field().n_nodes()), 2.0 * kBeads);
   EXPECT_NEAR(problem.data_squared() / problem.n_data() / *problem.stated_variance(), 1, 4 / std::sqrt(1.0 * kBeads));
 }
@@ -191,7 +190,7 @@ TEST(Criteria, an_l_curve_has_a_corner_where_it_is_an_l_and_none_where_it_bends_
       EXPECT_NEAR(std::log(*scan.by_l_curve / kCorner), 0, std::log(1.2));  // a tenth of the scan's step
     } else {
       try {
-        chosen_lambda(scan, "l-curve");
+        chosen_lambda(scan, LambdaCriterion::l_curve);
         FAIL() << "a corner was found";
       } catch (const NotSolved& error) {
         EXPECT_NE(error.report.reason.find("set lambda_by = risk"), std::string::npos) << error.report.reason;
@@ -207,14 +206,11 @@ TEST(Fttc, its_automatic_lambda_is_nearly_the_best_there_is) {
         if (noise == 0 && states_errors) continue;
         if (n_side == 256 && states_errors) continue;
         const EllipseScene scene = ellipse_scene(n_side, noise, 7, 0, 64, states_errors);
-        const LatticeProblem problem(scene.field, scene.gel,
-                                     {.model = greens::GelModel::half_space,
-                                      .spacing_um = {},
-                                      .padding = 1.5,
-                                      .basis = Basis::waves,
-                                      .threads = 1});
+        const LatticeProblem problem(
+            scene.field, scene.gel,
+            {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
         TikhonovSolver solver(problem);
-        const double chosen = chosen_lambda(scan_lambda(problem, solver), "risk");
+        const double chosen = chosen_lambda(scan_lambda(problem, solver), LambdaCriterion::risk);
         const auto error_at = [&](double lambda) {
           solver.solve(lambda, 1e-4);
           return test::traction_error(scene, tractions_kPa(problem, solver.solution(), ReadOut::cells, 0));
@@ -254,7 +250,7 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
   for (const double noise : {0.0, 0.05, 0.1}) {
     const EllipseScene scene = ellipse_scene(128, noise, 5);
     const auto start = std::chrono::steady_clock::now();
-    const Reconstruction r = reconstruct(inputs_of(scene), half_space("sparse"), 1);
+    const Reconstruction r = reconstruct(inputs_of(scene), half_space(TractionMethod::sparse), 1);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - start;
     const double error = test::traction_error(scene, map_of(r));
     std::printf("sparse, noise %g: L2 %.3f, F %.3f, %.1f s\n", noise, error, test::force_error(scene, forces_of(r)),
@@ -265,7 +261,7 @@ TEST(Sparse, tractions_are_sharper_than_any_smooth_ones) {
 }
 
 TEST(Tractions, forces_by_adhesion_are_nearer_the_truth_than_any_sum_of_the_map_over_grown_ellipses) {
-  for (const char* method : {"fttc", "sparse"}) {
+  for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::sparse}) {
     for (const double noise : {0.02, 0.08}) {
       const EllipseScene scene = ellipse_scene(64, noise, 31);
       const Reconstruction r = reconstruct(inputs_of(scene), half_space(method), 2);
@@ -277,8 +273,8 @@ TEST(Tractions, forces_by_adhesion_are_nearer_the_truth_than_any_sum_of_the_map_
         best = std::min(best, test::force_error(scene, sums));
       }
       const double reached = test::force_error(scene, forces_of(r));
-      std::printf("%s, noise %g: error of forces %.3f, of the best sums %.3f\n", method, noise, reached, best);
-      EXPECT_LE(reached, best) << method << ", noise " << noise;
+      std::printf("%s, noise %g: error of forces %.3f, of the best sums %.3f\n", name_of(method), noise, reached, best);
+      EXPECT_LE(reached, best) << name_of(method) << ", noise " << noise;
     }
   }
 }
@@ -296,15 +292,16 @@ void expect_forces_err_as_stated(const TractionParameters& parameters, double no
       sum += z * z / 40;
     }
   }
-  std::printf("%s, noise %g, lambda %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n", parameters.method.c_str(),
+  std::printf("%s, noise %g, lambda %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n", name_of(parameters.method),
               noise, parameters.lambda_um_per_kPa.value_or(0), offset, sum);
-  EXPECT_LE(std::abs(offset), 3 * std::sqrt(1 / 40.0)) << parameters.method << ", noise " << noise;
-  EXPECT_NEAR(sum, 1, 3 * std::sqrt(2 / 40.0)) << parameters.method << ", noise " << noise;
+  EXPECT_LE(std::abs(offset), 3 * std::sqrt(1 / 40.0)) << name_of(parameters.method) << ", noise " << noise;
+  EXPECT_NEAR(sum, 1, 3 * std::sqrt(2 / 40.0)) << name_of(parameters.method) << ", noise " << noise;
 }
 
 TEST(Tractions, forces_by_adhesion_err_as_much_as_stated_whatever_the_penalty_takes) {
   for (const double noise : {0.03, 0.08}) {
-    for (const char* method : {"fttc", "sparse"}) expect_forces_err_as_stated(half_space(method), noise);
+    for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::sparse})
+      expect_forces_err_as_stated(half_space(method), noise);
   }
   // with lambdas that others chose: far less smoothing than the default, and the default's at the larger noise
   TractionParameters parameters = half_space();
@@ -323,7 +320,7 @@ TEST(AdhesionForces, are_as_good_as_the_noise_allows_and_err_as_much_as_stated) 
     const int n_seeds = noise > 0 ? 10 : 1;
     for (int seed = 1; seed <= n_seeds; ++seed) {
       const EllipseScene scene = ellipse_scene(128, noise, static_cast<unsigned>(seed));
-      const Reconstruction r = reconstruct(inputs_of(scene), half_space("adhesion-forces"), 2);
+      const Reconstruction r = reconstruct(inputs_of(scene), half_space(TractionMethod::adhesion_forces), 2);
       error += test::force_error(scene, forces_of(r)) / n_seeds;
       for (std::size_t a = 0; a < r.forces.size(); ++a) {
         const double off = norm(r.forces[a].force_nN) - norm(scene.forces_nN[a]);
@@ -354,7 +351,7 @@ TEST(AdhesionForces, of_few_beads_tell_the_noise_by_what_forces_leave_of_it) {
       const double x = place(random), y = place(random), u = noise(random), v = noise(random);
       inputs.beads.push_back({.position_um = {x, y}, .displacement_um = {u, v}, .sigma_um = 0, .flag = {}});
     }
-    const Reconstruction r = reconstruct(inputs, half_space("adhesion-forces"), 1);
+    const Reconstruction r = reconstruct(inputs, half_space(TractionMethod::adhesion_forces), 1);
     ASSERT_EQ(r.figures.front().first, "residual_variance_um2");
     mean += std::get<double>(r.figures.front().second) / kDraws;
   }
@@ -363,14 +360,14 @@ TEST(AdhesionForces, of_few_beads_tell_the_noise_by_what_forces_leave_of_it) {
 
 TEST(AdhesionForces, sensitivities_are_what_a_wrong_ellipse_does) {
   const EllipseScene scene = ellipse_scene(64, 0.02, 3);
-  const Reconstruction before = reconstruct(inputs_of(scene), half_space("adhesion-forces"), 2);
+  const Reconstruction before = reconstruct(inputs_of(scene), half_space(TractionMethod::adhesion_forces), 2);
   constexpr std::size_t kOne = 4;
   const double angle = scene.adhesions[kOne].angle_rad;
   const Vec2 along{std::cos(angle), std::sin(angle)};
   const auto change_by = [&](const std::function<void(Adhesion&)>& edit) {
     TractionInputs inputs = inputs_of(scene);
     edit(inputs.adhesions[kOne]);
-    const Reconstruction after = reconstruct(inputs, half_space("adhesion-forces"), 2);
+    const Reconstruction after = reconstruct(inputs, half_space(TractionMethod::adhesion_forces), 2);
     return norm(after.forces[kOne].force_nN - before.forces[kOne].force_nN);
   };
   // the same equations by another route: rounding
@@ -417,7 +414,7 @@ TEST(DenseMethods, point_forces_find_those_of_the_scene) {
   // too.
   for (const double noise : {0.0, 0.05}) {
     const EllipseScene scene = ellipse_scene(64, noise, 5);
-    const Reconstruction r = reconstruct(inputs_of(scene), half_space("trpf"), 2);
+    const Reconstruction r = reconstruct(inputs_of(scene), half_space(TractionMethod::trpf), 2);
     EXPECT_LE(test::force_error(scene, forces_of(r)), 0.15);
   }
 }
@@ -428,7 +425,7 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
     const double angle = k * std::numbers::pi / 12;
     outline.push_back(Vec2{32, 32} + 26 * Vec2{std::cos(angle), std::sin(angle)});
   }
-  for (const char* method : {"trpf", "bem"}) {
+  for (const TractionMethod method : {TractionMethod::trpf, TractionMethod::bem}) {
     for (const double noise : {0.01, 0.05, 0.1}) {
       const EllipseScene scene = ellipse_scene(64, noise, 401);
       TractionInputs inputs = inputs_of(scene);
@@ -438,10 +435,10 @@ TEST(DenseMethods, state_errors_that_hold_noise_penalty_and_model) {
       for (std::size_t a = 0; a < r.forces.size(); ++a) {
         squares += std::pow((norm(r.forces[a].force_nN) - norm(scene.forces_nN[a])) / *r.forces[a].sigma_nN, 2) / 8;
       }
-      std::printf("%s, noise %g: rms of error/sigma %.2f\n", method, noise, std::sqrt(squares));
+      std::printf("%s, noise %g: rms of error/sigma %.2f\n", name_of(method), noise, std::sqrt(squares));
       // the noise alone would give 1.6 to 10; the root of a mean of eight squares is itself known to a quarter
-      EXPECT_GT(std::sqrt(squares), 0.7) << method << noise;
-      EXPECT_LT(std::sqrt(squares), 1.4) << method << noise;
+      EXPECT_GT(std::sqrt(squares), 0.7) << name_of(method) << noise;
+      EXPECT_LT(std::sqrt(squares), 1.4) << name_of(method) << noise;
     }
   }
 }
@@ -466,7 +463,7 @@ TEST(DenseMethods, elements_find_tractions_that_are_even_on_elements) {
     }
   }
   TractionParameters parameters;
-  parameters.method = "bem";
+  parameters.method = TractionMethod::bem;
   parameters.element_um = 3;
   parameters.lambda_um_per_kPa = 1e-6;  // as good as none
   const Reconstruction r = reconstruct(inputs, parameters, 2);
@@ -497,7 +494,7 @@ TEST(NeighbourNoise, is_not_told_by_few_beads_or_beads_on_a_line) {
 }
 
 TEST(Fttc, a_gel_of_poissons_ratio_one_half_is_the_limit_of_nearly_incompressible_ones) {
-  for (const greens::GelModel model : {greens::GelModel::layer, greens::GelModel::half_space}) {
+  for (const GelModel model : {GelModel::layer, GelModel::half_space}) {
     for (const double k : {0.01, 0.1, 1.0}) {
       const auto at = [&](double nu) {
         return greens::wave_compliance({.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 60}, model, k);
@@ -507,12 +504,13 @@ TEST(Fttc, a_gel_of_poissons_ratio_one_half_is_the_limit_of_nearly_incompressibl
     }
   }
   const std::vector<substrate::Ellipse> ellipses = {{{0, 0}, 1, 0.5, 0.3}};
-  for (const char* model : {"layer", "half-space"}) {
+  for (const GelModel model : values_of<GelModel>()) {
     const auto at = [&](double nu) {
       const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 60};
-      return greens::make_greens(gel, {.model = model}, 1)->compliance_um_per_nN({{3, 1}}, ellipses);
+      return greens::make_greens(gel, {.model = substrate::kind_of(model)}, 1)
+          ->compliance_um_per_nN({{3, 1}}, ellipses);
     };
-    EXPECT_LE((at(0.5) - at(0.499999)).norm(), 1e-5 * at(0.5).norm()) << model;
+    EXPECT_LE((at(0.5) - at(0.499999)).norm(), 1e-5 * at(0.5).norm()) << name_of(model);
   }
 }
 

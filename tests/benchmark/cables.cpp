@@ -81,7 +81,7 @@ void derivatives_of_20_groups(benchmark::State& state) {
 
 /// The thesis' method, to the same residual.
 void cold_by_conjugate_gradients(benchmark::State& state) {
-  const Scene scene(state, {.contraction = "conjugate-gradient"});
+  const Scene scene(state, {.contraction = cables::Contraction::conjugate_gradient});
   cables::Equilibrium equilibrium;
   for (auto _ : state) equilibrium = scene.cables.equilibrium(scene.tensions);
   record(state, equilibrium);

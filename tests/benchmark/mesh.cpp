@@ -19,7 +19,7 @@ Cell cell_of(double n_vertices) {
                                   .n_outline_points = static_cast<int>(20 * radius_um)});
 }
 
-void mesh(benchmark::State& state, const char* anchor) {
+void mesh(benchmark::State& state, mesh::AdhesionAnchor anchor) {
   const Cell cell = cell_of(static_cast<double>(state.range(0)));
   mesh::NetworkParameters p;
   p.adhesion_anchor = anchor;
@@ -38,8 +38,8 @@ void sizes(benchmark::internal::Benchmark* benchmark) {
   for (const int n : {1000, 3000, 10000, 30000, 100000}) benchmark->Arg(n);
   benchmark->Unit(benchmark::kMillisecond)->Complexity();
 }
-BENCHMARK_CAPTURE(mesh, ellipse, "ellipse")->Apply(sizes);
-BENCHMARK_CAPTURE(mesh, rim, "rim")->Apply([](benchmark::internal::Benchmark* b) {
+BENCHMARK_CAPTURE(mesh, ellipse, mesh::AdhesionAnchor::ellipse)->Apply(sizes);
+BENCHMARK_CAPTURE(mesh, rim, mesh::AdhesionAnchor::rim)->Apply([](benchmark::internal::Benchmark* b) {
   for (const int n : {200, 600, 2000, 6000, 20000}) b->Arg(n);  // five times as many vertices
   b->Unit(benchmark::kMillisecond)->Complexity();
 });

@@ -35,12 +35,13 @@ double reported_error(const Substrate& model) {
 struct Case {
   double poisson_ratio, thickness_um, tolerance;
   int adhesions;
-  const char* element = "q2-p1disc";
+  substrate::FiniteElement element = substrate::FiniteElement::q2_p1disc;
 };
 
 TEST(Refined, reports_its_error_within_a_factor_of_two_and_meets_the_tolerance) {
-  for (const Case& c : {Case{0.3, 30, 0.03, 3}, Case{0.49, 30, 0.01, 2}, Case{0.4999, 60, 0.02, 3},
-                        Case{0.49, 8, 0.02, 3}, Case{0.4999, 12, 0.02, 1}, Case{0.45, 30, 0.04, 2, "q1-p0"}}) {
+  for (const Case& c :
+       {Case{0.3, 30, 0.03, 3}, Case{0.49, 30, 0.01, 2}, Case{0.4999, 60, 0.02, 3}, Case{0.49, 8, 0.02, 3},
+        Case{0.4999, 12, 0.02, 1}, Case{0.45, 30, 0.04, 2, substrate::FiniteElement::q1_p0}}) {
     const Gel gel = gel_of(c.poisson_ratio, c.thickness_um);
     const auto points = test::scattered_points(2000, 20);
     const auto ellipses = test::scattered_ellipses(c.adhesions, 15, 7);
@@ -52,8 +53,8 @@ TEST(Refined, reports_its_error_within_a_factor_of_two_and_meets_the_tolerance) 
         matrix, greens::make_greens(gel, test::model_named("layer"), 2)->compliance_um_per_nN(points, ellipses));
     const double reported = reported_error(*model);
     EXPECT_LE(reported, c.tolerance);
-    EXPECT_LT(reported, 2 * error) << c.element << " nu " << c.poisson_ratio << " h " << c.thickness_um;
-    EXPECT_GT(reported, error / 2) << c.element << " nu " << c.poisson_ratio << " h " << c.thickness_um;
+    EXPECT_LT(reported, 2 * error) << name_of(c.element) << " nu " << c.poisson_ratio << " h " << c.thickness_um;
+    EXPECT_GT(reported, error / 2) << name_of(c.element) << " nu " << c.poisson_ratio << " h " << c.thickness_um;
   }
 }
 
@@ -134,7 +135,7 @@ struct SquareScene {
 TEST(Refined, turns_mirrors_scales_and_superposes_with_the_scene) {
   const Gel gel = gel_of(0.49, 15);
   SubstrateParameters exact = refined_to(0);
-  exact.precision = "double";
+  exact.precision = numerics::Precision::double_;
   const auto model = choice::make_substrate(gel, exact, 2);
   const SquareScene scene;
   const Eigen::MatrixXd before = model->compliance_um_per_nN(scene.points, scene.ellipses);
@@ -305,14 +306,14 @@ struct Imbalance {
   double mean, rms;  // over all depths, as shares of the load
 };
 
-Imbalance imbalance(const char* element, double poisson_ratio, double growth) {
+Imbalance imbalance(substrate::FiniteElement element, double poisson_ratio, double growth) {
   SubstrateParameters parameters = refined_to(0);
   parameters.stress = true;
-  parameters.precision = "double";
+  parameters.precision = numerics::Precision::double_;
   parameters.element = element;
   parameters.margin_thicknesses = 1;
   parameters.elements_across_adhesion = 2 / growth;
-  parameters.growth = std::string(element) == "q1-p0" ? 8 * growth : growth;  // the same meshes
+  parameters.growth = element == substrate::FiniteElement::q1_p0 ? 8 * growth : growth;  // the same meshes
   const Vec2 load = {2, 1};
   const VolumeField field =
       choice::make_substrate(gel_of(poisson_ratio, 10), parameters, 2)->volume({{{0, 0}, 4, 2, 0.4}}, {load});
@@ -328,9 +329,9 @@ Imbalance imbalance(const char* element, double poisson_ratio, double growth) {
 
 TEST(Volume, carries_the_load_down_to_the_base) {
   const double tiny = 1e-8;  // rounding times the condition: lambda / mu = 5000 by the gel's by the boxes' size squared
-  for (const char* element : {"q2-p1disc", "q1-p0"}) {
+  for (const auto element : values_of<substrate::FiniteElement>()) {
     for (const double nu : {0.3, 0.4999}) {
-      SCOPED_TRACE(std::string(element) + " nu " + std::to_string(nu));
+      SCOPED_TRACE(std::string(name_of(element)) + " nu " + std::to_string(nu));
       // the virtual displacement 1 - z/h belongs to all meshes: as a mean over depth the balance is exact on any; on
       // one of equal boxes every layer's own belongs to it
       EXPECT_LT(imbalance(element, nu, 2).rms, tiny);
@@ -342,7 +343,7 @@ TEST(Volume, carries_the_load_down_to_the_base) {
         EXPECT_LT(finer.mean, tiny);
         EXPECT_LT(finer.rms, std::sqrt(0.5) * before);
         before = finer.rms;
-        if (std::string(element) != "q1-p0") break;  // the next is large
+        if (element != substrate::FiniteElement::q1_p0) break;  // the next is large
       }
     }
   }

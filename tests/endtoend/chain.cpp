@@ -151,7 +151,7 @@ void recompute_displacement(const fs::path& cell) {
   std::vector<Vec2> points_um;
   for (const Bead& b : beads) points_um.push_back(b.position_um);
   const auto layer = greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-                                         {.model = "layer"}, 2);
+                                         {.model = substrate::ModelKind::layer}, 2);
   const std::vector<Vec2> u_um = layer->displacements_um(points_um, ellipses, forces_nN);
   for (int i = 0; i < truth.n_rows(); ++i) {
     const Vec2 listed{truth.number(i, "ux_um"), truth.number(i, "uy_um")};

@@ -73,15 +73,15 @@ TEST(OthersData, tractions_of_a_monolayer_are_those_of_the_program_that_publishe
       published.push_back({row[2] / 1000, row[3] / 1000});
     }
     TractionParameters parameters;
-    parameters.gel_model = "half-space";
+    parameters.gel_model = GelModel::half_space;
     parameters.padding = 1;
-    parameters.read_out = "points";
+    parameters.read_out = ReadOut::points;
     parameters.lambda_um_per_kPa = 0.9;  // sqrt(8.1e-19) m/Pa
     Reconstruction r = reconstruct(inputs, parameters, 1);
     ASSERT_EQ(r.patches.size(), published.size());
     const Comparison same = compare(tractions_of(r), published);
     parameters.lambda_um_per_kPa = {};
-    parameters.read_out = "cells";
+    parameters.read_out = ReadOut::cells;
     parameters.padding = 1.5;
     r = reconstruct(inputs, parameters, 1);
     const Comparison own = compare(tractions_of(r), published);
@@ -123,8 +123,8 @@ TEST(OthersData, discs_of_a_synthetic_cell_carry_their_tractions) {
                                 .mean_intensity = 1});
   }
   TractionParameters parameters;
-  parameters.method = "adhesion-forces";
-  parameters.gel_model = "half-space";
+  parameters.method = TractionMethod::adhesion_forces;
+  parameters.gel_model = GelModel::half_space;
   const Reconstruction r = reconstruct(inputs, parameters, 2);
   double furthest = 0;
   int n_inside = 0;
@@ -276,7 +276,7 @@ TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_t
     EXPECT_NEAR(colony.area_um2, published.area_um2, 0.005 * published.area_um2);  // three digits
     TractionParameters parameters;
     parameters.padding = 1;
-    parameters.read_out = "points";
+    parameters.read_out = ReadOut::points;
     parameters.lambda_um_per_kPa = 1e-5;  // none
     parameters.gaussian_um = std::max(colony.n_columns, colony.n_rows) / 50.0 * colony.step_um;
     const std::vector<Vec2> same = tractions_of(reconstruct(colony.inputs, parameters, 1));

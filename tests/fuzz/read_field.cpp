@@ -24,7 +24,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   using namespace mbtfm;
   const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
   beads::TrackParameters in_pixels;
-  in_pixels.length_unit = "px";
+  in_pixels.length_unit = beads::LengthUnit::px;
   in_pixels.pixel_size_um = 0.1;
   fuzz::answer([&] { beads::outwardness(beads::read_given_field(file, {})); });
   fuzz::answer([&] { beads::read_given_field(file, in_pixels); });

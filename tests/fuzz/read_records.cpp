@@ -29,7 +29,7 @@ std::vector<std::string> samples() {
   return {
       bytes_of(folder() / "whole.json"),
       R"({"stage": "fit", "figures": {"relative_l2": 0.1, "n": 3}, "summary": "two fibres", "outputs": [{"file": "fit.json"}],
- "effects": [{"name": "mesh", "switch": "auto", "on": true, "number": 0.5, "why": "it matters", "seconds": 1}],
+ "effects": [{"name": "finite sides", "switch": "auto", "on": true, "number": 0.5, "why": "it matters", "seconds": 1}],
  "run": {"finished": true, "converged": true, "version": "0.1.0", "settings": {"gel": {"thickness_um": 60}},
   "inputs": {"3_network/network.vtu": ")" +
           hash + R"("}, "outputs": {"4_fit/fit.json": ")" + hash + R"("},

@@ -36,7 +36,8 @@ struct AnyParameters {
   std::optional<int> n_more;
   std::uint64_t seed = 1;
   bool is_drawn = false;
-  std::string method = "fast", name;
+  mbtfm::Switch method = mbtfm::Switch::on;
+  std::string name;
 };
 
 void declare(mbtfm::stage::ParameterList& list, AnyParameters& p) {
@@ -48,7 +49,7 @@ void declare(mbtfm::stage::ParameterList& list, AnyParameters& p) {
   list.add("n_more", p.n_more, Range::any(), "another count");
   list.add("seed", p.seed, "a seed");
   list.add("is_drawn", p.is_drawn, "a choice of two");
-  list.add("method", p.method, "a choice of some", {"fast", "exact"});
+  list.add("method", p.method, "a choice of some");
   list.add("name", p.name, "a text");
 }
 

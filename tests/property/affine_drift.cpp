@@ -11,7 +11,7 @@ namespace {
 
 const std::vector<test::Peak> kCell = test::ring_of_adhesions(384, 6);
 
-Tracking tracked(double turn_rad, std::uint64_t seed, const std::string& drift = "auto") {
+Tracking tracked(double turn_rad, std::uint64_t seed, Switch drift = Switch::automatic) {
   const auto pair = test::draw_bead_pair(
       kCell, {.width = 384, .n_beads = 2950, .turn_rad = turn_rad, .drift = {2, -1}, .seed = seed});
   TrackParameters parameters;
@@ -42,9 +42,9 @@ TEST(AffineDrift, a_field_that_was_found_is_kept_where_turning_back_fails) {
     const auto peaks = peak_px > 0 ? test::ring_of_adhesions(96, peak_px) : std::vector<test::Peak>{};
     const auto pair = test::draw_bead_pair(
         peaks, {.width = 96, .n_beads = 30, .turn_rad = 0.0105, .seed = static_cast<std::uint64_t>(seed)});
-    TrackParameters parameters{.method = "beads", .drift_affine = "on"};
+    TrackParameters parameters{.method = TrackMethod::beads, .drift_affine = Switch::on};
     EXPECT_THROW(track_beads(pair.relaxed, pair.stressed, 0.1, parameters), NotFollowed);
-    parameters.drift_affine = "auto";
+    parameters.drift_affine = Switch::automatic;
     const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 0.1, parameters);
     EXPECT_GT(std::abs(tracking.common.turn_rad), 0.01);
     EXPECT_EQ(tracking.affine.is_on, peak_px == 0);
@@ -52,7 +52,7 @@ TEST(AffineDrift, a_field_that_was_found_is_kept_where_turning_back_fails) {
 }
 
 TEST(AffineDrift, the_question_changes_nothing_where_the_answer_is_no) {
-  const DisplacementField asked = tracked(0, 1).field, not_asked = tracked(0, 1, "off").field;
+  const DisplacementField asked = tracked(0, 1).field, not_asked = tracked(0, 1, Switch::off).field;
   ASSERT_EQ(asked.size(), not_asked.size());
   for (std::size_t i = 0; i < asked.size(); ++i) {
     // one least squares, another column beside it: rounding of sums of some thousand terms

@@ -181,7 +181,7 @@ TEST_P(Cables, each_step_lowers_the_energy) {
 }
 
 TEST_P(Cables, conjugate_gradients_find_the_same_minimum) {
-  const Eigen::VectorXd f = forces(net, tensions, {.contraction = "conjugate-gradient"});
+  const Eigen::VectorXd f = forces(net, tensions, {.contraction = cables::Contraction::conjugate_gradient});
   EXPECT_LE((f - reference).lpNorm<Eigen::Infinity>(), tolerance);
 }
 

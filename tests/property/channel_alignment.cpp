@@ -117,7 +117,7 @@ TEST(ChannelAlignment, fibres_of_a_shifted_channel_are_tied_as_if_it_were_not) {
   EXPECT_NEAR(moved.alignment->shift_um.x, 0.1 * kRight, 0.03) << "a third of a pixel";
   EXPECT_NEAR(moved.alignment->shift_um.y, 0.1 * kDown, 0.03);
   EXPECT_NEAR(n_tied(moved), n_tied(still), 2);
-  parameters.align_channels = "off";
+  parameters.align_channels = Switch::off;
   EXPECT_FALSE(segment_cell(shifted, cell.actin, parameters).is_aligned);
 }
 

@@ -24,7 +24,7 @@ LinearData with_motions(const TensionScene& scene, const DisplacementField& bead
   return reduce(beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(beads));
 }
 
-EnsembleFit fit_of(const TensionScene& scene, LinearData& data, const std::string& loss = "squares") {
+EnsembleFit fit_of(const TensionScene& scene, LinearData& data, Loss loss = Loss::squares) {
   FitParameters parameters;
   parameters.loss = loss;
   std::vector<cables::CableNetwork> networks;
@@ -34,17 +34,17 @@ EnsembleFit fit_of(const TensionScene& scene, LinearData& data, const std::strin
 
 TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {
   const TensionScene scene = test::tension_scene("case_21", 600, 0.05, 3);
-  for (const std::string loss : {"squares", "huber"}) {
+  for (const Loss loss : {Loss::squares, Loss::huber}) {
     LinearData still = with_motions(scene, scene.beads);
     DisplacementField moved_beads = scene.beads;
     move(moved_beads, kMotion);
     LinearData moved = with_motions(scene, moved_beads);
     const EnsembleFit a = fit_of(scene, still, loss), b = fit_of(scene, moved, loss);
     const double scale = values_of(a).norm();
-    EXPECT_LE((values_of(a) - values_of(b)).norm(), 1e-6 * scale) << loss;  // where iterations end
-    EXPECT_LE((a.covariance_nN2 - b.covariance_nN2).norm(), 1e-5 * a.covariance_nN2.norm()) << loss;
-    EXPECT_NEAR(a.chi_squared_per_degree, b.chi_squared_per_degree, 1e-6) << loss;
-    EXPECT_NEAR(relative_l2(still, a.forces_nN), relative_l2(moved, b.forces_nN), 1e-6) << loss;
+    EXPECT_LE((values_of(a) - values_of(b)).norm(), 1e-6 * scale) << name_of(loss);  // where iterations end
+    EXPECT_LE((a.covariance_nN2 - b.covariance_nN2).norm(), 1e-5 * a.covariance_nN2.norm()) << name_of(loss);
+    EXPECT_NEAR(a.chi_squared_per_degree, b.chi_squared_per_degree, 1e-6) << name_of(loss);
+    EXPECT_NEAR(relative_l2(still, a.forces_nN), relative_l2(moved, b.forces_nN), 1e-6) << name_of(loss);
   }
 }
 

@@ -152,9 +152,9 @@ TEST(CutCells, a_cut_is_a_note_if_allowed_for_and_a_caution_if_not) {
   const Scene s = scene(41);
   EXPECT_TRUE(tensions::allows_forces_beyond(switches, s.cut.cell));
   EXPECT_FALSE(tensions::allows_forces_beyond(switches, s.experiment.cell));
-  switches.beyond_cut = "off";
+  switches.beyond_cut = Switch::off;
   EXPECT_FALSE(tensions::allows_forces_beyond(switches, s.cut.cell));
-  switches.beyond_cut = "on";
+  switches.beyond_cut = Switch::on;
   EXPECT_THROW(tensions::allows_forces_beyond(switches, s.experiment.cell), UsageError);
 }
 

@@ -247,7 +247,7 @@ TEST(DrawnTensions, follow_the_histograms_of_their_types) {
 
 TEST(Ring, turns_into_itself) {
   drawing::CellParameters p;
-  p.layout = "ring";
+  p.layout = drawing::Layout::ring;
   p.n_adhesions = 12;
   p.n_dorsal = 6;
   p.diameter_um = 40;

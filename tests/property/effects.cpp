@@ -38,7 +38,7 @@ std::vector<cables::CableNetwork> networks(int n, cables::CableParameters cables
 }
 
 EnsembleFit fitted(const std::vector<cables::CableNetwork>& on, LinearData data, const TensionScene& s,
-                   const std::string& loss = "squares") {
+                   std::optional<Loss> loss = Loss::squares) {
   FitParameters parameters;
   parameters.n_meshes = static_cast<int>(on.size());
   parameters.loss = loss;
@@ -47,12 +47,12 @@ EnsembleFit fitted(const std::vector<cables::CableNetwork>& on, LinearData data,
 
 TEST(EffectsOfTheFit, stress_fibres_where_the_cell_has_any) {
   Cell with = cell_of_three_fibres(), without = test::round_cell(14, 12), left_out = with;
-  EXPECT_TRUE(cables::take_fibres(with, "auto").is_on);
+  EXPECT_TRUE(cables::take_fibres(with, Switch::automatic).is_on);
   EXPECT_EQ(with.fibres.size(), 3u);
-  EXPECT_FALSE(cables::take_fibres(without, "auto").is_on);
-  EXPECT_FALSE(cables::take_fibres(left_out, "off").is_on);
+  EXPECT_FALSE(cables::take_fibres(without, Switch::automatic).is_on);
+  EXPECT_FALSE(cables::take_fibres(left_out, Switch::off).is_on);
   EXPECT_TRUE(left_out.fibres.empty());
-  EXPECT_THROW(cables::take_fibres(without, "on"), InvalidData);
+  EXPECT_THROW(cables::take_fibres(without, Switch::on), InvalidData);
 }
 
 /// A triangular lattice whose border is held all round: pulling alike, its cables stay as they are.
@@ -96,19 +96,24 @@ TEST(EffectsOfTheFit, elasticity_that_is_off_is_that_of_very_soft_cables) {
 TEST(EffectsOfTheFit, a_robust_loss_where_beads_stray) {
   TensionScene s = scene(0.05);
   const auto on = networks(1);
-  EXPECT_FALSE(robust_loss_effect("auto", fitted(on, s.data, s, loss_of_switch("auto", "huber")).loss).is_on);
+  EXPECT_FALSE(
+      robust_loss_effect(Switch::automatic, fitted(on, s.data, s, loss_of_switch(Switch::automatic, Loss::huber)).loss)
+          .is_on);
   for (std::size_t i = 0; i < s.beads.size(); i += 33) s.beads[i].displacement_um += Vec2{8 * s.beads[i].sigma_um, 0};
   s.data = reduce(s.beads, s.compliance_um_per_nN);
-  EXPECT_TRUE(robust_loss_effect("auto", fitted(on, s.data, s, loss_of_switch("auto", "huber")).loss).is_on);
-  EXPECT_FALSE(robust_loss_effect("off", fitted(on, s.data, s, loss_of_switch("off", "huber")).loss).is_on);
-  EXPECT_EQ(loss_of_switch("on", "tukey"), "tukey");
+  EXPECT_TRUE(
+      robust_loss_effect(Switch::automatic, fitted(on, s.data, s, loss_of_switch(Switch::automatic, Loss::huber)).loss)
+          .is_on);
+  EXPECT_FALSE(
+      robust_loss_effect(Switch::off, fitted(on, s.data, s, loss_of_switch(Switch::off, Loss::huber)).loss).is_on);
+  EXPECT_EQ(loss_of_switch(Switch::on, Loss::tukey), Loss::tukey);
 }
 
 TEST(EffectsOfTheFit, time_coupling_where_there_is_a_frame_before) {
-  EXPECT_TRUE(decide_time_coupling(true, "auto").is_on);
-  EXPECT_FALSE(decide_time_coupling(true, "off").is_on);
-  EXPECT_FALSE(decide_time_coupling(false, "auto").is_on);
-  EXPECT_FALSE(decide_time_coupling(false, "on").is_on) << "a series has a first frame";
+  EXPECT_TRUE(decide_time_coupling(true, Switch::automatic).is_on);
+  EXPECT_FALSE(decide_time_coupling(true, Switch::off).is_on);
+  EXPECT_FALSE(decide_time_coupling(false, Switch::automatic).is_on);
+  EXPECT_FALSE(decide_time_coupling(false, Switch::on).is_on) << "a series has a first frame";
 }
 
 }  // namespace

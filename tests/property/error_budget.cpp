@@ -75,7 +75,7 @@ Eigen::VectorXd answers(const Fitted& f, const Eigen::VectorXd& displacement_um)
   test::measure(other, 0, 1);
   for (Bead& bead : other.beads) bead.sigma_um = f.scene.beads.front().sigma_um;
   other.data = reduce(other.beads, other.compliance_um_per_nN);
-  const EnsembleFit fit = test::fit_own_network(other, {.loss = "squares"});  // the propagation is that of squares
+  const EnsembleFit fit = test::fit_own_network(other, {.loss = Loss::squares});  // the propagation is that of squares
   return test::values_of(fit) - f.scene.tensions_nN;
 }
 
@@ -149,8 +149,8 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
       link.rest_length_um *= length(network) / length(old);
     }
     truth.cables = cables::CableNetwork(network);
-    truth.compliance_um_per_nN =
-        greens::make_greens(kGel, {.model = "layer"}, 2)->compliance_um_per_nN(truth.points_um, truth.ellipses);
+    truth.compliance_um_per_nN = greens::make_greens(kGel, {.model = substrate::ModelKind::layer}, 2)
+                                     ->compliance_um_per_nN(truth.points_um, truth.ellipses);
     test::contract(truth, f.scene.tensions_nN);
     const Eigen::VectorXd error = answers(f, truth.displacement_um);
     for (std::size_t i = 0; i < n; ++i) squares[i] += std::pow(error[static_cast<Eigen::Index>(i)], 2) / kDraws;
@@ -174,8 +174,8 @@ TEST(ErrorBudget, states_what_errors_of_the_segmentation_do) {
 TEST(ErrorBudget, tells_the_bias_of_a_substrate_that_lacks_the_base) {
   TensionScene scene = test::tension_scene("case_21", 1500, kLittleNoise, 3);
   const Eigen::VectorXd on_layer = scene.displacement_um;
-  scene.compliance_um_per_nN =
-      greens::make_greens(kGel, {.model = "half-space"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
+  scene.compliance_um_per_nN = greens::make_greens(kGel, {.model = substrate::ModelKind::half_space}, 2)
+                                   ->compliance_um_per_nN(scene.points_um, scene.ellipses);
   test::contract(scene, scene.tensions_nN);
   test::measure(scene, kLittleNoise, 3);
   const Fitted f = fitted(std::move(scene));
@@ -195,13 +195,13 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
   for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
   const auto scene = [&] { return test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 1500, 0.02, 7); };
   TensionScene whole = scene();
-  const Eigen::VectorXd end = test::values_of(test::fit_own_network(whole, {.loss = "squares"}));
+  const Eigen::VectorXd end = test::values_of(test::fit_own_network(whole, {.loss = Loss::squares}));
   int n_compared = 0;
   for (int steps = 1; steps < 6; ++steps) {
     Fitted early{scene(), {}, {}};
     early.networks.emplace_back(early.scene.cables.network());
     early.fit = fit_ensemble(early.networks, early.scene.data, early.scene.adhesion_ids,
-                             {.loss = "squares", .n_meshes = 1, .max_steps = steps}, 2, {});
+                             {.loss = Loss::squares, .n_meshes = 1, .max_steps = steps}, 2, {});
     const Eigen::VectorXd left = test::values_of(early.fit) - end;
     // further off the misfit bends, and nearer the whole fit's own last step counts
     if (left.norm() > 0.1 * end.norm() || left.norm() < 1e-4 * end.norm()) continue;
@@ -246,9 +246,9 @@ TEST(ErrorBudget, an_error_of_the_thickness_or_of_poissons_ratio_does_what_anoth
     Gel other = gel;
     other.thickness_um += gel.thickness_sigma_um.value_or(0);
     other.poisson_ratio -= gel.poisson_ratio_sigma.value_or(0);
-    const Eigen::VectorXd change =
-        greens::make_greens(other, {.model = "layer"}, 2)->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
-        f.scene.forces_nN;
+    const Eigen::VectorXd change = greens::make_greens(other, {.model = substrate::ModelKind::layer}, 2)
+                                       ->compliance_um_per_nN(f.scene.points_um, f.scene.ellipses) *
+                                   f.scene.forces_nN;
     const Eigen::VectorXd moved = answers(f, change);
     for (std::size_t i = 0; i < budget.tensions.size(); ++i) {
       const double stated = *budget.tensions[i].parts_nN.gel;

@@ -130,7 +130,7 @@ TEST(Beads, keep_their_distance_or_say_that_they_cannot) {
 
 TEST(TwoAdhesions, feel_the_tension_of_the_fibre_between_them_where_the_network_is_weak) {
   drawing::ScenarioParameters p = small_scenario();
-  p.cell.layout = "line";
+  p.cell.layout = drawing::Layout::line;
   p.cell.n_adhesions = 2;
   p.cell.elongation = 8;
   p.cell.adhesion_area_um2 = 1;

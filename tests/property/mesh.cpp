@@ -84,9 +84,9 @@ TEST(Mesh, two_hundred_random_cells_give_valid_networks) {
     if (has_room && seed % 4 < 2) cell.holes_um = {hole};
     GeneratedNetwork generated;
     NetworkParameters parameters{.seed = seed};
-    parameters.adhesion_anchor = std::array{"rim", "ellipse", "centre"}[seed % 3];
-    parameters.free_fibre_ends = std::array{"width", "point"}[seed % 2];
-    parameters.seeds = std::array{"regular", "jittered", "poisson"}[seed / 2 % 3];
+    parameters.adhesion_anchor = values_of<AdhesionAnchor>()[seed % 3];
+    parameters.free_fibre_ends = std::array{FreeFibreEnds::width, FreeFibreEnds::point}[seed % 2];
+    parameters.seeds = values_of<Seeds>()[seed / 2 % 3];
     ASSERT_NO_THROW(generated = generate_network(cell, parameters));
     expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
     EXPECT_GE(generated.worst_free_quality, 0.3);
@@ -154,11 +154,11 @@ TEST(Mesh, fibres_keep_their_lengths) {
 
 TEST(Mesh, statistics_do_not_change_when_the_cell_is_turned_and_shifted) {
   const Cell cell = ordinary_cell(7);
-  for (const std::string anchor : {"rim", "ellipse"}) {
+  for (const AdhesionAnchor anchor : {AdhesionAnchor::rim, AdhesionAnchor::ellipse}) {
     const NetworkParameters parameters{.adhesion_anchor = anchor};
     const GeneratedNetwork still = generate_network(cell, parameters);
     for (const double angle : {0.3, 1.7, 3.0}) {
-      SCOPED_TRACE(anchor + ", angle " + std::to_string(angle));
+      SCOPED_TRACE(name_of(anchor) + std::string(", angle ") + std::to_string(angle));
       const GeneratedNetwork turned = generate_network(moved(cell, angle, {-500, 1200}), parameters);
       // the number of vertices is set by the area; the lattice of the seeds falls differently at the rim (~2 %)
       const double mean = mean_edge_um(still.network);
@@ -179,12 +179,12 @@ TEST(Mesh, orientation_of_the_outline_does_not_matter) {
 }
 
 TEST(Mesh, scales_with_the_unit_of_length) {
-  for (const std::string anchor : {"rim", "ellipse"}) {
+  for (const AdhesionAnchor anchor : {AdhesionAnchor::rim, AdhesionAnchor::ellipse}) {
     const Cell cell = ordinary_cell(9);
     const GeneratedNetwork in_um = generate_network(cell, {.adhesion_anchor = anchor});
     const auto n_vertices = static_cast<double>(in_um.network.vertices_um.size());
     for (const double factor : {1e3, 1e-3}) {  // nm and mm
-      SCOPED_TRACE(anchor + ", factor " + std::to_string(factor));
+      SCOPED_TRACE(name_of(anchor) + std::string(", factor ") + std::to_string(factor));
       const GeneratedNetwork scaled =
           generate_network(in_units(cell, factor), {.edge_length_um = 1.5 * factor, .adhesion_anchor = anchor});
       // the relaxation follows last digits: another mesh of the same kind, as from another seed

@@ -33,8 +33,8 @@ TEST(MeshSpread, links_to_second_neighbours_gain_more_than_a_second_mesh) {
   double with = 0, without = 0;
   for (const std::uint64_t seed : {3, 4, 5}) {
     const Cell cell = testing::random_cell(seed, {.least_distance_um = 1});
-    with += variance_of_forces(cell, {.link_reach = "second-neighbours"}, 10);
-    without += variance_of_forces(cell, {.link_reach = "neighbours"}, 10);
+    with += variance_of_forces(cell, {.link_reach = LinkReach::second_neighbours}, 10);
+    without += variance_of_forces(cell, {.link_reach = LinkReach::neighbours}, 10);
   }
   EXPECT_LT(with, 0.5 * without);
 }

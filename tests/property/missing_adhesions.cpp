@@ -35,7 +35,7 @@ struct Hidden {
     for (const Vec2 place : kPlaces) {
       discs.push_back({.centre_um = place, .semi_major_um = 0.6, .semi_minor_um = 0.4, .angle_rad = 1});
     }
-    const auto gel = greens::make_greens(kGel, {.model = "layer"}, 1);
+    const auto gel = greens::make_greens(kGel, {.model = substrate::ModelKind::layer}, 1);
     const Eigen::Vector4d forces(kForce_nN.x, kForce_nN.y, -kForce_nN.x, -kForce_nN.y);
     scene.displacement_um += gel->compliance_um_per_nN(scene.points_um, discs) * forces;
   }

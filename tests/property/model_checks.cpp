@@ -16,7 +16,7 @@ test::TensionScene one_fibre(double tension_nN, int n_beads) {
 }
 
 std::vector<ModelScore> scores(test::TensionScene& scene) {
-  const EnsembleFit fit = test::fit_own_network(scene, {.loss = "squares"});
+  const EnsembleFit fit = test::fit_own_network(scene, {.loss = Loss::squares});
   return compare_models(fit, scene.data, scene.cables, scene.adhesion_ids);
 }
 

@@ -130,7 +130,7 @@ TEST(ModelError, of_the_total_force_is_what_it_misses_where_forces_are_not_the_m
       beads[b].displacement_um += Vec2{more_um[row], more_um[row + 1]};
     }
     LinearData data = reduce(beads, scene.compliance_um_per_nN);
-    return fit_ensemble(networks, data, scene.adhesion_ids, {.loss = "squares"}, 2, {});
+    return fit_ensemble(networks, data, scene.adhesion_ids, {.loss = Loss::squares}, 2, {});
   };
   const Eigen::Index n = scene.compliance_um_per_nN.cols();
   const EnsembleFit fit = fitted(Eigen::VectorXd::Zero(n));
@@ -227,7 +227,7 @@ Cell cell_with_arcs() {
 struct OverStated {
   double all = 0, noise_alone = 0;
 };
-OverStated errors_over_stated(const char* reach_of_truth, int n_meshes) {
+OverStated errors_over_stated(mesh::LinkReach reach_of_truth, int n_meshes) {
   OverStated squares;
   const Cell cell = cell_with_arcs();
   std::map<int, substrate::Ellipse> ellipses;
@@ -254,12 +254,12 @@ OverStated errors_over_stated(const char* reach_of_truth, int n_meshes) {
 }
 
 TEST(ModelError, is_what_the_tensions_of_a_cell_with_another_network_are_off_by) {
-  for (const char* reach : {"second-neighbours", "neighbours"}) {
+  for (const mesh::LinkReach reach : {mesh::LinkReach::second_neighbours, mesh::LinkReach::neighbours}) {
     for (const int n_meshes : {2, 6}) {
       const OverStated squares = errors_over_stated(reach, n_meshes);
       // twenty fibres: chi² / 20 is within 0.37 … 2.0 in 99.5 % (chi² with 20 degrees), if all tell of themselves
-      EXPECT_LT(squares.all, 2.0) << reach << ", " << n_meshes << " meshes";
-      EXPECT_GT(squares.all, 0.2) << reach << ", " << n_meshes << " meshes";
+      EXPECT_LT(squares.all, 2.0) << name_of(reach) << ", " << n_meshes << " meshes";
+      EXPECT_GT(squares.all, 0.2) << name_of(reach) << ", " << n_meshes << " meshes";
       EXPECT_GT(squares.noise_alone, 4) << "the noise alone must not explain it for this to tell anything";
     }
   }
@@ -277,7 +277,7 @@ TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_e
   }
   FitParameters parameters;
   parameters.n_meshes = 4;
-  parameters.loss = "squares";  // with one that weighs beads down their noise counts for less than it is
+  parameters.loss = Loss::squares;  // with one that weighs beads down their noise counts for less than it is
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
   ASSERT_TRUE(fit.model_error.has_value());
   const Influence influence = influence_of(fit, scene.data);

@@ -27,7 +27,7 @@ struct ShiftedCell {
   LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
 
   /// Fitted on the network that made the forces.
-  std::pair<EnsembleFit, FoundPlacement> fit(const std::string& setting = "auto") const {
+  std::pair<EnsembleFit, FoundPlacement> fit(Switch setting = Switch::automatic) const {
     std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
     LinearData data = data_of(scene.beads);
@@ -70,7 +70,7 @@ TEST(Placement, motions_are_the_derivatives_of_the_displacement) {
   const auto model = [&](const Placement& at) -> Eigen::VectorXd {
     DisplacementField places;
     for (const Vec2 p : beads) places.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
-    const auto gel = greens::make_greens(kGel, {.model = "half-space"}, 1);
+    const auto gel = greens::make_greens(kGel, {.model = substrate::ModelKind::half_space}, 1);
     const Eigen::VectorXd seen =
         gel->compliance_um_per_nN(points_of(in_cell_frame(places, at)), ellipses_of(cell)) * forces;
     Eigen::VectorXd u(seen.size());
@@ -104,7 +104,7 @@ TEST(Placement, what_carries_a_bead_changes_its_displacement_by_as_much_as_the_f
     by.segment<2>(2 * i) << way.x, way.y;
   }
   for (int i = 0; i < 14; ++i) forces[i] = std::sin(1 + i);
-  const auto gel = greens::make_greens(kGel, {.model = "half-space"}, 1);
+  const auto gel = greens::make_greens(kGel, {.model = substrate::ModelKind::half_space}, 1);
   const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
   const Eigen::VectorXd wanted =
       (gel->compliance_um_per_nN(carried, ellipses) - gel->compliance_um_per_nN(beads, ellipses)) * forces;
@@ -153,16 +153,16 @@ TEST(Placement, beads_that_do_not_tell_it_leave_the_cell_where_it_is) {
   const ShiftedCell noisy = shifted_cell({0.2, 0.1}, 0, 3, 1);
   const LinearData data = noisy.data_of(noisy.scene.beads);
   const Trial start = uniform_start({noisy.scene.cables, data.reduced, noisy.scene.adhesion_ids});
-  const auto place = [&](const std::string& setting) {
+  const auto place = [&](Switch setting) {
     return place_cell(
         noisy.cell, noisy.scene.cables, noisy.scene.beads, data,
         [&](const DisplacementField& at) { return noisy.data_of(at); }, kGel, {}, start, setting, 1);
   };
-  for (const std::string setting : {"auto", "off"}) {
+  for (const Switch setting : {Switch::automatic, Switch::off}) {
     const PlacedCell stays = place(setting);
-    EXPECT_FALSE(stays.effect.is_on) << setting;
-    EXPECT_EQ(norm(stays.placement.shift_um), 0) << setting;
-    EXPECT_EQ(stays.data.motions.cols(), 6) << setting;
+    EXPECT_FALSE(stays.effect.is_on) << name_of(setting);
+    EXPECT_EQ(norm(stays.placement.shift_um), 0) << name_of(setting);
+    EXPECT_EQ(stays.data.motions.cols(), 6) << name_of(setting);
   }
 }
 
@@ -203,7 +203,7 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(shifted.scene.cables.network(), shifted.scene.cables.parameters());
   const LinearData data = shifted.data_of(shifted.scene.beads);
-  const std::pair<EnsembleFit, FoundPlacement> known = shifted.fit("on");
+  const std::pair<EnsembleFit, FoundPlacement> known = shifted.fit(Switch::on);
   const EnsembleFit& single = known.first;
   const Trial start = next_start(single);
   const auto frame_fit = [&](const AllowMore& allow) {

@@ -96,7 +96,7 @@ class RecordsOfCells : public testing::Test {
   void rewrite_all(const std::string& what) {
     const fs::path run_json = cell_ / "run.json";
     const std::string before = files::read_text(run_json);
-    for (const runner::StageState state : {runner::StageState::up_to_date, runner::StageState::not_asked}) {
+    for (const StageState state : {StageState::up_to_date, StageState::not_asked}) {
       runner::CellOutcome outcome;
       for (const runner::Stage& stage : runner::stages())
         outcome.stages.push_back({.stage = stage.name, .status = {state, ""}, .failure = {}});

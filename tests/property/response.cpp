@@ -48,7 +48,7 @@ MatrixXd whole(const Response& response) {
 
 std::unique_ptr<Substrate> gel(const std::string& model, double thickness_um) {
   return greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = thickness_um},
-                             {.model = model}, 2);
+                             {.model = named<ModelKind>(model).value()}, 2);
 }
 
 class BlockedResponse : public testing::TestWithParam<std::pair<const char*, double>> {

@@ -149,12 +149,13 @@ TEST(IncompressibleGel, is_the_limit_of_nearly_incompressible_ones) {
   const Gel nearly{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.4999, .thickness_um = 20};
   const Ellipse ellipse = {{0, 0}, 1, 0.5, 0};
   const std::vector<Vec2> points = {{0, 0}, {3, 1}, {20, 5}};
-  for (const std::string model : {"half-space", "layer"}) {
+  for (const ModelKind model : {ModelKind::half_space, ModelKind::layer}) {
     const auto compliance = [&](const Gel& gel) {
       return greens::make_greens(gel, {.model = model}, 1)->compliance_um_per_nN(points, {ellipse});
     };
     // smooth in nu: 1e-4 of it changes the compliance by some 1e-4; a layer's own numbers are right to as much
-    EXPECT_LE((compliance(incompressible) - compliance(nearly)).norm(), 2e-3 * compliance(nearly).norm()) << model;
+    EXPECT_LE((compliance(incompressible) - compliance(nearly)).norm(), 2e-3 * compliance(nearly).norm())
+        << name_of(model);
   }
 }
 

@@ -135,7 +135,7 @@ std::vector<bool> spoil(TensionScene& scene, int per_ten, unsigned seed) {
   return is_good;
 }
 
-double squared_error(TensionScene& scene, const std::string& loss) {
+double squared_error(TensionScene& scene, Loss loss) {
   FitParameters parameters;
   parameters.loss = loss;
   return (values_of(fit_own_network(scene, parameters)) - scene.tensions_nN).squaredNorm();
@@ -144,22 +144,22 @@ double squared_error(TensionScene& scene, const std::string& loss) {
 TEST(TensionFit, robust_losses_bear_outliers_and_cost_little_without) {
   // Three repeats of some ten tensions: norms of errors are good to 1/sqrt(2 · 30) = 13 %, ratios to 18 %.
   double plain = 0, outlying_squares = 0;
-  std::map<std::string, double> clean, outlying;
+  std::map<Loss, double> clean, outlying;
   for (unsigned seed = 0; seed < 3; ++seed) {
     TensionScene scene = tension_scene("case_21", 2000, 0.07, 500 + seed);
-    plain += squared_error(scene, "squares");
-    for (const std::string loss : {"huber", "tukey", "l1"}) clean[loss] += squared_error(scene, loss);
+    plain += squared_error(scene, Loss::squares);
+    for (const Loss loss : {Loss::huber, Loss::tukey, Loss::l1}) clean[loss] += squared_error(scene, loss);
     spoil(scene, 3, 600 + seed);
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
-    outlying_squares += squared_error(scene, "squares");
-    for (const std::string loss : {"huber", "l1"}) outlying[loss] += squared_error(scene, loss);
+    outlying_squares += squared_error(scene, Loss::squares);
+    for (const Loss loss : {Loss::huber, Loss::l1}) outlying[loss] += squared_error(scene, loss);
   }
   // 1/0.95 and 1/0.79 of the variance, plus the scatter of the two estimates' difference
-  EXPECT_LE(clean["huber"], 1.3 * plain);
-  EXPECT_LE(clean["tukey"], 1.3 * plain);
-  EXPECT_LE(clean["l1"], 1.8 * plain);
-  EXPECT_LE(outlying["huber"], 0.1 * outlying_squares);
-  EXPECT_LE(outlying["l1"], 0.1 * outlying_squares);
+  EXPECT_LE(clean[Loss::huber], 1.3 * plain);
+  EXPECT_LE(clean[Loss::tukey], 1.3 * plain);
+  EXPECT_LE(clean[Loss::l1], 1.8 * plain);
+  EXPECT_LE(outlying[Loss::huber], 0.1 * outlying_squares);
+  EXPECT_LE(outlying[Loss::l1], 0.1 * outlying_squares);
 }
 
 TEST(TensionFit, tukeys_loss_is_as_good_as_if_one_knew_the_outliers) {
@@ -167,12 +167,12 @@ TEST(TensionFit, tukeys_loss_is_as_good_as_if_one_knew_the_outliers) {
   double plain = 0, tukey = 0, knowing = 0;
   for (unsigned seed = 0; seed < 8; ++seed) {
     TensionScene scene = tension_scene("case_21", 2000, 0.07, 500 + seed);
-    plain += squared_error(scene, "squares");
+    plain += squared_error(scene, Loss::squares);
     const std::vector<bool> is_good = spoil(scene, 3, 600 + seed);
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
-    tukey += squared_error(scene, "tukey");
+    tukey += squared_error(scene, Loss::tukey);
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN, is_good);
-    knowing += squared_error(scene, "squares");
+    knowing += squared_error(scene, Loss::squares);
   }
   // On the same beads: 1/0.95 of the variance, and the scatter of the two estimates' difference (a twentieth of the
   // variance, sqrt(0.05) of the error, is independent), three times over 88 tensions.
@@ -210,7 +210,7 @@ TEST(TensionFit, beads_stray_that_are_alone_and_further_off_than_chance_has_it) 
 
 TEST(TensionFit, leaving_a_stray_bead_out_moves_the_tensions_as_foretold) {
   FitParameters parameters;
-  parameters.loss = "squares";
+  parameters.loss = Loss::squares;
   int n_tried = 0;
   for (unsigned seed = 0; seed < 6; ++seed) {
     TensionScene scene = tension_scene("case_21", 2000, 0.05, 720 + seed);
@@ -247,9 +247,9 @@ TEST(TensionFit, by_default_a_few_bad_beads_do_no_harm_and_good_ones_are_fitted_
     TensionScene scene = tension_scene("case_21", 2000, 0.05, 700 + seed);
     const auto error = [&](const EnsembleFit& fit) { return (values_of(fit) - scene.tensions_nN).squaredNorm(); };
     FitParameters by_squares;
-    by_squares.loss = "squares";
+    by_squares.loss = Loss::squares;
     const EnsembleFit unspoilt = fit_own_network(scene);
-    EXPECT_EQ(unspoilt.loss, "squares");
+    EXPECT_EQ(unspoilt.loss, Loss::squares);
     EXPECT_EQ(values_of(unspoilt), values_of(fit_own_network(scene, by_squares)));
     clean += error(unspoilt);
     for (std::size_t a = 0; a < 4; ++a) {
@@ -260,7 +260,7 @@ TEST(TensionFit, by_default_a_few_bad_beads_do_no_harm_and_good_ones_are_fitted_
     }
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
     const EnsembleFit fit = fit_own_network(scene);
-    EXPECT_EQ(fit.loss, "huber");
+    EXPECT_EQ(fit.loss, Loss::huber);
     robust += error(fit);
     scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
     squares += error(fit_own_network(scene, by_squares));
@@ -275,14 +275,14 @@ TEST(TensionFit, a_fit_does_not_depend_on_the_weights_that_another_left) {
   for (std::size_t b = 0; b < 10; ++b) scene.beads[100 * b].displacement_um += Vec2{1, 0};
   scene.data = reduce(scene.beads, scene.compliance_um_per_nN);
   const EnsembleFit first = fit_own_network(scene);
-  ASSERT_EQ(first.loss, "huber");
+  ASSERT_EQ(first.loss, Loss::huber);
   const Eigen::VectorXd weights = scene.data.bead_weight;
   const EnsembleFit again = fit_own_network(scene);
   EXPECT_EQ(again.loss, first.loss);
   EXPECT_EQ(values_of(again), values_of(first));
   EXPECT_EQ(scene.data.bead_weight, weights);
   FitParameters by_squares;
-  by_squares.loss = "squares";
+  by_squares.loss = Loss::squares;
   fit_own_network(scene, by_squares);
   EXPECT_TRUE((scene.data.bead_weight.array() == 1).all());
 }
@@ -308,15 +308,16 @@ TEST(TensionFit, a_mirrored_and_turned_experiment_gives_the_same_tensions) {
     e.angle_rad = -1.5707963267948966 - e.angle_rad;
   }
   const auto gel = greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
-                                       {.model = "layer"}, 2);
+                                       {.model = substrate::ModelKind::layer}, 2);
   other.data = reduce(other.beads, gel->compliance_um_per_nN(points, ellipses));
-  for (const std::string loss : {"squares", "tukey"}) {
+  for (const Loss loss : {Loss::squares, Loss::tukey}) {
     FitParameters parameters;
     parameters.loss = loss;
     const Eigen::VectorXd here = values_of(fit_own_network(scene, parameters));
     const Eigen::VectorXd there = values_of(fit_own_network(other, parameters));
     // the fit's tolerance; reweighting stops at a thousandth of the largest tension
-    EXPECT_LE((here - there).cwiseAbs().maxCoeff(), (loss == "squares" ? 1e-4 : 2e-3) * here.maxCoeff()) << loss;
+    EXPECT_LE((here - there).cwiseAbs().maxCoeff(), (loss == Loss::squares ? 1e-4 : 2e-3) * here.maxCoeff())
+        << name_of(loss);
   }
 }
 
@@ -361,7 +362,7 @@ TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
   const TensionScene scene = tension_scene("case_21", 2000, 0.05, 9);
   TensionScene same = tension_scene("case_21", 2000, 0.05, 9);
   FitParameters parameters;
-  parameters.loss = "squares";  // both misfits with the same weights
+  parameters.loss = Loss::squares;  // both misfits with the same weights
   const EnsembleFit fit = fit_own_network(same, parameters);
   const std::vector<FibreLeftOut> left_out = leave_each_fibre_out(fit, influence_of(fit, same.data));
   // without the fibre its links are plain network

@@ -14,10 +14,10 @@ namespace {
 using test::ellipse_scene;
 using test::EllipseScene;
 
-TractionParameters half_space(const std::string& method) {
+TractionParameters half_space(TractionMethod method) {
   TractionParameters parameters;
   parameters.method = method;
-  parameters.gel_model = "half-space";
+  parameters.gel_model = GelModel::half_space;
   return parameters;
 }
 
@@ -25,7 +25,7 @@ TractionInputs inputs_of(const EllipseScene& scene) {
   return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions, .outline_um = {}};
 }
 
-const std::vector<std::string> kMethods = {"fttc", "sparse", "trpf", "bem", "adhesion-forces"};
+const std::vector<TractionMethod> kMethods = values_of<TractionMethod>();
 
 /// With what every method asks for.
 TractionInputs full_inputs_of(const EllipseScene& scene) {
@@ -34,7 +34,7 @@ TractionInputs full_inputs_of(const EllipseScene& scene) {
   return inputs;
 }
 
-TractionParameters parameters_of(const std::string& method) {
+TractionParameters parameters_of(TractionMethod method) {
   TractionParameters parameters = half_space(method);
   parameters.element_um = 4;
   return parameters;
@@ -57,14 +57,14 @@ TractionInputs mapped(TractionInputs inputs, const Map& map, Vec2 centre, double
 template <class Map>
 void expect_mapped_forces(const Map& map, double turn_rad, double mirror) {
   const EllipseScene scene = ellipse_scene(48, 0.03, 4);
-  for (const std::string& method : kMethods) {
+  for (const TractionMethod method : kMethods) {
     const TractionInputs inputs = full_inputs_of(scene);
     const Reconstruction before = reconstruct(inputs, parameters_of(method), 1);
     const Reconstruction after = reconstruct(mapped(inputs, map, {32, 32}, turn_rad, mirror), parameters_of(method), 2);
     for (std::size_t a = 0; a < before.forces.size(); ++a) {
       const Vec2 expected = map(before.forces[a].force_nN);
       // Sums run in another order: rounding, and what iterations that stop at 1e-3 make of it.
-      EXPECT_NEAR(norm(after.forces[a].force_nN - expected), 0, 2e-3 * norm(expected)) << method << " " << a;
+      EXPECT_NEAR(norm(after.forces[a].force_nN - expected), 0, 2e-3 * norm(expected)) << name_of(method) << " " << a;
     }
   }
 }
@@ -81,7 +81,7 @@ TEST(Tractions, know_no_length_but_the_scenes_own) {
   // Twice as large in every length, lambda's too: tractions stay, forces grow fourfold.
   constexpr double kTwice = 2;
   const EllipseScene scene = ellipse_scene(48, 0.03, 4);
-  for (const char* method : {"fttc", "trpf", "bem"}) {
+  for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::trpf, TractionMethod::bem}) {
     TractionParameters parameters = parameters_of(method);
     parameters.lambda_um_per_kPa = 1;  // smooths by tens of per cent, so that a lambda in another unit shows
     const TractionInputs inputs = full_inputs_of(scene);
@@ -101,7 +101,7 @@ TEST(Tractions, know_no_length_but_the_scenes_own) {
     for (std::size_t a = 0; a < one.forces.size(); ++a) {
       const Vec2 expected = kTwice * kTwice * one.forces[a].force_nN;
       // as above; and the disc that stands for a point does not grow: (0.1 um over the beads' distance)²
-      EXPECT_NEAR(norm(two.forces[a].force_nN - expected), 0, 0.01 * norm(expected)) << method << " " << a;
+      EXPECT_NEAR(norm(two.forces[a].force_nN - expected), 0, 0.01 * norm(expected)) << name_of(method) << " " << a;
     }
   }
 }
@@ -113,19 +113,20 @@ TEST(Tractions, forces_are_found_on_gels_of_any_compressibility) {
   std::vector<Vec2> points;
   for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   for (const Bead& b : scene.field) points.push_back(b.position_um);
-  for (const char* model : {"half-space", "layer"}) {
+  for (const GelModel model : values_of<GelModel>()) {
     for (const double nu : {0.0, 0.25, 0.49, 0.4999, 0.4999999}) {
       TractionInputs inputs = inputs_of(scene);
       inputs.gel = {.youngs_modulus_kPa = 8.4, .poisson_ratio = nu, .thickness_um = 20};
-      const auto greens = greens::make_greens(inputs.gel, {.model = model}, 2);
+      const auto greens = greens::make_greens(inputs.gel, {.model = substrate::kind_of(model)}, 2);
       const std::vector<Vec2> u = greens->displacements_um(points, ellipses, scene.forces_nN);
       for (std::size_t i = 0; i < u.size(); ++i) inputs.beads[i].displacement_um = u[i];
-      for (const auto& [method, most] : {std::pair{"fttc", 0.05}, {"adhesion-forces", 1e-6}}) {
+      for (const auto& [method, most] :
+           {std::pair{TractionMethod::fttc, 0.05}, {TractionMethod::adhesion_forces, 1e-6}}) {
         TractionParameters parameters = half_space(method);
         parameters.gel_model = model;
         std::vector<Vec2> forces;
         for (const AdhesionForce& f : reconstruct(inputs, parameters, 2).forces) forces.push_back(f.force_nN);
-        EXPECT_LE(test::force_error(scene, forces), most) << method << ", " << model << ", nu " << nu;
+        EXPECT_LE(test::force_error(scene, forces), most) << name_of(method) << ", " << name_of(model) << ", nu " << nu;
       }
     }
   }
@@ -134,19 +135,19 @@ TEST(Tractions, forces_are_found_on_gels_of_any_compressibility) {
 TEST(Tractions, are_the_same_bits_for_any_number_of_threads) {
   TractionInputs inputs = inputs_of(ellipse_scene(32, 0.05, 8));
   inputs.outline_um = {{10, 10}, {54, 10}, {54, 54}, {10, 54}};
-  TractionParameters parameters = half_space("fttc");
+  TractionParameters parameters = half_space(TractionMethod::fttc);
   parameters.element_um = 6;
-  for (const char* method : {"fttc", "sparse", "trpf", "bem", "adhesion-forces"}) {
+  for (const TractionMethod method : kMethods) {
     parameters.method = method;
     const Reconstruction one = reconstruct(inputs, parameters, 1);
     for (const int threads : {2, 4}) {
       const Reconstruction many = reconstruct(inputs, parameters, threads);
       for (std::size_t p = 0; p < one.patches.size(); ++p) {
-        ASSERT_EQ(many.patches[p].traction_kPa, one.patches[p].traction_kPa) << method << ", " << threads;
+        ASSERT_EQ(many.patches[p].traction_kPa, one.patches[p].traction_kPa) << name_of(method) << ", " << threads;
       }
       for (std::size_t a = 0; a < one.forces.size(); ++a) {
-        ASSERT_EQ(many.forces[a].force_nN, one.forces[a].force_nN) << method << ", " << threads;
-        ASSERT_EQ(many.forces[a].sigma_nN, one.forces[a].sigma_nN) << method << ", " << threads;
+        ASSERT_EQ(many.forces[a].force_nN, one.forces[a].force_nN) << name_of(method) << ", " << threads;
+        ASSERT_EQ(many.forces[a].sigma_nN, one.forces[a].sigma_nN) << name_of(method) << ", " << threads;
       }
     }
   }
@@ -155,7 +156,8 @@ TEST(Tractions, are_the_same_bits_for_any_number_of_threads) {
 TEST(Fttc, a_scene_turned_by_any_angle_has_the_same_forces_turned) {
   // Off the lattice's axes cells cut the ellipses otherwise: a few per cent of the force at their rims.
   const auto forces = [](double turn) {
-    const Reconstruction r = reconstruct(inputs_of(ellipse_scene(128, 0, 1, turn)), half_space("fttc"), 1);
+    const Reconstruction r =
+        reconstruct(inputs_of(ellipse_scene(128, 0, 1, turn)), half_space(TractionMethod::fttc), 1);
     return r.forces;
   };
   const auto straight = forces(0);
@@ -171,7 +173,7 @@ TEST(Fttc, a_scene_turned_by_any_angle_has_the_same_forces_turned) {
 
 TEST(Fttc, odd_and_even_lattices_agree) {
   // Cells of another size cut the grown ellipses otherwise: as for the turned scene.
-  TractionParameters parameters = half_space("fttc");
+  TractionParameters parameters = half_space(TractionMethod::fttc);
   for (const double padding : {1.0, 1.5}) {
     parameters.padding = padding;
     const EllipseScene even = ellipse_scene(128, 0), odd = ellipse_scene(127, 0);
@@ -190,7 +192,7 @@ TEST(Fttc, cross_validation_smooths_more_where_there_is_more_noise) {
     const EllipseScene scene = ellipse_scene(96, noise, 2, 0, 64, false);
     const LatticeProblem problem(
         scene.field, scene.gel,
-        {.model = greens::GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
+        {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 1});
     TikhonovSolver solver(problem);
     const LambdaScan scan = scan_lambda(problem, solver);
     EXPECT_GT(scan.by_gcv, before);
@@ -203,7 +205,7 @@ TEST(Fttc, a_field_cut_at_the_border_does_not_inflate_the_contractile_moment) {
   const auto moment = [](const EllipseScene& scene, bool is_near) {
     TractionInputs inputs = inputs_of(scene);
     if (!is_near) inputs.adhesions.clear();
-    return sums_of(reconstruct(inputs, half_space("fttc"), 1), inputs, 1.5).contractile_moment_nN_um();
+    return sums_of(reconstruct(inputs, half_space(TractionMethod::fttc), 1), inputs, 1.5).contractile_moment_nN_um();
   };
   double truth = 0;
   for (std::size_t a = 0; a < whole.forces_nN.size(); ++a) {
@@ -221,7 +223,7 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
   const EllipseScene scene = ellipse_scene(96, 0);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  const auto greens = greens::make_greens(scene.gel, {.model = "half-space"}, 2);
+  const auto greens = greens::make_greens(scene.gel, {.model = substrate::ModelKind::half_space}, 2);
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> place(0, 64);
   std::vector<Vec2> points;
@@ -237,13 +239,13 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
     const Vec2 error{noise(random), noise(random)};
     inputs.beads.push_back({.position_um = points[i], .displacement_um = u[i] + error, .sigma_um = 0.02, .flag = {}});
   }
-  const Reconstruction r = reconstruct(inputs, half_space("fttc"), 1);
+  const Reconstruction r = reconstruct(inputs, half_space(TractionMethod::fttc), 1);
   std::vector<Vec2> forces;
   for (const AdhesionForce& f : r.forces) forces.push_back(f.force_nN);
   // As many beads on a lattice are the best spread they can have; chance leaves holes between scattered ones.
   const EllipseScene even = ellipse_scene(100, 0.02 / scene.largest_um, 3);
   std::vector<Vec2> even_forces;
-  for (const AdhesionForce& f : reconstruct(inputs_of(even), half_space("fttc"), 1).forces) {
+  for (const AdhesionForce& f : reconstruct(inputs_of(even), half_space(TractionMethod::fttc), 1).forces) {
     even_forces.push_back(f.force_nN);
   }
   const double on_lattice = test::force_error(even, even_forces), scattered = test::force_error(scene, forces);
@@ -253,11 +255,11 @@ TEST(Fttc, scattered_beads_and_a_lattice_tell_the_same) {
 
 TEST(Fttc, a_thick_layer_gives_the_tractions_of_the_half_space) {
   EllipseScene scene = ellipse_scene(64, 0.02, 3, 0, 6.4);  // spacing 0.1 um, cut out of the middle
-  TractionParameters layer = half_space("fttc");
-  layer.gel_model = "layer";
+  TractionParameters layer = half_space(TractionMethod::fttc);
+  layer.gel_model = GelModel::layer;
   layer.lambda_um_per_kPa = 0.05;
   TractionParameters half = layer;
-  half.gel_model = "half-space";
+  half.gel_model = GelModel::half_space;
   const Reconstruction reference = reconstruct(inputs_of(scene), half, 1);
   double before = 1e9, last = 1;
   for (const double thickness : {50.0, 100.0, 1000.0}) {
@@ -283,29 +285,29 @@ TEST(Tractions, where_nothing_moves_there_is_no_traction_and_that_is_said) {
   for (Bead& b : scene.field) b.displacement_um = {};
   TractionInputs inputs = inputs_of(scene);
   inputs.outline_um = {{10, 10}, {54, 10}, {54, 54}, {10, 54}};
-  TractionParameters parameters = half_space("fttc");
+  TractionParameters parameters = half_space(TractionMethod::fttc);
   parameters.element_um = 8;
-  for (const char* method : {"fttc", "sparse", "trpf", "bem", "adhesion-forces"}) {
+  for (const TractionMethod method : kMethods) {
     parameters.method = method;
     const Reconstruction r = reconstruct(inputs, parameters, 1);
-    for (const Patch& p : r.patches) EXPECT_EQ(p.traction_kPa, (Vec2{})) << method;
+    for (const Patch& p : r.patches) EXPECT_EQ(p.traction_kPa, (Vec2{})) << name_of(method);
     EXPECT_FALSE(r.patches.empty());
-    EXPECT_NE(r.remark.find("no bead has moved"), std::string::npos) << method;
+    EXPECT_NE(r.remark.find("no bead has moved"), std::string::npos) << name_of(method);
   }
 }
 
 TEST(Tractions, bad_input_is_named) {
   const EllipseScene scene = ellipse_scene(16, 0.05);
   const TractionInputs inputs = full_inputs_of(scene);
-  const auto expect_rejected = [](const TractionInputs& bad, const std::string& method, const std::string& word) {
+  const auto expect_rejected = [](const TractionInputs& bad, TractionMethod method, const std::string& word) {
     try {
       reconstruct(bad, parameters_of(method), 1);
-      ADD_FAILURE() << method << " took it: " << word;
+      ADD_FAILURE() << name_of(method) << " took it: " << word;
     } catch (const InvalidData& error) {
-      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << method << ": " << error.what();
+      EXPECT_NE(std::string(error.what()).find(word), std::string::npos) << name_of(method) << ": " << error.what();
     }
   };
-  for (const std::string& method : kMethods) {
+  for (const TractionMethod method : kMethods) {
     TractionInputs bad = inputs;
     bad.beads[7].displacement_um.x = std::nan("");
     expect_rejected(bad, method, "displacement of bead 7");
@@ -315,7 +317,7 @@ TEST(Tractions, bad_input_is_named) {
       expect_rejected(bad, method, std::to_string(n_beads));
     }
   }
-  for (const char* method : {"fttc", "sparse"}) {
+  for (const TractionMethod method : {TractionMethod::fttc, TractionMethod::sparse}) {
     TractionInputs bad = inputs;
     bad.beads[9].position_um = bad.beads[4].position_um;
     expect_rejected(bad, method, "position of bead 9");
@@ -325,8 +327,8 @@ TEST(Tractions, bad_input_is_named) {
   }
   TractionInputs few = inputs;
   few.beads.resize(7);
-  expect_rejected(few, "adhesion-forces", "8 adhesions");
-  expect_rejected(few, "trpf", "16 unknown");
+  expect_rejected(few, TractionMethod::adhesion_forces, "8 adhesions");
+  expect_rejected(few, TractionMethod::trpf, "16 unknown");
 }
 
 }  // namespace

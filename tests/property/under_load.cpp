@@ -25,7 +25,7 @@ struct PullingCell {
   DisplacementField at_rest;
 
   LinearData data_of(const DisplacementField& beads) const { return test::data_on_layer(beads, cell, kGel); }
-  BeadsOfState state(const DisplacementField& beads, const std::string& setting = "auto") const {
+  BeadsOfState state(const DisplacementField& beads, Switch setting = Switch::automatic) const {
     return take_state(
         beads, data_of(beads), [&](const DisplacementField& there) { return data_of(there); }, kSize_um, 0.01, setting,
         carried());
@@ -82,7 +82,7 @@ TEST(UnderLoad, tensions_of_a_cell_seen_under_load_are_right_by_the_beads_there)
     // three tensions: chance exceeds three standard errors of their sum of squares once in hundreds
     EXPECT_LT(error_of(cell, cell.fit(state.data)), 3);
     EXPECT_GT(error_of(cell, cell.fit(cell.data_of(cell.at_rest))), 3);
-    EXPECT_FALSE(cell.state(cell.at_rest, "off").effect.is_on);
+    EXPECT_FALSE(cell.state(cell.at_rest, Switch::off).effect.is_on);
   }
 }
 
@@ -96,9 +96,10 @@ TEST(UnderLoad, beads_that_are_given_under_load_stay_there) {
     // so clearly that the data under load are not asked for; by them it is the same
     const auto fail = [](const DisplacementField&) -> LinearData { throw std::logic_error("asked"); };
     const LinearData data = cell.data_of(cell.scene.beads);
-    EXPECT_FALSE(take_state(cell.scene.beads, data, fail, kSize_um, 0.01, "auto", cell.carried()).effect.is_on);
+    EXPECT_FALSE(
+        take_state(cell.scene.beads, data, fail, kSize_um, 0.01, Switch::automatic, cell.carried()).effect.is_on);
     const auto data_of = [&](const DisplacementField& there) { return cell.data_of(there); };
-    EXPECT_FALSE(take_state(cell.scene.beads, data, data_of, kSize_um, 0.01, "auto").effect.is_on);
+    EXPECT_FALSE(take_state(cell.scene.beads, data, data_of, kSize_um, 0.01, Switch::automatic).effect.is_on);
   }
 }
 
@@ -107,9 +108,9 @@ TEST(UnderLoad, beads_that_hardly_move_are_not_asked) {
   ASSERT_LT(cell.scene.largest_um, 0.01 * kSize_um);
   const auto fail = [](const DisplacementField&) -> LinearData { throw std::logic_error("asked"); };
   const LinearData data = cell.data_of(cell.at_rest);
-  EXPECT_FALSE(take_state(cell.at_rest, data, fail, kSize_um, 0.01, "auto").effect.is_on);
-  EXPECT_FALSE(take_state(cell.at_rest, data, fail, kSize_um, 0.01, "off").effect.is_on);
-  EXPECT_TRUE(cell.state(cell.at_rest, "on").effect.is_on);
+  EXPECT_FALSE(take_state(cell.at_rest, data, fail, kSize_um, 0.01, Switch::automatic).effect.is_on);
+  EXPECT_FALSE(take_state(cell.at_rest, data, fail, kSize_um, 0.01, Switch::off).effect.is_on);
+  EXPECT_TRUE(cell.state(cell.at_rest, Switch::on).effect.is_on);
 }
 
 }  // namespace

@@ -269,9 +269,9 @@ TEST(HardMesh, outline_of_thousands_of_pixel_steps) {
 TEST(HardMesh, cell_smaller_than_an_edge) {
   test::hard_case("edges of 10 to 100 um in a cell of 20 um", "a valid mesh, each adhesion held");
   const Cell cell = square_cell();
-  for (const std::string anchor : {"rim", "ellipse"}) {
+  for (const AdhesionAnchor anchor : {AdhesionAnchor::rim, AdhesionAnchor::ellipse}) {
     for (const double edge : {10.0, 20.0, 100.0}) {
-      SCOPED_TRACE(anchor + ", edge " + std::to_string(edge));
+      SCOPED_TRACE(std::string(name_of(anchor)) + ", edge " + std::to_string(edge));
       expect_valid(generate_network(cell, {.edge_length_um = edge, .adhesion_anchor = anchor}), cell, 0.0);
     }
   }
@@ -288,7 +288,7 @@ TEST(HardMesh, adhesions_of_any_size) {
     cell.adhesions.back().minor_axis_um *= scale;
     cell.adhesions.back().area_um2 *= scale * scale;
     cell.fibres = {fibre_along(1, {{2, 2}, {10, 10}}, 1, 5)};
-    const NetworkParameters parameters{.adhesion_anchor = "rim"};
+    const NetworkParameters parameters{.adhesion_anchor = AdhesionAnchor::rim};
     const GeneratedNetwork generated = generate_network(cell, parameters);
     expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
     EXPECT_GE(generated.worst_free_quality, 0.3);
@@ -311,12 +311,12 @@ TEST_P(HardCell, gives_a_valid_network_with_good_triangles_away_from_its_lines) 
                   "a valid mesh, worst free triangle >= 0.3");
   const Cell& cell = GetParam().cell;
   double worst = 1;
-  for (const std::string anchor : {"rim", "ellipse", "centre"}) {
+  for (const AdhesionAnchor anchor : values_of<AdhesionAnchor>()) {
     for (const std::uint64_t seed : {1, 2, 3}) {
-      SCOPED_TRACE(anchor + ", seed " + std::to_string(seed));
+      SCOPED_TRACE(std::string(name_of(anchor)) + ", seed " + std::to_string(seed));
       NetworkParameters parameters{.seed = seed};
       parameters.adhesion_anchor = anchor;
-      parameters.free_fibre_ends = anchor == "rim" ? "width" : "point";
+      parameters.free_fibre_ends = anchor == AdhesionAnchor::rim ? FreeFibreEnds::width : FreeFibreEnds::point;
       const GeneratedNetwork generated = generate_network(cell, parameters);
       expect_valid(generated, cell, testing::finest_edge_um(cell, parameters));
       EXPECT_GE(generated.worst_free_quality, 0.3);
@@ -332,7 +332,7 @@ INSTANTIATE_TEST_SUITE_P(Mesh, HardCell, ::testing::ValuesIn(testing::hard_cells
 TEST(HardMesh, rims_hold_the_adhesions_areas) {
   test::hard_case("eight points stand for an ellipse", "their polygon has its area, to 1 %");
   Cell cell = square_cell();
-  const GeneratedNetwork generated = generate_network(cell, {.adhesion_anchor = "rim"});
+  const GeneratedNetwork generated = generate_network(cell, {.adhesion_anchor = AdhesionAnchor::rim});
   for (const Adhesion& a : cell.adhesions) {
     Polygon rim;  // round the centre
     for (std::size_t v = 0; v < generated.network.vertices_um.size(); ++v) {

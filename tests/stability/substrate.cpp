@@ -135,7 +135,10 @@ TEST_P(Model, takes_empty_scenes) {
 TEST(Substrate, names_the_models_it_knows) {
   test::hard_case("a misspelt model", "an error that lists the models");
   try {
-    choice::make_substrate(kGel, test::model_named("layr"), 1);
+    SubstrateParameters parameters;
+    stage::ParameterList list;
+    declare(list, parameters);
+    stage::set_from_text(stage::parameter_named(list, "model"), "layr");
     FAIL();
   } catch (const UsageError& error) {
     EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, auto"), std::string::npos)
@@ -172,7 +175,7 @@ TEST(Substrate, says_which_mesh_would_fit_the_memory) {
   test::hard_case("memory for part of the mesh asked for", "an error with the mesh that would fit");
   SubstrateParameters parameters = test::model_named("refined");
   parameters.displacement_tolerance = 0;
-  parameters.precision = "double";
+  parameters.precision = numerics::Precision::double_;
   for (const auto& [limit_GB, fitting] : {std::pair{0.2, "elements; one of"}, std::pair{0.5, "unknowns would fit"}}) {
     parameters.memory_limit_GB = limit_GB;
     try {
@@ -282,7 +285,7 @@ TEST(Automatic, leaves_out_no_more_than_the_tolerance) {
     SubstrateParameters sides = parameters;
     sides.side_distance_um = kGel.thickness_um * -std::log(tolerance) / 1.48 * 1.001;
     ASSERT_EQ(choice(kGel, sides, points, ellipses), "layer");
-    sides.model = "split";
+    sides.model = ModelKind::split;
     EXPECT_LT(
         test::mean_column_difference(choice::make_substrate(kGel, sides, 2)->compliance_um_per_nN(points, ellipses),
                                      compliance("layer", kGel, points, ellipses)),
@@ -312,7 +315,7 @@ TEST(Automatic, each_effect_of_the_gel_has_a_scene_that_calls_for_it_and_one_tha
   p.modulus_profile = "0:8.4, 20:8.45";
   EXPECT_FALSE(effects_for(60, p).grading.is_on);
   EXPECT_FALSE(effects_for(60, p).vertical.is_on);
-  p.effects.vertical_displacement = "on";
+  p.effects.vertical_displacement = Switch::on;
   EXPECT_TRUE(effects_for(60, p).vertical.is_on);
 }
 
@@ -341,18 +344,18 @@ TEST(Automatic, obeys_its_switches) {
   SubstrateParameters p;
   p.side_distance_um = 30;
   p.modulus_profile = "0:8.4, 5:8.4, 5:20";
-  p.effects.depth_graded_gel = "off";
+  p.effects.depth_graded_gel = Switch::off;
   EXPECT_EQ(choice(kGel, p, points, ellipses), "split");
-  p.effects.finite_sides = "off";
+  p.effects.finite_sides = Switch::off;
   EXPECT_EQ(choice(kGel, p, points, ellipses), "layer");
-  p.effects.finite_thickness = "off";
+  p.effects.finite_thickness = Switch::off;
   EXPECT_EQ(choice(kGel, p, points, ellipses), "half-space");
 }
 
 TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) {
   test::hard_case("sides without a distance, a model without what is on", "an error that names both");
-  const auto refused = [](const std::string& model, std::string stage::EffectSwitches::*member,
-                          const std::string& setting, std::optional<double> side_distance_um = {}) {
+  const auto refused = [](const std::string& model, Switch stage::EffectSwitches::*member, Switch setting,
+                          std::optional<double> side_distance_um = {}) {
     SubstrateParameters p = test::model_named(model);
     p.effects.*member = setting;
     p.side_distance_um = side_distance_um;
@@ -364,13 +367,13 @@ TEST(Automatic, refuses_switches_without_a_datum_and_models_that_cannot_follow) 
     return false;
   };
   using S = stage::EffectSwitches;
-  EXPECT_TRUE(refused("auto", &S::finite_sides, "on"));
-  EXPECT_TRUE(refused("auto", &S::depth_graded_gel, "on"));
-  EXPECT_TRUE(refused("auto", &S::finite_thickness, "off", 5));  // sides so near are on, and have a base
-  EXPECT_TRUE(refused("half-space", &S::finite_thickness, "on"));
-  EXPECT_TRUE(refused("layer", &S::finite_thickness, "off"));
-  EXPECT_TRUE(refused("layer", &S::finite_sides, "on", 30));
-  EXPECT_FALSE(refused("auto", &S::finite_sides, "on", 30));
+  EXPECT_TRUE(refused("auto", &S::finite_sides, Switch::on));
+  EXPECT_TRUE(refused("auto", &S::depth_graded_gel, Switch::on));
+  EXPECT_TRUE(refused("auto", &S::finite_thickness, Switch::off, 5));  // sides so near are on, and have a base
+  EXPECT_TRUE(refused("half-space", &S::finite_thickness, Switch::on));
+  EXPECT_TRUE(refused("layer", &S::finite_thickness, Switch::off));
+  EXPECT_TRUE(refused("layer", &S::finite_sides, Switch::on, 30));
+  EXPECT_FALSE(refused("auto", &S::finite_sides, Switch::on, 30));
 }
 
 TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
@@ -380,10 +383,10 @@ TEST(Substrate, refuses_profiles_that_are_none_and_models_that_take_none) {
     parameters.modulus_profile = text;
     EXPECT_THROW(choice::make_substrate(kGel, parameters, 1), UsageError) << text;
   }
-  for (const char* model : {"half-space", "layer", "split"}) {
+  for (const ModelKind model : {ModelKind::half_space, ModelKind::layer, ModelKind::split}) {
     parameters.model = model;
     parameters.modulus_profile = "0:8, 4:8, 4:16";
-    EXPECT_THROW(choice::make_substrate(kGel, parameters, 1), UsageError) << model;
+    EXPECT_THROW(choice::make_substrate(kGel, parameters, 1), UsageError) << name_of(model);
   }
   EXPECT_THROW(choice::make_substrate(kGel, test::model_named("split"), 1)->volume({{{0, 0}, 1, 0.5, 0}}, {{1, 0}}),
                UsageError);

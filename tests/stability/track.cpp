@@ -223,7 +223,7 @@ TEST(TrackStability, pictures_of_different_beads_or_turned_against_each_other_gi
   EXPECT_NE(what_is_wrong(little.relaxed, little.stressed).find("(effects.drift_affine = off), found a turn of 1.1"),
             std::string::npos);
   TrackParameters parameters;
-  parameters.drift_affine = "on";
+  parameters.drift_affine = Switch::on;
   EXPECT_EQ(what_is_wrong(one.relaxed, other.stressed, parameters).substr(0, refused.size()), refused);
   EXPECT_EQ(what_is_wrong(one.relaxed, one.stressed, parameters), "nothing");
 }

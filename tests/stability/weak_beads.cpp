@@ -11,7 +11,7 @@
 namespace mbtfm::beads {
 namespace {
 
-TrackParameters by(TrackMethod method) { return {.method = word_of(method)}; }
+TrackParameters by(TrackMethod method) { return {.method = method}; }
 
 /// Wider than the windows: narrower ones no window shows.
 std::vector<test::Peak> wide_adhesions() {

@@ -99,7 +99,7 @@ void compare_fit(int n) {
   Eigen::VectorXd tensions = Eigen::VectorXd::Constant(9, 3);
   tensions[0] = 0.06;
   const test::TensionScene scene = test::scene_of(cell, tensions, 5000, 0.05, 1);
-  const auto fit = [&](const std::string& loss) {
+  const auto fit = [&](std::optional<tensions::Loss> loss) {
     test::TensionScene copy = test::scene_of(cell, tensions, 10, 0.05, 1);
     copy.beads = scene.beads;
     copy.data = scene.data;
@@ -109,7 +109,7 @@ void compare_fit(int n) {
     test::fit_own_network(copy, parameters);
   };
   compare(
-      "robust loss", n, [&] { fit("auto"); }, [&] { fit("squares"); });
+      "robust loss", n, [&] { fit({}); }, [&] { fit(tensions::Loss::squares); });
   const std::vector<double> given(tensions.data(), tensions.data() + tensions.size());
   const auto contract = [&](double stiffness) {
     const cables::CableNetwork cables(scene.cables.network(), {.axial_stiffness_nN = stiffness});
@@ -133,7 +133,7 @@ void compare_fibres(int n) {
   };
   const auto fit_without = [&] {
     Cell cell = fibrous;
-    cables::take_fibres(cell, "off");
+    cables::take_fibres(cell, Switch::off);
     fit(cell);
   };
   compare("stress fibres", n, fit_without, [&] { fit(even); });
@@ -157,7 +157,7 @@ void compare_series(int n) {
   const tensions::FitParameters parameters{.n_meshes = 1};
   const tensions::Trial start = tensions::uniform_start({networks.front(), scene.data.reduced, scene.adhesion_ids});
   const auto off = [&] {
-    const Effect coupling = tensions::decide_time_coupling(true, "off");
+    const Effect coupling = tensions::decide_time_coupling(true, Switch::off);
     tensions::fit_series(frames, networks, substrate::dense_response(scene.compliance_um_per_nN), {},
                          scene.adhesion_ids, parameters, false, coupling.is_on, 1, {}, start);
   };
@@ -172,13 +172,13 @@ void compare_series(int n) {
 
 void compare_tracking(int n) {
   const auto pair = test::draw_bead_pair(test::ring_of_adhesions(512, 6), {.width = 512, .n_beads = 5200});
-  const auto track = [&](const std::string& drift) {
+  const auto track = [&](Switch drift) {
     beads::TrackParameters parameters;
     parameters.drift_affine = drift;
     beads::track_beads(pair.relaxed, pair.stressed, 0.1, parameters, 1);
   };
   compare(
-      "affine drift", n, [&] { track("auto"); }, [&] { track("off"); });
+      "affine drift", n, [&] { track(Switch::automatic); }, [&] { track(Switch::off); });
 }
 
 }  // namespace

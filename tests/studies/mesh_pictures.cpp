@@ -58,9 +58,9 @@ int main() {
       kColumns * kPanel, rows * (kPanel + kTitle));
   for (int i = 0; i < static_cast<int>(cells.size()); ++i) {
     mesh::NetworkParameters p;
-    p.adhesion_anchor = "rim";
-    p.free_fibre_ends = "width";
-    p.link_reach = "neighbours";  // links are the triangulation's edges
+    p.adhesion_anchor = mesh::AdhesionAnchor::rim;
+    p.free_fibre_ends = mesh::FreeFibreEnds::width;
+    p.link_reach = mesh::LinkReach::neighbours;  // links are the triangulation's edges
     const mesh::GeneratedNetwork generated = mesh::generate_network(cells[i].cell, p);
     std::string title = cells[i].name;
     std::replace(title.begin(), title.end(), '_', ' ');

@@ -29,7 +29,7 @@ Cell unit_disc() {
   return cell;
 }
 
-void print_row(const Scene& scene, const std::string& seeds, const std::string& anchor, int n_seeds) {
+void print_row(const Scene& scene, mesh::Seeds seeds, mesh::AdhesionAnchor anchor, int n_seeds) {
   double vertices = 0, mean = 0, worst = 1, worst_mean = 1, free_mean = 0, free_worst = 1, even = 0, sweeps = 0;
   double seconds = 0, needles = 0;
   int n_at_rest = 0;
@@ -54,7 +54,7 @@ void print_row(const Scene& scene, const std::string& seeds, const std::string& 
     n_at_rest += generated.report.converged;
   }
   std::printf("%s,%g,%s,%s,%.0f,%.4f,%.4f,%.3f,%.4f,%.3f,%.4f,%.0f,%d/%d,%.1f,%.3f\n", scene.name.c_str(),
-              scene.edge_um, seeds.c_str(), anchor.c_str(), vertices, mean, worst_mean, worst, free_mean, free_worst,
+              scene.edge_um, name_of(seeds), name_of(anchor), vertices, mean, worst_mean, worst, free_mean, free_worst,
               even, sweeps, n_at_rest, n_seeds, needles, seconds);
   std::fflush(stdout);
 }
@@ -74,9 +74,10 @@ int main(int argc, char** argv) {
       "scene,edge_um,seeds,anchor,vertices,mean,least_mean,worst,free_mean,free_worst,even_share,sweeps,at_rest,"
       "needles,"
       "cpu_s\n");
-  for (const std::string seeds : {"regular", "jittered", "poisson"}) {
-    if (argc > 3 && seeds != argv[3]) continue;
-    for (const Scene& s : scenes) print_row(s, seeds, "centre", n_seeds);
-    for (const std::string anchor : {"ellipse", "rim"}) print_row(cell, seeds, anchor, n_seeds);
+  for (const mesh::Seeds seeds : values_of<mesh::Seeds>()) {
+    if (argc > 3 && name_of(seeds) != std::string(argv[3])) continue;
+    for (const Scene& s : scenes) print_row(s, seeds, mesh::AdhesionAnchor::centre, n_seeds);
+    for (const auto anchor : {mesh::AdhesionAnchor::ellipse, mesh::AdhesionAnchor::rim})
+      print_row(cell, seeds, anchor, n_seeds);
   }
 }

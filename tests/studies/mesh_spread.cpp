@@ -22,27 +22,28 @@
 namespace {
 
 using namespace mbtfm;
+using mesh::AdhesionAnchor, mesh::LinkReach, mesh::LinkWeights, mesh::Seeds;
 
 struct Formulation {
   const char* name;
-  const char* link_weights;
-  const char* adhesion_anchor;
-  const char* seeds;
-  const char* link_reach;
+  LinkWeights link_weights;
+  AdhesionAnchor adhesion_anchor;
+  Seeds seeds;
+  LinkReach link_reach;
   bool keeps_surface_tension;  ///< links pull in proportion to the edge; the thesis' are the same at any edge
   double finest_um;            ///< edge length below which it is left out: the rim has small ones of its own
 };
-constexpr const char* kNear = "neighbours";
-constexpr const char* kFar = "second-neighbours";
+constexpr LinkReach kNear = LinkReach::neighbours, kFar = LinkReach::second_neighbours;
 constexpr Formulation kFormulations[] = {
-    {"thesis: link values, points", "equal", "centre", "jittered", kNear, false, 0},
-    {"link values per edge, points", "equal", "centre", "jittered", kNear, true, 0},
-    {"width, points", "width", "centre", "jittered", kNear, true, 0},
-    {"width, ellipses", "width", "ellipse", "jittered", kNear, true, 0},
-    {"width, ellipses, regular", "width", "ellipse", "regular", kNear, true, 0},
-    {"width, ellipses, Poisson disc", "width", "ellipse", "poisson", kNear, true, 0},
-    {"width, rims (dashed)", "width", "rim", "jittered", kNear, true, 0.9},
-    {"second neighbours: default (dashed)", "width", "ellipse", "jittered", kFar, true, 0}};
+    {"thesis: link values, points", LinkWeights::equal, AdhesionAnchor::centre, Seeds::jittered, kNear, false, 0},
+    {"link values per edge, points", LinkWeights::equal, AdhesionAnchor::centre, Seeds::jittered, kNear, true, 0},
+    {"width, points", LinkWeights::width, AdhesionAnchor::centre, Seeds::jittered, kNear, true, 0},
+    {"width, ellipses", LinkWeights::width, AdhesionAnchor::ellipse, Seeds::jittered, kNear, true, 0},
+    {"width, ellipses, regular", LinkWeights::width, AdhesionAnchor::ellipse, Seeds::regular, kNear, true, 0},
+    {"width, ellipses, Poisson disc", LinkWeights::width, AdhesionAnchor::ellipse, Seeds::poisson, kNear, true, 0},
+    {"width, rims (dashed)", LinkWeights::width, AdhesionAnchor::rim, Seeds::jittered, kNear, true, 0.9},
+    {"second neighbours: default (dashed)", LinkWeights::width, AdhesionAnchor::ellipse, Seeds::jittered, kFar, true,
+     0}};
 constexpr double kEdges_um[] = {3, 2, 1.5, 1, 0.7, 0.4};
 
 /// What one mesh gives.

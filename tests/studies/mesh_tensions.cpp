@@ -23,15 +23,21 @@ struct Formulation {
 };
 
 const Formulation kTruths[] = {
-    {"neighbours", {.edge_length_um = 0.9, .link_reach = "neighbours"}},
-    {"second neighbours", {.edge_length_um = 0.9, .link_reach = "second-neighbours"}},
+    {"neighbours", {.edge_length_um = 0.9, .link_reach = mesh::LinkReach::neighbours}},
+    {"second neighbours", {.edge_length_um = 0.9, .link_reach = mesh::LinkReach::second_neighbours}},
     {"neighbours with rims",
-     {.edge_length_um = 0.9, .link_reach = "neighbours", .adhesion_anchor = "rim", .rim_points = 12}}};
+     {.edge_length_um = 0.9,
+      .link_reach = mesh::LinkReach::neighbours,
+      .adhesion_anchor = mesh::AdhesionAnchor::rim,
+      .rim_points = 12}}};
 const Formulation kFits[] = {
-    {"thesis", {.link_weights = "equal", .link_reach = "neighbours", .adhesion_anchor = "centre"}},
-    {"neighbours", {.link_reach = "neighbours"}},
-    {"second neighbours", {.link_reach = "second-neighbours"}},
-    {"second neighbours at 2 um", {.edge_length_um = 2, .link_reach = "second-neighbours"}}};
+    {"thesis",
+     {.link_weights = mesh::LinkWeights::equal,
+      .link_reach = mesh::LinkReach::neighbours,
+      .adhesion_anchor = mesh::AdhesionAnchor::centre}},
+    {"neighbours", {.link_reach = mesh::LinkReach::neighbours}},
+    {"second neighbours", {.link_reach = mesh::LinkReach::second_neighbours}},
+    {"second neighbours at 2 um", {.edge_length_um = 2, .link_reach = mesh::LinkReach::second_neighbours}}};
 
 struct Scene {
   experiment::Experiment experiment;
@@ -51,7 +57,8 @@ Scene scene(std::uint64_t seed) {
     ellipses.push_back(substrate::ellipse_of(a));
     s.adhesion_ids.push_back(a.adhesion_id);
   }
-  s.compliance_um_per_nN = greens::make_greens(p.gel, {.model = "layer"}, 1)->compliance_um_per_nN(points, ellipses);
+  s.compliance_um_per_nN =
+      greens::make_greens(p.gel, {.model = substrate::ModelKind::layer}, 1)->compliance_um_per_nN(points, ellipses);
   return s;
 }
 

@@ -72,7 +72,7 @@ OtherNetwork other_network(std::uint64_t seed, const mesh::NetworkParameters* tr
     o.adhesion_ids.push_back(adhesion.adhesion_id);
   }
   const Eigen::MatrixXd compliance =
-      greens::make_greens(p.gel, {.model = "layer"}, 2)->compliance_um_per_nN(points, ellipses);
+      greens::make_greens(p.gel, {.model = substrate::ModelKind::layer}, 2)->compliance_um_per_nN(points, ellipses);
   DisplacementField exact = o.experiment.displacement;
   if (truth) {
     const Eigen::VectorXd u_um = compliance * o.forces_nN;
@@ -153,9 +153,11 @@ using Formulations = std::vector<std::pair<const char*, mesh::NetworkParameters>
 
 Formulations true_formulations() {
   return {{"second neighbours", {}},
-          {"edges", {.link_reach = "neighbours"}},
-          {"edges and rims", {.link_reach = "neighbours", .adhesion_anchor = "rim", .rim_points = 12}},
-          {"edges and centres", {.link_reach = "neighbours", .adhesion_anchor = "centre"}}};
+          {"edges", {.link_reach = mesh::LinkReach::neighbours}},
+          {"edges and rims",
+           {.link_reach = mesh::LinkReach::neighbours, .adhesion_anchor = mesh::AdhesionAnchor::rim, .rim_points = 12}},
+          {"edges and centres",
+           {.link_reach = mesh::LinkReach::neighbours, .adhesion_anchor = mesh::AdhesionAnchor::centre}}};
 }
 
 /// Of every adhesion: true force, found force, stated error; and of the cell's total.

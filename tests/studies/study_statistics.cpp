@@ -31,9 +31,9 @@ test::StudySettings strong_cell_effects(int n_cells, std::uint64_t seed) {
 }
 
 std::string name_of_test(const statistics::Comparison& c) {
-  if (c.test == "Mann-Whitney")
+  if (c.test == Test::mann_whitney)
     return c.unit == statistics::Unit::observation ? "Mann-Whitney, by fibre" : "Mann-Whitney, medians";
-  return c.test;
+  return name_of(c.test);
 }
 
 /// p-values of dorsal against ventral (first condition) and of the conditions (ventral fibres), by question and test.
@@ -47,8 +47,9 @@ void add_p_values(const statistics::Sample& sample, const std::optional<statisti
                   PValues& p_values) {
   for (const statistics::Comparison& c : statistics::compare(sample, model)) {
     const bool is_types = c.group_a == "dorsal" && c.group_b == "ventral" && c.within == "a";
-    const bool is_conditions = c.question == "between conditions" && c.within == "ventral" && !c.group_b.empty();
-    if (is_types || is_conditions) p_values[{c.question, name_of_test(c)}].push_back(c.p_value);
+    const bool is_conditions =
+        c.question == Question::between_conditions && c.within == "ventral" && !c.group_b.empty();
+    if (is_types || is_conditions) p_values[{name_of(c.question), name_of_test(c)}].push_back(c.p_value);
   }
 }
 

@@ -55,7 +55,7 @@ int run(const std::vector<std::string>& arguments) {
   Study study;
   stage::ParameterList list;
   declare(list, study);
-  study.substrate.model = arguments.at(0);
+  stage::set_from_text(stage::parameter_named(list, "model"), arguments.at(0));
   test::set_all(list, {arguments.begin() + 1, arguments.end()});
   const auto points = test::scattered_points(study.beads, 45);
   const auto ellipses = test::scattered_ellipses(study.adhesions, 35);
@@ -64,11 +64,11 @@ int run(const std::vector<std::string>& arguments) {
   for (int k = 0; k < study.repeat; ++k) {
     const double wall = now_s(), cpu = cpu_s();
     matrix = model->compliance_um_per_nN(points, ellipses);
-    std::printf("%s,nu %g,h %g,wall %.2f s,cpu %.2f s,peak %.2f GB,", study.substrate.model.c_str(),
+    std::printf("%s,nu %g,h %g,wall %.2f s,cpu %.2f s,peak %.2f GB,", name_of(study.substrate.model),
                 study.gel.poisson_ratio, study.gel.thickness_um, now_s() - wall, cpu_s() - cpu, peak_GB());
   }
   substrate::SubstrateParameters exact;
-  exact.model = "layer";
+  exact.model = substrate::ModelKind::layer;
   const Eigen::MatrixXd reference = greens::make_greens(study.gel, exact, 2)->compliance_um_per_nN(points, ellipses);
   const test::ColumnErrors error = test::column_errors(matrix, reference, points, ellipses);
   std::printf("all %.3f %%,outside %.3f %%,inside %.3f %%,worst %.3f %%\n", 100 * error.all, 100 * error.outside,
@@ -77,7 +77,7 @@ int run(const std::vector<std::string>& arguments) {
     std::cout << "  " << name << " ";
     std::visit([](const auto& v) { std::cout << v << "\n"; }, value);
   }
-  for (const Effect& effect : model->effects()) std::cout << "  " << effect.name << ": " << effect.why << "\n";
+  for (const Effect& effect : model->effects()) std::cout << "  " << name_of(effect.kind) << ": " << effect.why << "\n";
   return 0;
 }
 

@@ -97,15 +97,15 @@ void descent(const Arguments& a) {
   };
   // thesis: from all tensions at the network's
   const tensions::Trial start = problem.evaluate(Eigen::VectorXd::Constant(n, 0.06));
-  for (const std::string method : {"plain-cg", "blockwise-cg"}) {
-    for (const std::string gradients : {"exact", "finite-difference"}) {
+  for (const auto method : {tensions::FitMethod::plain_cg, tensions::FitMethod::blockwise_cg}) {
+    for (const auto gradients : values_of<tensions::Gradients>()) {
       parameters.method = method;
       parameters.gradients = gradients;
-      add(method + (gradients == "exact" ? "" : ", finite differences"),
+      add(name_of(method) + std::string(gradients == tensions::Gradients::exact ? "" : ", finite differences"),
           tensions::fit_tensions(problem, parameters, 2, start));
     }
   }
-  parameters.gradients = "exact";
+  parameters.gradients = tensions::Gradients::exact;
   add("network fixed",
       tensions::fit_conjugate_gradients(problem, parameters, 2, start, {{.tensions = fibres, .n_steps = 10}}));
   add("gauss-newton", tensions::fit_gauss_newton(problem, parameters, start));
@@ -212,7 +212,7 @@ void add_repeats(NoiseRow& row, TensionScene& scene, double noise, int n_repeats
     measure_again(scene, noise, first_seed + static_cast<unsigned>(r));
     const tensions::EnsembleFit fit = test::fit_own_network(scene);
     row.l2 += tensions::relative_l2(scene.data, fit.forces_nN);
-    row.n_robust += fit.loss == "squares" ? 0 : 1;
+    row.n_robust += fit.loss == tensions::Loss::squares ? 0 : 1;
     ++row.n_repeats;
     add_forces(row, scene, fit, true_network_nN, linearised);
     add_tensions(row, scene.tensions_nN, limit, fit);

@@ -48,12 +48,17 @@ TensionScene full_scene(int n_beads) {
   return test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), n_beads, kNoise, 1);
 }
 
-std::unique_ptr<substrate::Substrate> our_gel() { return choice::make_substrate(kGel, {.model = "split"}, 1); }
+std::unique_ptr<substrate::Substrate> our_gel() {
+  return choice::make_substrate(kGel, {.model = substrate::ModelKind::split}, 1);
+}
 
 /// Double precision: finite differences take five digits.
 std::unique_ptr<substrate::Substrate> thesis_gel(bool is_kept) {
   if (is_kept) return our_gel();
-  return choice::make_substrate(kGel, {.model = "refined", .displacement_tolerance = 0, .precision = "double"}, 1);
+  return choice::make_substrate(
+      kGel,
+      {.model = substrate::ModelKind::refined, .displacement_tolerance = 0, .precision = numerics::Precision::double_},
+      1);
 }
 
 Eigen::VectorXd thesis_start_nN(const tensions::TensionProblem& problem) {
@@ -122,8 +127,8 @@ Thesis minimise(const tensions::TensionProblem& compliance_given, const tensions
     throw Stop();
   };
   tensions::FitParameters parameters;
-  parameters.method = "blockwise-cg";
-  parameters.gradients = "finite-difference";
+  parameters.method = tensions::FitMethod::blockwise_cg;
+  parameters.gradients = tensions::Gradients::finite_difference;
   parameters.max_evaluations = 2 * most_evaluations;
   parameters.tolerance = 1e-300;  // its steps are short long before the minimum
   const tensions::TensionProblem problem(compliance_given.cables(), compliance_given.data(),

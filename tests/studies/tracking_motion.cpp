@@ -104,7 +104,7 @@ int main(int argc, char** argv) {
         const images::Image relaxed = cut(pair.relaxed), stressed = cut(pair.stressed);
         std::printf("%d %-12s %-7s ", seed, asked.name, crop.name);
         beads::TrackParameters parameters;
-        parameters.drift_affine = "auto";
+        parameters.drift_affine = Switch::automatic;
         try {
           const auto t = beads::track_beads(relaxed, stressed, pixel, parameters, threads);
           const Vec2 missed = t.common.drift_um - motion(middle);

@@ -18,7 +18,7 @@ void fttc_against_the_best(int n_side, double noise, int n_seeds) {
     const test::EllipseScene scene = test::ellipse_scene(n_side, noise, kFirstSeed + s, 0, 64, noise > 0);
     const LatticeProblem problem(
         scene.field, scene.gel,
-        {.model = greens::GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 2});
+        {.model = GelModel::half_space, .spacing_um = {}, .padding = 1.5, .basis = Basis::waves, .threads = 2});
     TikhonovSolver solver(problem);
     const auto error_at = [&](double lambda) {
       solver.solve(lambda, 1e-4);
@@ -35,10 +35,10 @@ void fttc_against_the_best(int n_side, double noise, int n_seeds) {
               100 * noise, reached, best_of_all, worst, n_seeds);
 }
 
-void forces_and_their_errors(const char* method, double noise, int n_seeds) {
+void forces_and_their_errors(TractionMethod method, double noise, int n_seeds) {
   TractionParameters parameters;
   parameters.method = method;
-  parameters.gel_model = "half-space";
+  parameters.gel_model = GelModel::half_space;
   double force_error = 0, map_error = 0, squares = 0;
   for (int s = 0; s < n_seeds; ++s) {
     const test::EllipseScene scene = test::ellipse_scene(128, noise, kFirstSeed + s);
@@ -54,7 +54,7 @@ void forces_and_their_errors(const char* method, double noise, int n_seeds) {
       squares += std::pow(off / std::max(r.forces[a].sigma_nN.value_or(0), 1e-9), 2) / (8 * n_seeds);
     }
   }
-  std::printf("%-15s noise %3.0f %%: F %.4f", method, 100 * noise, force_error);
+  std::printf("%-15s noise %3.0f %%: F %.4f", name_of(method), 100 * noise, force_error);
   if (map_error > 0) std::printf(", L2 %.3f", map_error);
   if (noise > 0) std::printf(", mean (error/sigma)² %.2f", squares);
   std::printf(" (%d seeds)\n", n_seeds);
@@ -69,8 +69,8 @@ int main() {
     const bool is_noisy = noise > 0;
     fttc_against_the_best(128, noise, is_noisy ? 6 : 1);
     fttc_against_the_best(256, noise, is_noisy ? 2 : 1);
-    forces_and_their_errors("fttc", noise, is_noisy ? 6 : 1);
-    forces_and_their_errors("sparse", noise, is_noisy ? 6 : 1);
-    forces_and_their_errors("adhesion-forces", noise, is_noisy ? 10 : 1);
+    forces_and_their_errors(TractionMethod::fttc, noise, is_noisy ? 6 : 1);
+    forces_and_their_errors(TractionMethod::sparse, noise, is_noisy ? 6 : 1);
+    forces_and_their_errors(TractionMethod::adhesion_forces, noise, is_noisy ? 10 : 1);
   }
 }

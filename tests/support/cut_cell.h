@@ -133,9 +133,9 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
     ellipses.push_back(substrate::ellipse_of(a));
     ids.push_back(a.adhesion_id);
   }
-  tensions::LinearData data =
-      tensions::reduce(beads, greens::make_greens(gel, {.model = "layer"}, 2)->response(points, ellipses), {}, 2,
-                       tensions::affine_motions(beads));
+  tensions::LinearData data = tensions::reduce(
+      beads, greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)->response(points, ellipses), {}, 2,
+      tensions::affine_motions(beads));
   CutFit result;
   if (allow == Beyond::allowed && !cuts_of(cell).empty())
     result.beyond = tensions::allow_forces_beyond(data, cell, gel, spacing);

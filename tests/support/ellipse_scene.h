@@ -80,7 +80,7 @@ inline EllipseScene ellipse_scene(int n_side, double noise, unsigned seed = 1, d
   balance(scene.adhesions, scene.forces_nN);
   std::vector<substrate::Ellipse> ellipses;
   for (const Adhesion& a : scene.adhesions) ellipses.push_back(substrate::ellipse_of(a));
-  const auto greens = greens::make_greens(scene.gel, {.model = "half-space"}, 2);
+  const auto greens = greens::make_greens(scene.gel, {.model = substrate::ModelKind::half_space}, 2);
   std::vector<Vec2> points;
   const double start = 32 - side_um / 2;
   for (int j = 0; j < n_side; ++j) {

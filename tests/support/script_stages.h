@@ -44,7 +44,7 @@ inline nlohmann::ordered_json record_of_folder(const fs::path& folder, const std
           {"summary", "made by a script"},
           {"figures", {{"n", 3}, {"share", 0.25}, {"is_good", true}, {"why", "so"}}},
           {"effects",
-           {{{"name", "robust_loss"},
+           {{{"name", "robust loss"},
              {"switch", "auto"},
              {"on", false},
              {"number", 0.1},

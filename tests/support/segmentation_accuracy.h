@@ -25,7 +25,7 @@ inline SimulatedCell simulated_cell(const std::string& scenario, const std::stri
   stage::ParameterList list;
   declare(list, p);
   stage::read_toml(list, drawing::scenario_file(scenario));
-  p.microscope.image_quality = quality;
+  p.microscope.image_quality = named<drawing::ImageQuality>(quality).value();
   p.microscope.image_size_px = image_size_px;
   const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
   constexpr int kThreads = 2;

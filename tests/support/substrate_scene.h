@@ -93,7 +93,7 @@ inline ColumnErrors column_errors(const Eigen::MatrixXd& matrix, const Eigen::Ma
 
 inline substrate::SubstrateParameters model_named(const std::string& name) {
   substrate::SubstrateParameters parameters;
-  parameters.model = name;
+  parameters.model = named<substrate::ModelKind>(name).value();
   return parameters;
 }
 

@@ -92,8 +92,8 @@ inline TensionScene scene_of(const Network& network, const Eigen::VectorXd& tens
     scene.points_um.push_back({low.x - 15 + a * (high.x - low.x + 30), low.y - 15 + b * (high.y - low.y + 30)});
   }
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
-  scene.compliance_um_per_nN =
-      greens::make_greens(gel, {.model = "layer"}, 2)->compliance_um_per_nN(scene.points_um, scene.ellipses);
+  scene.compliance_um_per_nN = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)
+                                   ->compliance_um_per_nN(scene.points_um, scene.ellipses);
   contract(scene, tensions_nN);
   return scene;
 }
@@ -153,9 +153,9 @@ inline void add_ventral(Cell& cell, int start_id, int end_id) {
 /// As the thesis has it: link values along edges only, adhesions at points.
 inline mesh::NetworkParameters thesis_network() {
   mesh::NetworkParameters p;
-  p.link_weights = "equal";
-  p.link_reach = "neighbours";
-  p.adhesion_anchor = "centre";
+  p.link_weights = mesh::LinkWeights::equal;
+  p.link_reach = mesh::LinkReach::neighbours;
+  p.adhesion_anchor = mesh::AdhesionAnchor::centre;
   return p;
 }
 

@@ -37,11 +37,12 @@ inline double finest_edge_um(const Cell& cell, const mesh::NetworkParameters& pa
   for (const Adhesion& a : cell.adhesions) {
     Polygon rim = ellipse_corners(a, 64);
     rim.push_back(rim.front());
-    if (parameters.adhesion_anchor == "rim") finest = std::min(finest, length_um(rim) / parameters.rim_points);
+    if (parameters.adhesion_anchor == mesh::AdhesionAnchor::rim)
+      finest = std::min(finest, length_um(rim) / parameters.rim_points);
   }
   for (const Fibre& f : cell.fibres) {
     const bool is_free = !f.start_adhesion_id || !f.end_adhesion_id;
-    if (parameters.free_fibre_ends == "width" && is_free) finest = std::min(finest, f.width_um);
+    if (parameters.free_fibre_ends == mesh::FreeFibreEnds::width && is_free) finest = std::min(finest, f.width_um);
   }
   return finest;
 }

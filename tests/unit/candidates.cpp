@@ -84,17 +84,17 @@ TEST(Candidates, hold_no_arc_one_end_of_a_dorsal_fibre_and_both_of_a_ventral_one
 TEST(Candidates, are_taken_where_nothing_shows_the_adhesions_and_as_the_parameters_say) {
   EXPECT_EQ(source_of({}, true, false), AdhesionSource::image);
   EXPECT_EQ(source_of({}, false, false), AdhesionSource::cell);
-  EXPECT_EQ(source_of({.adhesions = "fibre-ends"}, true, false), AdhesionSource::fibre_ends);
-  EXPECT_EQ(source_of({.adhesions = "pattern"}, true, true), AdhesionSource::pattern);
-  EXPECT_THROW(source_of({.adhesions = "pattern"}, true, false), UsageError);
-  EXPECT_THROW(source_of({.adhesions = "image"}, false, false), UsageError);
+  EXPECT_EQ(source_of({.adhesions = AdhesionSource::fibre_ends}, true, false), AdhesionSource::fibre_ends);
+  EXPECT_EQ(source_of({.adhesions = AdhesionSource::pattern}, true, true), AdhesionSource::pattern);
+  EXPECT_THROW(source_of({.adhesions = AdhesionSource::pattern}, true, false), UsageError);
+  EXPECT_THROW(source_of({.adhesions = AdhesionSource::image}, false, false), UsageError);
 }
 
 struct Scene {
   test::DrawnScene drawn = test::drawn_scene(10, 1);
   images::Channel adhesion{"paxillin.tif", drawn.adhesion_image}, actin{"actin.tif", drawn.actin_image};
   SegmentParameters parameters;
-  explicit Scene(const char* adhesions) {
+  explicit Scene(std::optional<AdhesionSource> adhesions) {
     parameters.pixel_size_um = test::DrawnScene::kPixel_um;
     parameters.candidates.adhesions = adhesions;
   }
@@ -121,7 +121,7 @@ void expect_same_fibres(const Cell& a, const Cell& b) {
 }
 
 TEST(Candidates, without_an_adhesion_image_stand_at_the_ends_of_the_fibres_and_along_the_rim) {
-  const Scene scene("auto");
+  const Scene scene({});
   const Segmentation s = segment_cell(std::nullopt, scene.actin, scene.parameters);
   EXPECT_EQ(s.source, AdhesionSource::cell);
   ASSERT_FALSE(s.cell.adhesions.empty());
@@ -146,7 +146,7 @@ TEST(Candidates, without_an_adhesion_image_stand_at_the_ends_of_the_fibres_and_a
 }
 
 TEST(Candidates, at_fibre_ends_alone_have_no_other_place) {
-  const Scene scene("fibre-ends");
+  const Scene scene(AdhesionSource::fibre_ends);
   const Segmentation s = segment_cell(scene.adhesion, scene.actin, scene.parameters);
   EXPECT_TRUE(are_candidates(s.cell));
   EXPECT_LE(s.cell.adhesions.size(), 2 * s.cell.fibres.size());
@@ -154,7 +154,7 @@ TEST(Candidates, at_fibre_ends_alone_have_no_other_place) {
 }
 
 TEST(Candidates, of_a_pattern_lie_on_it_and_in_the_cell) {
-  Scene scene("pattern");
+  Scene scene(AdhesionSource::pattern);
   images::Image half = test::even_image(256, 256, 0);
   for (int j = 0; j < 256; ++j)
     for (int i = 0; i < 128; ++i) half.at(i, j) = 255;
@@ -175,13 +175,13 @@ TEST(Candidates, of_a_pattern_lie_on_it_and_in_the_cell) {
 }
 
 TEST(Candidates, of_a_pattern_stand_where_fibres_end_on_it) {
-  Scene scene("pattern");
+  Scene scene(AdhesionSource::pattern);
   HandDrawn drawn;
   images::Image disc = test::even_image(256, 256, 255);
   for (int j = 0; j < 256; ++j) disc.at(0, j) = 0;
   drawn.adhesion_mask = std::make_shared<const LabelMask>(mask_of(disc, "pattern.tif"));
   const Segmentation without = segment_cell(std::nullopt, scene.actin, scene.parameters, drawn);
-  scene.parameters.candidates.adhesions = "cell";
+  scene.parameters.candidates.adhesions = AdhesionSource::cell;
   const Segmentation at_ends = segment_cell(std::nullopt, scene.actin, scene.parameters);
   ASSERT_FALSE(without.cell.fibres.empty());
   ASSERT_TRUE(without.second);
@@ -196,7 +196,7 @@ TEST(Candidates, of_a_pattern_stand_where_fibres_end_on_it) {
 }
 
 TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
-  const Scene scene("pattern");
+  const Scene scene(AdhesionSource::pattern);
   const auto beneath = [&](Vec2 shift_um) {
     images::Image image = test::even_image(256, 256, 0);
     for (int j = 0; j < 256; ++j)
@@ -211,7 +211,7 @@ TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
 }
 
 TEST(Candidates, are_not_asked_for_where_an_image_shows_the_adhesions) {
-  const Scene scene("auto");
+  const Scene scene({});
   const Segmentation s = segment_cell(scene.adhesion, scene.actin, scene.parameters);
   EXPECT_EQ(s.source, AdhesionSource::image);
   EXPECT_FALSE(s.second);

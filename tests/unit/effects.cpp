@@ -22,10 +22,10 @@ stage::EffectSwitches read(std::string_view toml, const std::vector<std::string>
 TEST(Effects, a_stage_reads_its_own_switches_and_leaves_the_others_to_their_stages) {
   const std::string toml = "[effects]\nfinite_sides = 'off'\ndrift_affine = 'on'\neffect_tolerance = 0.05\n";
   const stage::EffectSwitches fit = read(toml, {"finite_sides", "effect_tolerance"});
-  EXPECT_EQ(fit.finite_sides, "off");
-  EXPECT_EQ(fit.drift_affine, "auto");
+  EXPECT_EQ(fit.finite_sides, Switch::off);
+  EXPECT_EQ(fit.drift_affine, Switch::automatic);
   EXPECT_EQ(fit.effect_tolerance, 0.05);
-  EXPECT_EQ(read(toml, {"drift_affine"}).drift_affine, "on");
+  EXPECT_EQ(read(toml, {"drift_affine"}).drift_affine, Switch::on);
 }
 
 TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
@@ -38,14 +38,21 @@ TEST(Effects, a_misspelt_switch_is_refused_by_every_stage) {
   EXPECT_THROW(read("[effects]\nfinite_sides = 'yes'\n", {"finite_sides"}), InputError);
 }
 
+TEST(Effects, are_read_back_by_their_names) {
+  for (const EffectKind kind : values_of<EffectKind>()) EXPECT_EQ(named<EffectKind>(name_of(kind)), kind);
+  EXPECT_EQ(name_of(EffectKind::time_coupling), std::string("time coupling")) << "a word for each kind, in its order";
+}
+
 TEST(Effects, auto_follows_the_number_and_a_switch_overrules_it) {
   for (const double number : {0.02, 0.01, 0.0}) {
-    EXPECT_EQ(stage::decided("sides", "auto", number, 0.01, "they change").is_on, number > 0.01);
-    EXPECT_TRUE(stage::decided("sides", "on", number, 0.01, "they change").is_on);
-    EXPECT_FALSE(stage::decided("sides", "off", number, 0.01, "they change").is_on);
+    EXPECT_EQ(stage::decided(EffectKind::finite_sides, Switch::automatic, number, 0.01, "they change").is_on,
+              number > 0.01);
+    EXPECT_TRUE(stage::decided(EffectKind::finite_sides, Switch::on, number, 0.01, "they change").is_on);
+    EXPECT_FALSE(stage::decided(EffectKind::finite_sides, Switch::off, number, 0.01, "they change").is_on);
   }
-  EXPECT_EQ(stage::line_of(stage::decided("sides", "auto", 0.02, 0.01, "they change the field by")),
-            "sides: on (auto): they change the field by 0.02, above 0.01");
+  EXPECT_EQ(stage::line_of(
+                stage::decided(EffectKind::finite_sides, Switch::automatic, 0.02, 0.01, "they change the field by")),
+            "finite sides: on (auto): they change the field by 0.02, above 0.01");
 }
 
 TEST(Effects, a_switch_makes_anew_the_stages_that_have_it_and_no_other) {

@@ -20,7 +20,7 @@ TEST(GivenField, columns_are_mapped_and_pixels_become_um) {
   const test::TemporaryFolder folder;
   TrackParameters p;
   p.x_column = "x", p.y_column = "y", p.ux_column = "u", p.uy_column = "v", p.sigma_column = "error";
-  p.length_unit = "px";
+  p.length_unit = LengthUnit::px;
   p.pixel_size_um = 0.5;
   for (const char separator : {',', ';', '\t'}) {
     std::string text = "i,x,y,u,v,error\n1,0,3,2,-1,0.1\n2,9,4,1,0.5,0.2";
@@ -72,7 +72,7 @@ TEST(GivenField, growth_is_taken_off_and_a_field_without_it_stays_as_it_is) {
       }
     }
     TrackParameters parameters;
-    parameters.drift_affine = "auto";
+    parameters.drift_affine = Switch::automatic;
     const DisplacementField before = field;
     const GivenMotion motion = take_affine_off(field, parameters);
     EXPECT_EQ(motion.affine.is_on, growth > 0) << motion.affine.why;
@@ -127,7 +127,7 @@ TEST(GivenField, what_is_wrong_with_a_file_is_said) {
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n"), {}), InputError);
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1e200,2,3,4\n"), {}), InputError);
   TrackParameters pixels;
-  pixels.length_unit = "px";
+  pixels.length_unit = LengthUnit::px;
   EXPECT_THROW(read_given_field(write(folder, "x_um,y_um,ux_um,uy_um\n1,2,3,4\n"), pixels), UsageError);
 }
 

@@ -7,13 +7,17 @@
 namespace mbtfm {
 namespace {
 
+enum class Method { fast, exact };
+constexpr auto words(Method) { return std::array{"fast", "exact"}; }
+
 struct Example {
   double length_um = 1.5;
   std::optional<double> pixel_size_um;
   int count = 3;
   std::optional<int> page;
   bool is_on = false;
-  std::string method = "fast";
+  Method method = Method::fast;
+  std::optional<Method> other;
   std::uint64_t seed = 1;
 };
 
@@ -25,7 +29,8 @@ void declare(stage::ParameterList& list, Example& e) {
   list.add("count", e.count, Range::between(1, 10), "how many");
   list.add("page", e.page, {.low = 1}, "which page");
   list.add("is_on", e.is_on, "whether");
-  list.add("method", e.method, "which way", {"fast", "exact"});
+  list.add("method", e.method, "which way");
+  list.add("other", e.other, "which other way");
   list.add("seed", e.seed, "seed");
 }
 
@@ -49,7 +54,7 @@ TEST(Parameters, values_are_read_from_their_table) {
                    "t");
   EXPECT_EQ(e.pixel_size_um, 0.1);
   EXPECT_EQ(e.length_um, 2);
-  EXPECT_EQ(e.method, "exact");
+  EXPECT_EQ(e.method, Method::exact);
   EXPECT_TRUE(e.is_on);
   EXPECT_EQ(e.seed, 7u);
   EXPECT_FALSE(e.page);
@@ -126,6 +131,38 @@ TEST(Parameters, a_repeated_key_a_wrong_type_and_a_value_out_of_range_are_refuse
   EXPECT_NE(message_of("[network]\nmethod = 'slow'\n").find("expected one of fast, exact, found 'slow'"),
             std::string::npos);
   EXPECT_NE(message_of("[network]\ncount = [1, 2]\n").find("array"), std::string::npos);
+}
+
+TEST(Parameters, a_choice_knows_its_words_and_names_the_one_that_was_meant) {
+  EXPECT_EQ(message_of("[network]\nmethod = 'exakt'\n"),
+            "cell.toml:2: [network] method: expected one of fast, exact, found 'exakt' | did you mean 'exact'? (which "
+            "way)");
+  EXPECT_EQ(message_of("[network]\nmethod = 'slow'\n"),
+            "cell.toml:2: [network] method: expected one of fast, exact, found 'slow' | which way");
+  Example e;
+  stage::ParameterList list;
+  declare(list, e);
+  stage::Parameter& other = stage::parameter_named(list, "other");
+  EXPECT_EQ(stage::to_text(other), "auto") << "unset";
+  stage::set_from_text(other, "exact");
+  EXPECT_EQ(e.other, Method::exact);
+  EXPECT_EQ(stage::to_text(other), "exact");
+  stage::set_from_text(other, "auto");
+  EXPECT_FALSE(e.other);
+  EXPECT_THROW(stage::set_from_text(other, "fas"), UsageError);
+  EXPECT_NE(stage::to_markdown(list).find("| one of auto, fast, exact | which other way |"), std::string::npos);
+}
+
+TEST(Parameters, a_choice_may_be_restricted_to_some_words_of_its_type) {
+  Switch way = Switch::off;
+  stage::ParameterList list;
+  list.table("network");
+  list.add("way", way, "which way", {Switch::automatic, Switch::off});
+  stage::Parameter& parameter = stage::parameter_named(list, "way");
+  EXPECT_EQ(parameter.default_value, "off");
+  EXPECT_THROW(stage::set_from_text(parameter, "on"), UsageError);
+  stage::set_from_text(parameter, "auto");
+  EXPECT_EQ(way, Switch::automatic);
 }
 
 TEST(Parameters, a_key_of_very_many_parts_is_refused_before_it_is_taken_apart) {

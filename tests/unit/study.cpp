@@ -263,11 +263,11 @@ TEST(Analysis, tests_are_made_by_fibre_and_by_cell_between_types_and_conditions)
   const Analysis analysis = analyse(study, {.bootstrap_draws = 200});
   std::set<std::string> tests;
   for (const Comparison& t : analysis.tensions.comparisons) {
-    tests.insert(t.question + ", " + t.test + ", " + name_of(t.unit));
+    tests.insert(name_of(t.question) + std::string(", ") + name_of(t.test) + ", " + name_of(t.unit));
     EXPECT_GE(t.p_value, 0);
     EXPECT_LE(t.p_value, 1);
     EXPECT_GE(t.p_holm.value_or(1), t.p_value);
-    EXPECT_TRUE(!t.group_b.empty() || t.question == "between kinds");  // two conditions need no omnibus test
+    EXPECT_TRUE(!t.group_b.empty() || t.question == Question::between_kinds);  // two conditions need no omnibus test
   }
   // between kinds: Kruskal-Wallis, Mann-Whitney by fibre and by median; clustered; mixed. Between conditions: no K-W
   EXPECT_EQ(tests.size(), 6u + 4u);
@@ -304,8 +304,8 @@ TEST(Analysis, tests_by_cell_hold_their_level_where_those_by_fibre_do_not) {
                                                                  .type_in_cell_sd_nN = 0.7,
                                                                  .seed = 100 + static_cast<std::uint64_t>(i)}));
     for (const Comparison& c : compare(sample, model_of(sample).model)) {
-      if (c.question == "between conditions" && c.within == "ventral" && c.p_value < 0.05)
-        ++n_rejected[c.test + ", " + name_of(c.unit)];
+      if (c.question == Question::between_conditions && c.within == "ventral" && c.p_value < 0.05)
+        ++n_rejected[name_of(c.test) + std::string(", ") + name_of(c.unit)];
     }
   }
   // 5 % of 200 are 10, with a standard deviation of 3.1; four of it

@@ -1,0 +1,93 @@
+/// Words that stand for a choice are read once, where a file, an argument or a flag is: from there on it is a value of
+/// an enumeration (pipeline/contract/words.h), which the compiler knows.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <map>
+#include <regex>
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+
+const fs::path kRoot = MBTFM_SOURCE_DIR;
+
+/// Readers of formats whose words are not ours, or of tables that hold them.
+const std::map<std::string, std::string> kReaders = {
+    {"pipeline/files/vtu_file.cpp", "elements and attributes of VTU"},
+    {"pipeline/files/vtu_data.cpp", "VTU's names of compressors"},
+    {"pipeline/files/csv_files.cpp", "true and false in CSV"},
+    {"pipeline/files/fit_summary.cpp", "keys of fit.json"},
+    {"pipeline/stage/parameters.cpp", "tables, true and false of cell.toml and flags"},
+    {"segment/images/ome.cpp", "elements of OME-XML"},
+    {"segment/images/stack.cpp", "the order of axes in OME-XML"},
+    {"segment/rois/roi_set.cpp", "ImageJ's ROIs and their archives"},
+    {"segment/beads/given_field.cpp", "other programs' words for a missing number in CSV"},
+    {"mbtfm/tensions/series.cpp", "true and false in CSV"},
+};
+
+/// Paths, names of files, units of what a user types and the like: what no enumeration would make clearer.
+constexpr std::size_t kMostElsewhere = 10;
+
+std::string text_of(const fs::path& file) {
+  std::ifstream stream(file);
+  return {std::istreambuf_iterator<char>(stream), {}};
+}
+
+/// "file:line: the line" of each comparison with a text that is written out, on either side.
+std::vector<std::string> comparisons_in(const std::string& name, const std::string& text) {
+  static const std::regex comparison(R"re([=!]=\s*"|"\s*[=!]=(?!=))re");
+  std::vector<std::string> found;
+  for (std::sregex_iterator at(text.begin(), text.end(), comparison), end; at != end; ++at) {
+    const auto place = static_cast<std::size_t>(at->position());
+    const std::size_t begin = text.rfind('\n', place) + 1, stop = text.find('\n', place);
+    const auto line = 1 + std::count(text.begin(), text.begin() + at->position(), '\n');
+    found.push_back(name + ":" + std::to_string(line) + ": " + text.substr(begin, stop - begin));
+  }
+  return found;
+}
+
+std::map<std::string, std::vector<std::string>> comparisons() {
+  std::map<std::string, std::vector<std::string>> found;
+  for (const char* top : {"pipeline", "segment", "network", "substrate", "mbtfm", "samples"}) {
+    for (const auto& entry : fs::recursive_directory_iterator(kRoot / top)) {
+      const std::string extension = entry.path().extension();
+      if (extension != ".h" && extension != ".cpp") continue;
+      const std::string name = fs::relative(entry.path(), kRoot).generic_string();
+      const auto in_file = comparisons_in(name, text_of(entry.path()));
+      if (!in_file.empty()) found[name] = in_file;
+    }
+  }
+  return found;
+}
+
+TEST(Words, a_comparison_with_a_written_text_is_seen_on_either_side_and_over_lines) {
+  EXPECT_EQ(comparisons_in("a.cpp", "x\nif (loss == \"huber\") y;\n"),
+            std::vector<std::string>{"a.cpp:2: if (loss == \"huber\") y;"});
+  EXPECT_EQ(comparisons_in("a.cpp", "if (\"huber\" != loss)").size(), 1u);
+  EXPECT_EQ(comparisons_in("a.cpp", "loss ==\n    \"huber\"").size(), 1u);
+  EXPECT_TRUE(comparisons_in("a.cpp", "text = \"huber\"; f(\"a\", b == c);").empty());
+}
+
+TEST(Words, are_compared_as_texts_in_readers_only) {
+  std::string places;
+  std::size_t n = 0;
+  for (const auto& [file, in_file] : comparisons()) {
+    if (kReaders.contains(file)) continue;
+    n += in_file.size();
+    for (const std::string& place : in_file) places += "\n" + place;
+  }
+  EXPECT_LE(n, kMostElsewhere) << "declare an enumeration with words instead (docs/developers/folders.md):" << places;
+}
+
+TEST(Words, readers_that_are_excused_compare_texts) {
+  const auto found = comparisons();
+  for (const auto& [file, reason] : kReaders) EXPECT_TRUE(found.contains(file)) << file << ": " << reason;
+}
+
+}  // namespace
+}  // namespace mbtfm
