@@ -188,11 +188,10 @@ double height_of_cortex(const Judge& judge) {
   const Field& field = judge.field;
   if (judge.outline_um.empty()) return std::numeric_limits<double>::infinity();
   std::vector<double> heights;
-  Polygon ring = judge.outline_um;
-  ring.push_back(ring.front());
-  for (std::size_t i = 0; i + 1 < ring.size(); ++i) {
+  const Polygon& ring = judge.outline_um;
+  for (std::size_t i = 0; i < ring.size(); ++i) {
     const cv::Point2d from = to_pixels(ring[i] - field.origin_um, field.pixel_um),
-                      way = to_pixels(ring[i + 1] - field.origin_um, field.pixel_um) - from;
+                      way = to_pixels(ring[(i + 1) % ring.size()] - field.origin_um, field.pixel_um) - from;
     const double length = std::hypot(way.x, way.y), angle = std::atan2(way.y, way.x);
     const int reach = cvCeil(judge.p.fibre_edge_um / field.pixel_um);
     for (double s = 0.5; s < length; ++s) {

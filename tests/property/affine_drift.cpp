@@ -42,7 +42,9 @@ TEST(AffineDrift, a_field_that_was_found_is_kept_where_turning_back_fails) {
     const auto peaks = peak_px > 0 ? test::ring_of_adhesions(96, peak_px) : std::vector<test::Peak>{};
     const auto pair = test::draw_bead_pair(
         peaks, {.width = 96, .n_beads = 30, .turn_rad = 0.0105, .seed = static_cast<std::uint64_t>(seed)});
-    TrackParameters parameters{.method = TrackMethod::beads, .drift_affine = Switch::on};
+    TrackParameters parameters;
+    parameters.method = TrackMethod::beads;
+    parameters.drift_affine = Switch::on;
     EXPECT_THROW(track_beads(pair.relaxed, pair.stressed, 0.1, parameters), NotFollowed);
     parameters.drift_affine = Switch::automatic;
     const Tracking tracking = track_beads(pair.relaxed, pair.stressed, 0.1, parameters);

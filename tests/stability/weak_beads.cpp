@@ -11,7 +11,11 @@
 namespace mbtfm::beads {
 namespace {
 
-TrackParameters by(TrackMethod method) { return {.method = method}; }
+TrackParameters by(TrackMethod method) {
+  TrackParameters parameters;
+  parameters.method = method;
+  return parameters;
+}
 
 /// Wider than the windows: narrower ones no window shows.
 std::vector<test::Peak> wide_adhesions() {

@@ -14,7 +14,7 @@ inline void set_all(stage::ParameterList& list, const std::vector<std::string>& 
   for (const std::string& setting : settings) {
     const auto split = setting.find('=');
     stage::set_from_text(stage::parameter_named(list, setting.substr(0, split)),
-                  split == std::string::npos ? "" : setting.substr(split + 1));
+                         split == std::string::npos ? "" : setting.substr(split + 1));
   }
 }
 
