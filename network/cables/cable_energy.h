@@ -9,7 +9,7 @@
 #include <cmath>
 
 #include "pipeline/contract/geometry.h"
-#include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/spring_matrix.h"
 
 namespace mbtfm::cables {
 
@@ -69,12 +69,11 @@ inline double energy_fJ(const Cable& cable, const Pull& pull, const Rounding& ro
 
 /// d²U of one cable with respect to its span: `along_nN_per_um` along the cable and force / length across it.
 /// `direction` is span / length, or an estimate of it no longer than 1.
-inline numerics::BlockCholesky::Block stiffness(const Pull& pull, Vec2 span_um, double along_nN_per_um,
-                                                Vec2 direction) {
+inline numerics::SpringMatrix::Block stiffness(const Pull& pull, Vec2 span_um, double along_nN_per_um, Vec2 direction) {
   const Vec2 n = (1 / pull.length_um) * span_um;
   const double across = pull.force_nN / pull.length_um;
   const double xy = along_nN_per_um * n.x * n.y - across * (direction.x * n.y + direction.y * n.x) / 2;
-  numerics::BlockCholesky::Block block;
+  numerics::SpringMatrix::Block block;
   block << along_nN_per_um * n.x * n.x + across * (1 - direction.x * n.x), xy,  //
       xy, along_nN_per_um * n.y * n.y + across * (1 - direction.y * n.y);
   return block;

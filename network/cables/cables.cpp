@@ -51,7 +51,7 @@ FreeVertices free_vertices(const Network& network) {
     pair[k] = static_cast<int>(pairs.size());
     pairs.push_back({a, b});
   }
-  return {std::move(unknown), std::move(pair), numerics::BlockCholesky(n_free, pairs)};
+  return {std::move(unknown), std::move(pair), numerics::SpringMatrix(n_free, pairs)};
 }
 
 CableState state_of(const Cable& cable, const Pull& pull, Vec2 span_um, const Rounding& rounding) {
@@ -228,20 +228,20 @@ Eigen::MatrixXd CableNetwork::reaction_derivatives(const std::vector<double>& te
                                                    const Equilibrium& equilibrium, int threads) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
   const Eigen::Index n_groups = static_cast<Eigen::Index>(impl_->fibre_ids.size());
-  numerics::BlockCholesky h_ff = impl_->free.matrix;
+  numerics::SpringMatrix h_ff = impl_->free.matrix;
   h_ff.set_zero();
-  numerics::BlockCholesky::Columns b_f = numerics::BlockCholesky::Columns::Zero(2 * h_ff.n_blocks(), n_groups);
+  numerics::SpringMatrix::Columns b_f = numerics::SpringMatrix::Columns::Zero(2 * h_ff.n_blocks(), n_groups);
   Eigen::MatrixXd result = Eigen::MatrixXd::Zero(2 * static_cast<Eigen::Index>(impl_->held_vertices.size()), n_groups);
   struct Coupling {
     int held, unknown;
-    numerics::BlockCholesky::Block stiffness;
+    numerics::SpringMatrix::Block stiffness;
   };
   std::vector<Coupling> couplings;  // the blocks of −H_xf
 
   for (std::size_t k = 0; k < cables.size(); ++k) {
     const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->rounding());
     const Vec2 n = (1 / p.length_um) * equilibrium.spans_um[k];
-    const numerics::BlockCholesky::Block block = stiffness(p, equilibrium.spans_um[k], p.stiffness_nN_per_um, n);
+    const numerics::SpringMatrix::Block block = stiffness(p, equilibrium.spans_um[k], p.stiffness_nN_per_um, n);
     impl_->free.add(h_ff, k, cables[k], block);
     const Eigen::Vector2d pull_of_unit_tension = impl_->network.links[k].share * Eigen::Vector2d(n.x, n.y);
     const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};
@@ -258,10 +258,10 @@ Eigen::MatrixXd CableNetwork::reaction_derivatives(const std::vector<double>& te
   }
   h_ff.factorise();
   // tensions in groups, each on its own
-  constexpr Eigen::Index kGroup = 8 * numerics::kRightHandSides;
+  constexpr Eigen::Index kGroup = 8 * numerics::kRightHandSides<double>;
   numerics::parallel_for(static_cast<int>((n_groups + kGroup - 1) / kGroup), threads, [&](int g) {
     const Eigen::Index first = g * kGroup, count = std::min(kGroup, n_groups - first);
-    numerics::BlockCholesky::Columns moved = b_f.middleCols(first, count);
+    numerics::SpringMatrix::Columns moved = b_f.middleCols(first, count);
     h_ff.solve(moved);  // now −dx_f/dt
     for (const Coupling& c : couplings)
       result.block(2 * c.held, first, 2, count) -= c.stiffness * moved.middleRows<2>(2 * c.unknown);
@@ -287,13 +287,13 @@ Eigen::MatrixXd CableNetwork::adhesion_force_derivatives(const std::vector<doubl
 GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium,
                                                  const Eigen::MatrixXd& weights) const {
   const std::vector<Cable> cables = impl_->cables(tensions_nN);
-  numerics::BlockCholesky h_ff = impl_->free.matrix;
+  numerics::SpringMatrix h_ff = impl_->free.matrix;
   h_ff.set_zero();
-  numerics::BlockCholesky::Columns w_f = numerics::BlockCholesky::Columns::Zero(2 * h_ff.n_blocks(), weights.cols());
+  numerics::SpringMatrix::Columns w_f = numerics::SpringMatrix::Columns::Zero(2 * h_ff.n_blocks(), weights.cols());
   for (std::size_t k = 0; k < cables.size(); ++k) {
     const Pull p = pull(cables[k], equilibrium.spans_um[k], impl_->rounding());
     const Vec2 n = (1 / p.length_um) * equilibrium.spans_um[k];
-    const numerics::BlockCholesky::Block block = stiffness(p, equilibrium.spans_um[k], p.stiffness_nN_per_um, n);
+    const numerics::SpringMatrix::Block block = stiffness(p, equilibrium.spans_um[k], p.stiffness_nN_per_um, n);
     impl_->free.add(h_ff, k, cables[k], block);
     const int ends[2] = {cables[k].vertex_a, cables[k].vertex_b};
     for (int e = 0; e < 2; ++e) {

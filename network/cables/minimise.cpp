@@ -286,8 +286,8 @@ class Newton : public Descent {
     }
   }
 
-  numerics::BlockCholesky matrix_;
-  numerics::BlockCholesky::Columns columns_;
+  numerics::SpringMatrix matrix_;
+  numerics::SpringMatrix::Columns columns_;
   std::vector<Dual> dual_;  // by cable
 };
 

@@ -6,18 +6,18 @@
 #include "network/cables/cable_energy.h"
 #include "network/cables/cables.h"
 #include "pipeline/contract/report.h"
-#include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/spring_matrix.h"
 
 namespace mbtfm::cables {
 
 /// Which vertices move, and where the cables' stiffness goes in the matrix over them.
 struct FreeVertices {
-  std::vector<int> unknown;        ///< by vertex: its block in the matrix, or −1 where it is held
-  std::vector<int> pair;           ///< by cable: its pair of blocks, or −1 where an end is held
-  numerics::BlockCholesky matrix;  ///< analysed
+  std::vector<int> unknown;       ///< by vertex: its block in the matrix, or −1 where it is held
+  std::vector<int> pair;          ///< by cable: its pair of blocks, or −1 where an end is held
+  numerics::SpringMatrix matrix;  ///< analysed
 
-  void add(numerics::BlockCholesky& to, std::size_t cable_index, const Cable& cable,
-           const numerics::BlockCholesky::Block& block) const {
+  void add(numerics::SpringMatrix& to, std::size_t cable_index, const Cable& cable,
+           const numerics::SpringMatrix::Block& block) const {
     const int a = unknown[cable.vertex_a], b = unknown[cable.vertex_b];
     if (pair[cable_index] >= 0)
       to.add_spring(pair[cable_index], block);

@@ -1,57 +1,73 @@
-/// Cholesky factorisation of a symmetric matrix of 2×2 blocks (one per planar vertex) whose pattern stays while its
-/// values change. Multifrontal: columns that share their rows are a dense panel, and what a panel takes from the matrix
-/// to its right is handed on to the next panel up the elimination tree (Liu, SIAM Review 34 (1992) 82).
+/// Cholesky factorisation of a symmetric matrix of kBlock × kBlock blocks whose pattern stays while its values change.
+/// Multifrontal: columns that share their rows are a dense panel, and what a panel takes from the matrix to its right
+/// is handed on to the next panel up the elimination tree (Liu, SIAM Review 34 (1992) 82).
 ///
-/// Written out here for two reasons. A slack direction (a pivot that vanishes) must hold still, where CHOLMOD's panels
-/// fail. And CHOLMOD takes more than three times as long at 1 200 to 20 000 vertices (benchmark_cables).
+/// Written out here for three reasons. A slack direction (a pivot that vanishes) may have to hold still, where
+/// CHOLMOD's panels fail. CHOLMOD takes more than three times as long at 1 200 to 20 000 vertices (benchmark_cables).
+/// And the bits depend neither on the number of threads nor on the kernels that a BLAS chooses.
 #pragma once
 
 #include <Eigen/Core>
-#include <array>
 #include <memory>
 #include <vector>
 
+#include "pipeline/numerics/elimination.h"
+
 namespace mbtfm::numerics {
 
+/// The lower triangle of a symmetric matrix of n × n blocks.
+template <int kBlock>
+struct BlockMatrix : BlockPattern {
+  std::vector<double> value;  ///< kBlock² a block, row by row
+  /// The block of the pattern at row >= column.
+  double* block(int at_row, int column) {
+    return &value[kBlock * kBlock * static_cast<std::size_t>(slot(at_row, column))];
+  }
+};
+
+/// What becomes of a pivot lost in rounding (a direction without stiffness): the matrix is refused, or an infinite one
+/// stands for it: the direction does not move.
+enum class LostPivot { fails, holds_still };
+
+struct FactoriseOptions {
+  LostPivot lost_pivot = LostPivot::fails;
+  double shift = 0;  ///< added to the diagonal
+  int threads = 1;
+};
+
+template <int kBlock, class Real>  // 2 and double, 3 and double or float
 class BlockCholesky {
  public:
-  using Block = Eigen::Matrix2d;
-  /// Right-hand sides, one in a column; rows 2i, 2i+1 belong to block i.
-  using Columns = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+  using Numbers = Eigen::Matrix<Real, Eigen::Dynamic, 1>;
 
-  /// Analyse the pattern: fill-reducing order, elimination tree, panels. Copies share it.
-  /// @param pairs  (i, j), i != j: the blocks off the diagonal that may be filled; repetitions share one block
-  BlockCholesky(int n_blocks, const std::vector<std::array<int, 2>>& pairs);
+  explicit BlockCholesky(std::shared_ptr<const Elimination> elimination) : elimination_(std::move(elimination)) {}
 
-  void set_zero();
-  /// Add the stiffness of a spring between the two blocks of pairs[pair]: +K on their diagonals, −K between them.
-  void add_spring(int pair, const Block& stiffness);
-  /// Add to the diagonal block i.
-  void add_diagonal(int i, const Block& stiffness);
+  /// Subtrees run side by side; the panels above them one after the other, cut into tiles. Neither depends on the
+  /// number of threads, so the bits do not. @returns whether no pivot was lost that must not be
+  bool factorise(const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options);
 
-  /// Factorise the present values with `shift` times their mean diagonal added to each diagonal block. A pivot lost in
-  /// rounding (a direction without stiffness) is replaced by an infinite one: the direction does not move.
-  void factorise(double shift = 0);
-  /// Solve in place with the last factorisation.
-  void solve(Columns& columns) const;
+  /// In place, with the last factorisation. Skips the panels below which no right-hand side is.
+  /// @param x         rows in the order of elimination, each of n numbers
+  /// @param n         1, or a multiple of kRightHandSides
+  /// @param is_needed by panel: whether its solution is, and with it those of the panels above; empty: all are
+  void solve(Real* x, std::size_t n, const std::vector<char>& is_needed = {}) const;
 
-  int n_blocks() const { return static_cast<int>(diagonal_.size()); }
+  const Elimination& elimination() const { return *elimination_; }
+  /// The panels, one after the other, column-major.
+  Numbers& factor() { return factor_; }
+  const Numbers& factor() const { return factor_; }
 
  private:
-  struct Pattern;
-  struct Panel;
-  bool is_parent(const Panel& panel, const Panel& child) const;
-  void assemble(const Panel& panel, double shift);
-  enum class Part { columns, rest };
-  void add_update(const Panel& child, const double* update, const Panel& panel, Part part, double* own_update);
-  void eliminate(const Panel& panel, double* update, double shift);
+  using Panel = EliminationPanel;
+  using Updates = std::vector<std::unique_ptr<Real[]>>;  // by panel: what it hands on
+  bool eliminate(const Panel& panel, const BlockMatrix<kBlock>& matrix, const FactoriseOptions& options,
+                 Updates& updates);
+  void assemble(const Panel& panel, const BlockMatrix<kBlock>& matrix, double shift);
+  void add_updates(const Panel& panel, bool to_columns, const Updates& updates, int threads);
+  Real* values_of(const Panel& panel) { return factor_.data() + kBlock * kBlock * panel.at; }
 
-  std::shared_ptr<const Pattern> pattern_;
-  std::vector<Block> diagonal_, off_diagonal_;  // the matrix, in the order of elimination
-  std::vector<double> factor_;                  // the panels, one after the other
-  // Two stacks of what panels still have to hand on: a panel takes its children's from one and leaves its own on the
-  // other.
-  std::array<std::vector<double>, 2> updates_;
+  std::shared_ptr<const Elimination> elimination_;
+  Numbers factor_;
 };
 
 }  // namespace mbtfm::numerics

@@ -1,28 +1,16 @@
-/// Sparse Cholesky factorisation of matrices of 3 x 3 blocks: nested dissection of the nodes (METIS) and supernodes by
-/// CHOLMOD, fronts by our own, whose bits do not depend on the number of threads.
+/// The factor of a matrix of 3 x 3 blocks, made once for many right-hand sides: in single or double precision, within a
+/// limit of memory, kept on disk.
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <functional>
 #include <memory>
 #include <string>
 #include <vector>
 
-namespace mbtfm::numerics {
+#include "pipeline/numerics/block_cholesky.h"
 
-/// The lower triangle of a symmetric matrix of n x n blocks of 3 x 3, by block columns.
-struct BlockMatrix {
-  int n = 0;
-  std::vector<int> start;     ///< by column, n + 1
-  std::vector<int> row;       ///< block rows, rising, the first of a column its diagonal
-  std::vector<double> value;  ///< 9 a block, row by row
-  /// The block of the pattern at row >= column.
-  double* block(int at_row, int column) {
-    const auto found = std::lower_bound(row.begin() + start[column], row.begin() + start[column + 1], at_row);
-    return &value[9 * static_cast<std::size_t>(found - row.begin())];
-  }
-};
+namespace mbtfm::numerics {
 
 /// One column of a right-hand side or a solution, by node and axis.
 class NodalColumn {
@@ -56,7 +44,7 @@ class SparseCholesky {
   /// A file of the cache is called by the hash of the matrix, so it is never that of another; a damaged one is ignored.
   /// @throws NotSolved where the factor would take more than the memory allowed (known before it is allocated), or the
   ///         matrix is not positive definite
-  SparseCholesky(const BlockMatrix& matrix, const FactorOptions& options);
+  SparseCholesky(const BlockMatrix<3>& matrix, const FactorOptions& options);
   ~SparseCholesky();
   SparseCholesky(const SparseCholesky&) = delete;
   SparseCholesky& operator=(const SparseCholesky&) = delete;

@@ -1,8 +1,9 @@
-/// The dense parts of a multifrontal factorisation, and of solving with it. Compiled for several instruction sets: the
-/// last bits depend on the processor, not on anything else.
+/// The dense parts of a multifrontal factorisation, and of solving with it. Compiled for several instruction sets with
+/// the same sums and without fused multiplication: the bits are the same on every processor.
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 namespace mbtfm::numerics {
 
@@ -12,25 +13,34 @@ struct DensePanel {
   Value* values = nullptr;
   std::size_t height = 0, width = 0;
 };
-/// Of a symmetric matrix.
-using DenseColumns = DensePanel<double>;
-/// What partial_cholesky() leaves of them.
-using DenseFactor = DensePanel<const double>;
 
-/// The first `width` steps of Cholesky's factorisation, in place. A pivot not above least_pivot[column] is replaced by
-/// an infinite one. What is above the diagonal is overwritten.
+/// What the functions below are compiled for.
+enum class Instructions { baseline, avx2, avx512 };
+std::vector<Instructions> known_instructions();  ///< to this processor, the fastest last
+Instructions fastest_instructions();
+
+/// The first `width` steps of Cholesky's factorisation, in place; float or double. A pivot not above
+/// least_pivot[column] is replaced by an infinite one. What is above the diagonal is overwritten. Same bits for any
+/// number of threads.
 /// @param change  out: what the height − width rows and columns that remain change by, column-major, on and below
 ///                their diagonal: minus the product of the new columns' lower rows with their transpose
-void partial_cholesky(const DenseColumns& columns, const double* least_pivot, double* change);
+template <class Real>
+void partial_cholesky(const DensePanel<Real>& columns, const Real* least_pivot, Real* change, int threads = 1,
+                      Instructions instructions = fastest_instructions());
 
 /// Right-hand sides are rows of so many numbers, one row for each of the matrix: 1 number, or a multiple of this.
-constexpr std::size_t kRightHandSides = 8;
+template <class Real>
+constexpr std::size_t kRightHandSides = 64 / sizeof(Real);
 
 /// With L₁ the first `width` rows of the factor, L₂ those below: (a, b) -> (L₁⁻¹ a, b − L₂ L₁⁻¹ a).
 /// @param rows  `height` of them
-void solve_lower(const DenseFactor& factor, double* rows, std::size_t n_right_hand_sides);
+template <class Real>
+void solve_lower(const DensePanel<const Real>& factor, Real* rows, std::size_t n_right_hand_sides,
+                 Instructions instructions = fastest_instructions());
 
 /// (a, b) -> (L₁⁻ᵀ (a − L₂ᵀ b), b)
-void solve_upper(const DenseFactor& factor, double* rows, std::size_t n_right_hand_sides);
+template <class Real>
+void solve_upper(const DensePanel<const Real>& factor, Real* rows, std::size_t n_right_hand_sides,
+                 Instructions instructions = fastest_instructions());
 
 }  // namespace mbtfm::numerics

@@ -18,54 +18,36 @@ std::string hash_of(const std::vector<T>& values) {
   return files::sha256({reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
 }
 
-std::size_t n_values(const Supernodes& s, int k) {
-  return 9 * static_cast<std::size_t>(s.n_rows(k)) * static_cast<std::size_t>(s.n_columns(k));
-}
-
-std::size_t n_bytes(const Supernodes& s) {
-  std::size_t n = 0;
-  for (int k = 0; k < s.count(); ++k) n += sizeof(double) * n_values(s, k);
-  return n;
-}
-
 }  // namespace
 
-FactorFile::FactorFile(const std::filesystem::path& folder, const BlockMatrix& matrix, const Supernodes& supernodes)
-    : supernodes_(supernodes) {
+FactorFile::FactorFile(const std::filesystem::path& folder, const BlockMatrix<3>& matrix,
+                       const Elimination& elimination)
+    : n_bytes_(9 * sizeof(double) * elimination.n_blocks()) {
   // the order of elimination, too: another version of METIS has another
-  const std::string key = hash_of(matrix.start) + hash_of(matrix.row) + hash_of(matrix.value) +
-                          hash_of(supernodes.place) + hash_of(supernodes.first) + hash_of(supernodes.row);
+  std::vector<int> first;
+  for (const EliminationPanel& panel : elimination.panels) first.push_back(panel.first);
+  const std::string key =
+      hash_of(matrix.start) + hash_of(matrix.row) + hash_of(matrix.value) + hash_of(elimination.place) + hash_of(first);
   file_ = folder / ("factor-" + files::sha256(key) + ".bin");
 }
 
-CachedFactor FactorFile::read() const {
+std::string FactorFile::read(Eigen::VectorXd& factor) const {
   std::ifstream stream(file_, std::ios::binary);
-  if (!stream) return {.panels = {}, .note = "absent"};
+  if (!stream) return "absent";
   std::ostringstream text;
   text << stream.rdbuf();
   const std::string bytes = std::move(text).str();
-  const std::size_t n = n_bytes(supernodes_);
-  const bool is_whole = bytes.size() == n + kHashLength &&
-                        std::string_view(bytes).substr(n) == files::sha256(std::string_view(bytes).substr(0, n));
-  if (!is_whole) return {.panels = {}, .note = "damaged, ignored: " + file_.string()};
-  Panels<double> panels(supernodes_.count());
-  const char* from = bytes.data();
-  for (int k = 0; k < supernodes_.count(); ++k) {
-    const std::size_t size = sizeof(double) * n_values(supernodes_, k);
-    panels[k] = std::make_unique_for_overwrite<double[]>(n_values(supernodes_, k));
-    std::memcpy(panels[k].get(), from, size);
-    from += size;
-  }
-  return {.panels = std::move(panels), .note = "used"};
+  const bool is_whole =
+      bytes.size() == n_bytes_ + kHashLength &&
+      std::string_view(bytes).substr(n_bytes_) == files::sha256(std::string_view(bytes).substr(0, n_bytes_));
+  if (!is_whole) return "damaged, ignored: " + file_.string();
+  factor.resize(static_cast<Eigen::Index>(n_bytes_ / sizeof(double)));
+  std::memcpy(factor.data(), bytes.data(), n_bytes_);
+  return "used";
 }
 
-std::string FactorFile::write(const Panels<double>& panels) const {
-  std::string bytes;
-  bytes.reserve(n_bytes(supernodes_) + kHashLength);
-  for (int k = 0; k < supernodes_.count(); ++k) {
-    bytes.append(reinterpret_cast<const char*>(panels[k].get()), sizeof(double) * n_values(supernodes_, k));
-  }
-  bytes += files::sha256(bytes);
+std::string FactorFile::write(const Eigen::VectorXd& factor) const {
+  const std::string_view numbers(reinterpret_cast<const char*>(factor.data()), n_bytes_);
   std::error_code error;
   std::filesystem::create_directories(file_.parent_path(), error);
   std::string temporary = file_.string() + ".XXXXXX";
@@ -73,7 +55,7 @@ std::string FactorFile::write(const Panels<double>& panels) const {
   if (descriptor < 0) return "; not written: " + file_.string();
   close(descriptor);
   std::ofstream stream(temporary, std::ios::binary);
-  stream.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  stream << numbers << files::sha256(numbers);
   stream.close();
   if (stream) std::filesystem::rename(temporary, file_, error);
   if (stream && !error) return "; written";

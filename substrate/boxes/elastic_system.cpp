@@ -96,7 +96,7 @@ std::span<const NodeWeight> ElasticSystem::carriers(int node) const {
   return hanging.empty() ? std::span(&own_[node], 1) : std::span(hanging);
 }
 
-numerics::BlockMatrix ElasticSystem::pattern() const {
+numerics::BlockMatrix<3> ElasticSystem::pattern() const {
   std::vector<std::vector<int>> nodes_of_cell(mesh_.cells.size());
   std::vector<std::vector<int>> cells_of_node(n_free_);
   for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
@@ -110,7 +110,7 @@ numerics::BlockMatrix ElasticSystem::pattern() const {
     nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
     for (const int node : nodes) cells_of_node[node].push_back(static_cast<int>(cell));
   }
-  numerics::BlockMatrix matrix;
+  numerics::BlockMatrix<3> matrix;
   matrix.n = n_free_;
   matrix.start = {0};
   std::vector<int> seen(n_free_, -1);
@@ -130,8 +130,8 @@ numerics::BlockMatrix ElasticSystem::pattern() const {
   return matrix;
 }
 
-numerics::BlockMatrix ElasticSystem::assemble(const substrate::Material& material) {
-  numerics::BlockMatrix matrix = pattern();
+numerics::BlockMatrix<3> ElasticSystem::assemble(const substrate::Material& material) {
+  numerics::BlockMatrix<3> matrix = pattern();
   std::vector<Eigen::Triplet<double>> bottom;
   const auto add = [&](const NodeWeight& at_a, const NodeWeight& at_b, const auto& block) {
     const int row = free_of_node_[at_a.node];

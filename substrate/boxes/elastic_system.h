@@ -47,8 +47,8 @@ class ElasticSystem {
   void number_nodes();
   /// The nodes that carry a node: itself, or what it hangs on.
   std::span<const NodeWeight> carriers(int node) const;
-  numerics::BlockMatrix pattern() const;
-  numerics::BlockMatrix assemble(const substrate::Material& material);
+  numerics::BlockMatrix<3> pattern() const;
+  numerics::BlockMatrix<3> assemble(const substrate::Material& material);
 
   BlockMesh mesh_;
   int n_free_ = 0;

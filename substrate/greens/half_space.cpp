@@ -172,7 +172,39 @@ HalfSpaceEllipse::HalfSpaceEllipse(const Gel& gel, const substrate::Ellipse& ell
       poisson_ratio_(gel.poisson_ratio),
       cos_(std::cos(ellipse.angle_rad)),
       sin_(std::sin(ellipse.angle_rad)),
-      scale_(1 / (2 * pi * pi * substrate::shear_modulus_kPa(gel) * ellipse.semi_major_um * ellipse.semi_minor_um)) {}
+      scale_(1 / (2 * pi * pi * substrate::shear_modulus_kPa(gel) * ellipse.semi_major_um * ellipse.semi_minor_um)) {
+  // w = s (p e^(it) + q e^(-it)), s² even on [0, 1]: the terms without e^(it), times <s²> = 1/2 or <s⁴> = 1/3
+  const double p = 0.5 * (ellipse.semi_major_um + ellipse.semi_minor_um);
+  const double q = 0.5 * (ellipse.semi_major_um - ellipse.semi_minor_um);
+  m20_ = p * q;
+  m11_ = 0.5 * (p * p + q * q);
+  m40_ = 2 * m20_ * m20_;
+  m31_ = 2 * m20_ * m11_;
+  m22_ = (p * p * p * p + 4 * m20_ * m20_ + q * q * q * q) / 3;
+}
+
+Sym2 HalfSpaceEllipse::far_compliance_um_per_nN(Vec2 point_um) const {
+  // With z = x + i y in the ellipse's frame a point force's field is (2-nu)/2 1/|z| I plus the reflection
+  // nu/2 z²/|z|³; of both, at z - w, the series in w/z and conj(w/z): those of (1-t)^(-1/2), (1-t)^(1/2), (1-t)^(-3/2)
+  const Vec2 offset = point_um - ellipse_.centre_um;
+  const double x = cos_ * offset.x + sin_ * offset.y, y = cos_ * offset.y - sin_ * offset.x;
+  const double u = 1 / (x * x + y * y);
+  const double re = u * u * (x * x - y * y), im = -2 * u * u * x * y;  // of z^-2
+  const double re2 = re * re - im * im, im2 = 2 * re * im;
+  const double even =
+      1 + u * (m11_ / 4 + m22_ * 9 / 64 * u) + re * (m20_ * 3 / 4 + m31_ * 5 / 16 * u) + re2 * m40_ * 35 / 64;
+  const double turned_re =
+      1 - u * (m11_ * 3 / 4 + m22_ * 15 / 64 * u) + re * (m20_ * 7 / 4 - m31_ * 19 / 16 * u) + re2 * m40_ * 155 / 64;
+  const double turned_im = im * (m31_ * u - 2 * m20_) - im2 * m40_ * 5 / 2;
+  const double turn_re = re / u, turn_im = -im / u;  // z²/|z|²
+  const double plane_re = turn_re * turned_re - turn_im * turned_im;
+  const double plane_im = turn_re * turned_im + turn_im * turned_re;
+  const double c = cos_ * cos_ - sin_ * sin_, s = 2 * cos_ * sin_;
+  const double area_scale = 0.5 * pi * ellipse_.semi_major_um * ellipse_.semi_minor_um * scale_ * std::sqrt(u);
+  const double mean = area_scale * (2 - poisson_ratio_) * even, part = area_scale * poisson_ratio_;
+  const double xx = part * (c * plane_re - s * plane_im), xy = part * (s * plane_re + c * plane_im);
+  return {mean + xx, xy, mean - xx};
+}
 
 Sym2 HalfSpaceEllipse::compliance_um_per_nN(Vec2 point_um) const {
   const double c = cos_;

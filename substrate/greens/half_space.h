@@ -37,11 +37,15 @@ class HalfSpaceEllipse {
  public:
   HalfSpaceEllipse(const Gel& gel, const substrate::Ellipse& ellipse);
   Sym2 compliance_um_per_nN(Vec2 point_um) const;
+  /// The same up to the fourth order of a/r, a the larger semi-axis: off by (a/r)^6 / 10 of it, at a tenth of the cost.
+  Sym2 far_compliance_um_per_nN(Vec2 point_um) const;
 
  private:
   substrate::Ellipse ellipse_;
   double poisson_ratio_, cos_, sin_;
   double scale_;  ///< 1 / (2 pi mu A)
+  /// Means over the ellipse of w^j conj(w)^k, w = x + i y in its frame; the odd ones vanish.
+  double m20_, m11_, m40_, m31_, m22_;
 };
 
 /// Displacement (um) of points of the surface into the half-space, by forces spread evenly over ellipses; exact:

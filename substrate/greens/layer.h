@@ -51,16 +51,19 @@ class Layer {
   Sym2 point_compliance_um_per_nN(Vec2 offset_um) const;
   /// The part by which a point force's field differs from the half-space's; smooth everywhere.
   Sym2 point_correction_um_per_nN(Vec2 offset_um) const;
+  /// Its mean by a rule around the force.
+  Sym2 mean_correction_um_per_nN(Vec2 offset_um, const std::vector<substrate::DiscPoint>& rule) const;
   const Gel& gel() const { return gel_; }
 
  private:
   Gel gel_;
   LayerTable table_;
   double scale_;  ///< 1 / (2 pi mu h)
+  double per_thickness_;
 };
 
-/// Averages a layer's point field over one ellipse: exact half-space field + averaged correction near it, the average
-/// of the whole field far from it, to about 1e-8 of the field.
+/// Averages a layer's point field over one ellipse: half-space field + averaged correction up to some thicknesses, the
+/// average of the whole field beyond, to about 1e-8 of the field.
 class LayerEllipse {
  public:
   LayerEllipse(const Layer& layer, const substrate::Ellipse& ellipse);
@@ -71,11 +74,8 @@ class LayerEllipse {
   substrate::Ellipse ellipse_;
   HalfSpaceEllipse half_space_;
   std::vector<substrate::DiscPoint> correction_rule_;
-  struct FarRule {
-    double from_um;
-    std::vector<substrate::DiscPoint> points;
-  };
-  std::vector<FarRule> far_rules_;  ///< cheapest first
+  std::vector<substrate::DiscPoint> whole_rule_;
+  double far_from_um_, whole_from_um_;
 };
 
 }  // namespace mbtfm::greens

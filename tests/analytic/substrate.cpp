@@ -229,6 +229,22 @@ TEST(HalfSpace, a_hertz_like_patch_moves_the_surface_by_the_known_values) {
   }
 }
 
+TEST(HalfSpace, series_of_an_ellipse_errs_as_the_sixth_power_of_its_size_over_the_distance) {
+  for (const double aspect : {1.0, 1.5, 10.0}) {
+    const Ellipse ellipse = {.centre_um = {1, 2}, .semi_major_um = aspect, .semi_minor_um = 1, .angle_rad = 0.7};
+    const greens::HalfSpaceEllipse field(kGel, ellipse);
+    for (const double r : {5.0, 10.0, 20.0}) {
+      for (int k = 0; k < 12; ++k) {
+        const double direction = 2 * pi * k / 12;
+        const Vec2 point = ellipse.centre_um + r * aspect * Vec2{std::cos(direction), std::sin(direction)};
+        EXPECT_LT(relative_difference(field.far_compliance_um_per_nN(point), field.compliance_um_per_nN(point)),
+                  0.2 * std::pow(r, -6))
+            << "aspect " << aspect << ", r " << r << ", direction " << direction;
+      }
+    }
+  }
+}
+
 TEST(HalfSpace, far_from_an_ellipse_its_field_is_a_point_force) {
   const Ellipse ellipse = {.centre_um = {}, .semi_major_um = 1, .semi_minor_um = 0.4, .angle_rad = 1};
   // the next term is the second moment, (a/r)²/4 times a second derivative's factor of at most 2

@@ -6,7 +6,7 @@
 
 #include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
-#include "pipeline/numerics/block_cholesky.h"
+#include "pipeline/numerics/spring_matrix.h"
 #include "tests/support/lattice.h"
 #include "tests/support/random_cell.h"
 
@@ -16,7 +16,7 @@ using namespace mbtfm;
 using cables::CableNetwork;
 using cables::CableParameters;
 using cables::Equilibrium;
-using numerics::BlockCholesky;
+using numerics::SpringMatrix;
 
 /// A cell of 2 000 um² with 19 fibres on a mesh of about so many vertices. The network's links keep its surface tension
 /// and stiffness: 0.06 nN and 50 nN at an edge of 1.5 um.
@@ -108,11 +108,11 @@ std::vector<std::array<int, 2>> pairs_of(const Network& network) {
 void factorise(benchmark::State& state) {
   const Network& net = mesh(static_cast<int>(state.range(0)));
   const auto pairs = pairs_of(net);
-  numerics::BlockCholesky matrix(static_cast<int>(net.vertices_um.size()), pairs);
+  numerics::SpringMatrix matrix(static_cast<int>(net.vertices_um.size()), pairs);
   matrix.set_zero();
   for (std::size_t k = 0; k < pairs.size(); ++k)
-    matrix.add_spring(static_cast<int>(k), numerics::BlockCholesky::Block::Identity());
-  for (int i = 0; i < matrix.n_blocks(); ++i) matrix.add_diagonal(i, 0.01 * numerics::BlockCholesky::Block::Identity());
+    matrix.add_spring(static_cast<int>(k), numerics::SpringMatrix::Block::Identity());
+  for (int i = 0; i < matrix.n_blocks(); ++i) matrix.add_diagonal(i, 0.01 * numerics::SpringMatrix::Block::Identity());
   for (auto _ : state) matrix.factorise();
 }
 
