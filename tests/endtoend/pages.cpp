@@ -3,7 +3,7 @@
 
 #include <algorithm>
 
-#include "pipeline/report/base64.h"
+#include "pipeline/files/base64.h"
 #include "pipeline/report/report.h"
 #include "pipeline/statistics/study_files.h"
 #include "tests/support/browser.h"
@@ -194,7 +194,7 @@ TEST_F(Pages, print_whole) {
               kPaper_px + 0.5)
         << page;
     const std::string pdf = browser.call("Page.printToPDF", {{"preferCSSPageSize", true}})["data"];
-    EXPECT_TRUE(pdf.starts_with(report::base64("%PDF-1"))) << page;
+    EXPECT_TRUE(pdf.starts_with(report::files::base64("%PDF-1"))) << page;
   }
 }
 
