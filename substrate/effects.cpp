@@ -16,10 +16,9 @@ void check_data(const SubstrateParameters& p) {
                      "depth_graded_gel = on: expected substrate.modulus_profile, found none");
 }
 
-GelEffects effects_of_model(const SubstrateParameters& p) {
+GelEffects effects_of_model(const SubstrateParameters& p, const Capabilities& can) {
   check_data(p);
   const std::string as_model = "as the model " + p.model + " has it";
-  const bool has_base = p.model != "half-space", has_sides = p.model == "split" || p.model == "refined";
   const auto row = [&](const char* name, const char* key, const std::string& setting, bool can_on, bool can_off,
                        bool is_on, const std::string& why) {
     require_of_effects(setting != "on" || can_on,
@@ -29,17 +28,17 @@ GelEffects effects_of_model(const SubstrateParameters& p) {
     return stage::decided(name, setting, is_on, why);
   };
   const bool is_graded = !p.modulus_profile.empty() && p.effects.depth_graded_gel != "off";
-  if (is_graded && p.model != "refined") {
+  if (is_graded && !can.grading) {
     throw UsageError("substrate.modulus_profile: the model '" + p.model +
                      "' holds for one modulus at every depth: take the model refined or auto, or switch "
                      "effects.depth_graded_gel off");
   }
   return {
-      row(kThickness, "finite_thickness", p.effects.finite_thickness, has_base, !has_base, has_base, as_model),
-      row(kSides, "finite_sides", p.effects.finite_sides, has_sides, true, has_sides && p.side_distance_um, as_model),
+      row(kThickness, "finite_thickness", p.effects.finite_thickness, can.base, !can.base, can.base, as_model),
+      row(kSides, "finite_sides", p.effects.finite_sides, can.sides, true, can.sides && p.side_distance_um, as_model),
       row(kGrading, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
-      row(kVertical, "vertical_displacement", p.effects.vertical_displacement, true, true, asks_for_vertical(p),
-          asks_for_vertical(p) ? "asked for" : "not asked for"),
+      row(kVertical, "vertical_displacement", p.effects.vertical_displacement, can.normal_displacement, true,
+          asks_for_vertical(p), asks_for_vertical(p) ? "asked for" : "not asked for"),
       stage::decided(kSurface, "auto", false, as_model + ": level and smooth")};
 }
 

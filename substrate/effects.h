@@ -14,7 +14,7 @@ struct GelEffects {
 };
 
 /// What the named model takes into account. @throws UsageError where a switch asks for something else
-GelEffects effects_of_model(const SubstrateParameters& parameters);
+GelEffects effects_of_model(const SubstrateParameters& parameters, const Capabilities& can);
 
 // The names of the effects, for people.
 inline constexpr const char* kThickness = "finite thickness";

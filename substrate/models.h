@@ -1,4 +1,4 @@
-/// The models by name: each in its own file, listed once in a table.
+/// A model of the gel as a row of a table. Each stands in its own file (docs/extending.md).
 #pragma once
 
 #include <memory>
@@ -10,9 +10,18 @@ namespace mbtfm::substrate {
 
 struct Model {
   std::string name;
+  Capabilities can;
   std::unique_ptr<Substrate> (*make)(const Gel& gel, const SubstrateParameters& parameters, int threads);
-  bool takes_incompressible = false;  ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
+  /// The parameters with which its own error stays below a tolerance; null: it has none.
+  SubstrateParameters (*within)(SubstrateParameters parameters, double tolerance) = nullptr;
+  /// Whether it can follow what the parameters say of the gel; null: always.
+  bool (*follows)(const Gel& gel, const SubstrateParameters& parameters) = nullptr;
 };
+
+template <class Kind>
+std::unique_ptr<Substrate> make_model(const Gel& gel, const SubstrateParameters& parameters, int threads) {
+  return std::make_unique<Kind>(gel, parameters, threads);
+}
 
 /// @throws UsageError where no model of the table has the name or it takes no incompressible gel, InvalidData as
 /// check(gel)
