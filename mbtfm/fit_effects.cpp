@@ -8,6 +8,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/choice/factory.h"
+#include "substrate/response.h"
 
 namespace mbtfm::tensions {
 namespace {
@@ -31,7 +32,7 @@ std::optional<Change> change_by_gel(EffectKind kind, const FittedCell& c,
                                     const substrate::SubstrateParameters& parameters, int threads) {
   const auto gel = choice::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.data;
-  with.response = gel->response(points_of(c.inputs.beads), ellipses_of(c.inputs.cell));
+  with.response = gel->response({ellipses_of(c.inputs.cell)}, {points_of(c.inputs.beads)})->kept();
   return change_between(kind, c.fit,
                         fit_again(c, c.networks, unweighted(std::move(with)), c.parameters.fit.loss, threads));
 }

@@ -33,7 +33,7 @@
 #include "substrate/choice/factory.h"
 #include "substrate/compliance.h"
 #include "substrate/gel_vtu.h"
-#include "substrate/stated_error.h"
+#include "substrate/response.h"
 
 namespace mbtfm::tensions {
 namespace {
@@ -116,18 +116,14 @@ std::string names_of_groups(const EnsembleFit& fit) {
 ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data, const std::vector<cables::CableNetwork>& networks,
                       const FitInputs& inputs, const substrate::Substrate& substrate, const FitStageParameters& p,
                       bool is_placed, int threads) {
-  const Figures figures = substrate.figures();
-  const bool lacks_base =
-      std::find(figures.begin(), figures.end(),
-                Figures::value_type{"substrate_model", name_of(substrate::ModelKind::half_space)}) != figures.end();
   return error_budget({.fit = fit,
                        .data = data,
                        .networks = networks,
                        .cell = inputs.cell,
                        .beads = inputs.beads,
                        .gel = p.gel,
-                       .substrate_error = substrate::stated_error(p.substrate, figures),
-                       .lacks_base = lacks_base,
+                       .substrate_error = substrate.stated_error(),
+                       .lacks_base = !substrate.capabilities().base,
                        .segmentation = p.segmentation,
                        .n_of_place = is_placed ? 3 : 0},
                       threads);
@@ -137,7 +133,7 @@ ErrorBudget budget_of(const EnsembleFit& fit, const LinearData& data, const std:
 EnsembleFit fit_of(const Cell& second, const DisplacementField& beads, const substrate::Substrate& substrate,
                    const cables::CableParameters& cables, const FitStageParameters& p, int threads) {
   const Eigen::MatrixXd motions = allows_common_motion(p.effects) ? affine_motions(beads) : Eigen::MatrixXd();
-  LinearData data = reduce(beads, substrate.response(points_of(beads), ellipses_of(second)),
+  LinearData data = reduce(beads, substrate.response({ellipses_of(second)}, {points_of(beads)})->kept(),
                            beads_in_region(beads, second, p.fit), threads, motions);
   if (allows_forces_beyond(p.effects, second)) allow_forces_beyond(data, second, p.gel);
   const Network network = mesh::generate_network(second, p.network).network;
@@ -298,7 +294,7 @@ StageReport fit(const FitStageParameters& given, stage::StageContext& context) {
   const auto substrate = choice::make_substrate(p.gel, p.substrate, context.threads);
   context.progress(0.05, "compliance of the substrate");
   const auto response_on = [&](const DisplacementField& b) {
-    return substrate->response(points_of(b), ellipses_of(inputs.cell));
+    return substrate->response({ellipses_of(inputs.cell)}, {points_of(b)})->kept();
   };
   Responses responses = responses_of(inputs.beads, series, response_on);
   const bool moves = allows_common_motion(p.effects);

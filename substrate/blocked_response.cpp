@@ -100,7 +100,7 @@ MatrixXd common_modes(const MatrixXd& at_nodes) {
   return eigen.eigenvectors().rightCols(squares.size() - n_left_out);
 }
 
-class Blocked final : public Response {
+class Blocked final : public KeptResponse {
  public:
   Blocked(Index n_points, Index n_columns, std::vector<Block> blocks, int threads)
       : n_points_(n_points), n_columns_(n_columns), blocks_(std::move(blocks)), threads_(threads) {}
@@ -269,7 +269,7 @@ Square square_around(const std::vector<Vec2>& points_um) {
   return {.centre_um = 0.5 * (low + high), .half_um = 0.5 * std::max(high.x - low.x, high.y - low.y)};
 }
 
-Block block_of(const Substrate& model, const std::vector<Vec2>& points_um, std::vector<Index> points,
+Block block_of(const MatrixAt& matrix_at, const std::vector<Vec2>& points_um, std::vector<Index> points,
                const std::vector<Ellipse>& ellipses) {
   std::vector<Vec2> own_um;
   for (const Index p : points) own_um.push_back(points_um[static_cast<std::size_t>(p)]);
@@ -283,7 +283,7 @@ Block block_of(const Substrate& model, const std::vector<Vec2>& points_um, std::
     std::vector<Index>& columns = is_away ? far_columns : near_columns;
     columns.insert(columns.end(), {column, column + 1});
   }
-  const MatrixXd at_nodes = model.compliance_um_per_nN(nodes_um(square), far);
+  const MatrixXd at_nodes = matrix_at(nodes_um(square), far);
   const MatrixXd common = common_modes(at_nodes), weights = interpolation(square, own_um);
   MatrixXd modes(2 * static_cast<Index>(own_um.size()), common.cols());
   for (const Index axis : {0, 1}) axis_of(modes, axis) = weights * axis_of(common, axis);
@@ -293,12 +293,12 @@ Block block_of(const Substrate& model, const std::vector<Vec2>& points_um, std::
           .modes = modes.cast<float>(),
           .far = std::make_shared<const MatrixXf>(std::move(shares)),
           .near_columns = std::make_shared<const std::vector<Index>>(std::move(near_columns)),
-          .near = model.compliance_um_per_nN(own_um, near).cast<float>()};
+          .near = matrix_at(own_um, near).cast<float>()};
 }
 
 }  // namespace
 
-SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>& points_um,
+SharedResponse blocked_response(const MatrixAt& matrix_at, const std::vector<Vec2>& points_um,
                                 const std::vector<Ellipse>& ellipses, int threads) {
   std::vector<std::vector<Index>> parts;
   std::vector<Index> all(points_um.size());
@@ -309,7 +309,7 @@ SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>&
   std::vector<Block> blocks(parts.size());
   numerics::parallel_for(static_cast<int>(parts.size()), threads, [&](int b) {
     const auto i = static_cast<std::size_t>(b);
-    blocks[i] = block_of(model, points_um, std::move(parts[i]), ellipses);
+    blocks[i] = block_of(matrix_at, points_um, std::move(parts[i]), ellipses);
   });
   return std::make_shared<Blocked>(static_cast<Index>(points_um.size()), 2 * static_cast<Index>(ellipses.size()),
                                    std::move(blocks), threads);

@@ -3,6 +3,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "substrate/effects.h"
+#include "substrate/loads.h"
 #include "substrate/models.h"
 #include "substrate/response.h"
 
@@ -55,34 +56,42 @@ void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>&
   }
 }
 
-SharedResponse Substrate::response(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const {
-  return dense_response(compliance_um_per_nN(points_um, ellipses));
+std::vector<Effect> Substrate::effects() const { return effects_of_model(parameters_, capabilities_).list(); }
+
+Eigen::MatrixXd Substrate::compliance_um_per_nN(const std::vector<Vec2>& points_um,
+                                                const std::vector<Ellipse>& ellipses) const {
+  return response({ellipses}, {points_um})->matrix();
 }
+
+namespace {
+
+Eigen::VectorXd column_of(const std::vector<Vec2>& forces_nN) {
+  Eigen::VectorXd column(2 * static_cast<Eigen::Index>(forces_nN.size()));
+  for (std::size_t j = 0; j < forces_nN.size(); ++j)
+    column.segment<2>(2 * static_cast<Eigen::Index>(j)) << forces_nN[j].x, forces_nN[j].y;
+  return column;
+}
+
+}  // namespace
 
 std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                               const std::vector<Vec2>& forces_nN) const {
   check_forces(ellipses, forces_nN);
-  Eigen::VectorXd forces(2 * static_cast<Eigen::Index>(ellipses.size()));
-  for (std::size_t j = 0; j < forces_nN.size(); ++j) {
-    forces[2 * j] = forces_nN[j].x;
-    forces[2 * j + 1] = forces_nN[j].y;
-  }
+  const Eigen::VectorXd u = response({ellipses}, {points_um})->displace(column_of(forces_nN));
   std::vector<Vec2> displacements;
   displacements.reserve(points_um.size());
-  if (is_large(points_um, ellipses)) {
-    const Eigen::VectorXd u = response(points_um, ellipses)->displace(forces);
-    for (Eigen::Index row = 0; row < u.size(); row += 2) displacements.push_back({u[row], u[row + 1]});
-    return displacements;
-  }
-  constexpr std::size_t kBlock = 2048;  // points at a time: some MB of matrix
-  for (std::size_t begin = 0; begin < points_um.size(); begin += kBlock) {
-    const std::size_t end = std::min(begin + kBlock, points_um.size());
-    const std::vector<Vec2> block(points_um.begin() + begin, points_um.begin() + end);
-    const Eigen::VectorXd u = compliance_um_per_nN(block, ellipses) * forces;
-    for (std::size_t i = 0; i < block.size(); ++i) displacements.push_back({u[2 * i], u[2 * i + 1]});
-  }
+  for (Eigen::Index i = 0; i < u.size(); i += 2) displacements.push_back({u[i], u[i + 1]});
   return displacements;
 }
+
+std::vector<double> Substrate::vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                           const std::vector<Vec2>& forces_nN) const {
+  check_forces(ellipses, forces_nN);
+  const Eigen::VectorXd u = response({ellipses}, {points_um, Components::normal})->displace(column_of(forces_nN));
+  return {u.begin(), u.end()};
+}
+
+bool Substrate::has_vertical() const { return asks_for_vertical(parameters_); }
 
 std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,
                                      const SubstrateParameters& parameters, int threads) {
@@ -93,18 +102,12 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
     for (const Model& known : table) names += (names.empty() ? "" : ", ") + std::string(name_of(known.kind));
     throw UsageError("substrate.model: expected one of " + names + ", found '" + name_of(parameters.model) + "'");
   }
-  if (gel.poisson_ratio == 0.5 && !model->takes_incompressible) {
+  if (gel.poisson_ratio == 0.5 && !model->can.incompressible) {
     throw UsageError("gel.poisson_ratio = 0.5: the model " + std::string(name_of(model->kind)) +
                      " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
                      "or half-space");
   }
-  if (model->kind == ModelKind::automatic) return model->make(gel, parameters, threads);  // decides by the scene
-  return model->make(gel, without_what_is_off(parameters, effects_of_model(parameters)), threads);
-}
-
-std::vector<double> Substrate::vertical_um(const std::vector<Vec2>&, const std::vector<Ellipse>&,
-                                           const std::vector<Vec2>&) const {
-  throw UsageError("effects.vertical_displacement: the model has no displacement: take half-space, split or refined");
+  return model->make(gel, without_what_is_off(parameters, effects_of_model(parameters, model->can)), threads);
 }
 
 VolumeField Substrate::volume(const std::vector<Ellipse>&, const std::vector<Vec2>&) const {

@@ -84,36 +84,65 @@ struct VolumeField {
   std::vector<std::array<double, 6>> stress_kPa;  ///< mean over each box: xx, yy, zz, xy, yz, xz; empty: not asked
 };
 
-class Response;  // see response.h
+/// What a model of the gel takes into account or answers.
+struct Capabilities {
+  bool base = false;                 ///< the gel has a thickness
+  bool sides = false;                ///< and an edge
+  bool grading = false;              ///< its modulus may change with depth
+  bool inside = false;               ///< volume()
+  bool normal_displacement = false;  ///< of the surface, into the gel
+  bool incompressible = false;       ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
+  bool linear = true;                ///< a response is a matrix
+};
 
+struct Loads;         // see loads.h
+struct Observations;  // see loads.h
+class Response;       // see response.h
+
+/// A gel: what its loads displace.
 class Substrate {
  public:
+  Substrate(SubstrateParameters parameters, const Capabilities& capabilities)
+      : parameters_(std::move(parameters)), capabilities_(capabilities) {}
   virtual ~Substrate() = default;
-  /// Displacement (um) of each point for a unit force (1 nN) on each ellipse: rows 2i, 2i+1 are x, y at points[i];
-  /// columns 2j, 2j+1 are a force along x, y on ellipses[j].
-  /// @throws InvalidData where a point or an ellipse is not finite, is no ellipse or lies outside the model's block;
-  ///         NotSolved where the memory would not suffice
-  virtual Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
-                                               const std::vector<Ellipse>& ellipses) const = 0;
-  /// The same as an operator, which need not hold the matrix.
-  virtual std::shared_ptr<const Response> response(const std::vector<Vec2>& points_um,
-                                                   const std::vector<Ellipse>& ellipses) const;
-  /// Displacement (um) of each point for given forces on the ellipses, without forming the matrix.
-  /// @throws as compliance_um_per_nN, and InvalidData where a force is not finite or their number differs
-  virtual std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
-                                             const std::vector<Vec2>& forces_nN) const;
-  /// Displacement (um) of each point of the surface into the gel. Computed nowhere else.
-  /// @throws as displacements_um, and UsageError where the model has none
-  virtual std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
-                                          const std::vector<Vec2>& forces_nN) const;
-  /// Whether the parameters ask for it.
-  virtual bool has_vertical() const { return false; }
-  /// Displacement and, where the parameters ask for it, stress inside the gel. @throws as vertical_um
+
+  /// How the observed points answer to the loads: nothing is computed yet. Not to outlive the model.
+  /// @throws InvalidData where a point or a load is not finite, is no ellipse or lies outside the model's block;
+  ///         UsageError where the model takes no such loads or points; when it computes, NotSolved where the memory
+  ///         would not suffice
+  virtual std::shared_ptr<const Response> response(const Loads& loads, const Observations& observations) const = 0;
+  /// Displacement and, where the parameters ask for it, stress inside the gel.
+  /// @throws as response, and UsageError where the model has none
   virtual VolumeField volume(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) const;
+  virtual Capabilities capabilities() const { return capabilities_; }
+  /// Relative L2 error of an ellipse's displacements, mean over ellipses, that the calls so far made: as estimated, or
+  /// as the model's accuracy was measured. What it leaves out by its capabilities is not in it.
+  virtual double stated_error() const { return 0; }
   /// What it took into account.
-  virtual std::vector<Effect> effects() const = 0;
+  virtual std::vector<Effect> effects() const;
   /// Its size, and what the calls so far cost.
   virtual Figures figures() const = 0;
+
+  // For forces along the surface, on ellipses, and points of the surface:
+
+  /// Displacement (um) of each point for a unit force (1 nN) on each ellipse: rows 2i, 2i+1 are x, y at points[i];
+  /// columns 2j, 2j+1 are a force along x, y on ellipses[j]. @throws as response
+  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses) const;
+  /// The same for given forces, without forming the matrix.
+  /// @throws as response, and InvalidData where a force is not finite or their number differs
+  std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                     const std::vector<Vec2>& forces_nN) const;
+  /// Displacement (um) of each point of the surface into the gel. Computed nowhere else. @throws as displacements_um
+  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
+                                  const std::vector<Vec2>& forces_nN) const;
+  /// Whether the parameters ask for it.
+  bool has_vertical() const;
+
+ protected:
+  SubstrateParameters parameters_;
+
+ private:
+  Capabilities capabilities_;
 };
 
 }  // namespace mbtfm::substrate

@@ -16,12 +16,10 @@ void check_data(const SubstrateParameters& p) {
                      "depth_graded_gel = on: expected substrate.modulus_profile, found none");
 }
 
-GelEffects effects_of_model(const SubstrateParameters& p) {
+GelEffects effects_of_model(const SubstrateParameters& p, const Capabilities& can) {
   check_data(p);
   const std::string model = name_of(p.model);
   const std::string as_model = "as the model " + model + " has it";
-  const bool has_base = p.model != ModelKind::half_space;
-  const bool has_sides = p.model == ModelKind::split || p.model == ModelKind::refined;
   const auto row = [&](EffectKind kind, const char* key, Switch setting, bool can_on, bool can_off, bool is_on,
                        const std::string& why) {
     require_of_effects(setting != Switch::on || can_on,
@@ -31,19 +29,19 @@ GelEffects effects_of_model(const SubstrateParameters& p) {
     return stage::decided(kind, setting, is_on, why);
   };
   const bool is_graded = !p.modulus_profile.empty() && p.effects.depth_graded_gel != Switch::off;
-  if (is_graded && p.model != ModelKind::refined) {
+  if (is_graded && !can.grading) {
     throw UsageError("substrate.modulus_profile: the model '" + model +
                      "' holds for one modulus at every depth: take the model refined or auto, or switch "
                      "effects.depth_graded_gel off");
   }
   using enum EffectKind;
   return {
-      row(finite_thickness, "finite_thickness", p.effects.finite_thickness, has_base, !has_base, has_base, as_model),
-      row(finite_sides, "finite_sides", p.effects.finite_sides, has_sides, true, has_sides && p.side_distance_um,
+      row(finite_thickness, "finite_thickness", p.effects.finite_thickness, can.base, !can.base, can.base, as_model),
+      row(finite_sides, "finite_sides", p.effects.finite_sides, can.sides, true, can.sides && p.side_distance_um,
           as_model),
       row(depth_graded_gel, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
-      row(vertical_displacement, "vertical_displacement", p.effects.vertical_displacement, true, true,
-          asks_for_vertical(p), asks_for_vertical(p) ? "asked for" : "not asked for"),
+      row(vertical_displacement, "vertical_displacement", p.effects.vertical_displacement, can.normal_displacement,
+          true, asks_for_vertical(p), asks_for_vertical(p) ? "asked for" : "not asked for"),
       stage::decided(uneven_surface, Switch::automatic, false, as_model + ": level and smooth")};
 }
 

@@ -14,7 +14,7 @@ struct GelEffects {
 };
 
 /// What the named model takes into account. @throws UsageError where a switch asks for something else
-GelEffects effects_of_model(const SubstrateParameters& parameters);
+GelEffects effects_of_model(const SubstrateParameters& parameters, const Capabilities& can);
 
 /// @throws UsageError "effects.<message>" where it does not hold
 void require_of_effects(bool holds, const std::string& message);

@@ -1,4 +1,4 @@
-/// The models: each in its own file, listed once in a table.
+/// A model of the gel as a row of a table. Each stands in its own file (docs/extending.md).
 #pragma once
 
 #include <memory>
@@ -10,8 +10,12 @@ namespace mbtfm::substrate {
 
 struct Model {
   ModelKind kind;
+  Capabilities can;
   std::unique_ptr<Substrate> (*make)(const Gel& gel, const SubstrateParameters& parameters, int threads);
-  bool takes_incompressible = false;  ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
+  /// The parameters with which its own error stays below a tolerance; null: it has none.
+  SubstrateParameters (*within)(SubstrateParameters parameters, double tolerance) = nullptr;
+  /// Whether it can follow what the parameters say of the gel; null: always.
+  bool (*follows)(const Gel& gel, const SubstrateParameters& parameters) = nullptr;
 };
 
 /// @throws UsageError where the table has no such model or it takes no incompressible gel, InvalidData as check(gel)

@@ -3,14 +3,20 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <memory>
 #include <vector>
 
-#include "substrate/compliance.h"
+#include "substrate/loads.h"
 
 namespace mbtfm::substrate {
 
-/// u = G F: rows 2i, 2i+1 are x, y of point i (um), columns 2j, 2j+1 a force along x, y on ellipse j (nN).
+class KeptResponse;
+using SharedResponse = std::shared_ptr<const KeptResponse>;
+
+/// u = G F, F the strengths of the loads by component, u the displacements (um) by component. For forces along the
+/// surface and points of it: rows 2i, 2i+1 are x, y of point i, columns 2j, 2j+1 a force along x, y on ellipse j (nN).
+/// Of a model that is not linear displace() alone is the answer, the others its derivative at rest.
 class Response {
  public:
   virtual ~Response() = default;
@@ -20,30 +26,53 @@ class Response {
   virtual Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const = 0;
   /// Gᵀ D: cols() × any number
   virtual Eigen::MatrixXd pull_back(const Eigen::MatrixXd& displacements) const = 0;
+  /// G: not where it is too large to be held
+  virtual Eigen::MatrixXd matrix() const = 0;
+  /// The same in memory, for many calls: as its matrix, or something that needs less room.
+  virtual SharedResponse kept() const = 0;
+};
+using LazyResponse = std::shared_ptr<const Response>;
+
+/// A response in memory, which needs its model no more.
+class KeptResponse : public Response, public std::enable_shared_from_this<KeptResponse> {
+ public:
+  Eigen::MatrixXd matrix() const override;
+  SharedResponse kept() const override { return shared_from_this(); }
   /// Gᵀ diag(weight) G, on and above its diagonal; zero or rubbish below
   /// @param weight  by row, not negative
   virtual Eigen::MatrixXd upper_gram(const Eigen::VectorXd& weight) const = 0;
   /// The same at some of the points, in this order.
-  virtual std::shared_ptr<const Response> at_points(const std::vector<Eigen::Index>& points) const = 0;
+  virtual SharedResponse at_points(const std::vector<Eigen::Index>& points) const = 0;
 };
-using SharedResponse = std::shared_ptr<const Response>;
 
 /// All numbers in memory. @param compliance_um_per_nN  2·points × 2·ellipses
 SharedResponse dense_response(Eigen::MatrixXd compliance_um_per_nN, int threads = 1);
+
+/// How a model answers: by its matrix, by displacing, or both; what is empty is made of the other.
+struct Answers {
+  Eigen::Index rows = 0, cols = 0;
+  std::function<Eigen::MatrixXd()> matrix = {};
+  std::function<Eigen::MatrixXd(const Eigen::MatrixXd& forces_nN)> displace = {};
+  std::function<SharedResponse()> kept = {};
+};
+LazyResponse lazy_response(Answers answers);
+
+/// Along the surface and into the gel, of one scene: x, y, z by point.
+LazyResponse joined(LazyResponse along, LazyResponse normal);
+
+/// The matrix of some points along the surface, of a model whose columns cost as much as they have points.
+using MatrixAt =
+    std::function<Eigen::MatrixXd(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses)>;
 
 /// Far fields interpolated: points in squares of some hundred; ellipses at three half sides or more from a square's
 /// centre act on it by their field at 6 × 6 Chebyshev nodes, the nearer ones on each point by itself. Of each far
 /// ellipse's field this leaves some (3 + 2 √2)⁻⁶ = 3e-5 at the worst, as 1/r is analytic in the ellipse through the
 /// source (Trefethen, Approximation Theory and Approximation Practice, 2013, ch. 8).
-/// @param model  one whose columns cost as much as they have points: half-space, layer
-SharedResponse blocked_response(const Substrate& model, const std::vector<Vec2>& points_um,
+SharedResponse blocked_response(const MatrixAt& matrix_at, const std::vector<Vec2>& points_um,
                                 const std::vector<Ellipse>& ellipses, int threads);
 
-/// Whether the matrix would take more than 0.4 GB.
-bool is_large(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses);
-
-/// Dense, but blocked where it is large.
-SharedResponse pointwise_response(const Substrate& model, const std::vector<Vec2>& points_um,
-                                  const std::vector<Ellipse>& ellipses, int threads);
+/// Kept dense up to 0.4 GB, blocked beyond.
+LazyResponse pointwise_response(MatrixAt matrix_at, const std::vector<Vec2>& points_um,
+                                const std::vector<Ellipse>& ellipses, int threads);
 
 }  // namespace mbtfm::substrate

@@ -10,6 +10,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::tensions {
 
@@ -311,7 +312,8 @@ VectorXd change_by_other_gel_um(const BudgetInputs& in, const Gel& other, int th
   for (const Adhesion& a : in.cell.adhesions) ellipses.push_back(substrate::ellipse_of(a));
   const auto field = [&](const Gel& gel) {
     return greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads)
-        ->response(points, ellipses)
+        ->response({ellipses}, {points})
+        ->kept()
         ->displace(in.fit.forces_nN);
   };
   return field(other) - field(in.gel);

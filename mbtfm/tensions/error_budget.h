@@ -17,7 +17,7 @@ struct SegmentationErrors {
 };
 void declare(stage::ParameterList& list, SegmentationErrors& errors);
 
-/// What the budget is drawn up of. `substrate_error`: see stated_error.
+/// What the budget is drawn up of. `substrate_error`: see Substrate::stated_error().
 struct BudgetInputs {
   const EnsembleFit& fit;
   const LinearData& data;

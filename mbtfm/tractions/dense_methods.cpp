@@ -6,10 +6,9 @@
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/memory.h"
-#include "pipeline/numerics/parallel.h"
 #include "substrate/ellipse.h"
 #include "substrate/greens/models.h"
-#include "substrate/greens/square.h"
+#include "substrate/response.h"
 
 namespace mbtfm::tractions {
 
@@ -159,27 +158,14 @@ Reconstruction reconstruct_elements(const TractionInputs& inputs, const Traction
                              .remedy = "choose a larger element_um"});
   const std::vector<Vec2> centres = square_centres(inputs.outline_um, parameters.element_um);
   if (centres.empty()) throw UsageError("bem: no element of element_um fits into the outline");
-  check(inputs.gel);
-  const greens::Layer layer(inputs.gel);
-  const bool is_layer = parameters.gel_model == GelModel::layer;
-  const auto compliance = [&](const std::vector<Vec2>& at) {
-    Eigen::MatrixXd G(2 * at.size(), 2 * centres.size());
-    numerics::parallel_for(static_cast<int>(centres.size()), threads, [&](int j) {
-      for (std::size_t i = 0; i < at.size(); ++i) {
-        const Vec2 offset = at[i] - centres[static_cast<std::size_t>(j)];
-        const greens::Sym2 g = is_layer
-                                   ? greens::square_compliance_um_per_kPa(layer, parameters.element_um, offset)
-                                   : greens::square_compliance_um_per_kPa(inputs.gel, parameters.element_um, offset);
-        G.block<2, 2>(2 * static_cast<Index>(i), 2 * j) << g.xx, g.xy, g.xy, g.yy;
-      }
-    });
-    return G;
-  };
+  const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
+  std::vector<substrate::Square> squares;
+  for (const Vec2 centre : centres) squares.push_back({centre, parameters.element_um});
+  const auto compliance = [&](const std::vector<Vec2>& at) { return gel->response({squares}, {at})->matrix(); };
   const double area = parameters.element_um * parameters.element_um;
   Reconstruction r;
   r.lambda_unit = LambdaUnit::um_per_kPa;
   // sum of t² over elements of area a stands for the integral of t² over a
-  const auto gel = greens::make_greens(inputs.gel, {.model = substrate::kind_of(parameters.gel_model)}, threads);
   const Model model{.compliance = compliance,
                     .n_loads = centres.size(),
                     .truth = even_forces(inputs, *gel),

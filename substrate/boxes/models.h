@@ -1,15 +1,11 @@
 /// The models of finite elements.
 #pragma once
 
-#include <memory>
-
-#include "substrate/compliance.h"
+#include "substrate/models.h"
 
 namespace mbtfm::boxes {
 
-std::unique_ptr<substrate::Substrate> make_split(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                                                 int threads);
-std::unique_ptr<substrate::Substrate> make_refined(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                                                   int threads);
+substrate::Model split();
+substrate::Model refined();
 
 }  // namespace mbtfm::boxes

@@ -4,6 +4,7 @@
 /// on the bottom and tractions -sigma(u_c) n on the sides. All of that is as smooth as the gel is thick, so a coarse
 /// grid does, and it knows nothing of the adhesions: one factorisation for all scenes that cover the same squares.
 /// Valid for a homogeneous gel with a flat surface; sides about a thickness away from the adhesions at least.
+#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <memory>
@@ -12,7 +13,6 @@
 #include "substrate/boxes/load_cases.h"
 #include "substrate/boxes/models.h"
 #include "substrate/boxes/split_block.h"
-#include "substrate/effects.h"
 #include "substrate/greens/greens_model.h"
 #include "substrate/models.h"
 
@@ -38,61 +38,50 @@ greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse&
   return sum;
 }
 
+constexpr substrate::Capabilities kCan{.base = true, .sides = true, .normal_displacement = true};
+
+/// With 2 cells of the grid over the thickness (docs/accuracy.md); it falls as the cube of their size.
+constexpr double kErrorOfTwoCells = 1e-3;
+
+substrate::SubstrateParameters with_cells_for(substrate::SubstrateParameters parameters, double tolerance) {
+  const int cells = std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(kErrorOfTwoCells / tolerance))));
+  parameters.cells_per_thickness = std::max(parameters.cells_per_thickness, cells);
+  return parameters;
+}
+
+/// Quadratic elements need two to follow the half-space field at the sides.
+bool follows_sides(const Gel& gel, const substrate::SubstrateParameters& p) {
+  return !p.side_distance_um || *p.side_distance_um / gel.thickness_um * p.cells_per_thickness >= 2;
+}
+
 class Split final : public substrate::Substrate {
  public:
   Split(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : gel_(gel), parameters_(parameters), threads_(threads) {}
+      : Substrate(parameters, kCan), gel_(gel), threads_(threads) {}
 
-  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
-                                       const std::vector<substrate::Ellipse>& ellipses) const override {
-    const std::lock_guard lock(mutex_);
-    Eigen::MatrixXd matrix = near_field(points_um, ellipses);
-    if (matrix.size() == 0) return matrix;
-    add_correction(points_um, ellipses, unit_case, {0, 1}, matrix);
-    return matrix;
+  substrate::LazyResponse response(const substrate::Loads& loads,
+                                   const substrate::Observations& observations) const override {
+    const Scene scene{surface_points_of(observations), ellipses_of(loads)};
+    const auto of = [=, this](const std::vector<int>& axes) {
+      const auto rows = static_cast<Eigen::Index>(axes.size() * scene.points_um.size());
+      return substrate::lazy_response(
+          {.rows = rows,
+           .cols = 2 * static_cast<Eigen::Index>(scene.ellipses.size()),
+           .matrix = axes.size() == 2 ? std::function([=, this] { return matrix(scene); }) : nullptr,
+           .displace = [=, this](const Eigen::MatrixXd& forces_nN) { return displaced(scene, axes, forces_nN); }});
+    };
+    switch (observations.components) {
+      case substrate::Components::along:
+        return of({0, 1});
+      case substrate::Components::normal:
+        return of({2});
+      case substrate::Components::all:
+        break;
+    }
+    return joined(of({0, 1}), of({2}));
   }
 
-  std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um,
-                                     const std::vector<substrate::Ellipse>& ellipses,
-                                     const std::vector<Vec2>& forces_nN) const override {
-    substrate::check_forces(ellipses, forces_nN);
-    if (points_um.empty() || ellipses.empty()) return std::vector<Vec2>(points_um.size());
-    substrate::check_points(points_um);
-    check(ellipses);
-    const std::lock_guard lock(mutex_);
-    std::vector<greens::HalfSpaceEllipse> near;
-    for (const substrate::Ellipse& ellipse : ellipses) near.emplace_back(gel_, ellipse);
-    Eigen::MatrixXd field = Eigen::MatrixXd::Zero(2 * points_um.size(), 1);
-    numerics::parallel_for(static_cast<int>(points_um.size()), threads_, [&](int i) {
-      for (std::size_t j = 0; j < near.size(); ++j) {
-        const greens::Sym2 g = near[j].compliance_um_per_nN(points_um[i]);
-        field(2 * i, 0) += g.xx * forces_nN[j].x + g.xy * forces_nN[j].y;
-        field(2 * i + 1, 0) += g.xy * forces_nN[j].x + g.yy * forces_nN[j].y;
-      }
-    });
-    const LoadCase all = case_of(forces_nN);
-    add_correction(
-        points_um, ellipses, [&all](int) { return all; }, {0, 1}, field);
-    return vectors_of(field);
-  }
-
-  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
-                                  const std::vector<Vec2>& forces_nN) const override {
-    substrate::check_forces(ellipses, forces_nN);
-    if (points_um.empty() || ellipses.empty()) return std::vector<double>(points_um.size());
-    substrate::check_points(points_um);
-    check(ellipses);
-    const std::lock_guard lock(mutex_);
-    const std::vector<double> near = greens::half_space_vertical_um(gel_, points_um, ellipses, forces_nN, threads_);
-    Eigen::MatrixXd field = Eigen::Map<const Eigen::VectorXd>(near.data(), static_cast<Eigen::Index>(near.size()));
-    const LoadCase all = case_of(forces_nN);
-    add_correction(
-        points_um, ellipses, [&all](int) { return all; }, {2}, field);
-    return {field.data(), field.data() + field.size()};
-  }
-  bool has_vertical() const override { return substrate::asks_for_vertical(parameters_); }
-
-  std::vector<Effect> effects() const override { return substrate::effects_of_model(parameters_).list(); }
+  double stated_error() const override { return kErrorOfTwoCells * std::pow(2.0 / parameters_.cells_per_thickness, 3); }
 
   Figures figures() const override {
     const std::lock_guard lock(mutex_);
@@ -112,11 +101,56 @@ class Split final : public substrate::Substrate {
   }
 
  private:
-  Eigen::MatrixXd near_field(const std::vector<Vec2>& points_um,
-                             const std::vector<substrate::Ellipse>& ellipses) const {
-    return greens::compliance_by_columns(points_um, ellipses, threads_, [this](const substrate::Ellipse& ellipse) {
-      return greens::HalfSpaceEllipse(gel_, ellipse);
+  struct Scene {
+    std::vector<Vec2> points_um;
+    std::vector<substrate::Ellipse> ellipses;
+  };
+
+  Eigen::MatrixXd matrix(const Scene& scene) const {
+    const std::lock_guard lock(mutex_);
+    Eigen::MatrixXd matrix =
+        greens::compliance_by_columns(scene.points_um, scene.ellipses, threads_,
+                                      [this](const auto& ellipse) { return greens::HalfSpaceEllipse(gel_, ellipse); });
+    if (matrix.size() > 0) add_correction(scene.points_um, scene.ellipses, unit_case, {0, 1}, matrix);
+    return matrix;
+  }
+
+  /// By each column of forces: the near field, then the correction.
+  Eigen::MatrixXd displaced(const Scene& scene, const std::vector<int>& axes, const Eigen::MatrixXd& forces_nN) const {
+    Eigen::MatrixXd field =
+        Eigen::MatrixXd::Zero(static_cast<Eigen::Index>(axes.size() * scene.points_um.size()), forces_nN.cols());
+    if (field.size() == 0 || scene.ellipses.empty()) return field;
+    const std::lock_guard lock(mutex_);
+    std::vector<LoadCase> cases;
+    for (Eigen::Index column = 0; column < forces_nN.cols(); ++column) {
+      const std::vector<Vec2> forces = vectors_of(forces_nN.col(column));
+      field.col(column) = axes.size() == 2 ? near_field(scene, forces) : near_normal(scene, forces);
+      cases.push_back(case_of(forces));
+    }
+    add_correction(
+        scene.points_um, scene.ellipses, [&](int column) { return cases[static_cast<std::size_t>(column)]; }, axes,
+        field);
+    return field;
+  }
+
+  Eigen::VectorXd near_field(const Scene& scene, const std::vector<Vec2>& forces_nN) const {
+    std::vector<greens::HalfSpaceEllipse> near;
+    for (const substrate::Ellipse& ellipse : scene.ellipses) near.emplace_back(gel_, ellipse);
+    Eigen::VectorXd field = Eigen::VectorXd::Zero(2 * static_cast<Eigen::Index>(scene.points_um.size()));
+    numerics::parallel_for(static_cast<int>(scene.points_um.size()), threads_, [&](int i) {
+      for (std::size_t j = 0; j < near.size(); ++j) {
+        const greens::Sym2 g = near[j].compliance_um_per_nN(scene.points_um[i]);
+        field[2 * i] += g.xx * forces_nN[j].x + g.xy * forces_nN[j].y;
+        field[2 * i + 1] += g.xy * forces_nN[j].x + g.yy * forces_nN[j].y;
+      }
     });
+    return field;
+  }
+
+  Eigen::VectorXd near_normal(const Scene& scene, const std::vector<Vec2>& forces_nN) const {
+    const std::vector<double> near =
+        greens::half_space_vertical_um(gel_, scene.points_um, scene.ellipses, forces_nN, threads_);
+    return Eigen::Map<const Eigen::VectorXd>(near.data(), static_cast<Eigen::Index>(near.size()));
   }
 
   const SplitBlock& block_around(const substrate::Extent& scene) const {
@@ -186,7 +220,6 @@ class Split final : public substrate::Substrate {
   }
 
   Gel gel_;
-  substrate::SubstrateParameters parameters_;
   int threads_;
   mutable std::mutex mutex_;  // guards the block: made at the first call, kept while scenes cover the same squares
   mutable std::unique_ptr<SplitBlock> block_;
@@ -195,9 +228,12 @@ class Split final : public substrate::Substrate {
 
 }  // namespace
 
-std::unique_ptr<substrate::Substrate> make_split(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                                                 int threads) {
-  return std::make_unique<Split>(gel, parameters, threads);
+substrate::Model split() {
+  return {.kind = substrate::ModelKind::split,
+          .can = kCan,
+          .make = substrate::make_model<Split>,
+          .within = with_cells_for,
+          .follows = follows_sides};
 }
 
 }  // namespace mbtfm::boxes

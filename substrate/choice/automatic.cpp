@@ -1,32 +1,24 @@
-/// The cheapest model that computes the effects which the switches and the scene call for.
-///
-/// - `half-space` has neither base nor sides, `layer` has the base.
-/// - `split` takes even gels whose sides are no nearer than two elements of its grid, which is what quadratic elements
-///   need to follow the half-space field there; its grid leaves 0.1 % with 2 elements over the thickness, falling as
-///   their cube.
-/// - `refined` takes all.
+/// The cheapest model of the table that computes the effects which the switches and the scene call for.
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <mutex>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/stage/effects.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
 #include "substrate/effects.h"
-#include "substrate/models.h"
+#include "substrate/loads.h"
 #include "substrate/response.h"
 #include "substrate/scene.h"
-#include "substrate/stated_error.h"
 
 namespace mbtfm::choice {
 namespace {
 
-/// Cells of the grid of `split` over the thickness that leave no more than the tolerance.
-int cells_for(double tolerance) {
-  return std::max(2, static_cast<int>(std::ceil(2 * std::cbrt(substrate::kSplitErrorOfTwoCells / tolerance))));
-}
-
-SceneSize size_of(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses) {
+SceneSize size_of(const substrate::Loads& loads, const substrate::Observations& observations) {
+  const std::vector<Vec2>& points_um = surface_points_of(observations);
+  const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads);
   if (points_um.empty() && ellipses.empty()) return {};
   const substrate::Extent extent = substrate::extent_of(points_um, ellipses);
   SceneSize size{.width_um = norm(extent.high_um - extent.low_um)};
@@ -36,23 +28,25 @@ SceneSize size_of(const std::vector<Vec2>& points_um, const std::vector<substrat
   return size;
 }
 
-substrate::ModelKind model_for(const Gel& gel, const substrate::SubstrateParameters& p,
-                               const substrate::GelEffects& effects) {
-  using enum substrate::ModelKind;
-  if (effects.grading.is_on) return refined;
-  if (effects.sides.is_on) {
-    const double elements = *p.side_distance_um / gel.thickness_um * p.cells_per_thickness;
-    return elements >= 2 ? split : refined;
-  }
-  return effects.thickness.is_on ? layer : half_space;
+const substrate::Model& cheapest(const std::function<bool(const substrate::Model&)>& can) {
+  const auto model = std::find_if(models().begin(), models().end(), can);
+  MBTFM_ASSERT(model != models().end());
+  return *model;
+}
+
+const substrate::Model& model_for(const Gel& gel, const substrate::SubstrateParameters& p,
+                                  const substrate::GelEffects& effects) {
+  return cheapest([&](const substrate::Model& model) {
+    return (model.can.base || !effects.thickness.is_on) && (model.can.sides || !effects.sides.is_on) &&
+           (model.can.grading || !effects.grading.is_on) && (!model.follows || model.follows(gel, p));
+  });
 }
 
 class Automatic final : public substrate::Substrate {
   template <class Ask>
-  auto timed(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
-             const Ask& ask) const {
+  auto timed(const Ask& ask) const {
     const stage::Stopwatch watch;
-    auto answer = ask(model_of(points_um, ellipses));
+    auto answer = ask();
     const std::lock_guard lock(mutex_);
     seconds_ += watch.seconds();
     return answer;
@@ -60,38 +54,37 @@ class Automatic final : public substrate::Substrate {
 
  public:
   Automatic(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : gel_(gel), parameters_(parameters), threads_(threads) {
-    parameters_.cells_per_thickness =
-        std::max(parameters_.cells_per_thickness, cells_for(parameters_.effects.effect_tolerance));
+      : Substrate(parameters, {}), gel_(gel), threads_(threads) {
+    check(gel);
+    for (const substrate::Model& model : models())
+      if (model.within) parameters_ = model.within(parameters_, parameters_.effects.effect_tolerance);
     decide(gel_, parameters_, {});  // refuses what the switches get wrong before any file is read
   }
 
-  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
-                                       const std::vector<substrate::Ellipse>& ellipses) const override {
-    return timed(points_um, ellipses,
-                 [&](const substrate::Substrate& m) { return m.compliance_um_per_nN(points_um, ellipses); });
+  substrate::LazyResponse response(const substrate::Loads& loads,
+                                   const substrate::Observations& observations) const override {
+    const auto answer = timed([&] { return model_of(loads, observations).response(loads, observations); });
+    return substrate::lazy_response(
+        {.rows = answer->rows(),
+         .cols = answer->cols(),
+         .matrix = [=, this] { return timed([&] { return answer->matrix(); }); },
+         .displace = [=,
+                      this](const Eigen::MatrixXd& forces) { return timed([&] { return answer->displace(forces); }); },
+         .kept = [=, this] { return timed([&] { return answer->kept(); }); }});
   }
-  substrate::SharedResponse response(const std::vector<Vec2>& points_um,
-                                     const std::vector<substrate::Ellipse>& ellipses) const override {
-    return timed(points_um, ellipses, [&](const substrate::Substrate& m) { return m.response(points_um, ellipses); });
-  }
-  std::vector<Vec2> displacements_um(const std::vector<Vec2>& points_um,
-                                     const std::vector<substrate::Ellipse>& ellipses,
-                                     const std::vector<Vec2>& forces_nN) const override {
-    return timed(points_um, ellipses,
-                 [&](const substrate::Substrate& m) { return m.displacements_um(points_um, ellipses, forces_nN); });
-  }
-  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
-                                  const std::vector<Vec2>& forces_nN) const override {
-    return timed(points_um, ellipses,
-                 [&](const substrate::Substrate& m) { return m.vertical_um(points_um, ellipses, forces_nN); });
-  }
-  bool has_vertical() const override { return substrate::asks_for_vertical(parameters_); }
   substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
                                 const std::vector<Vec2>& forces_nN) const override {
     substrate::SubstrateParameters parameters = parameters_;
-    parameters.model = substrate::ModelKind::refined;  // the one that has an inside
+    parameters.model = cheapest([](const substrate::Model& model) { return model.can.inside; }).kind;
     return make_substrate(gel_, parameters, threads_)->volume(ellipses, forces_nN);
+  }
+  substrate::Capabilities capabilities() const override {
+    const std::lock_guard lock(mutex_);
+    return model_ ? model_->capabilities() : substrate::Capabilities{};
+  }
+  double stated_error() const override {
+    const std::lock_guard lock(mutex_);
+    return model_ ? model_->stated_error() : 0;
   }
   std::vector<Effect> effects() const override {
     const std::lock_guard lock(mutex_);
@@ -111,15 +104,13 @@ class Automatic final : public substrate::Substrate {
 
  private:
   /// The first scene decides: later ones of the same gel are answered by the same model.
-  const substrate::Substrate& model_of(const std::vector<Vec2>& points_um,
-                                       const std::vector<substrate::Ellipse>& ellipses) const {
+  const substrate::Substrate& model_of(const substrate::Loads& loads,
+                                       const substrate::Observations& observations) const {
     const std::lock_guard lock(mutex_);
     if (model_) return *model_;
-    substrate::check_points(points_um);
-    check(ellipses);
-    effects_ = decide(gel_, parameters_, size_of(points_um, ellipses));
+    effects_ = decide(gel_, parameters_, size_of(loads, observations));
     substrate::SubstrateParameters parameters = substrate::without_what_is_off(parameters_, effects_);
-    parameters.model = model_for(gel_, parameters, effects_);
+    parameters.model = model_for(gel_, parameters, effects_).kind;
     stage::EffectSwitches decided;  // as the model has them: the switches are obeyed by now
     decided.vertical_displacement = switched(effects_.vertical.is_on);
     parameters.effects = decided;
@@ -128,7 +119,6 @@ class Automatic final : public substrate::Substrate {
   }
 
   Gel gel_;
-  substrate::SubstrateParameters parameters_;
   int threads_;
   mutable std::mutex mutex_;  // guards the choice
   mutable substrate::GelEffects effects_;

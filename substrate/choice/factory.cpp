@@ -2,19 +2,19 @@
 
 #include "substrate/boxes/models.h"
 #include "substrate/greens/models.h"
-#include "substrate/models.h"
 
 namespace mbtfm::choice {
 
+const std::vector<substrate::Model>& models() {
+  static const std::vector<substrate::Model> table = {greens::half_space(), greens::layer(), boxes::split(),
+                                                      boxes::refined()};
+  return table;
+}
+
 std::unique_ptr<substrate::Substrate> make_substrate(const Gel& gel, const substrate::SubstrateParameters& parameters,
                                                      int threads) {
-  using enum substrate::ModelKind;
-  return substrate::make_from({{half_space, greens::make_half_space, true},
-                               {layer, greens::make_layer, true},
-                               {split, boxes::make_split, false},
-                               {refined, boxes::make_refined, false},
-                               {automatic, make_automatic, true}},
-                              gel, parameters, threads);
+  if (parameters.model == substrate::ModelKind::automatic) return make_automatic(gel, parameters, threads);
+  return substrate::make_from(models(), gel, parameters, threads);
 }
 
 }  // namespace mbtfm::choice

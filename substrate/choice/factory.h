@@ -1,11 +1,12 @@
 /// All models.
 #pragma once
 
-#include <memory>
-
-#include "substrate/compliance.h"
+#include "substrate/models.h"
 
 namespace mbtfm::choice {
+
+/// The table of models, the cheapest first. A model is one row.
+const std::vector<substrate::Model>& models();
 
 /// The model named in the parameters. The same bits for any number of threads. @throws UsageError, InvalidData
 std::unique_ptr<substrate::Substrate> make_substrate(const Gel& gel, const substrate::SubstrateParameters& parameters,

@@ -1,52 +1,47 @@
-#include "substrate/effects.h"
 #include "substrate/greens/greens_model.h"
 #include "substrate/greens/layer.h"
 #include "substrate/greens/layer_vertical.h"
 #include "substrate/greens/models.h"
-#include "substrate/models.h"
-#include "substrate/response.h"
+#include "substrate/greens/square.h"
 
 namespace mbtfm::greens {
 namespace {
 
-class LayerModel final : public substrate::Substrate {
+constexpr substrate::Capabilities kCan{.base = true, .normal_displacement = true, .incompressible = true};
+
+class LayerModel final : public GreensModel {
  public:
   LayerModel(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : parameters_(parameters), threads_(threads), layer_(gel) {}
-
-  Eigen::MatrixXd compliance_um_per_nN(const std::vector<Vec2>& points_um,
-                                       const std::vector<substrate::Ellipse>& ellipses) const override {
-    return compliance_by_columns(points_um, ellipses, threads_,
-                                 [this](const substrate::Ellipse& ellipse) { return LayerEllipse(layer_, ellipse); });
-  }
-  substrate::SharedResponse response(const std::vector<Vec2>& points_um,
-                                     const std::vector<substrate::Ellipse>& ellipses) const override {
-    return substrate::pointwise_response(*this, points_um, ellipses, threads_);
-  }
-  std::vector<double> vertical_um(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
-                                  const std::vector<Vec2>& forces_nN) const override {
-    substrate::check_points(points_um);
-    check(ellipses);
-    substrate::check_forces(ellipses, forces_nN);
-    return LayerVertical(layer_.gel()).vertical_um(points_um, ellipses, forces_nN, threads_);
-  }
-  bool has_vertical() const override { return substrate::asks_for_vertical(parameters_); }
-  std::vector<Effect> effects() const override { return substrate::effects_of_model(parameters_).list(); }
+      : GreensModel(gel, parameters, kCan, threads), layer_(gel) {}
   Figures figures() const override {
-    return {{"substrate_model", "layer"}, {"substrate_thickness_um", layer_.gel().thickness_um}};
+    return {{"substrate_model", "layer"}, {"substrate_thickness_um", gel_.thickness_um}};
   }
 
  private:
-  substrate::SubstrateParameters parameters_;
-  int threads_;
+  Eigen::MatrixXd by_ellipses(const std::vector<Vec2>& points_um,
+                              const std::vector<substrate::Ellipse>& ellipses) const override {
+    return compliance_by_columns(points_um, ellipses, threads_,
+                                 [this](const substrate::Ellipse& ellipse) { return LayerEllipse(layer_, ellipse); });
+  }
+  Sym2 by_square_um_per_kPa(double side_um, Vec2 offset_um) const override {
+    return square_compliance_um_per_kPa(layer_, side_um, offset_um);
+  }
+  WaveCompliance by_wave(double wave_number_per_um) const override {
+    return wave_compliance(gel_, GelModel::layer, wave_number_per_um);
+  }
+  std::vector<double> into_the_gel_um(const std::vector<Vec2>& points_um,
+                                      const std::vector<substrate::Ellipse>& ellipses,
+                                      const std::vector<Vec2>& forces_nN) const override {
+    return LayerVertical(gel_).vertical_um(points_um, ellipses, forces_nN, threads_);
+  }
+
   Layer layer_;
 };
 
 }  // namespace
 
-std::unique_ptr<substrate::Substrate> make_layer(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                                                 int threads) {
-  return std::make_unique<LayerModel>(gel, parameters, threads);
+substrate::Model layer() {
+  return {.kind = substrate::ModelKind::layer, .can = kCan, .make = substrate::make_model<LayerModel>};
 }
 
 }  // namespace mbtfm::greens

@@ -1,16 +1,12 @@
 /// The models of closed forms: they start quickly and know no finite elements.
 #pragma once
 
-#include <memory>
-
-#include "substrate/compliance.h"
+#include "substrate/models.h"
 
 namespace mbtfm::greens {
 
-std::unique_ptr<substrate::Substrate> make_half_space(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                                                      int threads);
-std::unique_ptr<substrate::Substrate> make_layer(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                                                 int threads);
+substrate::Model half_space();
+substrate::Model layer();
 /// The one of these two that the parameters name. @throws UsageError, InvalidData
 std::unique_ptr<substrate::Substrate> make_greens(const Gel& gel, const substrate::SubstrateParameters& parameters,
                                                   int threads);

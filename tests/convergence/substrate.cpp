@@ -9,7 +9,6 @@
 #include "substrate/ellipse.h"
 #include "substrate/greens/half_space.h"
 #include "substrate/material.h"
-#include "substrate/stated_error.h"
 #include "tests/support/substrate_scene.h"
 
 namespace mbtfm::substrate {
@@ -199,7 +198,7 @@ TEST(Split, states_an_error_that_falls_as_its_own_does) {
     parameters.margin_thicknesses = 6;  // beyond which the sides change nothing here
     const auto split = choice::make_substrate(gel, parameters, 2);
     const double error = test::mean_column_difference(split->compliance_um_per_nN(points, ellipses), layer);
-    const double stated = stated_error(parameters, split->figures());
+    const double stated = split->stated_error();
     std::printf("split with %d cells: error %.2g, stated %.2g\n", cells, error, stated);
     EXPECT_LE(error, 1.2 * stated) << cells << " cells";
     EXPECT_GE(error, 0.5 * stated) << cells << " cells";

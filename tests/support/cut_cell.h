@@ -14,6 +14,7 @@
 #include "samples/experiment/experiment.h"
 #include "segment/cells/hand_drawn.h"
 #include "substrate/greens/models.h"
+#include "substrate/response.h"
 
 namespace mbtfm::test {
 
@@ -134,8 +135,9 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
     ids.push_back(a.adhesion_id);
   }
   tensions::LinearData data = tensions::reduce(
-      beads, greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)->response(points, ellipses), {}, 2,
-      tensions::affine_motions(beads));
+      beads,
+      greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)->response({ellipses}, {points})->kept(), {},
+      2, tensions::affine_motions(beads));
   CutFit result;
   if (allow == Beyond::allowed && !cuts_of(cell).empty())
     result.beyond = tensions::allow_forces_beyond(data, cell, gel, spacing);

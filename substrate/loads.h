@@ -1,0 +1,53 @@
+/// What loads a gel, and where it is asked.
+#pragma once
+
+#include <array>
+#include <variant>
+#include <vector>
+
+#include "substrate/compliance.h"
+
+namespace mbtfm::substrate {
+
+/// Carries an even traction.
+struct Square {
+  Vec2 centre_um;
+  double side_um = 0;
+};
+
+/// A traction t cos(k · x) all over the surface.
+struct Wave {
+  Vec2 wave_vector_per_um;
+};
+
+/// Faces of a curved surface, each with an even traction.
+struct SurfaceFaces {
+  std::vector<std::array<double, 3>> points_um;
+  std::vector<std::array<int, 4>> faces;
+};
+
+/// Unit loads: 1 nN spread over each ellipse, a traction of 1 kPa on each of the others.
+struct Loads {
+  std::variant<std::vector<Ellipse>, std::vector<Square>, std::vector<Wave>, SurfaceFaces> shapes;
+  int n_components = 2;  ///< of each: along x and y, or into the gel, too
+  Eigen::Index size() const;
+};
+
+/// Of a displacement: along the surface (x, y), into the gel (z), or both.
+enum class Components { along, normal, all };
+
+struct Observations {
+  std::variant<std::vector<Vec2>, std::vector<std::array<double, 3>>> points_um;  ///< of the flat surface, or in space
+  Components components = Components::along;
+  Eigen::Index n_components() const {
+    return components == Components::all ? 3 : components == Components::along ? 2 : 1;
+  }
+  Eigen::Index size() const;
+};
+
+/// The ellipses or points, checked, where a model takes no others.
+/// @throws UsageError where they are others or a load has three components, InvalidData as check()
+const std::vector<Ellipse>& ellipses_of(const Loads& loads);
+const std::vector<Vec2>& surface_points_of(const Observations& observations);
+
+}  // namespace mbtfm::substrate
