@@ -23,21 +23,19 @@ std::optional<CrossValidation> cross_validation_of(const ReadyCell& ready, const
     tensions[types.back()].push_back(fit.tensions_nN[i].value);
   }
   if (n_draws == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) return {};
-  const TensionProblem problem(ready.networks.front(), ready.of_beads.data.reduced, adhesion_ids_of(cell));
-  return cross_validate(problem, ready.of_beads.data, fit.meshes.front().fit.trial, types, tensions, n_draws, 1,
-                        threads);
+  const TensionProblem problem(ready.networks.front(), fit.data.reduced, adhesion_ids_of(cell));
+  return cross_validate(problem, fit.data, fit.meshes.front().fit.trial, types, tensions, n_draws, 1, threads);
 }
 
 }  // namespace
 
 FoundMotions motions_found(const ReadyCell& cell, const EnsembleFit& fit, const stage::EffectSwitches& switches) {
-  const LinearData& data = cell.of_beads.data;
-  const MotionsBeside motions = motions_beside(data, fit);
+  const MotionsBeside motions = motions_beside(fit.data, fit);
   FoundMotions found;
   if (cell.decisions.placement.is_on) found.placement = placement_among(motions, cell.placement);
   if (!allows_common_motion(switches)) return found;
-  found.common = common_motion_among(motions, data.position_um);
-  found.curved = curved_motion_beside(data, cell.scene.beads, fit);
+  found.common = common_motion_among(motions, fit.data.position_um);
+  found.curved = curved_motion_beside(fit.data, cell.scene.beads, fit);
   return found;
 }
 
@@ -49,7 +47,7 @@ Figures figures_of(const FoundMotions& found) {
 }
 
 ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Parameters& p, int threads) {
-  const LinearData& data = cell.of_beads.data;
+  const LinearData& data = fit.data;
   const Cell& of = cell.scene.cell;
   ModelChecks checks{.models = compare_models(fit, data, cell.networks.front(), adhesion_ids_of(of)),
                      .influence = influence_of(fit, data),

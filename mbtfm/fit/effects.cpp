@@ -22,25 +22,19 @@ EnsembleFit fit_again(const FittedCell& c, const std::vector<cables::CableNetwor
   return fit_ensemble(networks, data, adhesion_ids_of(c.seen), parameters, threads, {});
 }
 
-/// Without what a robust loss has made of the beads' weights.
-LinearData unweighted(LinearData data) {
-  reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
-  return data;
-}
-
 Change change_with_data(const FittedCell& c, const Effect& e, LinearData data, int threads) {
   return change_between(e.kind, c.fit, fit_again(c, c.ready.networks, std::move(data), c.parameters.fit.loss, threads));
 }
 
 Change change_with_networks(const FittedCell& c, const Effect& e, const std::vector<cables::CableNetwork>& networks,
                             int threads) {
-  return change_between(e.kind, c.fit, fit_again(c, networks, c.ready.of_beads.data, c.parameters.fit.loss, threads));
+  return change_between(e.kind, c.fit, fit_again(c, networks, c.fit.data, c.parameters.fit.loss, threads));
 }
 
 Change change_with_gel(const FittedCell& c, const Effect& e, const substrate::SubstrateParameters& parameters,
                        int threads) {
   const auto gel = choice::make_substrate(c.parameters.gel, parameters, threads);
-  LinearData with = c.ready.of_beads.data;
+  LinearData with = c.fit.data;
   with.response = gel->response(points_of(c.ready.scene.beads), ellipses_of(c.ready.scene.cell));
   return change_with_data(c, e, unweighted(std::move(with)), threads);
 }
@@ -75,21 +69,19 @@ std::optional<Change> with_elasticity(const FittedCell& c, const Effect& e, int 
 
 std::optional<Change> with_loss(const FittedCell& c, const Effect& e, int threads) {
   return change_between(e.kind, c.fit,
-                        fit_again(c, c.ready.networks, c.ready.of_beads.data, c.parameters.fit.robust_kind, threads));
+                        fit_again(c, c.ready.networks, c.fit.data, c.parameters.fit.robust_kind, threads));
 }
 
 std::optional<Change> with_motion(const FittedCell& c, const Effect& e, int threads) {
-  LinearData with = c.ready.of_beads.data;
-  add_motions(with, affine_motions(c.ready.scene.beads));
-  return change_with_data(c, e, unweighted(std::move(with)), threads);
+  return change_with_data(c, e, unweighted(with_more_motions(c.fit.data, affine_motions(c.ready.scene.beads))),
+                          threads);
 }
 
 /// None where the image shows the whole cell.
 std::optional<Change> with_forces_beyond(const FittedCell& c, const Effect& e, int threads) {
   if (cuts_of(c.seen).empty()) return {};
-  LinearData with = unweighted(c.ready.of_beads.data);
-  allow_forces_beyond(with, c.seen, c.parameters.gel);
-  return change_with_data(c, e, std::move(with), threads);
+  auto [data, beyond] = with_forces_beyond(unweighted(c.fit.data), c.seen, c.parameters.gel);
+  return change_with_data(c, e, std::move(data), threads);
 }
 
 /// What it changes of the network's tension.
@@ -115,7 +107,7 @@ Effect of_common_motion(const FittedCell& c) {
 }
 
 Effect of_forces_beyond(const FittedCell& c) {
-  return beyond_cut_effect(c.parameters.effects.beyond_cut, c.seen, c.ready.of_beads.beyond);
+  return beyond_cut_effect(c.parameters.effects.beyond_cut, c.seen, c.ready.beyond);
 }
 
 Effect of_loss(const FittedCell& c) { return robust_loss_effect(c.parameters.effects.robust_loss, c.fit.loss); }

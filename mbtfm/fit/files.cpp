@@ -76,7 +76,7 @@ void write_fields(stage::StageContext& context, const FittedCell& cell, const Di
   files::write_displacement(context.output("out", "fitted_displacement.csv"), cell.fields.fitted);
   files::write_displacement(context.output("out", "displacement_without_fibres.csv"), cell.fields.without_fibres);
   write_displacement_vtp(context.output("out", "displacement.vtp"), tracked, cell.fields.fitted,
-                         {most_informed_array(cell.checks.influence), weight_array(cell.ready.of_beads.data)});
+                         {most_informed_array(cell.checks.influence), weight_array(cell.fit.data)});
 }
 
 void write_frames(stage::StageContext& context, const FittedCell& cell) {

@@ -13,21 +13,20 @@ using namespace tensions;
 
 namespace {
 
-EnsembleFit fit_networks(ReadyCell& cell, const FitParameters& p, const Work& work) {
-  LinearData& data = cell.of_beads.data;
+EnsembleFit fit_networks(const ReadyCell& cell, LinearData data, const FitParameters& p, const Work& work) {
   const SolvedMisfit misfit =
       p.substrate == TrialDisplacement::per_evaluation
           ? solved_misfit(*cell.gel, points_of(cell.scene.beads), ellipses_of(cell.scene.cell), data)
           : SolvedMisfit{};
-  return fit_ensemble(cell.networks, data, adhesion_ids_of(cell.scene.cell), p, work.threads, work.progress, misfit,
-                      &cell.start);
+  return fit_ensemble(cell.networks, std::move(data), adhesion_ids_of(cell.scene.cell), p, work.threads, work.progress,
+                      misfit, &cell.start);
 }
 
 ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Parameters& p, int threads) {
   const Figures figures = cell.gel->figures();
   const Figures::value_type half_space{"substrate_model", name_of(substrate::ModelKind::half_space)};
   return error_budget({.fit = fit,
-                       .data = cell.of_beads.data,
+                       .data = fit.data,
                        .networks = cell.networks,
                        .cell = cell.scene.cell,
                        .beads = cell.scene.beads,
@@ -44,15 +43,15 @@ EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters&
   if (!first.decisions.fibres.is_on) second.fibres.clear();
   LinearData data =
       data_of({.gel = *first.gel, .cell = second, .parameters = p, .threads = threads}, first.scene.beads);
-  return fit_ensemble(of_cables(span_ensemble(second, p, threads), first.networks.front().parameters()), data,
-                      adhesion_ids_of(second), p.fit, threads, {});
+  return fit_ensemble(of_cables(span_ensemble(second, p, threads), first.networks.front().parameters()),
+                      std::move(data), adhesion_ids_of(second), p.fit, threads, {});
 }
 
 Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optional<Cell>& second, const Parameters& p,
                const Work& work) {
   Found found{.tensions = tensions_of(fit),
               .forces = forces_of(fit, cell.scene.cell),
-              .summary = summary_of(fit, cell.of_beads.data, cell.scene, cell.networks, p.fit)};
+              .summary = summary_of(fit, cell.scene, cell.networks, p.fit)};
   const stage::Stopwatch watch;
   found.summary.error_budget = budget_of(cell, fit, p, work.threads);
   if (second) {
@@ -69,11 +68,11 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first
                                  const Parameters& p, const Work& work) {
   const SeriesOnGel& series = cell.series;
   if (series.frames.empty()) return {};
-  const auto allow = [&](LinearData& of_frame, const Eigen::VectorXd& forces_nN) {
-    if (cell.of_beads.beyond) allow_forces_beyond(of_frame, cell.scene.cell, p.gel);
+  const auto allow = [&](LinearData of_frame, const Eigen::VectorXd& forces_nN) {
+    if (cell.beyond) of_frame = with_forces_beyond(std::move(of_frame), cell.scene.cell, p.gel).data;
+    if (!cell.decisions.placement.is_on) return of_frame;
     // the same place for all, but each frame has the error of it
-    if (cell.decisions.placement.is_on)
-      allow_place(of_frame, cell.scene.cell, p.gel, forces_nN, cell.placement.centre_um, work.threads);
+    return with_place(std::move(of_frame), cell.scene.cell, p.gel, forces_nN, cell.placement.centre_um, work.threads);
   };
   return fit_series(series.frames, cell.networks, series.response,
                     beads_in_region(beads_of(series.frames), cell.scene.cell, p.fit), adhesion_ids_of(cell.scene.cell),
@@ -84,7 +83,7 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first
 ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const ModelChecks& checks,
                       const DisplacementField& tracked) {
   const auto field = [&](const Eigen::VectorXd& forces_nN) {
-    return in_bead_frame(field_of(forces_nN, cell.scene, cell.of_beads.data), tracked, cell.placement);
+    return in_bead_frame(field_of(forces_nN, cell.scene.beads, fit.data), tracked, cell.placement);
   };
   return {.fitted = field(fit.forces_nN), .without_fibres = field(checks.models.front().forces_nN)};
 }
@@ -98,14 +97,14 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   if (!inputs.frames.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
-  ReadyCell ready = make_ready(inputs, p, work);
+  auto [ready, data] = make_ready(inputs, p, work);
   const Work of_fit = work.part(0.4, inputs.frames.empty() ? 0.5 : 0.2);
-  EnsembleFit fit = fit_networks(ready, p.fit, of_fit);
+  EnsembleFit fit = fit_networks(ready, std::move(data), p.fit, of_fit);
   if (const auto elasticity =
           elasticity_after_all(ready.decisions.elasticity, ready.networks.front(), fit.meshes.front().fit.trial, p)) {
-    ready = with_cables(std::move(ready), p.cables, inputs);
+    ready = with_cables(std::move(ready), fit.data, p.cables, inputs);
     ready.decisions.elasticity = *elasticity;
-    fit = fit_networks(ready, p.fit, of_fit);
+    fit = fit_networks(ready, std::move(fit.data), p.fit, of_fit);
   }
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);

@@ -69,14 +69,15 @@ std::optional<std::vector<Tension>> tensions_before(const Inputs& inputs, const 
 
 }  // namespace
 
-ReadyCell with_cables(ReadyCell cell, const cables::CableParameters& cables, const Inputs& inputs) {
+ReadyCell with_cables(ReadyCell cell, const LinearData& data, const cables::CableParameters& cables,
+                      const Inputs& inputs) {
   cell.networks = of_cables(cell.networks, cables);
-  cell.start = start_on(cell.networks.front(), cell.of_beads.data, adhesion_ids_of(cell.scene.cell),
+  cell.start = start_on(cell.networks.front(), data, adhesion_ids_of(cell.scene.cell),
                         tensions_before(inputs, cell.decisions.time_coupling));
   return cell;
 }
 
-ReadyCell make_ready(const Inputs& inputs, const Parameters& p, const Work& work) {
+ReadyFit make_ready(const Inputs& inputs, const Parameters& p, const Work& work) {
   auto [cell, fibres] = take_cell(inputs, p.effects);
   std::unique_ptr<substrate::Substrate> gel = choice::make_substrate(p.gel, p.substrate, work.threads);
   const GelUnderCell on{.gel = *gel, .cell = cell, .parameters = p, .threads = work.threads};
@@ -97,18 +98,19 @@ ReadyCell make_ready(const Inputs& inputs, const Parameters& p, const Work& work
     series = in_cell_frame(std::move(series), state.beads, place.placement, on);
     started.start = std::move(place.start);
   }
-  return {.gel = std::move(gel),
-          .scene = {.cell = cell, .network = {}, .beads = std::move(state.beads), .n_flagged = inputs.n_flagged},
-          .of_beads = {.data = std::move(place.data), .beyond = at_rest.beyond},
-          .placement = place.placement,
-          .networks = std::move(started.networks),
-          .start = std::move(started.start),
-          .series = std::move(series),
-          .decisions = {.fibres = std::move(fibres),
-                        .under_load = std::move(state.effect),
-                        .placement = std::move(place.effect),
-                        .elasticity = std::move(started.elasticity),
-                        .time_coupling = coupling}};
+  ReadyCell ready{.gel = std::move(gel),
+                  .scene = {.cell = cell, .beads = std::move(state.beads), .n_flagged = inputs.n_flagged},
+                  .beyond = at_rest.beyond,
+                  .placement = place.placement,
+                  .networks = std::move(started.networks),
+                  .start = std::move(started.start),
+                  .series = std::move(series),
+                  .decisions = {.fibres = fibres,
+                                .under_load = std::move(state.effect),
+                                .placement = std::move(place.effect),
+                                .elasticity = std::move(started.elasticity),
+                                .time_coupling = coupling}};
+  return {std::move(ready), std::move(place.data)};
 }
 
 }  // namespace mbtfm::fit

@@ -27,20 +27,26 @@ struct Decisions {
 
 struct ReadyCell {
   std::unique_ptr<substrate::Substrate> gel;
-  tensions::FitInputs scene;  ///< the cell with the fibres that its networks have, the beads in state and frame
-  DataOfBeads of_beads;
-  tensions::Placement placement;  ///< of the cell on the beads
+  tensions::CellOnBeads scene;  ///< the cell with the fibres that its networks have, the beads in state and frame
+  std::optional<tensions::ForcesBeyond> beyond;  ///< the cut; none: not allowed for
+  tensions::Placement placement;                 ///< of the cell on the beads
   std::vector<cables::CableNetwork> networks;
   tensions::Trial start;  ///< on the first of them
   SeriesOnGel series;
   Decisions decisions;
 };
 
+/// With the data of the beads, which are large where the cell is: the fit takes them over.
+struct ReadyFit {
+  ReadyCell cell;
+  tensions::LinearData data;
+};
 /// @param parameters  as_switched()
 /// @throws InputError where the network is not that of the cell; UsageError where a switch asks for what the scene has
 /// not
-ReadyCell make_ready(const Inputs& inputs, const Parameters& parameters, const tensions::Work& work);
+ReadyFit make_ready(const Inputs& inputs, const Parameters& parameters, const tensions::Work& work);
 /// The same on networks of other cables.
-ReadyCell with_cables(ReadyCell cell, const cables::CableParameters& cables, const Inputs& inputs);
+ReadyCell with_cables(ReadyCell cell, const tensions::LinearData& data, const cables::CableParameters& cables,
+                      const Inputs& inputs);
 
 }  // namespace mbtfm::fit
