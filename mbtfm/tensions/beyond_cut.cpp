@@ -184,47 +184,60 @@ std::vector<substrate::Ellipse> places_beyond(const Cell& cell, double finest_um
   return places;
 }
 
-ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
-                                 const Eigen::MatrixXd& compliance_um_per_nN, double area_um2) {
-  MBTFM_ASSERT(data.motion_precision.size() == 0);
-  Eigen::MatrixXd Z = compliance_um_per_nN;  // of forces of 1 nN/um times the root of the area
+namespace {
+
+/// Of each place the displacement by forces of 1 nN/um times the root of its area.
+Eigen::MatrixXd by_root_of_area(Eigen::MatrixXd compliance_um_per_nN, const std::vector<substrate::Ellipse>& places) {
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double side_um = std::sqrt(std::numbers::pi) * places[i].semi_major_um;
-    Z.middleCols<2>(2 * static_cast<Eigen::Index>(i)) *= side_um;
+    compliance_um_per_nN.middleCols<2>(2 * static_cast<Eigen::Index>(i)) *= side_um;
   }
+  return compliance_um_per_nN;
+}
+
+/// The motions by random forces Z that stand out of the noise, of unit variance.
+Eigen::MatrixXd motions_that_stand_out(const LinearData& data, const Eigen::MatrixXd& Z, double kappa) {
+  // What together stands out by a tenth of the noise of one component changes no weight by a per cent.
+  constexpr double kUnseen = 0.01;
+  const Eigen::MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
+  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(square);
+  const Eigen::Index n_motions = (eigen.eigenvalues().array() > kUnseen).count();
+  return std::sqrt(kappa) * Z * eigen.eigenvectors().rightCols(n_motions);
+}
+
+}  // namespace
+
+DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
+                                  const Eigen::MatrixXd& compliance_um_per_nN, double area_um2) {
+  MBTFM_ASSERT(data.motion_precision.size() == 0);
+  const Eigen::MatrixXd Z = by_root_of_area(compliance_um_per_nN, places);
   const Eigen::Index n_affine = data.motions.cols();
-  const bool has_affine = n_affine > 0;
-  allow_motions(data, with_even_traction(data.motions, places, compliance_um_per_nN));
+  Eigen::MatrixXd with_even = with_even_traction(data.motions, places, compliance_um_per_nN);
+  data = with_motions(std::move(data), std::move(with_even));
   const Spectrum spectrum = spectrum_of(data, Z);
   // With few beads at the cut the likelihood is flat down to zero; then what is hidden is as strong as what is seen.
   const double n_adhesions = 0.5 * static_cast<double>(data.response->cols());
   const double seen = n_adhesions / area_um2 * mean_square_force(data, spectrum.variance) / spectrum.variance;
   const double kappa = std::max(seen, likeliest_kappa(spectrum));
-  ForcesBeyond found;
-  found.n_places = static_cast<Eigen::Index>(places.size());
-  found.intensity_nN_per_um = std::sqrt(kappa * spectrum.variance);
-  // Of unit variance. What together stands out by a tenth of the noise of one component changes no weight by a per
-  // cent.
-  constexpr double kUnseen = 0.01;
-  const Eigen::MatrixXd square = kappa * numerics::transposed_product(Z, squared_weights(data).asDiagonal() * Z);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(square);
-  found.n_motions = (eigen.eigenvalues().array() > kUnseen).count();
+  const Eigen::MatrixXd random = motions_that_stand_out(data, Z, kappa);
   const Eigen::Index n_free = data.motions.cols();
-  Eigen::MatrixXd motions(Z.rows(), n_free + found.n_motions);
+  Eigen::MatrixXd motions(Z.rows(), n_free + random.cols());
   if (n_free > 0) motions.leftCols(n_free) = data.motions;
-  motions.rightCols(found.n_motions) = std::sqrt(kappa) * Z * eigen.eigenvectors().rightCols(found.n_motions);
+  motions.rightCols(random.cols()) = random;
   // An even traction is free, so that what these motions have of it may be left to it. Both together would be the same
   // motion twice, whose square no rounding leaves definite.
   const Eigen::MatrixXd even = motions.middleCols(n_affine, n_free - n_affine);
   const Eigen::MatrixXd weighted = squared_weights(data).asDiagonal() * even;
-  motions.rightCols(found.n_motions) -= even * (even.transpose() * weighted)
-                                                   .completeOrthogonalDecomposition()
-                                                   .solve(weighted.transpose() * motions.rightCols(found.n_motions));
+  motions.rightCols(random.cols()) -= even * (even.transpose() * weighted)
+                                                 .completeOrthogonalDecomposition()
+                                                 .solve(weighted.transpose() * motions.rightCols(random.cols()));
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(motions.cols());
   precision.head(n_free).setZero();
-  if (has_affine) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
-  allow_motions(data, std::move(motions), std::move(precision));
-  return found;
+  if (n_affine > 0) precision.segment<3>(3).setConstant(spectrum.variance / (kUsualGrowth * kUsualGrowth));
+  const ForcesBeyond beyond{.n_places = static_cast<Eigen::Index>(places.size()),
+                            .n_motions = random.cols(),
+                            .intensity_nN_per_um = std::sqrt(kappa * spectrum.variance)};
+  return {with_motions(std::move(data), std::move(motions), std::move(precision)), beyond};
 }
 
 /// Standard deviation that a component of an adhesion's own force is expected to have at this distance from the cut, in
@@ -235,7 +248,8 @@ double expected_own(double distance_um) {
   return distance_um < kUnseen_um ? 1 : kOfNetwork * std::exp(-distance_um / kFade_um);
 }
 
-void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
+DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell) {
+  auto& [data, found] = given;
   constexpr double kLeast = 0.02;  // nothing beside the errors that forces have in whole cells, too (0.1)
   std::vector<Eigen::Index> near;
   std::vector<double> expected;
@@ -248,7 +262,7 @@ void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
   }
   const Eigen::Index n_forces = data.response->cols();
   const double variance = noise_variance(data), mean_square = mean_square_force(data, variance);
-  if (near.empty() || mean_square <= 0) return;
+  if (near.empty() || mean_square <= 0) return given;
   found.n_own = static_cast<Eigen::Index>(near.size());
   found.own_nN = std::sqrt(mean_square);
   const Eigen::Index before = data.motions.cols(), n_own = 2 * found.n_own;
@@ -262,23 +276,21 @@ void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found) {
   motions << data.motions, data.response->displace(forces.rightCols(n_own));
   Eigen::VectorXd precision = Eigen::VectorXd::Ones(before + n_own);
   precision.head(before) = data.motion_precision;
-  allow_motions(data, std::move(motions), std::move(precision));
+  data = with_motions(std::move(data), std::move(motions), std::move(precision));
   data.forces_by_motion = std::move(forces);
+  return given;
 }
 
-ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing) {
+DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing) {
   DisplacementField beads;
   for (const Vec2 p : data.position_um) beads.push_back({.position_um = p, .displacement_um = {}, .flag = {}});
   const double density = beads_per_um2(beads);
-  if (density <= 0) return {};
+  if (density <= 0) return {std::move(data), {}};
   const auto places = places_beyond(cell, spacing.finest / std::sqrt(density), spacing.growth);
-  ForcesBeyond found =
-      allow_forces_beyond(data, places,
-                          greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
-                              ->compliance_um_per_nN(data.position_um, places),
-                          std::abs(signed_area_um2(cell.outline_um)));
-  allow_own_forces(data, cell, found);
-  return found;
+  const Eigen::MatrixXd compliance = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, data.threads)
+                                         ->compliance_um_per_nN(data.position_um, places);
+  return with_own_forces(
+      with_forces_beyond(std::move(data), places, compliance, std::abs(signed_area_um2(cell.outline_um))), cell);
 }
 
 bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell) {

@@ -42,26 +42,30 @@ struct ForcesBeyond {
   double own_nN = 0;
 };
 
-/// Add the motions to those that the data have. The forces are taken for random, independent of each other and of one
-/// intensity: the one that makes the data most likely, whatever the forces inside of the image are (restricted maximum
-/// likelihood; Patterson & Thompson, Biometrika 58 (1971) 545), but no less than that of the forces in view.
-/// An even traction of any size is allowed for beside them.
-/// What lies out there pulls the image's border outwards or inwards as a growth would: growth and shears are from here
-/// on expected to be of usual size (kUsualGrowth).
+struct DataWithBeyond {
+  LinearData data;
+  ForcesBeyond beyond;
+};
+/// The data with these motions beside those that they have. The forces are taken for random, independent of each other
+/// and of one intensity: the one that makes the data most likely, whatever the forces inside of the image are
+/// (restricted maximum likelihood; Patterson & Thompson, Biometrika 58 (1971) 545), but no less than that of the forces
+/// in view. An even traction of any size is allowed for beside them. What lies out there pulls the image's border
+/// outwards or inwards as a growth would: growth and shears are from here on expected to be of usual size
+/// (kUsualGrowth).
 /// @param data  whose motions are affine_motions(), of precision 0, or none
 /// @param compliance_um_per_nN  2·beads × 2·places
 /// @param area_um2  of the part of the cell that is in view
-ForcesBeyond allow_forces_beyond(LinearData& data, const std::vector<substrate::Ellipse>& places,
-                                 const Eigen::MatrixXd& compliance_um_per_nN, double area_um2);
-/// Let adhesions near the cut have forces of their own, beside the network's: a fibre of which less than 3 um is in
+DataWithBeyond with_forces_beyond(LinearData data, const std::vector<substrate::Ellipse>& places,
+                                  const Eigen::MatrixXd& compliance_um_per_nN, double area_um2);
+/// Adhesions near the cut may have forces of their own, beside the network's: a fibre of which less than 3 um is in
 /// view is not segmented (segment.fibre_shortest_um) and may pull on them; and at the cut the network is held where it
 /// is, while the cell's own gave way, which fades over 10 um. They pass through the cut. Expected is a part of the size
 /// that adhesion forces of this cell have, as forces independent of each other tell it.
 /// @param cell  whose adhesions are those of the data
-void allow_own_forces(LinearData& data, const Cell& cell, ForcesBeyond& found);
+DataWithBeyond with_own_forces(DataWithBeyond given, const Cell& cell);
 /// Both, for the places of this cell, on a layer of this gel (of gels with sides or a graded modulus it differs by
 /// less than the intensity is known to).
-ForcesBeyond allow_forces_beyond(LinearData& data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing = {});
+DataWithBeyond with_forces_beyond(LinearData data, const Cell& cell, const Gel& gel, const BeyondSpacing& spacing = {});
 
 /// @throws UsageError where it is switched on and the cell has no cut
 bool allows_forces_beyond(const stage::EffectSwitches& switches, const Cell& cell);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <boost/math/distributions/students_t.hpp>
 #include <cmath>
+#include <functional>
 #include <mutex>
 
 #include "mbtfm/tensions/robust.h"
@@ -43,8 +44,8 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
 }
 
 void add_errors(MeshFit& mesh, const EnsembleFit& all) {
-  const Eigen::MatrixXd J = displace(all.data, mesh.force_derivatives);
-  const Eigen::MatrixXd by_slope = numerics::transposed_product(J, *all.data.compliance);
+  const Eigen::MatrixXd J = displace(all.data.reduced, mesh.force_derivatives);
+  const Eigen::MatrixXd by_slope = numerics::transposed_product(J, *all.data.reduced.compliance);
   if (all.model_error)
     mesh.local.model_variance = by_slope * all.model_error->force_variance_nN2.asDiagonal() * by_slope.transpose();
   mesh.response = response_of(mesh.local, all.variance);
@@ -76,7 +77,7 @@ void add_bootstrap(EnsembleFit& all, const std::vector<cables::CableNetwork>& ne
   for (std::size_t m = 0; m < n_meshes; ++m) {
     std::vector<std::uint64_t> draws;
     for (std::size_t d = m; d < static_cast<std::size_t>(parameters.bootstrap); d += n_meshes) draws.push_back(d + 1);
-    const TensionProblem problem(networks[m], all.data, adhesion_ids);
+    const TensionProblem problem(networks[m], all.data.reduced, adhesion_ids);
     const Eigen::MatrixXd of_mesh = bootstrap_deviations_nN(
         problem, parameters, all.meshes[m].fit.trial, all.variance,
         all.model_error ? all.model_error->force_variance_nN2 : Eigen::VectorXd(), draws, threads);
@@ -299,8 +300,10 @@ void add_estimates(EnsembleFit& all, bool is_cut) {
   if (is_cut) all.cut = cut_force_of(all);
 }
 
+/// On the first network, with the data as its loss weighs them.
 struct FirstFit {
   TensionFit fit;
+  LinearData data;
   Loss loss = Loss::squares;
 };
 
@@ -316,15 +319,17 @@ Loss loss_called_for(std::optional<Loss> loss, const LinearData& data, const Ten
   return matter ? Loss::huber : Loss::squares;
 }
 
-FirstFit fit_first(const cables::CableNetwork& network, LinearData& data, const std::vector<int>& adhesion_ids,
+FirstFit fit_first(const cables::CableNetwork& network, LinearData data, const std::vector<int>& adhesion_ids,
                    const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
                    const Trial* start) {
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
   TensionFit fit = fit_tensions(problem, parameters, threads,
                                 start ? problem.evaluate(start->tensions_nN, start) : uniform_start(problem));
   const Loss loss = loss_called_for(parameters.loss, data, problem, fit.trial);
-  if (loss == Loss::squares) return {std::move(fit), loss};
-  return {fit_reweighted(data, network, adhesion_ids, parameters, loss, threads, std::move(fit)), loss};
+  if (loss == Loss::squares) return {std::move(fit), std::move(data), loss};
+  WeighedFit weighed =
+      fit_reweighted(std::move(data), network, adhesion_ids, parameters, loss, threads, std::move(fit));
+  return {std::move(weighed.fit), std::move(weighed.data), loss};
 }
 
 /// What each mesh makes of the mean tensions, by its derivatives about its own.
@@ -425,18 +430,54 @@ Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
       [&](const MeshFit&) { return ones; });
 }
 
-EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData& data,
+namespace {
+
+/// The others from the answer of the first, in threads.
+std::vector<MeshFit> fit_meshes(const std::vector<cables::CableNetwork>& networks, const ReducedData& data,
+                                const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
+                                const SolvedMisfit& solved_misfit, TensionFit first,
+                                const std::function<void()>& tell) {
+  const int n_meshes = static_cast<int>(networks.size());
+  std::vector<MeshFit> meshes(networks.size());
+  const Eigen::VectorXd answer = first.trial.tensions_nN;
+  const int inner = std::max(1, threads / std::max(1, n_meshes - 1));  // the first has only to be described
+  numerics::parallel_for(n_meshes, threads, [&](int m) {
+    const auto i = static_cast<std::size_t>(m);
+    const TensionProblem problem(networks[i], data, adhesion_ids, solved_misfit, inner);
+    meshes[i] = describe(
+        problem, m == 0 ? std::move(first) : fit_tensions(problem, parameters, inner, scaled_to_data(problem, answer)));
+    tell();
+  });
+  return meshes;
+}
+
+/// Of the beads, and of the model where two meshes or more tell it.
+void add_variances(EnsembleFit& all) {
+  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
+  all.chi_squared_per_degree = weighted_residual(all.data, all.forces_nN).squaredNorm() /
+                               static_cast<double>(std::max<Eigen::Index>(1, all.data.n_used - n_tensions));
+  all.variance = misfit_variance(all.data, all.forces_nN, n_tensions, all.loss);
+  if (all.meshes.size() < 2) return;
+  all.model_error = model_error(forces_at_mean(all), all.data.reduced,
+                                variance_beside_model_error(all.data, all.forces_nN, n_tensions, all.loss));
+  all.variance = all.model_error->noise_variance;
+}
+
+void check_networks(const std::vector<cables::CableNetwork>& networks) {
+  MBTFM_ASSERT(!networks.empty());
+  for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == networks.front().fibre_ids());
+}
+
+}  // namespace
+
+EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData data,
                          const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
                          const Progress& progress, const SolvedMisfit& solved_misfit, const Trial* start) {
+  check_networks(networks);
   const int n_meshes = static_cast<int>(networks.size());
-  MBTFM_ASSERT(n_meshes >= 1);
   EnsembleFit all;
   all.fibre_ids = networks.front().fibre_ids();
-  for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == all.fibre_ids);
   check_suffice(data.n_used, static_cast<Eigen::Index>(all.fibre_ids.size()));
-  // another fit may have left its weights: bad beads are known by a fit in which all count
-  if ((data.bead_weight.array() != 1).any()) reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
-  all.meshes.resize(networks.size());
   std::mutex mutex;
   int n_done = 0;
   const auto tell = [&] {
@@ -444,34 +485,21 @@ EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, Line
     if (progress)
       progress(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
   };
-  FirstFit first = fit_first(networks.front(), data, adhesion_ids, parameters, threads, solved_misfit, start);
-  all.loss = first.loss;
+  // bad beads are known by a fit in which all count
+  if ((data.bead_weight.array() != 1).any()) data = unweighted(std::move(data));
+  FirstFit first =
+      fit_first(networks.front(), std::move(data), adhesion_ids, parameters, threads, solved_misfit, start);
   tell();
-  all.data = data.reduced;
-  const auto n_tensions = static_cast<Eigen::Index>(all.fibre_ids.size());
-  const Eigen::VectorXd answer = first.fit.trial.tensions_nN;
-  const int inner = std::max(1, threads / std::max(1, n_meshes - 1));  // the first has only to be described
-  numerics::parallel_for(n_meshes, threads, [&](int m) {
-    const auto i = static_cast<std::size_t>(m);
-    const TensionProblem problem(networks[i], all.data, adhesion_ids, solved_misfit, inner);
-    all.meshes[i] =
-        describe(problem, m == 0 ? std::move(first.fit)
-                                 : fit_tensions(problem, parameters, inner, scaled_to_data(problem, answer)));
-    tell();
-  });
+  all.loss = first.loss;
+  all.data = std::move(first.data);
+  all.meshes = fit_meshes(networks, all.data.reduced, adhesion_ids, parameters, threads, solved_misfit,
+                          std::move(first.fit), tell);
   add_means(all);
-  all.own = own_forces_in(data);
-  all.chi_squared_per_degree = weighted_residual(data, all.forces_nN).squaredNorm() /
-                               static_cast<double>(std::max<Eigen::Index>(1, data.n_used - n_tensions));
-  all.variance = misfit_variance(data, all.forces_nN, n_tensions, all.loss);
-  if (n_meshes > 1) {
-    all.model_error = model_error(forces_at_mean(all), data.reduced,
-                                  variance_beside_model_error(data, all.forces_nN, n_tensions, all.loss));
-    all.variance = all.model_error->noise_variance;
-  }
+  all.own = own_forces_in(all.data);
+  add_variances(all);
   numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   all.network_bias =
-      network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data, adhesion_ids), threads);
+      network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);
   add_estimates(all, !networks.front().network().held_by_cut.empty());
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;

@@ -64,7 +64,7 @@ struct EnsembleFit {
   double chi_squared_per_degree = 0;      ///< of the mean over meshes: 1 where the model explains all but the noise
   double network_bias = 0;                ///< of its tension, relative: by forces that bend within its error
   double variance = 0;                    ///< of a component of `data`: see misfit_variance
-  ReducedData data;                       ///< as the loss weighs it
+  LinearData data;                        ///< as the loss weighs it
   Loss loss = Loss::squares;              ///< that the first fit called for
   std::optional<ModelError> model_error;  ///< that two meshes or more tell
   std::vector<MeshFit> meshes;
@@ -73,10 +73,10 @@ struct EnsembleFit {
 
 /// Fit on the first network, then, from its answer, on the others in threads; how they differ (two of them or more) and
 /// what they leave unexplained is the error of the model.
-/// @param data  its weights by bead are set anew: 1, or as a robust loss has them
+/// @param data  whatever its weights by bead are: another fit may have left them
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
 /// @param start  tensions to start from, and an equilibrium of the first network near by; null: all equal
-EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData& data,
+EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData data,
                          const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
                          const Progress& progress, const SolvedMisfit& solved_misfit = {},
                          const Trial* start = nullptr);

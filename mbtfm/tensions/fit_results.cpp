@@ -108,69 +108,81 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
   return forces;
 }
 
-FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
-                      const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters) {
-  const NoiseLevel noise =
-      noise_level(inputs.beads, data, fit.forces_nN, inputs.cell.outline_um, parameters.far_distance_um);
+namespace {
+
+/// Root of the sum of squares over the fibres.
+template <class Part>
+double over_fibres(const EnsembleFit& fit, const Part& part) {
+  double sum = 0;
+  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) sum += std::pow(part(fit.tensions_nN[i]), 2);
+  return std::sqrt(sum);
+}
+
+Figures figures_of(const CutForce& cut, const EnsembleFit& fit, const std::vector<Adhesion>& adhesions) {
+  const Interval interval = interval_95(cut.magnitude_nN);
+  double torque_nN_um = cut.reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
+  const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces_nN;
+  for (std::size_t a = 0; a < adhesions.size(); ++a) {
+    const auto at = 2 * static_cast<Eigen::Index>(a);
+    torque_nN_um -= cross(adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
+  }
+  return {{"cut_force_x_nN", cut.x_nN.value},       {"cut_force_x_sigma_nN", cut.x_nN.standard_error},
+          {"cut_force_y_nN", cut.y_nN.value},       {"cut_force_y_sigma_nN", cut.y_nN.standard_error},
+          {"cut_force_nN", cut.magnitude_nN.value}, {"cut_force_sigma_nN", cut.magnitude_nN.standard_error},
+          {"cut_force_low_nN", interval.low},       {"cut_force_high_nN", interval.high},
+          {"cut_torque_nN_um", torque_nN_um}};
+}
+
+/// sigma √n / |u less the motion|: the relative L2 that noise alone would leave.
+double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
+  const LinearData& data = fit.data;
   const Eigen::VectorXd model = data.response->displace(fit.forces_nN);
-  const double measured_um = (less_motion(data, data.displacement_um - model) + model).norm();  // less the motion
+  const double measured_um = (less_motion(data, data.displacement_um - model) + model).norm();
+  return measured_um > 0 ? noise_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
+}
+
+}  // namespace
+
+FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene,
+                      const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters) {
+  const Polygon& outline_um = scene.cell.outline_um;
+  const NoiseLevel noise = noise_level(scene.beads, fit.data, fit.forces_nN, outline_um, parameters.far_distance_um);
+  const Imbalance balance = imbalance_of(fit);
   FitSummary s;
-  s.relative_l2 = relative_l2(data, fit.forces_nN);
+  s.relative_l2 = relative_l2(fit.data, fit.forces_nN);
   s.noise_um = noise.sigma_um;
-  s.expected_relative_l2 =
-      measured_um > 0 ? noise.sigma_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
+  s.expected_relative_l2 = expected_relative_l2(fit, noise.sigma_um);
   s.total_force_nN = fit.total_force_nN.value;
   s.network_force_nN = fit.network_force_nN.value;
   s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
   s.network_surface_tension_nN_per_um =
-      surface_tension_nN_per_um(networks.front().network(), inputs.cell.outline_um, fit.tensions_nN[0].value);
+      surface_tension_nN_per_um(networks.front().network(), outline_um, fit.tensions_nN[0].value);
   s.n_meshes = static_cast<int>(fit.meshes.size());
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
-  const Imbalance balance = imbalance_of(fit);
-  double mesh_part = 0, noise_part = 0;
-  for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) {
-    mesh_part += std::pow(fit.tensions_nN[i].from_model(), 2);
-    noise_part += std::pow(fit.tensions_nN[i].noise, 2);
-  }
   s.more = {{"noise_source", noise.source},
             {"chi_squared_per_degree", fit.chi_squared_per_degree},
             {"total_force_sigma_nN", fit.total_force_nN.standard_error},
             {"network_force_sigma_nN", fit.network_force_nN.standard_error},
             {"net_force_over_total", balance.force},
             {"net_torque_over_total", balance.torque},
-            {"tension_error_from_noise_nN", std::sqrt(noise_part)},
-            {"tension_error_from_mesh_nN", std::sqrt(mesh_part)},
-            {"n_beads", std::int64_t(inputs.beads.size())},
-            {"n_flagged_beads", std::int64_t(inputs.n_flagged)},
+            {"tension_error_from_noise_nN", over_fibres(fit, [](const Estimate& t) { return t.noise; })},
+            {"tension_error_from_mesh_nN", over_fibres(fit, [](const Estimate& t) { return t.from_model(); })},
+            {"n_beads", std::int64_t(scene.beads.size())},
+            {"n_flagged_beads", std::int64_t(scene.n_flagged)},
             {"method", name_of(parameters.method)},
             {"loss", name_of(fit.loss)},
             {"reason", fit.report.reason}};
-  if (fit.cut) {
-    const Interval interval = interval_95(fit.cut->magnitude_nN);
-    double torque_nN_um = fit.cut->reaction.torque_nN_um;  // and of the adhesions' own forces, at their centres
-    const Eigen::VectorXd own_nN = adhesion_forces_nN(fit) - fit.forces_nN;
-    for (std::size_t a = 0; a < inputs.cell.adhesions.size(); ++a) {
-      const auto at = 2 * static_cast<Eigen::Index>(a);
-      torque_nN_um -= cross(inputs.cell.adhesions[a].position_um, {own_nN[at], own_nN[at + 1]});
-    }
-    s.more.insert(s.more.end(), {{"cut_force_x_nN", fit.cut->x_nN.value},
-                                 {"cut_force_x_sigma_nN", fit.cut->x_nN.standard_error},
-                                 {"cut_force_y_nN", fit.cut->y_nN.value},
-                                 {"cut_force_y_sigma_nN", fit.cut->y_nN.standard_error},
-                                 {"cut_force_nN", fit.cut->magnitude_nN.value},
-                                 {"cut_force_sigma_nN", fit.cut->magnitude_nN.standard_error},
-                                 {"cut_force_low_nN", interval.low},
-                                 {"cut_force_high_nN", interval.high},
-                                 {"cut_torque_nN_um", torque_nN_um}});
-  }
+  if (!fit.cut) return s;
+  const Figures of_cut = figures_of(*fit.cut, fit, scene.cell.adhesions);
+  s.more.insert(s.more.end(), of_cut.begin(), of_cut.end());
   return s;
 }
 
-DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data) {
+DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data) {
   Eigen::VectorXd model = data.response->displace(forces_nN);
   if (data.motions.cols() > 0) model += data.motions * motion_in(data, data.displacement_um - model);
-  DisplacementField field = inputs.beads;
+  DisplacementField field = beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);
     field[i].displacement_um = {model[row], model[row + 1]};

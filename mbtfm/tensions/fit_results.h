@@ -11,9 +11,8 @@
 
 namespace mbtfm::tensions {
 
-struct FitInputs {
+struct CellOnBeads {
   Cell cell;
-  Network network;
   DisplacementField beads;  ///< without the flagged ones
   int n_flagged = 0;
 };
@@ -30,10 +29,10 @@ std::vector<Vec2> points_of(const DisplacementField& beads);
 std::vector<Tension> tensions_of(const EnsembleFit& fit);
 /// By adhesion of the cell, with standard errors.
 std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell);
-FitSummary summary_of(const EnsembleFit& fit, const LinearData& data, const FitInputs& inputs,
+FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene,
                       const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters);
 /// The model's displacement at the beads.
-DisplacementField field_of(const Eigen::VectorXd& forces_nN, const FitInputs& inputs, const LinearData& data);
+DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data);
 
 /// @param more  further arrays, by bead
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,

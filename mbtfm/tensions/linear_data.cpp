@@ -92,14 +92,14 @@ Explained explained(const LinearData& data, const Eigen::VectorXd& weight, const
 }
 
 /// From C with Gᵀ W² P G = Cᵀ C, and y = C⁻ᵀ Gᵀ W² P u.
-void set_reduced(LinearData& data, const Eigen::VectorXd& weight, Root C) {
+ReducedData reduced_by(const LinearData& data, const Eigen::VectorXd& weight, Root C) {
   auto [target, floor_squared] = explained(data, weight, C.U, data.displacement_um);
-  data.reduced = {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(C.U)),
-                  .target = std::move(target),
-                  .floor_squared = floor_squared,
-                  .n_components = data.n_used,
-                  .n_felt = C.n_felt,
-                  .is_upper = true};
+  return {.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(C.U)),
+          .target = std::move(target),
+          .floor_squared = floor_squared,
+          .n_components = data.n_used,
+          .n_felt = C.n_felt,
+          .is_upper = true};
 }
 
 /// Motions that cost a component of the beads each, as nothing is known of their sizes.
@@ -134,19 +134,19 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
     data.n_used += 2;
   }
   data.response = std::move(response);
-  reweight(data, Eigen::VectorXd::Ones(n_rows / 2));
-  return data;
+  return reweighted(std::move(data), Eigen::VectorXd::Ones(n_rows / 2));
 }
 
-void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
+LinearData with_motions(LinearData data, Eigen::MatrixXd motions, Eigen::VectorXd precision) {
   MBTFM_ASSERT(precision.size() == 0 || precision.size() == motions.cols());
   data.n_used += n_unexpected(data.motions, data.motion_precision) - n_unexpected(motions, precision);
   data.motions = std::move(motions);
   data.motion_precision = std::move(precision);
-  reweight(data, Eigen::VectorXd(data.bead_weight));
+  const Eigen::VectorXd as_they_are = data.bead_weight;
+  return reweighted(std::move(data), as_they_are);
 }
 
-void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
+LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions) {
   const Eigen::VectorXd weight = squared_weights(data);
   const Eigen::MatrixXd beside = less_motion(data, motions);
   Root root = root_less(
@@ -166,7 +166,8 @@ void add_motions(LinearData& data, const Eigen::MatrixXd& motions) {
     data.forces_by_motion.rightCols(n).setZero();
   }
   data.motion_inverse = inverse_of_motions(data, weight);
-  set_reduced(data, weight, std::move(root));
+  data.reduced = reduced_by(data, weight, std::move(root));
+  return data;
 }
 
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements) {
@@ -194,7 +195,7 @@ Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& force
   return less_motion(data, data.displacement_um - data.response->displace(forces_nN));
 }
 
-void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
+LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight) {
   data.bead_weight = bead_weight;
   data.reduced.compliance.reset();  // not two of them in memory
   const Eigen::VectorXd weight = squared_weights(data);
@@ -203,7 +204,13 @@ void reweight(LinearData& data, const Eigen::VectorXd& bead_weight) {
   const double trace = A.diagonal().sum();
   numerics::add_upper_gram(explained_by(data, weight, data.motions, data.motion_inverse).transpose(), A, data.threads,
                            -1);
-  set_reduced(data, weight, root_of(std::move(A), trace, data.threads));
+  data.reduced = reduced_by(data, weight, root_of(std::move(A), trace, data.threads));
+  return data;
+}
+
+LinearData unweighted(LinearData data) {
+  const Eigen::Index n_beads = data.bead_weight.size();
+  return reweighted(std::move(data), Eigen::VectorXd::Ones(n_beads));
 }
 
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {

@@ -55,11 +55,18 @@ LinearData reduce(const DisplacementField& beads, substrate::SharedResponse resp
 LinearData reduce(const DisplacementField& beads, Eigen::MatrixXd compliance_um_per_nN,
                   const std::vector<bool>& is_used = {});
 
-/// Let the beads move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
+// New data of the same beads. Who moves the old ones in has no two matrices in memory.
+
+/// The beads may move by any sum of these (2·beads × some) besides, instead of those that were allowed. Reduces again.
 /// @param precision  by motion, see LinearData::motion_precision
-void allow_motions(LinearData& data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
-/// Let them move by any sum of these too, of precision 0: quicker.
-void add_motions(LinearData& data, const Eigen::MatrixXd& motions);
+LinearData with_motions(LinearData data, Eigen::MatrixXd motions, Eigen::VectorXd precision = {});
+/// They may move by any sum of these too, of precision 0: quicker.
+LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions);
+/// Reduced again with these weights by bead.
+LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight);
+/// Without what a robust loss has made of the weights.
+LinearData unweighted(LinearData data);
+
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
 /// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D
 Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displacements);
@@ -78,9 +85,6 @@ std::optional<OwnForces> own_forces_in(const LinearData& data);
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
 /// What forces and motions leave: P (u − G R), um.
 Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);
-
-/// Reduce again with these weights by bead.
-void reweight(LinearData& data, const Eigen::VectorXd& bead_weight);
 
 /// W² and the weights by bead, by component.
 Eigen::VectorXd squared_weights(const LinearData& data);

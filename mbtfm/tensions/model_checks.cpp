@@ -154,7 +154,7 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions, int threads) {
   const MeshFit& mesh = fit.meshes.front();
-  const ReducedData data = fit.model_error ? whitened(fit.data, *fit.model_error, threads) : fit.data;
+  const ReducedData data = fit.model_error ? whitened(fit.data.reduced, *fit.model_error, threads) : fit.data.reduced;
   const Eigen::MatrixXd& C = *data.compliance;
   const Eigen::VectorXd residual = data.target - C * fit.forces_nN;
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.

@@ -189,10 +189,11 @@ Eigen::VectorXd carried_um(const Gel& gel, const std::vector<Ellipse>& ellipses,
   return change;
 }
 
-void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
-                 int threads) {
-  add_motions(data, placement_motions(gel, ellipses_of(cell), forces_nN, data.position_um,
-                                      data.response->displace(forces_nN), centre_um, threads));
+LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN,
+                      Vec2 centre_um, int threads) {
+  const Eigen::MatrixXd motions = placement_motions(gel, ellipses_of(cell), forces_nN, data.position_um,
+                                                    data.response->displace(forces_nN), centre_um, threads);
+  return with_more_motions(std::move(data), motions);
 }
 
 PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
@@ -231,8 +232,7 @@ PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, con
       return off("the beads do not tell it: " + in_words(moved(result.placement, step.value).shift_um, step.sigma));
     }
     if (length_um < kLinear * width_um) {
-      result.data = std::move(there);
-      add_motions(result.data, motions);
+      result.data = with_more_motions(std::move(there), motions);
       result.effect = stage::decided(EffectKind::channel_shift, setting, true, "found with the tensions");
       result.effect.seconds = watch.seconds();
       return result;

@@ -50,10 +50,10 @@ Eigen::VectorXd carried_um(const Gel& gel, const std::vector<substrate::Ellipse>
                            const Eigen::VectorXd& forces_nN, const std::vector<Vec2>& beads_um,
                            const Eigen::VectorXd& by_um, int threads);
 
-/// Let the beads move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
+/// The beads may move by a shift and a turn of the cell besides: the error bars then hold what they do not know of
 /// them.
-void allow_place(LinearData& data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN, Vec2 centre_um,
-                 int threads);
+LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const Eigen::VectorXd& forces_nN,
+                      Vec2 centre_um, int threads);
 
 /// A cell where the beads want it.
 struct PlacedCell {

@@ -118,7 +118,7 @@ Eigen::VectorXd linear_weights(Loss loss, const Eigen::VectorXd& residual, const
   return weights;
 }
 
-TensionFit fit_with_loss(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+WeighedFit fit_with_loss(LinearData data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
                          const FitParameters& parameters, int threads, TensionFit fit, Loss loss,
                          std::optional<double> fixed_scale) {
   constexpr int kMaxRounds = 20;      // each halves the change at least
@@ -131,11 +131,13 @@ TensionFit fit_with_loss(LinearData& data, const cables::CableNetwork& network, 
     if (is_exact(data, scale)) break;
     const TensionProblem problem(network, data.reduced, adhesion_ids, {}, threads);
     const Eigen::MatrixXd derivatives = problem.force_derivatives(fit.trial);
-    reweight(data, linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads));
-    const TensionProblem reweighted(network, data.reduced, adhesion_ids, {}, threads);
+    const Eigen::VectorXd weights =
+        linear_weights(loss, residual, bead_jacobian(data, derivatives), -before, scale, threads);
+    data = reweighted(std::move(data), weights);
+    const TensionProblem weighed(network, data.reduced, adhesion_ids, {}, threads);
     const auto fit_again = [&](const Trial& start, Search search) {
       const int n_evaluations = fit.n_evaluations;
-      fit = fit_tensions(reweighted, parameters, threads, start, search);
+      fit = fit_tensions(weighed, parameters, threads, start, search);
       fit.n_evaluations += n_evaluations;
     };
     const auto is_settled = [&] {
@@ -146,12 +148,12 @@ TensionFit fit_with_loss(LinearData& data, const cables::CableNetwork& network, 
       const double moved = data.weight_per_um.cwiseProduct(changed).norm();
       return moved <= settled || change.cwiseAbs().maxCoeff() <= 1e-3 * before.maxCoeff();
     };
-    fit_again(scaled_to_data(reweighted, before, &last), Search::nearest);
+    fit_again(scaled_to_data(weighed, before, &last), Search::nearest);
     if (!is_settled()) continue;
     fit_again(fit.trial, Search::best);  // only now: weights that still change do not change which side is best
     if (is_settled()) break;
   }
-  return fit;
+  return {std::move(fit), std::move(data)};
 }
 
 /// Whether the nearest bead's residual does not go along with that of the bead of this row, by half of it at least.
@@ -221,13 +223,15 @@ double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_resi
   return lengths.empty() ? 0 : numerics::median_in(lengths) / std::sqrt(2 * std::log(2.0));
 }
 
-TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+WeighedFit fit_reweighted(LinearData data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
                           const FitParameters& parameters, Loss loss, int threads, TensionFit first) {
   const Loss begin = loss == Loss::tukey ? Loss::huber : loss;
-  TensionFit fit = fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(first), begin, {});
-  if (loss != Loss::tukey) return fit;
-  const double scale = robust_scale(data, weighted_residual(data, fit.trial.forces_nN));
-  return fit_with_loss(data, network, adhesion_ids, parameters, threads, std::move(fit), Loss::tukey, scale);
+  auto [fit, weighed] =
+      fit_with_loss(std::move(data), network, adhesion_ids, parameters, threads, std::move(first), begin, {});
+  if (loss != Loss::tukey) return {std::move(fit), std::move(weighed)};
+  const double scale = robust_scale(weighed, weighted_residual(weighed, fit.trial.forces_nN));
+  return fit_with_loss(std::move(weighed), network, adhesion_ids, parameters, threads, std::move(fit), Loss::tukey,
+                       scale);
 }
 
 double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions, Loss loss) {

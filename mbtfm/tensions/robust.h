@@ -32,12 +32,16 @@ double robust_weight(Loss loss, double residual);
 /// Standard deviation of a component that the middle of the residuals tells: median of |r_b| / 1.1774 (Rayleigh).
 double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_residual);
 
+/// The last fit, and the data with the weights that it was made with.
+struct WeighedFit {
+  TensionFit fit;
+  LinearData data;
+};
 /// Weigh the beads by the residuals of a fit, fit on this network again, until the tensions stay. Tukey's loss, which
-/// has several minima, starts from Huber's. Leaves the weights in `data`.
+/// has several minima, starts from Huber's.
 /// @param loss  all but squares
 /// @param first  the fit by least squares
-/// @return the last fit
-TensionFit fit_reweighted(LinearData& data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+WeighedFit fit_reweighted(LinearData data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
                           const FitParameters& parameters, Loss loss, int threads, TensionFit first);
 
 /// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where

@@ -61,7 +61,7 @@ FrameData good_beads_of(const SeriesFrame& frame, const substrate::SharedRespons
   return data;
 }
 
-FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit, const LinearData& data) {
+FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit) {
   FrameFit result{.frame = frame.frame,
                   .refused = {},
                   .displacement_sha256 = frame.sha256,
@@ -69,7 +69,7 @@ FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit, const Linea
                   .sigmas_nN = {},
                   .total_force_nN = fit.total_force_nN,
                   .network_force_nN = fit.network_force_nN,
-                  .relative_l2 = relative_l2(data, fit.forces_nN),
+                  .relative_l2 = relative_l2(fit.data, fit.forces_nN),
                   .chi_squared_per_degree = fit.chi_squared_per_degree,
                   .converged = fit.report.converged};
   for (const Estimate& e : fit.tensions_nN) result.sigmas_nN.push_back(e.standard_error);
@@ -224,8 +224,8 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
                              moves ? affine_motions(good.beads) : Eigen::MatrixXd());
     const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, threads);
     const Trial begin = problem.evaluate(start.tensions_nN, &start);
-    if (allow) allow(data, begin.forces_nN);
-    return described(frame, fit_ensemble(networks, data, adhesion_ids, parameters, threads, {}, {}, &begin), data);
+    if (allow) data = allow(std::move(data), begin.forces_nN);
+    return described(frame, fit_ensemble(networks, std::move(data), adhesion_ids, parameters, threads, {}, {}, &begin));
   };
   for (const SeriesFrame& frame : frames) {
     if (progress) {

@@ -53,9 +53,9 @@ struct FrameFit {
 /// The fits that write_tracks and write_frames put into a folder; none where not both files are there.
 std::vector<FrameFit> read_fits(const Path& folder);
 
-/// Lets a frame's beads do more beside forces and common motion. @param forces_nN  of the network, with which the
-/// frame's fit starts
-using AllowMore = std::function<void(LinearData&, const Eigen::VectorXd& forces_nN)>;
+/// The data of a frame whose beads may do more beside forces and common motion. @param forces_nN  of the network, with
+/// which the frame's fit starts
+using AllowMore = std::function<LinearData(LinearData, const Eigen::VectorXd& forces_nN)>;
 
 /// @param response  of all beads
 /// @param is_used  by bead, as by reduce(); flagged beads are left out anyway

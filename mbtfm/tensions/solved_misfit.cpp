@@ -7,8 +7,9 @@
 namespace mbtfm::tensions {
 
 SolvedMisfit solved_misfit(const substrate::Substrate& substrate, std::vector<Vec2> points_um,
-                           std::vector<substrate::Ellipse> ellipses, const LinearData& data) {
-  return [&substrate, &data, points_um = std::move(points_um), ellipses = std::move(ellipses),
+                           std::vector<substrate::Ellipse> ellipses, LinearData data) {
+  data.reduced = {};  // not asked for, and large
+  return [&substrate, data = std::move(data), points_um = std::move(points_um), ellipses = std::move(ellipses),
           one_at_a_time = std::make_shared<std::mutex>()](const Eigen::VectorXd& forces) {
     std::vector<Vec2> forces_nN;
     for (Eigen::Index i = 0; i < forces.size(); i += 2) forces_nN.push_back({forces[i], forces[i + 1]});

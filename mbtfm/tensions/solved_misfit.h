@@ -10,8 +10,8 @@
 namespace mbtfm::tensions {
 
 /// One solution at a time, as the substrate has threads of its own.
-/// @param substrate, data  must outlive the function
+/// @param substrate  must outlive the function
 SolvedMisfit solved_misfit(const substrate::Substrate& substrate, std::vector<Vec2> points_um,
-                           std::vector<substrate::Ellipse> ellipses, const LinearData& data);
+                           std::vector<substrate::Ellipse> ellipses, LinearData data);
 
 }  // namespace mbtfm::tensions

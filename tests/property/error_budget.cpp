@@ -40,7 +40,7 @@ struct Fitted {
                      const Gel& gel = kGel) const {
     const Cell cell = cell_of(scene);
     return error_budget({.fit = fit,
-                         .data = scene.data,
+                         .data = fit.data,
                          .networks = networks,
                          .cell = cell,
                          .beads = scene.beads,
@@ -91,7 +91,7 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
     networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2, {});
   const ErrorBudget budget = error_budget({.fit = fit,
-                                           .data = scene.data,
+                                           .data = fit.data,
                                            .networks = networks,
                                            .cell = cell,
                                            .beads = scene.beads,
@@ -206,7 +206,7 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
     // further off the misfit bends, and nearer the whole fit's own last step counts
     if (left.norm() > 0.1 * end.norm() || left.norm() < 1e-4 * end.norm()) continue;
     const ErrorBudget budget = error_budget({.fit = early.fit,
-                                             .data = early.scene.data,
+                                             .data = early.fit.data,
                                              .networks = early.networks,
                                              .cell = cell,
                                              .beads = early.scene.beads,

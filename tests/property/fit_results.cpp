@@ -15,8 +15,7 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
   const EnsembleFit fit = test::fit_own_network(scene);
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network());
-  const FitSummary summary = summary_of(
-      fit, scene.data, {.cell = cell, .network = scene.cables.network(), .beads = scene.beads}, networks, {});
+  const FitSummary summary = summary_of(fit, {.cell = cell, .beads = scene.beads}, networks, {});
   EXPECT_NEAR(summary.noise_um, scene.beads.front().sigma_um, 0.1 * scene.beads.front().sigma_um);
   // of 8000 components; the noise level by the median of those far away is good to some per cent
   EXPECT_NEAR(summary.expected_relative_l2 / summary.relative_l2, 1, 0.1);
@@ -85,8 +84,8 @@ TEST(FitSummary, surface_tension_of_a_regular_network_is_root_three_times_tensio
   fit.tensions_nN = {{.value = kTension_nN}};
   fit.forces_nN = Eigen::VectorXd::Zero(4);
   fit.torques_nN_um = Eigen::VectorXd::Zero(2);
-  const LinearData data = reduce({}, Eigen::MatrixXd(0, 4));
-  const FitSummary summary = summary_of(fit, data, {.cell = cell, .network = {}, .beads = {}}, networks, {});
+  fit.data = reduce({}, Eigen::MatrixXd(0, 4));
+  const FitSummary summary = summary_of(fit, {.cell = cell, .beads = {}}, networks, {});
   const double expected = std::sqrt(3.0) * kTension_nN / kEdge_um;
   // beside 9 side² links there are half as many more as the border has, 6 side, since these count whole
   EXPECT_NEAR(summary.network_surface_tension_nN_per_um, (1 + 3.0 / (9 * kSide)) * expected, 1e-9 * expected);

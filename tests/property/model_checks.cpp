@@ -17,7 +17,7 @@ test::TensionScene one_fibre(double tension_nN, int n_beads) {
 
 std::vector<ModelScore> scores(test::TensionScene& scene) {
   const EnsembleFit fit = test::fit_own_network(scene, {.loss = Loss::squares});
-  return compare_models(fit, scene.data, scene.cables, scene.adhesion_ids);
+  return compare_models(fit, fit.data, scene.cables, scene.adhesion_ids);
 }
 
 TEST(ModelScores, a_parameter_costs_AIC_two_and_BIC_the_logarithm_of_the_number_of_data) {

@@ -280,7 +280,7 @@ TEST(ModelError, what_the_beads_tell_of_a_tension_adds_up_to_their_part_of_its_e
   parameters.loss = Loss::squares;  // with one that weighs beads down their noise counts for less than it is
   const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
   ASSERT_TRUE(fit.model_error.has_value());
-  const Influence influence = influence_of(fit, scene.data);
+  const Influence influence = influence_of(fit, fit.data);
   const MeshFit& mesh = fit.meshes.front();
   for (Eigen::Index i = 0; i < influence.variance.size(); ++i) {
     const double part = mesh.noise_covariance_nN2(i, i) / mesh.covariance_nN2(i, i);

@@ -35,9 +35,9 @@ struct ShiftedCell {
     PlacedCell place = place_cell(
         cell, networks.front(), scene.beads, data, [&](const DisplacementField& at) { return data_of(at); }, kGel, {},
         start, setting, 1);
-    EnsembleFit found = fit_ensemble(networks, place.data, scene.adhesion_ids, {}, 1, {});
+    EnsembleFit found = fit_ensemble(networks, std::move(place.data), scene.adhesion_ids, {}, 1, {});
     if (!place.effect.is_on) return {std::move(found), {place.placement, Eigen::Vector3d::Zero()}};
-    const MotionsBeside motions = motions_beside(place.data, found);
+    const MotionsBeside motions = motions_beside(found.data, found);
     return {std::move(found), placement_among(motions, place.placement)};
   }
 };
@@ -170,15 +170,15 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   const ShiftedCell still = shifted_cell({}, 0, 0.05, 3);
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
-  LinearData known = still.data_of(still.scene.beads);
+  const LinearData known = still.data_of(still.scene.beads);
   const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1, {});
-  LinearData unknown = known;
   const Eigen::VectorXd& forces = with_known.forces_nN;
-  add_motions(unknown, placement_motions(kGel, still.scene.ellipses, forces, still.scene.points_um,
-                                         known.response->displace(forces), {30, 30}, 1));
+  const LinearData unknown =
+      with_more_motions(known, placement_motions(kGel, still.scene.ellipses, forces, still.scene.points_um,
+                                                 known.response->displace(forces), {30, 30}, 1));
   const EnsembleFit fit = fit_ensemble(networks, unknown, still.scene.adhesion_ids, {}, 1, {});
   const ErrorBudget budget = error_budget({.fit = fit,
-                                           .data = unknown,
+                                           .data = fit.data,
                                            .networks = networks,
                                            .cell = still.cell,
                                            .beads = still.scene.beads,
@@ -212,8 +212,8 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
         .front();
   };
   const FrameFit held = frame_fit({});
-  const FrameFit allowed = frame_fit([&](LinearData& frame, const Eigen::VectorXd& forces_nN) {
-    allow_place(frame, shifted.cell, kGel, forces_nN, known.second.placement.centre_um, 1);
+  const FrameFit allowed = frame_fit([&](LinearData frame, const Eigen::VectorXd& forces_nN) {
+    return with_place(std::move(frame), shifted.cell, kGel, forces_nN, known.second.placement.centre_um, 1);
   });
   for (std::size_t i = 0; i < single.tensions_nN.size(); ++i) {
     // the forces whose motions are allowed are those of a rough fit here, of the fit's end there
@@ -226,10 +226,10 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
 TEST(Placement, added_motions_reduce_as_if_they_had_been_there_from_the_first) {
   const TensionScene scene = test::tension_scene("case_21", 80, 0.05, 7);
   const Eigen::MatrixXd affine = affine_motions(scene.beads);
-  LinearData once = reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine);
-  LinearData twice =
-      reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine.leftCols(2));
-  add_motions(twice, affine.rightCols(4));
+  const LinearData once = reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine);
+  const LinearData twice = with_more_motions(
+      reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine.leftCols(2)),
+      affine.rightCols(4));
   EXPECT_EQ(once.n_used, twice.n_used);
   EXPECT_NEAR(once.reduced.floor_squared, twice.reduced.floor_squared, 1e-9 * once.reduced.floor_squared);
   const Eigen::VectorXd forces = scene.forces_nN;

@@ -104,7 +104,7 @@ std::vector<cables::CableNetwork> span(const Cell& cell, int n_meshes, mesh::Net
   return networks;
 }
 
-tensions::EnsembleFit fit(const std::vector<cables::CableNetwork>& networks, tensions::LinearData& data,
+tensions::EnsembleFit fit(const std::vector<cables::CableNetwork>& networks, const tensions::LinearData& data,
                           const OtherNetwork& o, int threads = 2) {
   tensions::FitParameters parameters;
   parameters.n_meshes = static_cast<int>(networks.size());
@@ -193,8 +193,8 @@ void truths(Cells cells) {
       for (tensions::LinearData* data : {&o.noisy, &o.exact}) {
         const tensions::EnsembleFit found = fit(networks, *data, o);
         const Score s = score(found, o);
-        tensions::LinearData weighed = *data;
-        weighed.reduced = tensions::whitened(found.data, *found.model_error);
+        tensions::LinearData weighed = found.data;
+        weighed.reduced = tensions::whitened(found.data.reduced, *found.model_error);
         std::printf("%d,%s,%g,%.4f,%.3f,%.3f,%.4f\n", int(c), name, data == &o.noisy ? 1e3 * kNoise_um : 0,
                     s.relative_error, s.over_stated, s.coverage, relative_error(fit(networks, weighed, o), o));
       }

@@ -185,15 +185,13 @@ void add_tensions(NoiseRow& row, const Eigen::VectorXd& true_nN, const Eigen::Ve
   }
 }
 
-/// Noise of the same size anew: of the data reduced (see reweight) only the target changes.
+/// Noise of the same size anew: of the data reduced (see reweighted) only the target changes.
 void measure_again(TensionScene& scene, double noise, unsigned seed) {
   tensions::LinearData& data = scene.data;
   std::mt19937_64 random(seed);
   std::normal_distribution<double> normal(0, noise * scene.largest_um);
   for (Eigen::Index row = 0; row < data.displacement_um.size(); ++row)
     data.displacement_um[row] = scene.displacement_um[row] + normal(random);
-  if ((data.bead_weight.array() != 1).any())
-    return tensions::reweight(data, Eigen::VectorXd::Ones(data.bead_weight.size()));
   const Eigen::VectorXd weighted_u = data.weight_per_um.cwiseProduct(data.displacement_um);
   Eigen::MatrixXd target = data.response->pull_back(data.weight_per_um.cwiseProduct(weighted_u));
   numerics::solve_upper_transposed(*data.reduced.compliance, target);
@@ -211,7 +209,7 @@ void add_repeats(NoiseRow& row, TensionScene& scene, double noise, int n_repeats
   for (int r = 0; r < n_repeats; ++r) {
     measure_again(scene, noise, first_seed + static_cast<unsigned>(r));
     const tensions::EnsembleFit fit = test::fit_own_network(scene);
-    row.l2 += tensions::relative_l2(scene.data, fit.forces_nN);
+    row.l2 += tensions::relative_l2(fit.data, fit.forces_nN);
     row.n_robust += fit.loss == tensions::Loss::squares ? 0 : 1;
     ++row.n_repeats;
     add_forces(row, scene, fit, true_network_nN, linearised);
@@ -461,10 +459,10 @@ void segmentation(const Arguments& a) {
       }
       for (const Bead& b : scene.beads)
         measured += dot(b.displacement_um, b.displacement_um), expected += 2 * b.sigma_um * b.sigma_um;
-      std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, tensions::relative_l2(scene.data, fit.forces_nN),
+      std::printf("%d,%s,%.4f,%.4f,%.3f,%.3f\n", c, name, tensions::relative_l2(fit.data, fit.forces_nN),
                   std::sqrt(expected / measured), std::sqrt(change / m), largest);
       for (auto [series, value] :
-           {std::pair{&misfits, tensions::relative_l2(scene.data, fit.forces_nN) / std::sqrt(expected / measured)},
+           {std::pair{&misfits, tensions::relative_l2(fit.data, fit.forces_nN) / std::sqrt(expected / measured)},
             std::pair{&changes, std::sqrt(change / m)}}) {
         (*series)[name].name = name;
         (*series)[name].is_line = false;
@@ -545,7 +543,7 @@ void types(const Arguments& a) {
   const tensions::TensionProblem problem(scene.cables, scene.data.reduced, scene.adhesion_ids);
   const double begin = now_s();
   const tensions::CrossValidation result =
-      tensions::cross_validate(problem, scene.data, fit.meshes[0].fit.trial, of_fibres, by_type, a.n_repeats, 1, 2);
+      tensions::cross_validate(problem, fit.data, fit.meshes[0].fit.trial, of_fibres, by_type, a.n_repeats, 1, 2);
   std::vector<double> all = result.own;
   all.insert(all.end(), result.exchanged.begin(), result.exchanged.end());
   const auto [low, high] = std::minmax_element(all.begin(), all.end());
@@ -558,7 +556,7 @@ void types(const Arguments& a) {
   std::printf(
       "draws,median_l2_own,median_l2_exchanged,share_exchanged_worse,fitted_l2,seconds\n%d,%.4f,%.4f,%.3f,%.4f,%.1f\n",
       a.n_repeats, median(result.own), median(result.exchanged), double(n_worse) / a.n_repeats,
-      tensions::relative_l2(scene.data, fit.forces_nN), now_s() - begin);
+      tensions::relative_l2(fit.data, fit.forces_nN), now_s() - begin);
   save(a, "types",
        {{.title = "tensions drawn by type",
          .x_label = "relative L2",

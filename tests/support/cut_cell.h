@@ -139,8 +139,11 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
       greens::make_greens(gel, {.model = substrate::ModelKind::layer}, 2)->response({ellipses}, {points})->kept(), {},
       2, tensions::affine_motions(beads));
   CutFit result;
-  if (allow == Beyond::allowed && !cuts_of(cell).empty())
-    result.beyond = tensions::allow_forces_beyond(data, cell, gel, spacing);
+  if (allow == Beyond::allowed && !cuts_of(cell).empty()) {
+    tensions::DataWithBeyond allowed = tensions::with_forces_beyond(std::move(data), cell, gel, spacing);
+    data = std::move(allowed.data);
+    result.beyond = allowed.beyond;
+  }
   std::vector<cables::CableNetwork> networks;
   mesh::NetworkParameters p;
   for (int m = 0; m < n_meshes; ++m) {
@@ -149,8 +152,9 @@ inline CutFit fit_cut(const Cell& cell, const DisplacementField& beads, const Ge
   }
   tensions::FitParameters parameters;
   parameters.n_meshes = n_meshes;
-  result.fit = tensions::fit_ensemble(networks, data, ids, parameters, 2, {});
-  result.motion = tensions::common_motion_among(tensions::motions_beside(data, result.fit), data.position_um);
+  result.fit = tensions::fit_ensemble(networks, std::move(data), ids, parameters, 2, {});
+  result.motion =
+      tensions::common_motion_among(tensions::motions_beside(result.fit.data, result.fit), result.fit.data.position_um);
   return result;
 }
 

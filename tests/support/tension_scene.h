@@ -170,7 +170,7 @@ inline TensionScene scene_of(const Cell& cell, const Eigen::VectorXd& tensions_n
 }
 
 /// The fit on the scene's own network.
-inline tensions::EnsembleFit fit_own_network(TensionScene& scene, tensions::FitParameters parameters = {}) {
+inline tensions::EnsembleFit fit_own_network(const TensionScene& scene, tensions::FitParameters parameters = {}) {
   parameters.n_meshes = 1;
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network());

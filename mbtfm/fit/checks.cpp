@@ -1,0 +1,86 @@
+#include "mbtfm/fit/checks.h"
+
+#include <algorithm>
+
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::fit {
+
+using namespace tensions;
+
+namespace {
+
+/// Draws take the tensions of this cell's own fibres of a type. None where it lacks dorsal or ventral ones.
+std::optional<CrossValidation> cross_validation_of(const ReadyCell& ready, const EnsembleFit& fit, int n_draws,
+                                                   int threads) {
+  const Cell& cell = ready.scene.cell;
+  TypeTensions tensions;
+  std::vector<FibreType> types;
+  for (std::size_t i = 1; i < fit.fibre_ids.size(); ++i) {
+    const auto fibre = std::find_if(cell.fibres.begin(), cell.fibres.end(),
+                                    [&](const Fibre& f) { return f.fibre_id == fit.fibre_ids[i]; });
+    types.push_back(fibre->type == FibreType::edge ? FibreType::ventral : fibre->type);  // held alike, at both ends
+    tensions[types.back()].push_back(fit.tensions_nN[i].value);
+  }
+  if (n_draws == 0 || !tensions.contains(FibreType::dorsal) || !tensions.contains(FibreType::ventral)) return {};
+  const TensionProblem problem(ready.networks.front(), fit.data.reduced, adhesion_ids_of(cell));
+  return cross_validate(problem, fit.data, fit.meshes.front().fit.trial, types, tensions, n_draws, 1, threads);
+}
+
+}  // namespace
+
+FoundMotions motions_found(const ReadyCell& cell, const EnsembleFit& fit, const stage::EffectSwitches& switches) {
+  const MotionsBeside motions = motions_beside(fit.data, fit);
+  FoundMotions found;
+  if (cell.decisions.placement.is_on) found.placement = placement_among(motions, cell.placement);
+  if (!allows_common_motion(switches)) return found;
+  found.common = common_motion_among(motions, fit.data.position_um);
+  found.curved = curved_motion_beside(fit.data, cell.scene.beads, fit);
+  return found;
+}
+
+Figures figures_of(const FoundMotions& found) {
+  Figures figures = found.common ? tensions::figures_of(*found.common) : Figures{};
+  if (!found.placement) return figures;
+  for (const auto& figure : tensions::figures_of(*found.placement)) figures.push_back(figure);
+  return figures;
+}
+
+ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Parameters& p, int threads) {
+  const LinearData& data = fit.data;
+  const Cell& of = cell.scene.cell;
+  ModelChecks checks{.models = compare_models(fit, data, cell.networks.front(), adhesion_ids_of(of)),
+                     .influence = influence_of(fit, data),
+                     .left_out = {},
+                     .missing_fibres = missing_fibres(fit, of.adhesions, threads),
+                     .missing_adhesions = missing_adhesions(fit, data, of, p.gel, threads),
+                     .drawn = cross_validation_of(cell, fit, p.fit.cross_validation, threads)};
+  checks.left_out = leave_each_fibre_out(fit, checks.influence);
+  return checks;
+}
+
+Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
+  const auto best = std::ranges::min_element(checks.models, {}, &ModelScore::bic);
+  std::string unsupported;
+  for (const FibreLeftOut& f : checks.left_out) {
+    if (f.aic_rise <= 0) unsupported += (unsupported.empty() ? "" : ", ") + std::to_string(f.fibre_id);
+  }
+  return {{"best_model_by_bic", best->name},
+          {"fibres_not_told_apart", names_of_groups(fit)},
+          {"fibres_without_support", unsupported},
+          {"n_missing_fibres_hinted", std::int64_t(checks.missing_fibres.size())}};
+}
+
+std::string names_of_groups(const EnsembleFit& fit) {
+  std::string text;
+  for (const FibreGroup& group : fibres_not_told_apart(fit)) {
+    if (!text.empty()) text += "; ";
+    for (std::size_t k = 0; k < group.indices.size(); ++k) {
+      text += (k > 0 ? " + " : "") + std::to_string(fit.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
+    }
+    text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error) + " nN";
+  }
+  return text;
+}
+
+}  // namespace mbtfm::fit

@@ -1,0 +1,42 @@
+/// What is asked of a fit beside its tensions: what the beads do besides, and whether the model is the right one.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mbtfm/fit/ready_cell.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/cross_validation.h"
+#include "mbtfm/tensions/missing_adhesions.h"
+#include "mbtfm/tensions/model_checks.h"
+
+namespace mbtfm::fit {
+
+/// Motions that were found with the tensions; none of those that were not allowed for.
+struct FoundMotions {
+  std::optional<tensions::FoundMotion> common;
+  std::optional<tensions::FoundPlacement> placement;
+  std::optional<tensions::CurvedMotion> curved;  ///< asked of what is left
+};
+FoundMotions motions_found(const ReadyCell& cell, const tensions::EnsembleFit& fit,
+                           const stage::EffectSwitches& switches);
+/// Of fit.json.
+Figures figures_of(const FoundMotions& found);
+
+struct ModelChecks {
+  std::vector<tensions::ModelScore> models;
+  tensions::Influence influence;
+  std::vector<tensions::FibreLeftOut> left_out;
+  std::vector<tensions::MissingFibre> missing_fibres;
+  std::vector<tensions::MissingAdhesion> missing_adhesions;
+  std::optional<tensions::CrossValidation> drawn;
+};
+ModelChecks check_model(const ReadyCell& cell, const tensions::EnsembleFit& fit, const Parameters& parameters,
+                        int threads);
+/// Of fit.json.
+Figures figures_of(const ModelChecks& checks, const tensions::EnsembleFit& fit);
+
+/// "3 + 7: 5.2 ± 0.1 nN; …"
+std::string names_of_groups(const tensions::EnsembleFit& fit);
+
+}  // namespace mbtfm::fit

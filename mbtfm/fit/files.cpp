@@ -1,0 +1,123 @@
+#include "mbtfm/fit/files.h"
+
+#include "mbtfm/tensions/second_placement.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/named_array.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
+#include "substrate/gel_vtu.h"
+
+namespace mbtfm::fit {
+
+using namespace tensions;
+
+namespace {
+
+std::vector<SeriesFrame> read_frames(stage::StageContext& context) {
+  if (!context.has_input("frames")) return {};
+  std::vector<SeriesFrame> frames = read_series(context.input("frames", {"frames.csv"}));
+  std::vector<std::string> names;
+  for (const SeriesFrame& frame : frames) {
+    if (frame.refused.empty()) names.push_back(files::displacement_of_frame(frame.frame));
+  }
+  context.input("frames", names);
+  return frames;
+}
+
+/// That there is a frame before counts where its tensions are not asked for, too.
+std::optional<std::vector<Tension>> read_before(stage::StageContext& context, Switch time_coupling) {
+  if (!context.has_input("start")) return {};
+  if (time_coupling == Switch::off) return std::vector<Tension>{};
+  return files::read_tensions(context.input("start"));
+}
+
+std::optional<Cell> read_second_placement(stage::StageContext& context, const Cell& cell) {
+  std::optional<Cell> second = second_placement(context.inputs_.at("cell"), cell);
+  if (second) context.input("cell", kSecondPlacementFiles);
+  return second;
+}
+
+files::PointArray most_informed_array(const Influence& influence) {
+  return {.name = "informs_fibre_id",
+          .scalars = {influence.most_informed.begin(), influence.most_informed.end()},
+          .vectors = {}};
+}
+
+/// What the loss and the region leave of each bead.
+files::PointArray weight_array(const LinearData& data) {
+  files::PointArray array{.name = "weight", .scalars = {}, .vectors = {}};
+  for (Eigen::Index b = 0; b < data.bead_weight.size(); ++b) {
+    array.scalars.push_back(data.weight_per_um[2 * b] > 0 ? data.bead_weight[b] : 0);
+  }
+  return array;
+}
+
+void write_checks(stage::StageContext& context, const ModelChecks& checks, const EnsembleFit& fit) {
+  write_correlations(context.output("out", "correlations.csv"), fit);
+  write_models(context.output("out", "models.csv"), checks.models);
+  write_fibres_left_out(context.output("out", "fibres_left_out.csv"), checks.left_out);
+  write_missing_fibres(context.output("out", "missing_fibres.csv"), checks.missing_fibres);
+  write_missing_adhesions(context.output("out", "missing_adhesions.csv"), checks.missing_adhesions);
+  if (checks.drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *checks.drawn);
+}
+
+void write_found(stage::StageContext& context, const FittedCell& fitted) {
+  const Found& found = fitted.found;
+  const Cell& cell = fitted.ready.scene.cell;
+  files::write_tensions(context.output("out", "tensions.csv"), found.tensions, cell.fibres);
+  files::write_adhesion_forces(context.output("out", "adhesion_forces.csv"), found.forces, cell.adhesions);
+  files::write_fit_summary(context.output("out", "fit.json"), found.summary, cell.fibres);
+  write_contracted(context.output("out", "contracted.vtu"), fitted.ready.networks.front(), fitted.fit);
+  write_tractions_vtp(context.output("out", "tractions.vtp"), cell, found.forces);
+}
+
+void write_fields(stage::StageContext& context, const FittedCell& cell, const DisplacementField& tracked) {
+  files::write_displacement(context.output("out", "fitted_displacement.csv"), cell.fields.fitted);
+  files::write_displacement(context.output("out", "displacement_without_fibres.csv"), cell.fields.without_fibres);
+  write_displacement_vtp(context.output("out", "displacement.vtp"), tracked, cell.fields.fitted,
+                         {most_informed_array(cell.checks.influence), weight_array(cell.fit.data)});
+}
+
+void write_frames(stage::StageContext& context, const FittedCell& cell) {
+  if (cell.frames.empty()) return;
+  const std::vector<Fibre>& fibres = cell.ready.scene.cell.fibres;
+  const std::optional<double> interval_s = cell.parameters.fit.frame_interval_s;
+  write_tracks(context.output("out", "tracks.csv"), cell.frames, fibres, interval_s);
+  tensions::write_frames(context.output("out", "frames.csv"), cell.frames, interval_s);
+  files::write_text(context.output("out", "tracks.svg"), series_picture(cell.frames, fibres, interval_s));
+}
+
+void write_surface(stage::StageContext& context, const FittedCell& cell) {
+  std::vector<Vec2> forces_nN;
+  for (const AdhesionForce& f : cell.found.forces) forces_nN.push_back(f.force_nN);
+  substrate::write_substrate_vtu(context.output("out", "substrate.vtu"), *cell.ready.gel,
+                                 ellipses_of(cell.ready.scene.cell), forces_nN, cell.parameters.fit.surface_lines);
+}
+
+}  // namespace
+
+Inputs read_inputs(stage::StageContext& context, const Parameters& parameters) {
+  Inputs inputs{.cell = files::read_cell(context.input("cell", files::kCellFiles)),
+                .network = files::read_network(context.input("network")),
+                .network_file = context.inputs_.at("network").string(),
+                .beads = files::read_displacement(context.input("displacement"))};
+  inputs.n_flagged = static_cast<int>(std::erase_if(inputs.beads, [](const Bead& bead) { return !bead.flag.empty(); }));
+  inputs.frames = read_frames(context);
+  inputs.before = read_before(context, parameters.effects.time_coupling);
+  inputs.second_placement = read_second_placement(context, inputs.cell);
+  if (!inputs.frames.empty() && context.has_input("kept")) inputs.known_frames = read_fits(context.inputs_.at("kept"));
+  return inputs;
+}
+
+void write_results(stage::StageContext& context, const FittedCell& cell, const DisplacementField& tracked) {
+  write_checks(context, cell.checks, cell.fit);
+  write_found(context, cell);
+  write_fields(context, cell, tracked);
+  write_frames(context, cell);
+  context.progress(0.95, "surface of the gel");
+  write_surface(context, cell);
+  if (cell.parameters.explain) write_changes(context.output("out", "effects_left_out.csv"), cell.changes, cell.fit);
+}
+
+}  // namespace mbtfm::fit

@@ -1,0 +1,131 @@
+#include "mbtfm/fit/fit_cell.h"
+
+#include "mbtfm/fit/effects.h"
+#include "mbtfm/tensions/error_budget.h"
+#include "mbtfm/tensions/second_placement.h"
+#include "mbtfm/tensions/solved_misfit.h"
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::fit {
+
+using namespace tensions;
+
+namespace {
+
+EnsembleFit fit_networks(const ReadyCell& cell, LinearData data, const FitParameters& p, const Work& work) {
+  const SolvedMisfit misfit =
+      p.substrate == TrialDisplacement::per_evaluation
+          ? solved_misfit(*cell.gel, points_of(cell.scene.beads), ellipses_of(cell.scene.cell), data)
+          : SolvedMisfit{};
+  return fit_ensemble(cell.networks, std::move(data), adhesion_ids_of(cell.scene.cell), p, work.threads, work.progress,
+                      misfit, &cell.start);
+}
+
+ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Parameters& p, int threads) {
+  return error_budget({.fit = fit,
+                       .data = fit.data,
+                       .networks = cell.networks,
+                       .cell = cell.scene.cell,
+                       .beads = cell.scene.beads,
+                       .gel = p.gel,
+                       .substrate_error = cell.gel->stated_error(),
+                       .lacks_base = !cell.gel->capabilities().base,
+                       .segmentation = p.segmentation,
+                       .n_of_place = cell.decisions.placement.is_on ? 3 : 0},
+                      threads);
+}
+
+/// The fit of the cell with its candidates for adhesions at other places; beads, gel and cables as in the first.
+EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters& p, int threads) {
+  if (!first.decisions.fibres.is_on) second.fibres.clear();
+  LinearData data =
+      data_of({.gel = *first.gel, .cell = second, .parameters = p, .threads = threads}, first.scene.beads);
+  return fit_ensemble(of_cables(span_ensemble(second, p, threads), first.networks.front().parameters()),
+                      std::move(data), adhesion_ids_of(second), p.fit, threads, {});
+}
+
+Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optional<Cell>& second, const Parameters& p,
+               const Work& work) {
+  Found found{.tensions = tensions_of(fit),
+              .forces = forces_of(fit, cell.scene.cell),
+              .summary = summary_of(fit, cell.scene, cell.networks, p.fit)};
+  const stage::Stopwatch watch;
+  found.summary.error_budget = budget_of(cell, fit, p, work.threads);
+  if (second) {
+    work.tell(0.9, "candidates at other places");
+    const PlacementSpread spread = spread_between(fit, fit_of_second(*second, cell, p, work.threads));
+    found.summary.error_budget = with_spread(std::move(*found.summary.error_budget), spread);
+    found.summary.more.emplace_back("total_force_spread_by_placement_nN", spread.total_force_nN);
+  }
+  found.budget_s = watch.seconds();
+  return found;
+}
+
+std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first, const Inputs& inputs,
+                                 const Parameters& p, const Work& work) {
+  const SeriesOnGel& series = cell.series;
+  if (series.frames.empty()) return {};
+  const auto allow = [&](LinearData of_frame, const Eigen::VectorXd& forces_nN) {
+    if (cell.beyond) of_frame = with_forces_beyond(std::move(of_frame), cell.scene.cell, p.gel).data;
+    if (!cell.decisions.placement.is_on) return of_frame;
+    // the same place for all, but each frame has the error of it
+    return with_place(std::move(of_frame), cell.scene.cell, p.gel, forces_nN, cell.placement.centre_um, work.threads);
+  };
+  return fit_series(series.frames, cell.networks, series.response,
+                    beads_in_region(beads_of(series.frames), cell.scene.cell, p.fit), adhesion_ids_of(cell.scene.cell),
+                    p.fit, allows_common_motion(p.effects), cell.decisions.time_coupling.is_on, work.threads,
+                    work.progress, next_start(first), inputs.known_frames, allow);
+}
+
+ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const ModelChecks& checks,
+                      const DisplacementField& tracked) {
+  const auto field = [&](const Eigen::VectorXd& forces_nN) {
+    return in_bead_frame(field_of(forces_nN, cell.scene.beads, fit.data), tracked, cell.placement);
+  };
+  return {.fitted = field(fit.forces_nN), .without_fibres = field(checks.models.front().forces_nN)};
+}
+
+void append(Figures& figures, const Figures& more) { figures.insert(figures.end(), more.begin(), more.end()); }
+
+}  // namespace
+
+FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& work) {
+  const Parameters p = as_switched(given);
+  if (!inputs.frames.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
+    throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
+  check_place(inputs.beads, inputs.cell);
+  auto [ready, data] = make_ready(inputs, p, work);
+  const Work of_fit = work.part(0.4, inputs.frames.empty() ? 0.5 : 0.2);
+  EnsembleFit fit = fit_networks(ready, std::move(data), p.fit, of_fit);
+  if (const auto elasticity =
+          elasticity_after_all(ready.decisions.elasticity, ready.networks.front(), fit.meshes.front().fit.trial, p)) {
+    ready = with_cables(std::move(ready), fit.data, p.cables, inputs);
+    ready.decisions.elasticity = *elasticity;
+    fit = fit_networks(ready, std::move(fit.data), p.fit, of_fit);
+  }
+  Found found = found_by(ready, fit, inputs.second_placement, p, work);
+  FoundMotions motions = motions_found(ready, fit, p.effects);
+  ModelChecks checks = check_model(ready, fit, p, work.threads);
+  append(found.summary.more, figures_of(motions));
+  append(found.summary.more, figures_of(checks, fit));
+  ModelFields fields = fields_of(ready, fit, checks, inputs.beads);
+  std::vector<FrameFit> frames = fit_frames(ready, fit, inputs, p, work.part(0.6, 0.35));
+  FittedCell cell{.seen = inputs.cell,
+                  .parameters = p,
+                  .ready = std::move(ready),
+                  .fit = std::move(fit),
+                  .found = std::move(found),
+                  .motions = std::move(motions),
+                  .checks = std::move(checks),
+                  .fields = std::move(fields),
+                  .frames = std::move(frames)};
+  cell.effects = effects_of(cell);
+  if (!p.explain) return cell;
+  work.tell(0.95, "explaining what is off");
+  Explained explained = explain(std::move(cell.effects), cell, work.threads);
+  cell.effects = std::move(explained.effects);
+  cell.changes = std::move(explained.changes);
+  return cell;
+}
+
+}  // namespace mbtfm::fit
