@@ -18,6 +18,11 @@ struct Model {
   bool (*follows)(const Gel& gel, const SubstrateParameters& parameters) = nullptr;
 };
 
+template <class Kind>
+std::unique_ptr<Substrate> make_model(const Gel& gel, const SubstrateParameters& parameters, int threads) {
+  return std::make_unique<Kind>(gel, parameters, threads);
+}
+
 /// @throws UsageError where the table has no such model or it takes no incompressible gel, InvalidData as check(gel)
 std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel& gel,
                                      const SubstrateParameters& parameters, int threads);
