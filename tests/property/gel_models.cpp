@@ -28,7 +28,7 @@ class GelModels : public testing::TestWithParam<std::string> {
 
 std::vector<std::string> names() {
   std::vector<std::string> result = {"auto"};
-  for (const Model& model : choice::models()) result.push_back(model.name);
+  for (const Model& model : choice::models()) result.emplace_back(name_of(model.kind));
   return result;
 }
 
