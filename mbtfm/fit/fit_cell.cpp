@@ -21,6 +21,25 @@ EnsembleFit fit_networks(const ReadyCell& cell, LinearData data, const FitParame
                       misfit, &cell.start);
 }
 
+struct ReadyAndFitted {
+  ReadyCell ready;
+  EnsembleFit fit;
+};
+
+/// On elastic cables after all where the tensions that are found without call for them.
+ReadyAndFitted ready_and_fitted(const Inputs& inputs, const Parameters& p, const Work& work) {
+  auto [ready, data] = make_ready(inputs, p, work);
+  const Work of_fit = work.part(0.4, inputs.frames.empty() ? 0.5 : 0.2);
+  EnsembleFit fit = fit_networks(ready, std::move(data), p.fit, of_fit);
+  const auto elasticity =
+      elasticity_after_all(ready.decisions.elasticity, ready.networks.front(), fit.meshes.front().fit.trial, p);
+  if (!elasticity) return {std::move(ready), std::move(fit)};
+  ready = with_cables(std::move(ready), fit.data, p.cables, inputs);
+  ready.decisions.elasticity = *elasticity;
+  fit = fit_networks(ready, std::move(fit.data), p.fit, of_fit);
+  return {std::move(ready), std::move(fit)};
+}
+
 ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Parameters& p, int threads) {
   return error_budget({.fit = fit,
                        .data = fit.data,
@@ -85,6 +104,16 @@ ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const Model
   return {.fitted = field(fit.forces_nN), .without_fibres = field(checks.models.front().forces_nN)};
 }
 
+FittedCell with_effects(FittedCell cell, const Work& work) {
+  cell.effects = effects_of(cell);
+  if (!cell.parameters.explain) return cell;
+  work.tell(0.95, "explaining what is off");
+  Explained explained = explain(std::move(cell.effects), cell, work.threads);
+  cell.effects = std::move(explained.effects);
+  cell.changes = std::move(explained.changes);
+  return cell;
+}
+
 void append(Figures& figures, const Figures& more) { figures.insert(figures.end(), more.begin(), more.end()); }
 
 }  // namespace
@@ -94,15 +123,7 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   if (!inputs.frames.empty() && p.fit.substrate == TrialDisplacement::per_evaluation)
     throw UsageError("substrate = per-evaluation takes no time series: it would solve for each trial of each frame");
   check_place(inputs.beads, inputs.cell);
-  auto [ready, data] = make_ready(inputs, p, work);
-  const Work of_fit = work.part(0.4, inputs.frames.empty() ? 0.5 : 0.2);
-  EnsembleFit fit = fit_networks(ready, std::move(data), p.fit, of_fit);
-  if (const auto elasticity =
-          elasticity_after_all(ready.decisions.elasticity, ready.networks.front(), fit.meshes.front().fit.trial, p)) {
-    ready = with_cables(std::move(ready), fit.data, p.cables, inputs);
-    ready.decisions.elasticity = *elasticity;
-    fit = fit_networks(ready, std::move(fit.data), p.fit, of_fit);
-  }
+  auto [ready, fit] = ready_and_fitted(inputs, p, work);
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);
   ModelChecks checks = check_model(ready, fit, p, work.threads);
@@ -119,13 +140,7 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
                   .checks = std::move(checks),
                   .fields = std::move(fields),
                   .frames = std::move(frames)};
-  cell.effects = effects_of(cell);
-  if (!p.explain) return cell;
-  work.tell(0.95, "explaining what is off");
-  Explained explained = explain(std::move(cell.effects), cell, work.threads);
-  cell.effects = std::move(explained.effects);
-  cell.changes = std::move(explained.changes);
-  return cell;
+  return with_effects(std::move(cell), work);
 }
 
 }  // namespace mbtfm::fit
