@@ -22,7 +22,7 @@ cp -r "$scratch/old" "$scratch/new"
 for build in old new; do
   "${!build}/bin/mbtfm" batch "$scratch/$build" >"$scratch/$build.log" 2>&1 || tail -n 3 "$scratch/$build.log" >&2
   "${!build}/bin/mbtfm" stats "$scratch/$build" >>"$scratch/$build.log" 2>&1 || tail -n 3 "$scratch/$build.log" >&2
-  find "$scratch/$build" -name record.json -exec sed -i -E '/"(seconds|peak_memory_MB|version)":/d' {} +
+  find "$scratch/$build" -name record.json -exec sed -i -E '/"(seconds|peak_memory_MB|version|error_budget_s)":/d' {} +
 done
 differ=$(cd "$scratch" && diff -rq old new | grep -vE '(run\.json|report\.html|run\.log|batch\.csv|\.mbtfm\.hashes|profile\.html) ' || true)
 files=$(find "$scratch/old" -type f | wc -l)
