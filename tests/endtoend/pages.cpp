@@ -194,7 +194,7 @@ TEST_F(Pages, print_whole) {
               kPaper_px + 0.5)
         << page;
     const std::string pdf = browser.call("Page.printToPDF", {{"preferCSSPageSize", true}})["data"];
-    EXPECT_TRUE(pdf.starts_with(report::files::base64("%PDF-1"))) << page;
+    EXPECT_TRUE(pdf.starts_with(files::base64("%PDF-1"))) << page;
   }
 }
 
