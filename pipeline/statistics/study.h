@@ -35,7 +35,7 @@ struct StudyCell {
   std::vector<Tension> tensions;
   FitSummary fit;
   std::vector<Direction> directions;
-  std::vector<Finding> findings;  ///< of all its stages
+  std::vector<Finding> findings = {};  ///< of all its stages
 };
 
 /// A cell that cannot be used, or a folder that cannot be searched for cells.

@@ -121,7 +121,9 @@ std::string text_of(const CellResults& results) {
 
 Provenance fitted_here(std::vector<Finding> findings) {
   Provenance provenance;
-  provenance.stages.push_back({.name = "fit", .state = "run"});
+  provenance.stages.emplace_back();
+  provenance.stages.back().name = "fit";
+  provenance.stages.back().state = "run";
   provenance.findings = std::move(findings);
   return provenance;
 }
