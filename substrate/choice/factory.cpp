@@ -14,7 +14,9 @@ const std::vector<substrate::Model>& models() {
 std::unique_ptr<substrate::Substrate> make_substrate(const Gel& gel, const substrate::SubstrateParameters& parameters,
                                                      int threads) {
   if (parameters.model == "auto") return make_automatic(gel, parameters, threads);
-  return substrate::make_from(models(), gel, parameters, threads);
+  std::vector<substrate::Model> words = models();
+  words.push_back({.name = "auto", .can = {}, .make = make_automatic});  // for the message that lists them
+  return substrate::make_from(words, gel, parameters, threads);
 }
 
 }  // namespace mbtfm::choice
