@@ -2,6 +2,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/listed.h"
 #include "substrate/effects.h"
 #include "substrate/loads.h"
 #include "substrate/models.h"
@@ -63,25 +64,24 @@ Eigen::MatrixXd Substrate::compliance_um_per_nN(const std::vector<Vec2>& points_
   return response({ellipses}, {points_um})->matrix();
 }
 
-namespace {
-
-Eigen::VectorXd column_of(const std::vector<Vec2>& forces_nN) {
-  Eigen::VectorXd column(2 * static_cast<Eigen::Index>(forces_nN.size()));
-  for (std::size_t j = 0; j < forces_nN.size(); ++j)
-    column.segment<2>(2 * static_cast<Eigen::Index>(j)) << forces_nN[j].x, forces_nN[j].y;
+Eigen::VectorXd column_of(const std::vector<Vec2>& vectors) {
+  Eigen::VectorXd column(2 * static_cast<Eigen::Index>(vectors.size()));
+  for (std::size_t i = 0; i < vectors.size(); ++i)
+    column.segment<2>(2 * static_cast<Eigen::Index>(i)) << vectors[i].x, vectors[i].y;
   return column;
 }
 
-}  // namespace
+std::vector<Vec2> vectors_of(const Eigen::VectorXd& column) {
+  std::vector<Vec2> vectors;
+  vectors.reserve(static_cast<std::size_t>(column.size() / 2));
+  for (Eigen::Index row = 0; row < column.size(); row += 2) vectors.push_back({column[row], column[row + 1]});
+  return vectors;
+}
 
 std::vector<Vec2> Substrate::displacements_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
                                               const std::vector<Vec2>& forces_nN) const {
   check_forces(ellipses, forces_nN);
-  const Eigen::VectorXd u = response({ellipses}, {points_um})->displace(column_of(forces_nN));
-  std::vector<Vec2> displacements;
-  displacements.reserve(points_um.size());
-  for (Eigen::Index i = 0; i < u.size(); i += 2) displacements.push_back({u[i], u[i + 1]});
-  return displacements;
+  return vectors_of(response({ellipses}, {points_um})->displace(column_of(forces_nN)));
 }
 
 std::vector<double> Substrate::vertical_um(const std::vector<Vec2>& points_um, const std::vector<Ellipse>& ellipses,
@@ -98,9 +98,10 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
   check(gel);
   const auto model = std::ranges::find(table, parameters.model, &Model::kind);
   if (model == table.end()) {
-    std::string names;
-    for (const Model& known : table) names += (names.empty() ? "" : ", ") + std::string(name_of(known.kind));
-    throw UsageError("substrate.model: expected one of " + names + ", found '" + name_of(parameters.model) + "'");
+    std::vector<std::string> names;
+    for (const Model& known : table) names.emplace_back(name_of(known.kind));
+    throw UsageError("substrate.model: expected one of " + listed(names) + ", found '" + name_of(parameters.model) +
+                     "'");
   }
   if (gel.poisson_ratio == 0.5 && !model->can.incompressible) {
     throw UsageError("gel.poisson_ratio = 0.5: the model " + std::string(name_of(model->kind)) +

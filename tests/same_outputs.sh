@@ -10,9 +10,7 @@ shift 2
 scratch=$(mktemp -d "${TMPDIR:-/tmp}/mbtfm-same.XXXXXX")
 trap 'rm -rf "$scratch"' EXIT
 
-simulate() {
-  "$old/bin/mbtfm-simulate" --quiet --images "$@" 2>/dev/null || "$old/bin/mbtfm-simulate" --images "$@" >/dev/null
-}
+simulate() { "$old/bin/mbtfm-simulate" --quiet --images "$@"; }
 mkdir "$scratch/old"
 simulate --scenario u2os --seed 1 --noise 0.07 --beads 10000 --out "$scratch/old/demo"
 for seed in 2 3 4; do simulate --scenario two-adhesions --seed $seed --noise 0.1 --beads 1000 --out "$scratch/old/batch/$seed"; done
@@ -20,8 +18,13 @@ for folder in "$@"; do cp -rL "$folder" "$scratch/old/$(basename "$folder")"; do
 cp -r "$scratch/old" "$scratch/new"
 
 for build in old new; do
-  "${!build}/bin/mbtfm" batch "$scratch/$build" >"$scratch/$build.log" 2>&1 || tail -n 3 "$scratch/$build.log" >&2
-  "${!build}/bin/mbtfm" stats "$scratch/$build" >>"$scratch/$build.log" 2>&1 || tail -n 3 "$scratch/$build.log" >&2
+  for command in batch stats; do
+    if ! "${!build}/bin/mbtfm" $command "$scratch/$build" >"$scratch/$build.log" 2>&1; then
+      tail -n 5 "$scratch/$build.log" >&2
+      echo "mbtfm $command did not end well with the $build build" >&2
+      exit 1
+    fi
+  done
   find "$scratch/$build" -name record.json -exec sed -i -E '/"(seconds|peak_memory_MB|version|error_budget_s)":/d' {} +
 done
 differ=$(cd "$scratch" && diff -rq old new | grep -vE '(run\.json|report\.html|run\.log|batch\.csv|\.mbtfm\.hashes|profile\.html) ' || true)

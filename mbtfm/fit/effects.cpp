@@ -6,7 +6,6 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/effects.h"
 #include "substrate/choice/factory.h"
-#include "substrate/response.h"
 
 namespace mbtfm::fit {
 
@@ -36,7 +35,8 @@ Change change_with_gel(const FittedCell& c, const Effect& e, const substrate::Su
                        int threads) {
   const auto gel = choice::make_substrate(c.parameters.gel, parameters, threads);
   LinearData with = c.fit.data;
-  with.response = gel->response({ellipses_of(c.ready.scene.cell)}, {points_of(c.ready.scene.beads)})->kept();
+  with.response = response_of({.gel = *gel, .cell = c.ready.scene.cell, .parameters = c.parameters, .threads = threads},
+                              c.ready.scene.beads);
   return change_with_data(c, e, unweighted(std::move(with)), threads);
 }
 

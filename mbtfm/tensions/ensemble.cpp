@@ -307,16 +307,15 @@ struct FirstFit {
   Loss loss = Loss::squares;
 };
 
-/// The loss itself, or what the first fit calls for where it is unset: huber where stray beads move some tension.
+/// The loss itself, or what the first fit calls for where it is unset: huber where stray beads do harm.
 Loss loss_called_for(std::optional<Loss> loss, const LinearData& data, const TensionProblem& problem,
                      const Trial& trial) {
   if (loss) return *loss;
-  constexpr double kMatters = 0.1;  // of a standard error
+  constexpr double kHarm = 0.1;  // of a standard error
   const Eigen::VectorXd residual = weighted_residual(data, trial.forces_nN);
   const std::vector<Eigen::Index> strays = stray_beads(data, residual);
-  const bool matter =
-      !strays.empty() && most_moved_by(strays, data, residual, problem.force_derivatives(trial)) > kMatters;
-  return matter ? Loss::huber : Loss::squares;
+  const bool harm = !strays.empty() && harm_done_by(strays, data, residual, problem.force_derivatives(trial)) > kHarm;
+  return harm ? Loss::huber : Loss::squares;
 }
 
 FirstFit fit_first(const cables::CableNetwork& network, LinearData data, const std::vector<int>& adhesion_ids,

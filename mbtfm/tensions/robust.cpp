@@ -187,8 +187,8 @@ std::vector<Eigen::Index> stray_beads(const LinearData& data, const Eigen::Vecto
   return 2 * strays.size() > n_large ? strays : std::vector<Eigen::Index>();
 }
 
-double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
-                     const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives) {
+double harm_done_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
+                    const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives) {
   Eigen::VectorXd residual(2 * strays.size()), weight(2 * strays.size());
   for (std::size_t k = 0; k < strays.size(); ++k) {
     residual.segment<2>(2 * static_cast<Eigen::Index>(k)) = weighted_residual.segment<2>(2 * strays[k]);
@@ -201,7 +201,11 @@ double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& 
       others.completeOrthogonalDecomposition().solve(of_strays.transpose() * residual).cwiseAbs();
   const Eigen::VectorXd variance = all.completeOrthogonalDecomposition().pseudoInverse().diagonal();
   const Eigen::VectorXd in_errors = moved.cwiseQuotient(variance.cwiseMax(1e-300).cwiseSqrt());
-  return (variance.array() > 0).select(in_errors, 0).maxCoeff() / robust_scale(data, weighted_residual);
+  const double most_moved =
+      (variance.array() > 0).select(in_errors, 0).maxCoeff() / robust_scale(data, weighted_residual);
+  const double without_them = weighted_residual.squaredNorm() - residual.squaredNorm();
+  const double widened = weighted_residual.norm() / std::sqrt(std::max(without_them, 1e-300)) - 1;
+  return std::max(most_moved, widened);
 }
 
 double robust_weight(Loss loss, double residual) {

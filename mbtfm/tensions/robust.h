@@ -16,11 +16,12 @@ namespace mbtfm::tensions {
 /// still part of the gel only.
 std::vector<Eigen::Index> stray_beads(const LinearData& data, const Eigen::VectorXd& weighted_residual);
 
-/// By how many of its standard errors the tension moves most that does, if these beads lose all their weight; the
-/// forces taken as linear in the tensions. One of two hundred thousand beads moves none.
+/// What these beads do to the fit by least squares, in standard errors: by how many the tension moves most that does if
+/// they lose all their weight (the forces taken as linear in the tensions), or by what share they widen all of them,
+/// the larger. One of two hundred thousand beads moves none; but one that is micrometres off widens them from anywhere.
 /// @param force_derivatives  dR/dt: 2·adhesions × tensions
-double most_moved_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
-                     const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives);
+double harm_done_by(const std::vector<Eigen::Index>& strays, const LinearData& data,
+                    const Eigen::VectorXd& weighted_residual, const Eigen::MatrixXd& force_derivatives);
 
 /// Weight of a bead whose residual has this size, in robust standard deviations; 1 at zero (l1: large there).
 /// squares 1 | huber min(1, k/r), k = 1.500 | tukey (1 − (r/c)²)², c = 5.123 | l1 1/r.

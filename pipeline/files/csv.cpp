@@ -6,6 +6,7 @@
 #include <unordered_set>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/names.h"
 #include "pipeline/files/text.h"
@@ -107,9 +108,7 @@ void CsvTable::require(const std::vector<std::string>& columns) const {
 int CsvTable::index_of(const std::string& column) const {
   const auto at = std::find(header_.begin(), header_.end(), column);
   if (at != header_.end()) return static_cast<int>(at - header_.begin());
-  std::string found;
-  for (const std::string& name : header_) found += (found.empty() ? "" : ", ") + name;
-  throw InputError(name_ + ":1", "a column '" + column + "'", "the columns " + found);
+  throw InputError(name_ + ":1", "a column '" + column + "'", "the columns " + listed(header_));
 }
 
 void CsvTable::label_rows_by(const std::string& column, const std::string& kind) {

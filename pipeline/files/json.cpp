@@ -1,5 +1,6 @@
 #include "pipeline/files/json.h"
 
+#include "pipeline/contract/listed.h"
 #include "pipeline/files/names.h"
 
 namespace mbtfm::files {
@@ -36,9 +37,7 @@ template <Worded E>
 E value_of(const JsonRecord& record) {
   const std::optional<E> value = named<E>(record.text());
   if (value) return *value;
-  std::string expected;
-  for (const char* word : words(E{})) expected += (expected.empty() ? "one of " : ", ") + std::string(word);
-  record.fail(expected);
+  record.fail("one of " + listed(words(E{})));
 }
 
 }  // namespace

@@ -25,7 +25,7 @@ T median(std::vector<T> values) {
   return median_in(values);
 }
 
-/// The value of rank share · (size − 1), rounded down. None has 0.
+/// The value of rank share · (size − 1), rounded down; 0 where there are no values.
 /// @param share  0 … 1
 template <class T>
 T quantile(std::vector<T> values, double share) {

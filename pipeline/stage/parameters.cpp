@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/contract/range.h"
 #include "pipeline/files/text.h"
@@ -65,11 +66,7 @@ std::string expectation(const Parameter& p) {
                                [&](std::uint64_t*) { return std::string("an integer >= 0"); },
                                [&](bool*) { return std::string("true or false"); },
                                [&](std::string*) { return std::string("a text"); },
-                               [&](const Choice& choice) {
-                                 std::string words;
-                                 for (const auto& w : choice.words) words += (words.empty() ? "one of " : ", ") + w;
-                                 return words;
-                               }},
+                               [&](const Choice& choice) { return "one of " + listed(choice.words); }},
                     p.member);
 }
 

@@ -9,6 +9,7 @@
 #include <cstdio>
 #include <nlohmann/json.hpp>
 
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/version.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
@@ -39,9 +40,7 @@ struct CommandLine {
 std::string words_in(const Parameter& p) {
   const auto* choice = std::get_if<Choice>(&p.member);
   if (choice == nullptr) return {};
-  std::string words;
-  for (const std::string& word : choice->words) words += (words.empty() ? " (one of " : ", ") + word;
-  return words + ")";
+  return " (one of " + listed(choice->words) + ")";
 }
 
 void add_options(CLI::App& app, CommandLine& line, const StageDescription& description, const ParameterList& list) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/listed.h"
 
 namespace mbtfm::drawing {
 
@@ -141,9 +142,7 @@ std::string known_scenarios() {
     if (!names.empty()) break;
   }
   std::ranges::sort(names);
-  std::string list;
-  for (const std::string& name : names) list += (list.empty() ? "" : ", ") + name;
-  return list;
+  return listed(names);
 }
 
 }  // namespace

@@ -40,11 +40,4 @@ inline void add_samples(const std::vector<std::vector<NodeWeight>>& samples, con
   }
 }
 
-/// A column of x, y by point.
-inline std::vector<Vec2> vectors_of(const Eigen::MatrixXd& column) {
-  std::vector<Vec2> vectors(column.rows() / 2);
-  for (std::size_t i = 0; i < vectors.size(); ++i) vectors[i] = {column(2 * i, 0), column(2 * i + 1, 0)};
-  return vectors;
-}
-
 }  // namespace mbtfm::boxes

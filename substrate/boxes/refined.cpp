@@ -85,7 +85,7 @@ class Refined final : public substrate::Substrate {
              [=, this](const Eigen::MatrixXd& forces_nN) {
                Eigen::MatrixXd field(n_rows, forces_nN.cols());
                for (Eigen::Index column = 0; column < field.cols(); ++column) {
-                 const LoadCase all = case_of(vectors_of(forces_nN.col(column)));
+                 const LoadCase all = case_of(substrate::vectors_of(forces_nN.col(column)));
                  field.col(column) = asked(solve({points_um, ellipses, 1, [&all](int) { return all; }, axes}));
                }
                return field;

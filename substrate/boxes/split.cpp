@@ -123,7 +123,7 @@ class Split final : public substrate::Substrate {
     const std::lock_guard lock(mutex_);
     std::vector<LoadCase> cases;
     for (Eigen::Index column = 0; column < forces_nN.cols(); ++column) {
-      const std::vector<Vec2> forces = vectors_of(forces_nN.col(column));
+      const std::vector<Vec2> forces = substrate::vectors_of(forces_nN.col(column));
       field.col(column) = axes.size() == 2 ? near_field(scene, forces) : near_normal(scene, forces);
       cases.push_back(case_of(forces));
     }

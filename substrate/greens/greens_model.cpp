@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "substrate/models.h"
 
 namespace mbtfm::greens {
 
@@ -69,11 +70,9 @@ MatrixXd GreensModel::by_waves(const std::vector<Vec2>& points_um, const std::ve
 MatrixXd GreensModel::into_the_gel(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
                                    const MatrixXd& forces_nN) const {
   MatrixXd columns(points_um.size(), forces_nN.cols());
-  std::vector<Vec2> forces(ellipses.size());
   for (Index column = 0; column < forces_nN.cols(); ++column) {
-    for (std::size_t j = 0; j < forces.size(); ++j)
-      forces[j] = {forces_nN(2 * static_cast<Index>(j), column), forces_nN(2 * static_cast<Index>(j) + 1, column)};
-    const std::vector<double> normal = into_the_gel_um(points_um, ellipses, forces);
+    const std::vector<double> normal =
+        into_the_gel_um(points_um, ellipses, substrate::vectors_of(forces_nN.col(column)));
     std::copy(normal.begin(), normal.end(), columns.col(column).data());
   }
   return columns;

@@ -75,7 +75,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
       "mbtfm/tensions", "mbtfm/tractions"}},
     {"fftw3", {"mbtfm/tractions"}},
     {"deal.II/", {"substrate/boxes"}},
-    {"cholmod", {"pipeline/numerics"}},
+    {"cholmod", {}},
     {"metis", {"pipeline/numerics"}},
     {"boost/math/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/statistics"}},
     {"boost/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/numerics"}},
