@@ -8,6 +8,11 @@ target_compile_options(mbtfm_options INTERFACE -Wall -Wextra -Wshadow $<$<CXX_CO
 
 function(mbtfm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PUBLIC;PRIVATE")
+  if(NOT arg_UNPARSED_ARGUMENTS)  # headers alone
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE mbtfm_options ${arg_PUBLIC})
+    return()
+  endif()
   add_library(${name} STATIC ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PUBLIC mbtfm_options ${arg_PUBLIC} PRIVATE ${arg_PRIVATE})
 endfunction()

@@ -62,6 +62,15 @@ void write_checks(stage::StageContext& context, const ModelChecks& checks, const
   if (checks.drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *checks.drawn);
 }
 
+/// The first network, contracted by the mean tensions.
+void write_contracted(const Path& file, const cables::CableNetwork& network, const EnsembleFit& fit) {
+  std::vector<double> tensions;
+  for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
+  const cables::Equilibrium& nearby = cables::equilibrium_of(*fit.meshes.front().fit.trial.rest);
+  const cables::Equilibrium e = network.equilibrium(tensions, nearby.positions_um);
+  files::write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN, e.link_states);
+}
+
 void write_found(stage::StageContext& context, const FittedCell& fitted) {
   const Found& found = fitted.found;
   const Cell& cell = fitted.ready.scene.cell;

@@ -65,9 +65,13 @@ EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters&
 
 Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optional<Cell>& second, const Parameters& p,
                const Work& work) {
-  Found found{.tensions = tensions_of(fit),
-              .forces = forces_of(fit, cell.scene.cell),
-              .summary = summary_of(fit, cell.scene, cell.networks, p.fit)};
+  Found found{
+      .tensions = tensions_of(fit),
+      .forces = forces_of(fit, cell.scene.cell),
+      .summary = summary_of(fit, cell.scene,
+                            cables::surface_tension_nN_per_um(cell.networks.front().network(),
+                                                              cell.scene.cell.outline_um, fit.tensions_nN[0].value),
+                            p.fit)};
   const stage::Stopwatch watch;
   found.summary.error_budget = budget_of(cell, fit, p, work.threads);
   if (second) {

@@ -83,7 +83,8 @@ StartedNetworks with_cables_called_for(std::vector<cables::CableNetwork> network
 std::optional<Effect> elasticity_after_all(const Effect& elasticity, const cables::CableNetwork& network,
                                            const Trial& answer, const Parameters& p) {
   if (elasticity.is_on || elasticity.setting != Switch::automatic) return {};
-  const double share = cables::stretch_share(network.network(), answer.equilibrium, p.cables.axial_stiffness_nN);
+  const double share =
+      cables::stretch_share(network.network(), cables::equilibrium_of(*answer.rest), p.cables.axial_stiffness_nN);
   if (share <= p.effects.effect_tolerance) return {};
   Effect on = elasticity;
   on.is_on = true;

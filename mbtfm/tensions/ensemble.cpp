@@ -39,7 +39,7 @@ MeshFit describe(const TensionProblem& problem, TensionFit fit) {
   mesh.network_forces_nN = network_forces_nN(problem, trial);
   mesh.network_part_nN = problem.network_part_nN(trial);
   mesh.torques_nN_um = problem.torques_nN_um(trial);
-  mesh.cut = problem.cut_reaction(trial);
+  mesh.cut = trial.rest->cut_reaction();
   return mesh;
 }
 
@@ -70,8 +70,8 @@ double network_bias(const MeshFit& mesh, const TensionProblem& problem, int thre
 }
 
 /// Draws shared out over the meshes in turn; replaces the profile.
-void add_bootstrap(EnsembleFit& all, const std::vector<cables::CableNetwork>& networks,
-                   const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads) {
+void add_bootstrap(EnsembleFit& all, const network::Ensemble& networks, const std::vector<int>& adhesion_ids,
+                   const FitParameters& parameters, int threads) {
   const std::size_t n_meshes = all.meshes.size();
   std::vector<std::vector<double>> deviations(all.tensions_nN.size());
   for (std::size_t m = 0; m < n_meshes; ++m) {
@@ -318,7 +318,7 @@ Loss loss_called_for(std::optional<Loss> loss, const LinearData& data, const Ten
   return harm ? Loss::huber : Loss::squares;
 }
 
-FirstFit fit_first(const cables::CableNetwork& network, LinearData data, const std::vector<int>& adhesion_ids,
+FirstFit fit_first(const network::Contractile& network, LinearData data, const std::vector<int>& adhesion_ids,
                    const FitParameters& parameters, int threads, const SolvedMisfit& solved_misfit,
                    const Trial* start) {
   const TensionProblem problem(network, data.reduced, adhesion_ids, solved_misfit, threads);
@@ -432,7 +432,7 @@ Estimate sum_of(const EnsembleFit& fit, const std::vector<int>& indices) {
 namespace {
 
 /// The others from the answer of the first, in threads.
-std::vector<MeshFit> fit_meshes(const std::vector<cables::CableNetwork>& networks, const ReducedData& data,
+std::vector<MeshFit> fit_meshes(const network::Ensemble& networks, const ReducedData& data,
                                 const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
                                 const SolvedMisfit& solved_misfit, TensionFit first,
                                 const std::function<void()>& tell) {
@@ -462,16 +462,17 @@ void add_variances(EnsembleFit& all) {
   all.variance = all.model_error->noise_variance;
 }
 
-void check_networks(const std::vector<cables::CableNetwork>& networks) {
-  MBTFM_ASSERT(!networks.empty());
-  for (const auto& network : networks) MBTFM_ASSERT(network.fibre_ids() == networks.front().fibre_ids());
+void check_networks(const network::Ensemble& networks) {
+  MBTFM_ASSERT(networks.size() > 0);
+  for (std::size_t i = 1; i < networks.size(); ++i)
+    MBTFM_ASSERT(networks[i].fibre_ids() == networks.front().fibre_ids());
 }
 
 }  // namespace
 
-EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData data,
-                         const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
-                         const Progress& progress, const SolvedMisfit& solved_misfit, const Trial* start) {
+EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, const std::vector<int>& adhesion_ids,
+                         const FitParameters& parameters, int threads, const Progress& progress,
+                         const SolvedMisfit& solved_misfit, const Trial* start) {
   check_networks(networks);
   const int n_meshes = static_cast<int>(networks.size());
   EnsembleFit all;
@@ -499,7 +500,7 @@ EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, Line
   numerics::parallel_for(n_meshes, threads, [&](int m) { add_errors(all.meshes[static_cast<std::size_t>(m)], all); });
   all.network_bias =
       network_bias(all.meshes.front(), TensionProblem(networks.front(), all.data.reduced, adhesion_ids), threads);
-  add_estimates(all, !networks.front().network().held_by_cut.empty());
+  add_estimates(all, networks.front().is_cut());
   if (parameters.bootstrap > 0) add_bootstrap(all, networks, adhesion_ids, parameters, threads);
   return all;
 }

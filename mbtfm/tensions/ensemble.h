@@ -76,10 +76,9 @@ struct EnsembleFit {
 /// @param data  whatever its weights by bead are: another fit may have left them
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
 /// @param start  tensions to start from, and an equilibrium of the first network near by; null: all equal
-EnsembleFit fit_ensemble(const std::vector<cables::CableNetwork>& networks, LinearData data,
-                         const std::vector<int>& adhesion_ids, const FitParameters& parameters, int threads,
-                         const Progress& progress, const SolvedMisfit& solved_misfit = {},
-                         const Trial* start = nullptr);
+EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, const std::vector<int>& adhesion_ids,
+                         const FitParameters& parameters, int threads, const Progress& progress,
+                         const SolvedMisfit& solved_misfit = {}, const Trial* start = nullptr);
 
 /// 95 % interval of a positive quantity, by Student's t. `high` is infinite where no bead feels it.
 struct Interval {

@@ -65,10 +65,7 @@ double bead_share(const BudgetInputs& in) {
 
 /// How far the iterations stopped from the minimum, and the forces from balance.
 VectorXd solver_error(const EnsembleFit& fit, const MeshFit& mesh, const Gain& gain) {
-  const cables::Equilibrium& equilibrium = mesh.fit.trial.equilibrium;
-  const double n = static_cast<double>(equilibrium.positions_um.size());
-  // net forces left on the free vertices, as if at random
-  const double imbalance = equilibrium.report.last_change * std::sqrt(n) / std::max(fit.forces_nN.norm(), 1e-300);
+  const double imbalance = mesh.fit.trial.rest->imbalance_nN() / std::max(fit.forces_nN.norm(), 1e-300);
   VectorXd slope = mesh.local.g;
   for (Index i = 0; i < slope.size(); ++i) {
     if (mesh.local.tensions_nN[i] <= 0) slope[i] = std::min(slope[i], 0.0);  // at its bound, where the minimum is
@@ -190,30 +187,6 @@ MatrixXd by_network_adhesion(const BudgetInputs& in, const MatrixXd& by_cell_adh
   return weights;
 }
 
-/// The variance that free ends of fibres bring: an end further on is a bit more cable with the fibre's tension.
-VectorXd variance_of_ends(const BudgetInputs& in, const cables::GeometryGradient& gradient) {
-  const Network& network = in.networks.front().network();
-  const std::vector<int>& fibre_ids = in.fit.fibre_ids;
-  std::vector<std::vector<std::size_t>> links_of(network.vertices_um.size());
-  for (std::size_t k = 0; k < network.links.size(); ++k) {
-    if (network.links[k].fibre_id == 0) continue;
-    links_of[static_cast<std::size_t>(network.links[k].vertex_a)].push_back(k);
-    links_of[static_cast<std::size_t>(network.links[k].vertex_b)].push_back(k);
-  }
-  VectorXd variance = VectorXd::Zero(gradient.by_link.cols());
-  for (std::size_t v = 0; v < links_of.size(); ++v) {
-    if (links_of[v].size() != 1 || is_held(network, v)) continue;
-    const Link& link = network.links[links_of[v].front()];
-    const auto group = std::lower_bound(fibre_ids.begin(), fibre_ids.end(), link.fibre_id) - fibre_ids.begin();
-    const double tension_nN = link.share * in.fit.tensions_nN[static_cast<std::size_t>(group)].value;
-    const double longer_by = in.segmentation.fibre_end_error_um / link.rest_length_um;
-    variance += (longer_by * tension_nN * gradient.by_link.row(static_cast<Index>(links_of[v].front())))
-                    .cwiseAbs2()
-                    .transpose();
-  }
-  return variance;
-}
-
 /// What an adhesion's standard errors change, variation by variation.
 struct AdhesionChanges {
   std::vector<Index> near;  ///< beads
@@ -221,8 +194,8 @@ struct AdhesionChanges {
   MatrixXd by_vertices;     ///< answers to the vertices held otherwise: rows × variations
 };
 
-AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const cables::GeometryGradient& gradient) {
-  const cables::CableNetwork& cables = in.networks.front();
+AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const network::GeometryAnswer& sums,
+                           Index n_sums) {
   const Adhesion& a = in.cell.adhesions[adhesion];
   const substrate::Ellipse ellipse = substrate::ellipse_of(a);
   const auto row = 2 * static_cast<Index>(adhesion);
@@ -231,32 +204,27 @@ AdhesionChanges changes_of(const BudgetInputs& in, std::size_t adhesion, const c
   AdhesionChanges changes{.near = beads_near(in.beads, ellipse), .displacement = {}, .by_vertices = {}};
   const auto n = static_cast<Index>(variations.size());
   changes.displacement.resize(2 * static_cast<Index>(changes.near.size()), n);
-  changes.by_vertices = MatrixXd::Zero(gradient.by_held_vertex.cols(), n);
+  changes.by_vertices = MatrixXd::Zero(n_sums, n);
   for (Index v = 0; v < n; ++v) {
     const Variation& variation = variations[static_cast<std::size_t>(v)];
     changes.displacement.col(v) = change_by_other_ellipse(in, changes.near, ellipse, variation.ellipse, force_nN);
-    const std::vector<int>& held = cables.held_vertices();
-    for (std::size_t h = 0; h < held.size(); ++h) {
-      if (cables.network().adhesion_id[static_cast<std::size_t>(held[h])] != a.adhesion_id) continue;
-      const Vec2 arm = cables.network().vertices_um[static_cast<std::size_t>(held[h])] - a.position_um;
-      const Vec2 moved = variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
-      changes.by_vertices.col(v) += gradient.by_held_vertex.middleRows<2>(2 * static_cast<Index>(h)).transpose() *
-                                    Eigen::Vector2d(moved.x, moved.y);
-    }
+    changes.by_vertices.col(v) = sums.to_adhesion(a.adhesion_id, [&](Vec2 point_um) {
+      const Vec2 arm = point_um - a.position_um;
+      return variation.shift_um + variation.growth * arm + variation.turn_rad * Vec2{-arm.y, arm.x};
+    });
   }
   return changes;
 }
 
 VectorXd segmentation_variances(const BudgetInputs& in, const Gain& gain, const BeadAnswers& answers, int threads) {
-  const Trial& trial = in.fit.meshes.front().fit.trial;
-  const std::vector<double> tensions(trial.tensions_nN.begin(), trial.tensions_nN.end());
-  const cables::GeometryGradient gradient =
-      in.networks.front().geometry_gradient(tensions, trial.equilibrium, by_network_adhesion(in, gain.of_model));
+  const auto sums = in.fit.meshes.front().fit.trial.rest->answer_to_geometry(by_network_adhesion(in, gain.of_model));
+  VectorXd tensions_nN(static_cast<Index>(in.fit.tensions_nN.size()));
+  for (Index i = 0; i < tensions_nN.size(); ++i) tensions_nN[i] = in.fit.tensions_nN[static_cast<std::size_t>(i)].value;
   std::vector<AdhesionChanges> changes(in.cell.adhesions.size());
   numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {
-    changes[static_cast<std::size_t>(i)] = changes_of(in, static_cast<std::size_t>(i), gradient);
+    changes[static_cast<std::size_t>(i)] = changes_of(in, static_cast<std::size_t>(i), *sums, gain.of_model.rows());
   });
-  VectorXd variance = variance_of_ends(in, gradient);
+  VectorXd variance = sums->variance_of_free_ends(tensions_nN, in.segmentation.fibre_end_error_um);
   answers.for_each_block([&](Index first, const MatrixXd& of_beads) {
     std::vector<VectorXd> by_adhesion(changes.size());
     numerics::parallel_for(static_cast<int>(changes.size()), threads, [&](int i) {

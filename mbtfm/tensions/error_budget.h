@@ -21,7 +21,7 @@ void declare(stage::ParameterList& list, SegmentationErrors& errors);
 struct BudgetInputs {
   const EnsembleFit& fit;
   const LinearData& data;
-  const std::vector<cables::CableNetwork>& networks;
+  network::Ensemble networks;
   const Cell& cell;
   const DisplacementField& beads;
   Gel gel;

@@ -16,16 +16,6 @@ namespace mbtfm::tensions {
 
 namespace {
 
-/// Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
-/// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
-double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
-  double sum_um = 0;
-  for (const Link& link : network.links) {
-    if (link.fibre_id == 0) sum_um += link.share * link.rest_length_um;
-  }
-  return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
-}
-
 /// Along one axis.
 struct Reach {
   double low_um = std::numeric_limits<double>::infinity(), high_um = -low_um;
@@ -143,8 +133,8 @@ double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
 
 }  // namespace
 
-FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene,
-                      const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters) {
+FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
+                      const FitParameters& parameters) {
   const Polygon& outline_um = scene.cell.outline_um;
   const NoiseLevel noise = noise_level(scene.beads, fit.data, fit.forces_nN, outline_um, parameters.far_distance_um);
   const Imbalance balance = imbalance_of(fit);
@@ -155,8 +145,7 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene,
   s.total_force_nN = fit.total_force_nN.value;
   s.network_force_nN = fit.network_force_nN.value;
   s.fibre_force_nN = s.total_force_nN - s.network_force_nN;
-  s.network_surface_tension_nN_per_um =
-      surface_tension_nN_per_um(networks.front().network(), outline_um, fit.tensions_nN[0].value);
+  s.network_surface_tension_nN_per_um = surface_tension_nN_per_um;
   s.n_meshes = static_cast<int>(fit.meshes.size());
   s.iterations = fit.report.iterations;
   s.converged = fit.report.converged;
@@ -216,13 +205,6 @@ void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<A
     traction.vectors.push_back(1 / area_stood_for_um2(cell.adhesions[a]) * forces[a].force_nN);
   }
   files::write_ellipses_vtp(file, cell.adhesions, {force, traction});
-}
-
-void write_contracted(const Path& file, const cables::CableNetwork& network, const EnsembleFit& fit) {
-  std::vector<double> tensions;
-  for (const Estimate& e : fit.tensions_nN) tensions.push_back(e.value);
-  const cables::Equilibrium e = network.equilibrium(tensions, fit.meshes.front().fit.trial.equilibrium.positions_um);
-  files::write_contracted_network(file, network.network(), e.positions_um, e.link_force_nN, e.link_states);
 }
 
 }  // namespace mbtfm::tensions

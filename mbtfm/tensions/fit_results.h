@@ -29,8 +29,8 @@ std::vector<Vec2> points_of(const DisplacementField& beads);
 std::vector<Tension> tensions_of(const EnsembleFit& fit);
 /// By adhesion of the cell, with standard errors.
 std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell);
-FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene,
-                      const std::vector<cables::CableNetwork>& networks, const FitParameters& parameters);
+FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double surface_tension_nN_per_um,
+                      const FitParameters& parameters);
 /// The model's displacement at the beads.
 DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data);
 
@@ -38,7 +38,5 @@ DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementF
 void write_displacement_vtp(const Path& file, const DisplacementField& measured, const DisplacementField& fitted,
                             const std::vector<files::PointArray>& more = {});
 void write_tractions_vtp(const Path& file, const Cell& cell, const std::vector<AdhesionForce>& forces);
-/// The first network, contracted by the mean tensions.
-void write_contracted(const Path& file, const cables::CableNetwork& network, const EnsembleFit& fit);
 
 }  // namespace mbtfm::tensions

@@ -218,7 +218,7 @@ Eigen::MatrixXd bootstrap_deviations_nN(const TensionProblem& problem, const Fit
     Eigen::VectorXd of_model = force_variance_nN2.cwiseSqrt();
     for (double& e : of_model) e *= normal();
     if (of_model.size() > 0) drawn.target += *drawn.compliance * of_model;
-    const TensionProblem again(problem.cables(), drawn, problem.adhesion_ids());
+    const TensionProblem again(problem.cell(), drawn, problem.adhesion_ids());
     const Trial start = again.evaluate(solution.tensions_nN, &solution);
     deviations.col(d) = fit_gauss_newton(again, parameters, start).trial.tensions_nN - solution.tensions_nN;
   });

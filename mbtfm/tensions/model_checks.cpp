@@ -111,7 +111,7 @@ Influence influence_of(const EnsembleFit& fit, const LinearData& data) {
 }
 
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
-                                       const cables::CableNetwork& first_network,
+                                       const network::Contractile& first_network,
                                        const std::vector<int>& adhesion_ids) {
   const ReducedData& reduced = data.reduced;
   const double variance = noise_variance(data);

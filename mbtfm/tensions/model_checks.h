@@ -32,7 +32,7 @@ struct ModelScore {
 };
 /// no-fibres: a network of one tension; full: ours; adhesion-forces: every force for itself (thesis' null model).
 std::vector<ModelScore> compare_models(const EnsembleFit& fit, const LinearData& data,
-                                       const cables::CableNetwork& first_network, const std::vector<int>& adhesion_ids);
+                                       const network::Contractile& first_network, const std::vector<int>& adhesion_ids);
 
 /// What the beads tell of each tension. Influence: by how many of its standard errors a tension changes (on the first
 /// mesh) where a bead's displacement component changes by one of its own, as the fit weighs beads and meshes.

@@ -196,7 +196,7 @@ LinearData with_place(LinearData data, const Cell& cell, const Gel& gel, const E
   return with_more_motions(std::move(data), motions);
 }
 
-PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
+PlacedCell place_cell(const Cell& cell, const network::Contractile& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, Switch setting, int threads) {
   const stage::Stopwatch watch;

@@ -18,7 +18,7 @@
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/linear_data.h"
 #include "mbtfm/tensions/tension_fit.h"
-#include "network/cables/cables.h"
+#include "network/contractile.h"
 #include "pipeline/contract/report.h"
 #include "substrate/compliance.h"
 
@@ -72,7 +72,7 @@ using DataOf = std::function<LinearData(const DisplacementField&)>;
 /// field is linear in it, or where no place is found within kFarthest.
 /// @param data  of the beads as they are
 /// @param start  a trial with these data
-PlacedCell place_cell(const Cell& cell, const cables::CableNetwork& network, const DisplacementField& beads,
+PlacedCell place_cell(const Cell& cell, const network::Contractile& network, const DisplacementField& beads,
                       LinearData data, const DataOf& data_of, const Gel& gel, const FitParameters& parameters,
                       const Trial& start, Switch setting, int threads);
 

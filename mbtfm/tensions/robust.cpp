@@ -118,7 +118,7 @@ Eigen::VectorXd linear_weights(Loss loss, const Eigen::VectorXd& residual, const
   return weights;
 }
 
-WeighedFit fit_with_loss(LinearData data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+WeighedFit fit_with_loss(LinearData data, const network::Contractile& network, const std::vector<int>& adhesion_ids,
                          const FitParameters& parameters, int threads, TensionFit fit, Loss loss,
                          std::optional<double> fixed_scale) {
   constexpr int kMaxRounds = 20;      // each halves the change at least
@@ -227,7 +227,7 @@ double robust_scale(const LinearData& data, const Eigen::VectorXd& weighted_resi
   return lengths.empty() ? 0 : numerics::median_in(lengths) / std::sqrt(2 * std::log(2.0));
 }
 
-WeighedFit fit_reweighted(LinearData data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, const std::vector<int>& adhesion_ids,
                           const FitParameters& parameters, Loss loss, int threads, TensionFit first) {
   const Loss begin = loss == Loss::tukey ? Loss::huber : loss;
   auto [fit, weighed] =

@@ -42,7 +42,7 @@ struct WeighedFit {
 /// has several minima, starts from Huber's.
 /// @param loss  all but squares
 /// @param first  the fit by least squares
-WeighedFit fit_reweighted(LinearData data, const cables::CableNetwork& network, const std::vector<int>& adhesion_ids,
+WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, const std::vector<int>& adhesion_ids,
                           const FitParameters& parameters, Loss loss, int threads, TensionFit first);
 
 /// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where

@@ -211,8 +211,7 @@ Responses responses_of(const DisplacementField& beads, const std::vector<SeriesF
   return result;
 }
 
-std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
-                                 const std::vector<cables::CableNetwork>& networks,
+std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const network::Ensemble& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, int threads, const Progress& progress, Trial start,

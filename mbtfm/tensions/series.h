@@ -63,8 +63,7 @@ using AllowMore = std::function<LinearData(LinearData, const Eigen::VectorXd& fo
 /// @param is_coupled  each frame starts from the tensions of the one before; else all from `start`
 /// @param start  of the first frame, on the first network
 /// @param kept  fits of the same networks, compliance and parameters: taken for frames whose file is still the same
-std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames,
-                                 const std::vector<cables::CableNetwork>& networks,
+std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const network::Ensemble& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
                                  bool is_coupled, int threads, const Progress& progress, Trial start,

@@ -9,19 +9,15 @@
 
 namespace mbtfm::tensions {
 
-namespace {
-std::vector<double> to_vector(const Eigen::VectorXd& v) { return {v.data(), v.data() + v.size()}; }
-}  // namespace
-
-TensionProblem::TensionProblem(const cables::CableNetwork& cables, const ReducedData& data,
+TensionProblem::TensionProblem(const network::Contractile& cell, const ReducedData& data,
                                const std::vector<int>& adhesion_ids, SolvedMisfit solved_misfit, int threads)
-    : cables_(cables),
+    : cell_(cell),
       data_(data),
       adhesion_ids_(adhesion_ids),
       solved_misfit_(std::move(solved_misfit)),
       threads_(threads) {
   MBTFM_ASSERT(data.compliance->cols() == 2 * static_cast<Eigen::Index>(adhesion_ids.size()));
-  for (const int id : cables.adhesion_ids()) {
+  for (const int id : cell.adhesion_ids()) {
     const auto at = std::find(adhesion_ids.begin(), adhesion_ids.end(), id);
     if (at == adhesion_ids.end()) {
       throw InvalidData("adhesion " + std::to_string(id) + " of the network", "an adhesion of the cell",
@@ -31,22 +27,20 @@ TensionProblem::TensionProblem(const cables::CableNetwork& cables, const Reduced
   }
 }
 
-Eigen::MatrixXd TensionProblem::to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const {
-  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(data_.compliance->cols(), by_network_adhesion.cols());
+Eigen::MatrixXd TensionProblem::to_data_rows(const Eigen::MatrixXd& by_adhesion_of_cell) const {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(data_.compliance->cols(), by_adhesion_of_cell.cols());
   for (std::size_t i = 0; i < pair_of_.size(); ++i) {
-    rows.middleRows<2>(2 * pair_of_[i]) = by_network_adhesion.middleRows<2>(2 * static_cast<Eigen::Index>(i));
+    rows.middleRows<2>(2 * pair_of_[i]) = by_adhesion_of_cell.middleRows<2>(2 * static_cast<Eigen::Index>(i));
   }
   return rows;
 }
 
 Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby,
                                std::optional<double> force_tolerance) const {
-  const std::vector<double> tensions = to_vector(tensions_nN);
-  Trial trial{.tensions_nN = tensions_nN, .equilibrium = {}, .forces_nN = {}, .residual = {}};
-  trial.equilibrium =
-      cables_.equilibrium(tensions, nearby ? nearby->equilibrium.positions_um : std::vector<Vec2>{}, force_tolerance);
-  if (!trial.equilibrium.report.converged) throw NotSolved(trial.equilibrium.report);
-  trial.forces_nN = to_data_rows(cables_.adhesion_forces_nN(tensions, trial.equilibrium));
+  Trial trial{.tensions_nN = tensions_nN, .rest = {}, .forces_nN = {}, .residual = {}};
+  trial.rest = cell_.at_rest(tensions_nN, nearby ? nearby->rest.get() : nullptr, force_tolerance);
+  if (!trial.rest->report().converged) throw NotSolved(trial.rest->report());
+  trial.forces_nN = to_data_rows(trial.rest->forces_nN());
   trial.residual = *data_.compliance * trial.forces_nN - data_.target;
   trial.objective =
       0.5 * (solved_misfit_ ? solved_misfit_(trial.forces_nN) - data_.floor_squared : trial.residual.squaredNorm());
@@ -54,37 +48,18 @@ Trial TensionProblem::evaluate(const Eigen::VectorXd& tensions_nN, const Trial* 
 }
 
 Eigen::VectorXd TensionProblem::network_part_nN(const Trial& trial) const {
-  return to_data_rows(cables_.network_part_nN(trial.equilibrium));
+  return to_data_rows(trial.rest->network_part_nN());
 }
 
 Eigen::VectorXd TensionProblem::torques_nN_um(const Trial& trial) const {
-  const Network& network = cables_.network();
-  const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
-  Eigen::VectorXd torques = Eigen::VectorXd::Zero(data_.compliance->cols() / 2);
-  for (std::size_t v = 0; v < reactions.size(); ++v) {
-    if (network.adhesion_id[v] == 0) continue;
-    const auto& ids = cables_.adhesion_ids();
-    const auto at = std::lower_bound(ids.begin(), ids.end(), network.adhesion_id[v]) - ids.begin();
-    torques[pair_of_[static_cast<std::size_t>(at)]] += cross(network.vertices_um[v], reactions[v]);
-  }
-  return torques;
-}
-
-CutReaction TensionProblem::cut_reaction(const Trial& trial) const {
-  const Network& network = cables_.network();
-  CutReaction cut;
-  if (network.held_by_cut.empty()) return cut;
-  const std::vector<Vec2> reactions = cables_.reactions_nN(to_vector(trial.tensions_nN), trial.equilibrium);
-  for (std::size_t v = 0; v < reactions.size(); ++v) {
-    if (!network.held_by_cut[v]) continue;
-    cut.force_nN += Eigen::Vector2d(reactions[v].x, reactions[v].y);
-    cut.torque_nN_um += cross(network.vertices_um[v], reactions[v]);
-  }
-  return cut;
+  const Eigen::VectorXd torques = trial.rest->torques_nN_um();
+  Eigen::VectorXd rows = Eigen::VectorXd::Zero(data_.compliance->cols() / 2);
+  for (std::size_t i = 0; i < pair_of_.size(); ++i) rows[pair_of_[i]] = torques[static_cast<Eigen::Index>(i)];
+  return rows;
 }
 
 Eigen::MatrixXd TensionProblem::force_derivatives(const Trial& trial) const {
-  return to_data_rows(cables_.adhesion_force_derivatives(to_vector(trial.tensions_nN), trial.equilibrium, threads_));
+  return to_data_rows(trial.rest->force_derivatives(threads_));
 }
 
 Eigen::VectorXd TensionProblem::finite_difference_gradient(const Trial& trial, int threads) const {

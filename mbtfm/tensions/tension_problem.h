@@ -1,20 +1,21 @@
-/// The objective of the tension fit: Phi(t) = ½ |C R(t) − y|², R(t) the adhesion forces of the cable network.
+/// The objective of the tension fit: Phi(t) = ½ |C R(t) − y|², R(t) the adhesion forces of a contractile cell.
 #pragma once
 
 #include <Eigen/Core>
 #include <functional>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "mbtfm/tensions/linear_data.h"
-#include "network/cables/cables.h"
+#include "network/contractile.h"
 
 namespace mbtfm::tensions {
 
 /// One trial of the tensions. Knows its equilibrium, so that the next trial can start there.
 struct Trial {
   Eigen::VectorXd tensions_nN;
-  cables::Equilibrium equilibrium;
+  std::shared_ptr<const network::AtRest> rest;
   Eigen::VectorXd forces_nN;  ///< by adhesion of the data: fx, fy
   Eigen::VectorXd residual;   ///< C R − y
   double objective = 0;
@@ -23,11 +24,7 @@ struct Trial {
 /// |W (u(R) − u)|² with the displacement u(R) solved afresh for these adhesion forces, as the thesis does (3.2.5).
 using SolvedMisfit = std::function<double(const Eigen::VectorXd& forces_nN)>;
 
-/// What a cell's unseen part is pulled with through the cut: the pull of the network on the vertices held there.
-struct CutReaction {
-  Eigen::Vector2d force_nN{0, 0};
-  double torque_nN_um = 0;  ///< about the origin
-};
+using network::CutReaction;
 
 class TensionProblem {
  public:
@@ -36,22 +33,20 @@ class TensionProblem {
   /// @param solved_misfit  where given, the objective of every trial comes from it, and not from the data's compliance:
   ///                       the same to rounding, at the thesis' cost
   /// @param threads  that derivatives take
-  TensionProblem(const cables::CableNetwork& cables, const ReducedData& data, const std::vector<int>& adhesion_ids,
+  TensionProblem(const network::Contractile& cell, const ReducedData& data, const std::vector<int>& adhesion_ids,
                  SolvedMisfit solved_misfit = {}, int threads = 1);
 
-  int n_tensions() const { return static_cast<int>(cables_.fibre_ids().size()); }
-  const cables::CableNetwork& cables() const { return cables_; }
+  int n_tensions() const { return static_cast<int>(cell_.fibre_ids().size()); }
+  const network::Contractile& cell() const { return cell_; }
   const ReducedData& data() const { return data_; }
   const std::vector<int>& adhesion_ids() const { return adhesion_ids_; }
 
   /// @param nearby  a trial whose equilibrium is a good place to start, or none
-  /// @param force_tolerance  of the equilibrium, where rougher than usual will do: see CableNetwork::equilibrium
+  /// @param force_tolerance  of the equilibrium, where rougher than usual will do: see network::Contractile
   Trial evaluate(const Eigen::VectorXd& tensions_nN, const Trial* nearby = nullptr,
                  std::optional<double> force_tolerance = {}) const;
   /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
   Eigen::VectorXd torques_nN_um(const Trial& trial) const;
-  /// Zero where there is no cut. Balances the adhesions' forces: its derivatives are minus the sum of theirs.
-  CutReaction cut_reaction(const Trial& trial) const;
   /// The part of the forces that the actin network brings, by adhesion of the data.
   Eigen::VectorXd network_part_nN(const Trial& trial) const;
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
@@ -64,13 +59,13 @@ class TensionProblem {
   Eigen::VectorXd finite_difference_gradient(const Trial& trial, int threads) const;
 
  private:
-  Eigen::MatrixXd to_data_rows(const Eigen::MatrixXd& by_network_adhesion) const;
-  const cables::CableNetwork& cables_;
+  Eigen::MatrixXd to_data_rows(const Eigen::MatrixXd& by_adhesion_of_cell) const;
+  const network::Contractile& cell_;
   const ReducedData& data_;
   std::vector<int> adhesion_ids_;
   SolvedMisfit solved_misfit_;
   int threads_;
-  std::vector<Eigen::Index> pair_of_;  ///< of the network's i-th adhesion in the data
+  std::vector<Eigen::Index> pair_of_;  ///< of the i-th adhesion that holds the cell, in the data
 };
 
 /// The multiple of these tensions that fits best. Forces grow in proportion to the tensions (but for cables beyond

@@ -131,18 +131,16 @@ CableNetwork::CableNetwork(Network network, CableParameters parameters) {
     if (is_held(network, v)) held_vertices.push_back(static_cast<int>(v));
   const double mean_rest = mean_rest_length_um(network);
   FreeVertices free = free_vertices(network);
-  impl_ = std::make_unique<Impl>(Impl{std::move(network), parameters, std::move(fibre_ids), std::move(adhesion_ids),
-                                      std::move(group), std::move(adhesion), std::move(held_vertices), mean_rest,
-                                      std::move(free)});
+  impl_ = std::make_shared<const Impl>(Impl{std::move(network), parameters, std::move(fibre_ids),
+                                            std::move(adhesion_ids), std::move(group), std::move(adhesion),
+                                            std::move(held_vertices), mean_rest, std::move(free)});
 }
-CableNetwork::~CableNetwork() = default;
-CableNetwork::CableNetwork(CableNetwork&&) noexcept = default;
-CableNetwork& CableNetwork::operator=(CableNetwork&&) noexcept = default;
 
 const Network& CableNetwork::network() const { return impl_->network; }
 const CableParameters& CableNetwork::parameters() const { return impl_->parameters; }
 const std::vector<int>& CableNetwork::fibre_ids() const { return impl_->fibre_ids; }
 const std::vector<int>& CableNetwork::adhesion_ids() const { return impl_->adhesion_ids; }
+bool CableNetwork::is_cut() const { return !impl_->network.held_by_cut.empty(); }
 const std::vector<int>& CableNetwork::held_vertices() const { return impl_->held_vertices; }
 
 Equilibrium CableNetwork::equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start,
@@ -326,6 +324,16 @@ GeometryGradient CableNetwork::geometry_gradient(const std::vector<double>& tens
     }
   }
   return gradient;
+}
+
+// Of a sheet of links that carry share · t: half the trace of its stress, sigma = t / (2 A) sum share_k l_k. On a
+// regular triangulation of edge h this is sqrt(3) t / h (docs/theory.md, 4).
+double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN) {
+  double sum_um = 0;
+  for (const Link& link : network.links) {
+    if (link.fibre_id == 0) sum_um += link.share * link.rest_length_um;
+  }
+  return tension_nN * sum_um / (2 * std::abs(signed_area_um2(outline_um)));
 }
 
 }  // namespace mbtfm::cables

@@ -13,8 +13,10 @@
 #include <string>
 #include <vector>
 
+#include "network/contractile.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/network.h"
+#include "pipeline/contract/polyline.h"
 #include "pipeline/contract/report.h"
 #include "pipeline/stage/parameters.h"
 
@@ -52,22 +54,19 @@ struct GeometryGradient {
   Eigen::MatrixXd by_link;  ///< as the link's own tension grows
 };
 
-/// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix.
-class CableNetwork {
+/// A network prepared for many equilibria: numbering of the unknowns and the pattern of the stiffness matrix. Copies
+/// share it.
+class CableNetwork final : public network::Contractile {
  public:
   /// @throws InvalidData where fewer than two adhesions hold the network, or none beside a cut: its equilibrium is a
   /// point, or pulls on no substrate
   explicit CableNetwork(Network network, CableParameters parameters = {});
-  ~CableNetwork();
-  CableNetwork(CableNetwork&&) noexcept;
-  CableNetwork& operator=(CableNetwork&&) noexcept;
 
   const Network& network() const;
   const CableParameters& parameters() const;
-  /// Labels of the groups that have a tension: front() is 0, the actin network; then the fibres in rising order.
-  const std::vector<int>& fibre_ids() const;
-  /// Labels of the adhesions that hold vertices, in rising order.
-  const std::vector<int>& adhesion_ids() const;
+  const std::vector<int>& fibre_ids() const override;
+  const std::vector<int>& adhesion_ids() const override;
+  bool is_cut() const override;
   /// Vertices that adhesions or the cut hold, in rising order.
   const std::vector<int>& held_vertices() const;
 
@@ -79,6 +78,9 @@ class CableNetwork {
   /// @throws InvalidData where a tension is negative, not finite or missing
   Equilibrium equilibrium(const std::vector<double>& tensions_nN, const std::vector<Vec2>& start = {},
                           std::optional<double> force_tolerance = {}) const;
+  std::shared_ptr<const network::AtRest> at_rest(const Eigen::VectorXd& tensions_nN,
+                                                 const network::AtRest* nearby = nullptr,
+                                                 std::optional<double> force_tolerance = {}) const override;
 
   /// Force of the network on each held vertex, by vertex (zero for the free ones).
   std::vector<Vec2> reactions_nN(const std::vector<double>& tensions_nN, const Equilibrium& equilibrium) const;
@@ -103,7 +105,13 @@ class CableNetwork {
 
  private:
   struct Impl;
-  std::unique_ptr<Impl> impl_;
+  std::shared_ptr<const Impl> impl_;
 };
+
+/// Surface tension of a network whose cables have this tension.
+double surface_tension_nN_per_um(const Network& network, const Polygon& outline_um, double tension_nN);
+
+/// Of cables at rest; of another model: std::bad_cast.
+const Equilibrium& equilibrium_of(const network::AtRest& cables);
 
 }  // namespace mbtfm::cables

@@ -3,6 +3,7 @@
 #include <Eigen/Dense>
 #include <numbers>
 
+#include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "tests/support/equilibrium.h"
 

@@ -4,6 +4,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "network/cables/cables.h"
 #include "pipeline/numerics/parallel.h"
 #include "tests/support/equilibrium.h"
 #include "tests/support/lattice.h"

@@ -13,9 +13,7 @@ TEST(FitSummary, expects_the_misfit_that_there_is_where_the_model_is_right) {
   for (const auto& [a, b] : {std::pair{1, 9}, {3, 12}, {5, 15}}) test::add_ventral(cell, a, b);
   test::TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.1, 3, 5, 2), 4000, 0.1, 7);
   const EnsembleFit fit = test::fit_own_network(scene);
-  std::vector<cables::CableNetwork> networks;
-  networks.emplace_back(scene.cables.network());
-  const FitSummary summary = summary_of(fit, {.cell = cell, .beads = scene.beads}, networks, {});
+  const FitSummary summary = summary_of(fit, {.cell = cell, .beads = scene.beads}, 0.5, {});
   EXPECT_NEAR(summary.noise_um, scene.beads.front().sigma_um, 0.1 * scene.beads.front().sigma_um);
   // of 8000 components; the noise level by the median of those far away is good to some per cent
   EXPECT_NEAR(summary.expected_relative_l2 / summary.relative_l2, 1, 0.1);
@@ -73,22 +71,15 @@ Network regular_sheet(int side, double edge_um, Polygon& outline_um) {
   return network;
 }
 
-TEST(FitSummary, surface_tension_of_a_regular_network_is_root_three_times_tension_over_edge) {
+TEST(Cables, surface_tension_of_a_regular_network_is_root_three_times_tension_over_edge) {
   constexpr int kSide = 40;
   constexpr double kEdge_um = 0.7, kTension_nN = 0.06;
   Cell cell;
-  std::vector<cables::CableNetwork> networks;
-  networks.emplace_back(regular_sheet(kSide, kEdge_um, cell.outline_um));
-  EnsembleFit fit;
-  fit.fibre_ids = {0};
-  fit.tensions_nN = {{.value = kTension_nN}};
-  fit.forces_nN = Eigen::VectorXd::Zero(4);
-  fit.torques_nN_um = Eigen::VectorXd::Zero(2);
-  fit.data = reduce({}, Eigen::MatrixXd(0, 4));
-  const FitSummary summary = summary_of(fit, {.cell = cell, .beads = {}}, networks, {});
+  const double found =
+      cables::surface_tension_nN_per_um(regular_sheet(kSide, kEdge_um, cell.outline_um), cell.outline_um, kTension_nN);
   const double expected = std::sqrt(3.0) * kTension_nN / kEdge_um;
   // beside 9 side² links there are half as many more as the border has, 6 side, since these count whole
-  EXPECT_NEAR(summary.network_surface_tension_nN_per_um, (1 + 3.0 / (9 * kSide)) * expected, 1e-9 * expected);
+  EXPECT_NEAR(found, (1 + 3.0 / (9 * kSide)) * expected, 1e-9 * expected);
 }
 
 }  // namespace

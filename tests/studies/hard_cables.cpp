@@ -6,6 +6,7 @@
 #include <fstream>
 #include <sstream>
 
+#include "network/cables/cables.h"
 #include "tests/support/hard_cables.h"
 
 namespace {

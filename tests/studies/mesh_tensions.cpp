@@ -7,6 +7,7 @@
 #include <random>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "samples/experiment/experiment.h"
 #include "substrate/compliance.h"

@@ -131,7 +131,7 @@ Thesis minimise(const tensions::TensionProblem& compliance_given, const tensions
   parameters.gradients = tensions::Gradients::finite_difference;
   parameters.max_evaluations = 2 * most_evaluations;
   parameters.tolerance = 1e-300;  // its steps are short long before the minimum
-  const tensions::TensionProblem problem(compliance_given.cables(), compliance_given.data(),
+  const tensions::TensionProblem problem(compliance_given.cell(), compliance_given.data(),
                                          compliance_given.adhesion_ids(), until_there);
   try {
     tensions::fit_tensions(problem, parameters, 1, problem.evaluate(thesis_start_nN(problem)));

@@ -10,6 +10,7 @@
 #include "mbtfm/tensions/beyond_cut.h"
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
+#include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "samples/experiment/experiment.h"
 #include "segment/cells/hand_drawn.h"

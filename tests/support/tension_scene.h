@@ -9,6 +9,7 @@
 #include <random>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "network/cables/cables.h"
 #include "network/mesh/mesh.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
