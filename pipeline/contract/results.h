@@ -26,6 +26,21 @@ struct AdhesionForce {
   std::optional<double> low_nN{}, high_nN{};  ///< 95 % interval of the magnitude
 };
 
+/// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
+struct MissingFibre {
+  int start_adhesion_id = 0, end_adhesion_id = 0;
+  double tension_nN = 0;
+  double chi_squared_gain = 0;  ///< the other tensions following, in units of the noise
+};
+double sigma_nN(const MissingFibre& fibre);
+
+/// A force that the beads call for away from all adhesions.
+struct MissingAdhesion {
+  Vec2 position_um;
+  Vec2 force_nN;                ///< of the cell on the gel
+  double chi_squared_gain = 0;  ///< of two numbers; noise and the model's error counted
+};
+
 /// What each source adds to a standard error. In squares they add up.
 struct ErrorParts {
   double beads = 0;               ///< noise of the displacements

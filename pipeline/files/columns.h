@@ -124,10 +124,11 @@ struct Column {
   /// What is not kept as it is written. @param get  of a row  @param put  into a row
   template <class Get, class Put>
   requires std::invocable<Put, Row&, std::invoke_result_t<Get, const Row&>> Column(std::string column,
-                                                                                   std::string means, Get get, Put put)
-      : Column(std::move(column), std::move(means), get) {
+                                                                                   std::string means, Get get, Put put,
+                                                                                   ColumnOptions options = {})
+      : Column(std::move(column), std::move(means), get, options) {
     take = [=, column = name](Row& row, const CsvTable& table, int at) {
-      put(row, value_in<std::invoke_result_t<Get, const Row&>>(table, at, column, Range::any()));
+      put(row, value_in<std::invoke_result_t<Get, const Row&>>(table, at, column, options.range));
     };
   }
 };

@@ -198,10 +198,64 @@ const Table<Reaction>& reaction_table() {
   return table;
 }
 
+const Table<MissingFibre>& missing_fibre_table() {
+  static const Table<MissingFibre> table{
+      .file = "4_fit/missing_fibres.csv",
+      .row = "each fibre that was not segmented and that the beads call for (`mbtfm-add-fibres` adds them)",
+      .columns = {
+          {"start_adhesion_id", "adhesion at one end", &MissingFibre::start_adhesion_id, kId},
+          {"end_adhesion_id", "adhesion at the other end", &MissingFibre::end_adhesion_id, kId},
+          {"tension_nN", "its tension", &MissingFibre::tension_nN, kResultMayLack},
+          {"chi_squared_gain", "how much less misfit it leaves, in units of the noise", &MissingFibre::chi_squared_gain,
+           kResultMayLack},
+          {"sigma_nN", "standard error of the tension", [](const MissingFibre& f) { return sigma_nN(f); }, kResult}}};
+  return table;
+}
+
+const Table<MissingAdhesion>& missing_adhesion_table() {
+  using Row = MissingAdhesion;
+  static const Table<Row> table{
+      .file = "4_fit/missing_adhesions.csv",
+      .row = "each place away from all adhesions where the beads call for a force",
+      .columns = {{"x_um", "the place", x_of(&Row::position_um), kResult},
+                  {"y_um", "the place", y_of(&Row::position_um), kResult},
+                  {"fx_nN", "force of the cell on the gel", x_of(&Row::force_nN), kResult},
+                  {"fy_nN", "force of the cell on the gel", y_of(&Row::force_nN), kResult},
+                  {"chi_squared_gain", "how much less misfit it leaves", &Row::chi_squared_gain, kResultMayLack}}};
+  return table;
+}
+
+const Table<ImagePlace>& image_place_table() {
+  static const Table<ImagePlace> table{.file = "1_segment/images.csv",
+                                       .row = "the picture `images.jpg`",
+                                       .columns = {{"x_um", "its left edge", x_of(&ImagePlace::low_um)},
+                                                   {"y_um", "its upper edge", y_of(&ImagePlace::low_um)},
+                                                   {"width_um", "its width", x_of(&ImagePlace::size_um)},
+                                                   {"height_um", "its height", y_of(&ImagePlace::size_um)}}};
+  return table;
+}
+
+const Table<FrameRow>& frame_table() {
+  static const Table<FrameRow> table{
+      .file = "2_track/frames.csv",
+      .row = "each frame of a time series",
+      .columns = {{"frame", "counts from 1", &FrameRow::frame, kId},
+                  {"image", "its name", &FrameRow::image, kMayLack},
+                  {"n_tracked", "beads that were found", &FrameRow::n_tracked, kMayLack},
+                  {"drift_x_um", "common motion, taken off", &FrameRow::drift_x_um, kResultMayLack},
+                  {"drift_y_um", "common motion, taken off", &FrameRow::drift_y_um, kResultMayLack},
+                  {"turn_deg", "common turn, taken off", &FrameRow::turn_deg, kResultMayLack},
+                  {"noise_um", "standard error of a component far from the cell", &FrameRow::noise_um, kResultMayLack},
+                  {"largest_displacement_um", "of the beads", &FrameRow::largest_displacement_um, kResultMayLack},
+                  {"refused", "why it has no displacements; empty: it has", &FrameRow::refused}}};
+  return table;
+}
+
 std::string pages_of_cell_tables() {
   return page_of(adhesion_table()) + page_of(fibre_table()) + page_of(fibre_point_table()) + page_of(outline_table()) +
-         page_of(displacement_table()) + page_of(tension_table()) + page_of(adhesion_force_table()) +
-         page_of(point_table()) + page_of(reaction_table());
+         page_of(image_place_table()) + page_of(displacement_table()) + page_of(frame_table()) +
+         page_of(tension_table()) + page_of(adhesion_force_table()) + page_of(missing_fibre_table()) +
+         page_of(missing_adhesion_table()) + page_of(point_table()) + page_of(reaction_table());
 }
 
 }  // namespace mbtfm::files

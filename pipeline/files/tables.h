@@ -62,6 +62,25 @@ struct Reaction {
 };
 const Table<Reaction>& reaction_table();
 
+const Table<MissingFibre>& missing_fibre_table();
+const Table<MissingAdhesion>& missing_adhesion_table();
+
+/// Where images.jpg lies.
+struct ImagePlace {
+  Vec2 low_um, size_um;
+};
+const Table<ImagePlace>& image_place_table();
+
+/// What the tracker says of a frame of a time series.
+struct FrameRow {
+  int frame = 0;
+  std::string image = {};
+  std::optional<int> n_tracked = {};
+  std::optional<double> drift_x_um = {}, drift_y_um = {}, turn_deg = {}, noise_um = {}, largest_displacement_um = {};
+  std::string refused = {};  ///< why it has no displacements
+};
+const Table<FrameRow>& frame_table();
+
 /// Their part of docs/columns.md.
 std::string pages_of_cell_tables();
 
