@@ -13,7 +13,7 @@ struct MagnitudeInterval {
 ///   low:   P(R | low)  = 0.975, 0 where P(R | 0) is less
 ///   high:  P(R | high) = 0.025 P(R | 0)
 ///
-/// Covers the true length in 95 % of the cases where it is some σ or more, in 97.5 % where it is 0; never negative,
+/// Covers the true length in 95 % of the cases where it is 5 σ or more, in 97.5 % up to 2 σ; never negative,
 /// never empty. Without the factor P(R | 0), which is 1 from 3 σ on, a small R would leave no length at all.
 /// @param sigma  0: the length is exact; infinite: so is `high`
 /// Source: Rice, Bell Syst. Tech. J. 24, 46 (1945), (3.10-11); Read, J. Phys. G 28, 2693 (2002), for the factor.

@@ -132,16 +132,13 @@ const Table<AdhesionRow>& adhesion_table() {
   const auto of_adhesion = [=](std::vector<std::string> names) {
     return files::columns_of<AdhesionRow>(files::adhesion_table(), adhesion, names);
   };
-  const auto of_force = [](std::vector<std::string> names) {
-    return files::columns_of<AdhesionRow>(files::adhesion_force_table(), &AdhesionRow::of, names);
-  };
+  const auto force = files::adhesion_force_table().without({"adhesion_id", "x_um", "y_um", "area_um2"});
   static const Table<AdhesionRow> table{
       .file = "statistics/adhesions.csv",
       .row = "each adhesion",
       .columns = files::joined<AdhesionRow>({cell_columns<files::ForceOnAdhesion>(),
                                              of_adhesion({"adhesion_id", "x_um", "y_um", "area_um2", "eccentricity"}),
-                                             of_force({"fx_nN", "fy_nN", "force_nN", "traction_kPa", "sigma_nN",
-                                                       "force_low_nN", "force_high_nN", "connected"}),
+                                             files::columns_of<AdhesionRow>(force, &AdhesionRow::of),
                                              of_adhesion({"origin"})})};
   return table;
 }
@@ -167,23 +164,19 @@ const Table<FibreRow>& fibre_table() {
     return files::columns_of<FibreRow>(
         files::fibre_table(), [](const FibreRow& row) -> const Fibre& { return *row.of.fibre; }, names);
   };
-  const auto of_tension = [](std::vector<std::string> names) {
-    return files::columns_of<FibreRow>(
-        files::tension_table(), [](const FibreRow& row) -> const files::FibreTension& { return row.of.tension; },
-        names);
-  };
+  const auto tension = files::tension_table().without({"fibre_id", "type", "sigma_nN"});
+  const auto of_row = [](const FibreRow& row) -> const files::FibreTension& { return row.of.tension; };
   static const Table<FibreRow> table{
       .file = "statistics/fibres.csv",
       .row = "each fibre with a tension",
       .columns = files::joined<FibreRow>(
           {cell_columns<MeasuredTension>(),
            of_fibre({"fibre_id", "type", "length_um", "width_um", "confidence"}),
-           of_tension({"tension_nN", "low_nN", "high_nN"}),
+           files::columns_of<FibreRow>(tension, of_row),
            {{"sigma_nN",
              "standard error that the statistics take: half the interval over 1.96, the upper half where 0 cuts the "
              "lower",
-             [](const FibreRow& row) { return standard_error_nN(row.of.tension.tension); }, kResult}},
-           of_tension({"identifiable"})})};
+             [](const FibreRow& row) { return standard_error_nN(row.of.tension.tension); }, kResult}}})};
   return table;
 }
 
