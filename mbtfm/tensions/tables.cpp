@@ -70,7 +70,7 @@ const Table<FitOfFrame>& frame_fit_table() {
              return row.fit.total_force_nN.value - row.fit.network_force_nN.value;
            },
            kResult},
-          of_fit("relative_l2", "|measured − model| / |measured|", &FrameFit::relative_l2),
+          of_fit("relative_l2", "‖measured − model‖ / ‖measured‖", &FrameFit::relative_l2),
           of_fit("chi_squared_per_degree", "1 where the model explains all but the noise",
                  &FrameFit::chi_squared_per_degree),
           of_fit("converged", "the fit came to its end", &FrameFit::converged),
@@ -109,7 +109,7 @@ const Table<ModelScore>& model_table() {
       .columns = {{"model", "its name: no-fibres, full, adhesion-forces", &Row::name},
                   {"n_parameters", "numbers that are fitted", &Row::n_parameters},
                   {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
-                  {"relative_l2", "|measured − model| / |measured|", &Row::relative_l2, kResult},
+                  {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},
                   {"aic", "Akaike's criterion", &Row::aic, kResult},
                   {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
   return table;

@@ -149,7 +149,9 @@ std::vector<Tension> read_tensions(const Path& file) {
 }
 
 void write_tensions(const Path& file, const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres) {
-  write(file, tension_table(), with_types(tensions, fibres));
+  const std::vector<FibreTension> rows = with_types(tensions, fibres);
+  for (const FibreTension& row : rows) MBTFM_ASSERT(row.type || row.tension.fibre_id == 0);
+  write(file, tension_table(), rows);
 }
 
 std::vector<AdhesionForce> read_adhesion_forces(const Path& file) {

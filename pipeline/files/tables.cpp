@@ -3,8 +3,6 @@
 #include <map>
 #include <numbers>
 
-#include "pipeline/contract/errors.h"
-
 namespace mbtfm::files {
 
 namespace {
@@ -117,13 +115,10 @@ const Table<Bead>& displacement_table() {
 }
 
 std::vector<FibreTension> with_types(const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres) {
-  std::map<int, std::optional<FibreType>> type_of = {{0, std::nullopt}};
+  std::map<int, std::optional<FibreType>> type_of;
   for (const Fibre& f : fibres) type_of[f.fibre_id] = f.type;
   std::vector<FibreTension> rows;
-  for (const Tension& t : tensions) {
-    MBTFM_ASSERT(type_of.contains(t.fibre_id));
-    rows.push_back({.tension = t, .type = type_of[t.fibre_id]});
-  }
+  for (const Tension& t : tensions) rows.push_back({.tension = t, .type = type_of[t.fibre_id]});
   return rows;
 }
 

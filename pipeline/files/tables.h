@@ -45,7 +45,7 @@ struct FibreTension {
   Tension tension;
   std::optional<FibreType> type;  ///< none: the actin network, or not known
 };
-/// @throws InternalError where `fibres` lacks one of them
+/// With none where `fibres` lacks the fibre.
 std::vector<FibreTension> with_types(const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres);
 const Table<FibreTension>& tension_table();
 

@@ -108,7 +108,7 @@ const Table<InCell<CellRow>>& cell_table() {
              [](const Row& row) { return row.of.network_tension_nN(); }, kResult},
             {"network_surface_tension_nN_per_um", "of the actin network as a sheet",
              network(&FitSummary::network_surface_tension_nN_per_um), kResult},
-            {"relative_l2", "|measured − model| / |measured|", fit(&FitSummary::relative_l2), kResult},
+            {"relative_l2", "‖measured − model‖ / ‖measured‖", fit(&FitSummary::relative_l2), kResult},
             {"expected_relative_l2", "what the beads' noise alone would leave", fit(&FitSummary::expected_relative_l2),
              kResult},
             {"noise_um", "of a component of the displacement", fit(&FitSummary::noise_um), kResult},
