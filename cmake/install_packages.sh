@@ -11,7 +11,7 @@ packages=(
   librsvg2-dev pkg-config fonts-dejavu-core
   libcli11-dev nlohmann-json3-dev libfmt-dev libtomlplusplus-dev
   libjs-vega
-  libgtest-dev libgmock-dev libbenchmark-dev
+  libgtest-dev libgmock-dev libbenchmark-dev python3-jsonschema
   "$@"
 )
 

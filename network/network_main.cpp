@@ -15,11 +15,7 @@ std::string counted(std::size_t n, const std::string& what) {
   return n == 0 ? "" : ", " + std::to_string(n) + " " + what;
 }
 
-std::string listed(const std::vector<int>& ids) {
-  std::string list;
-  for (const int id : ids) list += (list.empty() ? "" : " ") + std::to_string(id);
-  return list;
-}
+std::vector<std::int64_t> list_of(const std::vector<int>& ids) { return {ids.begin(), ids.end()}; }
 
 struct NetworkStageParameters {
   mesh::NetworkParameters network;
@@ -64,9 +60,9 @@ StageReport report_of(const mesh::GeneratedNetwork& generated) {
                     {"relaxation_converged", generated.report.converged},
                     {"relaxation_steps", static_cast<std::int64_t>(generated.report.iterations)},
                     {"last_move_edges", generated.report.last_change},
-                    {"clipped_fibre_ids", listed(generated.clipped_fibre_ids)},
-                    {"snapped_adhesion_ids", listed(generated.snapped_adhesion_ids)},
-                    {"separated_adhesion_ids", listed(generated.separated_adhesion_ids)}};
+                    {"clipped_fibre_ids", list_of(generated.clipped_fibre_ids)},
+                    {"snapped_adhesion_ids", list_of(generated.snapped_adhesion_ids)},
+                    {"separated_adhesion_ids", list_of(generated.separated_adhesion_ids)}};
   if (n_by_cut > 0) report.figures.emplace_back("n_held_by_cut", n_by_cut);
   return report;
 }

@@ -3,7 +3,7 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/stage/stage.h"
 #include "segment/rois/roi.h"
 
@@ -37,20 +37,20 @@ StageReport add_fibres(const AddFibresParameters&, stage::StageContext& context)
     if (is_line(roi.shape)) fibres.push_back(roi);
   }
   const auto n_segmented = static_cast<std::int64_t>(fibres.size());
-  const files::CsvTable missing(missing_file);
-  for (int row = 0; row < missing.n_rows(); ++row) {
+  const std::vector<MissingFibre> missing = files::read(missing_file, files::missing_fibre_table());
+  for (const MissingFibre& m : missing) {
     Roi fibre;
     fibre.shape = RoiShape::polyline;
-    fibre.name = "added " + std::to_string(row + 1);
-    for (const char* end : {"start_adhesion_id", "end_adhesion_id"})
-      fibre.points_px.push_back(centre_of_adhesion(rois, missing.integer(row, end, 1), rois_file.string()));
+    fibre.name = "added " + std::to_string(&m - missing.data() + 1);
+    for (const int id : {m.start_adhesion_id, m.end_adhesion_id})
+      fibre.points_px.push_back(centre_of_adhesion(rois, id, rois_file.string()));
     fibres.push_back(fibre);
   }
   write_roi_set(context.output("out"), fibres);
   StageReport report;
-  report.summary = std::to_string(n_segmented) + " segmented fibres and " + std::to_string(missing.n_rows()) +
+  report.summary = std::to_string(n_segmented) + " segmented fibres and " + std::to_string(missing.size()) +
                    " that the beads call for; beside cell.toml, as fibres.zip, they are what mbtfm run takes";
-  report.figures = {{"n_segmented", n_segmented}, {"n_added", std::int64_t{missing.n_rows()}}};
+  report.figures = {{"n_segmented", n_segmented}, {"n_added", std::int64_t(missing.size())}};
   return report;
 }
 

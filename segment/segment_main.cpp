@@ -3,9 +3,8 @@
 #include <opencv2/core/utility.hpp>
 
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
-#include "pipeline/files/text.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/stage/stage.h"
@@ -216,9 +215,7 @@ void write_cell(stage::StageContext& context, const std::string& folder, const S
   files::write_cell_vtp(out("cell.vtp"), s.cell);
   images::write_png(out("overlay.png"), overlay);
   images::write_jpeg(out("images.jpg"), ground.picture);
-  files::CsvText place({"x_um", "y_um", "width_um", "height_um"});
-  place.add(ground.low_um.x).add(ground.low_um.y).add(ground.size_um.x).add(ground.size_um.y).end_row();
-  files::write_text(out("images.csv"), place.str());
+  files::write(out("images.csv"), files::image_place_table(), {{ground.low_um, ground.size_um}});
   if (s.second) {
     files::write_adhesions(out("adhesions_2.csv"), s.second->adhesions);
     files::write_fibres(out("fibres_2.csv"), out("fibre_points_2.csv"), s.second->fibres);

@@ -6,10 +6,9 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/named_array.h"
-#include "pipeline/files/text.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
@@ -242,58 +241,44 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
           pixel_size_um};
 }
 
-/// What came of the frames of a time series, one row each.
-class FrameList {
- public:
-  void add(const Frame& frame, const Tracking& t) {
-    begin(frame)
-        .add(t.n_good)
-        .add(t.common.drift_um.x)
-        .add(t.common.drift_um.y)
-        .add(t.common.turn_rad * kRadian_deg)
-        .add(t.noise_um);
-    list_.add(figures_of(t.field).largest_um).add("").end_row();
-  }
-  void add_refused(const Frame& frame, const std::string& why) {
-    begin(frame);
-    for (int column = 0; column < 6; ++column) list_.add("");
-    list_.add(why).end_row();
-  }
-  std::string str() const { return list_.str(); }
-
- private:
-  files::CsvText& begin(const Frame& frame) { return list_.add(++n_).add(frame.name()); }
-  int n_ = 0;
-  files::CsvText list_{{"frame", "image", "n_tracked", "drift_x_um", "drift_y_um", "turn_deg", "noise_um",
-                        "largest_displacement_um", "refused"}};
-};
+files::FrameRow row_of(int frame, const std::string& image, const Tracking& t) {
+  return {.frame = frame,
+          .image = image,
+          .n_tracked = t.n_good,
+          .drift_x_um = t.common.drift_um.x,
+          .drift_y_um = t.common.drift_um.y,
+          .turn_deg = t.common.turn_rad * kRadian_deg,
+          .noise_um = t.noise_um,
+          .largest_displacement_um = figures_of(t.field).largest_um};
+}
 
 /// The first frame that could be tracked stands for the series; one that could not does not stop the others.
 StageReport track_series(const std::vector<Frame>& frames, stage::StageContext& context,
                          const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
-  FrameList list;
+  std::vector<files::FrameRow> list;
   std::optional<StageReport> first;
   std::vector<InputError> refused;
   for (std::size_t k = 0; k < frames.size(); ++k) {
+    const int number = static_cast<int>(k) + 1;
     const double n = static_cast<double>(frames.size());
     const Progress progress = [&](double fraction, std::string_view what) {
       context.progress((static_cast<double>(k) + fraction) / n, what);
     };
     try {
       const auto [tracking, pixel_size_um] = tracked_frame(frames[k], progress);
-      const fs::path name = files::displacement_of_frame(static_cast<int>(k) + 1);
+      const fs::path name = files::displacement_of_frame(number);
       write_field(context, tracking.field, name.stem().string());
-      list.add(frames[k], tracking);
+      list.push_back(row_of(number, frames[k].name(), tracking));
       if (first) continue;
       write_field(context, tracking.field, "displacement");
       first = report_of(tracking, pixel_size_um);
     } catch (const InputError& error) {
-      list.add_refused(frames[k], error.what());
+      list.push_back({.frame = number, .image = frames[k].name(), .refused = error.what()});
       refused.push_back(error);
     }
   }
   if (!first) throw refused.front();
-  files::write_text(context.output("out", "frames.csv"), list.str());
+  files::write(context.output("out", "frames.csv"), files::frame_table(), list);
   StageReport& report = *first;
   report.figures.emplace_back("n_frames", static_cast<std::int64_t>(frames.size()));
   report.figures.emplace_back("n_frames_refused", static_cast<std::int64_t>(refused.size()));
@@ -326,19 +311,17 @@ void keep_field(stage::StageContext& context, const fs::path& folder, const std:
 /// from the same images it is the same again.
 StageReport complete_series(const std::vector<Frame>& frames, stage::StageContext& context, const fs::path& earlier,
                             const std::function<TrackedFrame(const Frame&, const Progress&)>& tracked_frame) {
-  const files::CsvTable list(earlier / "frames.csv");
   keep_field(context, earlier, "displacement.csv");
   std::int64_t n_kept = 0;
-  for (int row = 0; row < list.n_rows(); ++row) {
-    if (!list.text(row, "refused").empty()) continue;
-    const int frame = list.integer(row, "frame", 1);
-    const std::string name = files::displacement_of_frame(frame);
+  for (const files::FrameRow& row : files::read(earlier / "frames.csv", files::frame_table())) {
+    if (!row.refused.empty()) continue;
+    const std::string name = files::displacement_of_frame(row.frame);
     if (fs::is_regular_file(earlier / name)) {
       keep_field(context, earlier, name);
       ++n_kept;
       continue;
     }
-    const TrackedFrame again = tracked_frame(frames.at(static_cast<std::size_t>(frame) - 1), context.progress);
+    const TrackedFrame again = tracked_frame(frames.at(static_cast<std::size_t>(row.frame) - 1), context.progress);
     write_field(context, again.tracking.field, fs::path(name).stem().string());
   }
   fs::copy_file(earlier / "frames.csv", context.output("out", "frames.csv"));
@@ -360,7 +343,7 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
     return tracked(relaxed, beads, frame, parameters, binning, progress, context);
   };
   const std::optional<fs::path> earlier = earlier_run(context);
-  if (earlier && files::CsvTable(*earlier / "frames.csv").n_rows() == static_cast<int>(frames.size())) {
+  if (earlier && files::read(*earlier / "frames.csv", files::frame_table()).size() == frames.size()) {
     return complete_series(frames, context, *earlier, tracked_frame);
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);

@@ -26,7 +26,7 @@ class Response {
   virtual Eigen::MatrixXd displace(const Eigen::MatrixXd& forces_nN) const = 0;
   /// Gᵀ D: cols() × any number
   virtual Eigen::MatrixXd pull_back(const Eigen::MatrixXd& displacements) const = 0;
-  /// G: not where it is too large to be held
+  /// G: rows() × cols(); not where it is too large to be held
   virtual Eigen::MatrixXd matrix() const = 0;
   /// The same in memory, for many calls: as its matrix, or something that needs less room.
   virtual SharedResponse kept() const = 0;
@@ -38,7 +38,7 @@ class KeptResponse : public Response, public std::enable_shared_from_this<KeptRe
  public:
   Eigen::MatrixXd matrix() const override;
   SharedResponse kept() const override { return shared_from_this(); }
-  /// Gᵀ diag(weight) G, on and above its diagonal; zero or rubbish below
+  /// Gᵀ diag(weight) G, cols() square, on and above its diagonal; zero or rubbish below
   /// @param weight  by row, not negative
   virtual Eigen::MatrixXd upper_gram(const Eigen::VectorXd& weight) const = 0;
   /// The same at some of the points, in this order.

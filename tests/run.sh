@@ -3,12 +3,13 @@
 # e.g. ./tests/run.sh -L unit. MBTFM_TIDY=1: clang-tidy on the sources that differ from origin/main, too.
 set -euo pipefail
 cd "$(dirname "$0")/.."
-./cmake/install_packages.sh chromium clang-format  # chromium: to look at the pages; those tests skip where there is none
+./cmake/install_packages.sh chromium clang-format doxygen  # chromium: to look at the pages; those tests skip where there is none
 find mbtfm network pipeline samples segment substrate tests -name '*.cpp' -o -name '*.h' -o -name '*.inc' |
   xargs clang-format --dry-run -Werror || { echo "mbtfm: run clang-format -i on these files" >&2; exit 1; }
 cmake --preset release -DMBTFM_STRICT=ON >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }
 mv build-configure.log build/configure.log
 cmake --build build
+cmake --build build --target docs
 if [ -n "${MBTFM_TIDY:-}" ]; then
   git diff --name-only --diff-filter=d origin/main -- '*.cpp' | xargs -r clang-tidy -p build --quiet
 fi

@@ -61,9 +61,9 @@ ModelChecks check_model(const ReadyCell& cell, const EnsembleFit& fit, const Par
 
 Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
   const auto best = std::ranges::min_element(checks.models, {}, &ModelScore::bic);
-  std::string unsupported;
+  std::vector<std::int64_t> unsupported;
   for (const FibreLeftOut& f : checks.left_out) {
-    if (f.aic_rise <= 0) unsupported += (unsupported.empty() ? "" : ", ") + std::to_string(f.fibre_id);
+    if (f.aic_rise <= 0) unsupported.push_back(f.fibre_id);
   }
   return {{"best_model_by_bic", best->name},
           {"fibres_not_told_apart", names_of_groups(fit)},
@@ -71,16 +71,16 @@ Figures figures_of(const ModelChecks& checks, const EnsembleFit& fit) {
           {"n_missing_fibres_hinted", std::int64_t(checks.missing_fibres.size())}};
 }
 
-std::string names_of_groups(const EnsembleFit& fit) {
-  std::string text;
+std::vector<std::string> names_of_groups(const EnsembleFit& fit) {
+  std::vector<std::string> names;
   for (const FibreGroup& group : fibres_not_told_apart(fit)) {
-    if (!text.empty()) text += "; ";
+    std::string& text = names.emplace_back();
     for (std::size_t k = 0; k < group.indices.size(); ++k) {
       text += (k > 0 ? " + " : "") + std::to_string(fit.fibre_ids[static_cast<std::size_t>(group.indices[k])]);
     }
     text += ": " + brief(group.sum_nN.value) + " ± " + brief(group.sum_nN.standard_error) + " nN";
   }
-  return text;
+  return names;
 }
 
 }  // namespace mbtfm::fit

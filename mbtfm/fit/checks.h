@@ -27,8 +27,8 @@ struct ModelChecks {
   std::vector<tensions::ModelScore> models;
   tensions::Influence influence;
   std::vector<tensions::FibreLeftOut> left_out;
-  std::vector<tensions::MissingFibre> missing_fibres;
-  std::vector<tensions::MissingAdhesion> missing_adhesions;
+  std::vector<MissingFibre> missing_fibres;
+  std::vector<MissingAdhesion> missing_adhesions;
   std::optional<tensions::CrossValidation> drawn;
 };
 ModelChecks check_model(const ReadyCell& cell, const tensions::EnsembleFit& fit, const Parameters& parameters,
@@ -36,7 +36,7 @@ ModelChecks check_model(const ReadyCell& cell, const tensions::EnsembleFit& fit,
 /// Of fit.json.
 Figures figures_of(const ModelChecks& checks, const tensions::EnsembleFit& fit);
 
-/// "3 + 7: 5.2 ± 0.1 nN; …"
-std::string names_of_groups(const tensions::EnsembleFit& fit);
+/// "3 + 7: 5.2 ± 0.1 nN"
+std::vector<std::string> names_of_groups(const tensions::EnsembleFit& fit);
 
 }  // namespace mbtfm::fit

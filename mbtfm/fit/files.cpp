@@ -1,6 +1,7 @@
 #include "mbtfm/fit/files.h"
 
 #include "mbtfm/tensions/second_placement.h"
+#include "mbtfm/tensions/tables.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/named_array.h"
@@ -54,12 +55,13 @@ files::PointArray weight_array(const LinearData& data) {
 }
 
 void write_checks(stage::StageContext& context, const ModelChecks& checks, const EnsembleFit& fit) {
-  write_correlations(context.output("out", "correlations.csv"), fit);
-  write_models(context.output("out", "models.csv"), checks.models);
-  write_fibres_left_out(context.output("out", "fibres_left_out.csv"), checks.left_out);
-  write_missing_fibres(context.output("out", "missing_fibres.csv"), checks.missing_fibres);
-  write_missing_adhesions(context.output("out", "missing_adhesions.csv"), checks.missing_adhesions);
-  if (checks.drawn) write_cross_validation(context.output("out", "cross_validation.csv"), *checks.drawn);
+  const auto out = [&](const char* file) { return context.output("out", file); };
+  files::write(out("correlations.csv"), correlation_table(), correlation_rows(fit));
+  files::write(out("models.csv"), model_table(), checks.models);
+  files::write(out("fibres_left_out.csv"), fibre_left_out_table(), checks.left_out);
+  files::write(out("missing_fibres.csv"), files::missing_fibre_table(), checks.missing_fibres);
+  files::write(out("missing_adhesions.csv"), files::missing_adhesion_table(), checks.missing_adhesions);
+  if (checks.drawn) files::write(out("cross_validation.csv"), draw_table(), draw_rows(*checks.drawn));
 }
 
 /// The first network, contracted by the mean tensions.
@@ -126,7 +128,8 @@ void write_results(stage::StageContext& context, const FittedCell& cell, const D
   write_frames(context, cell);
   context.progress(0.95, "surface of the gel");
   write_surface(context, cell);
-  if (cell.parameters.explain) write_changes(context.output("out", "effects_left_out.csv"), cell.changes, cell.fit);
+  if (cell.parameters.explain)
+    files::write(context.output("out", "effects_left_out.csv"), change_table(), change_rows(cell.changes, cell.fit));
 }
 
 }  // namespace mbtfm::fit

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "mbtfm/tensions/findings.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/contract/numbers.h"
 
 namespace mbtfm::fit {
@@ -24,8 +25,8 @@ std::string summary_line(const FittedCell& cell) {
   std::string line = std::to_string(tensions.size() - 1) + " fibre tensions, total force " +
                      brief(cell.found.summary.total_force_nN) + " nN, relative L2 " +
                      brief(cell.found.summary.relative_l2) + of_series(cell.frames);
-  const std::string together = names_of_groups(cell.fit);
-  if (!together.empty()) line += "; not told apart, but their sum: fibres " + together;
+  const std::vector<std::string> together = names_of_groups(cell.fit);
+  if (!together.empty()) line += "; not told apart, but their sum: fibres " + listed(together);
   const auto n_unidentifiable = std::ranges::count(tensions, false, &Tension::identifiable);
   if (n_unidentifiable > 0)
     line += "; " + std::to_string(n_unidentifiable) + (n_unidentifiable == 1 ? " tension" : " tensions") +

@@ -3,8 +3,6 @@
 #include <random>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
 
 namespace mbtfm::tensions {
@@ -39,14 +37,6 @@ CrossValidation cross_validate(const TensionProblem& problem, const LinearData& 
         relative_l2(data, problem.evaluate(drawn, &around).forces_nN);
   });
   return result;
-}
-
-void write_cross_validation(const Path& file, const CrossValidation& result) {
-  files::CsvText csv({"draw", "own", "exchanged"});
-  for (std::size_t i = 0; i < result.own.size(); ++i) {
-    csv.add(static_cast<int>(i) + 1).add(result.own[i]).add(result.exchanged[i]).end_row();
-  }
-  files::write_text(file, csv.str());
 }
 
 }  // namespace mbtfm::tensions

@@ -26,7 +26,4 @@ CrossValidation cross_validate(const TensionProblem& problem, const LinearData& 
                                const std::vector<FibreType>& types, const TypeTensions& tensions, int n_draws,
                                std::uint64_t seed, int threads);
 
-/// Columns draw, own, exchanged.
-void write_cross_validation(const Path& file, const CrossValidation& result);
-
 }  // namespace mbtfm::tensions

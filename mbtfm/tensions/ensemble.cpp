@@ -505,8 +505,12 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   return all;
 }
 
+double quantile_975(const Estimate& estimate) {
+  return boost::math::quantile(boost::math::students_t(estimate.degrees), 0.975);
+}
+
 Interval interval_95(const Estimate& estimate) {
-  const double student = boost::math::quantile(boost::math::students_t(estimate.degrees), 0.975);
+  const double student = quantile_975(estimate);
   const double half = kNormal95 * estimate.standard_error;
   const Sides sides = estimate.sides_95.value_or(Sides{half, half});
   return {.low = std::max(0.0, estimate.value - student / kNormal95 * sides.below),

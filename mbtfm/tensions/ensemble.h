@@ -80,6 +80,8 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
                          const FitParameters& parameters, int threads, const Progress& progress,
                          const SolvedMisfit& solved_misfit = {}, const Trial* start = nullptr);
 
+/// Of Student's t at the estimate's degrees of freedom.
+double quantile_975(const Estimate& estimate);
 /// 95 % interval of a positive quantity, by Student's t. `high` is infinite where no bead feels it.
 struct Interval {
   double low = 0, high = 0;

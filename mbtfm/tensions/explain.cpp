@@ -3,8 +3,6 @@
 #include <cmath>
 
 #include "pipeline/contract/numbers.h"
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
 
 namespace mbtfm::tensions {
 
@@ -29,17 +27,6 @@ std::string sentence(const Change& change, const EnsembleFit& fit) {
   const int id = fit.fibre_ids[static_cast<std::size_t>(most)];
   return "would change the tensions by " + percent + ", that of " +
          (id == 0 ? "the network" : "fibre " + std::to_string(id)) + " by " + brief(largest) + " nN";
-}
-
-void write_changes(const std::filesystem::path& file, const std::vector<Change>& changes, const EnsembleFit& fit) {
-  files::CsvText csv({"effect", "fibre_id", "change_nN"});
-  for (const Change& change : changes) {
-    for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i) {
-      csv.add(name_of(change.effect)).add(fit.fibre_ids[static_cast<std::size_t>(i)]).add(change.by_tension_nN[i]);
-      csv.end_row();
-    }
-  }
-  files::write_text(file, csv.str());
 }
 
 }  // namespace mbtfm::tensions

@@ -24,7 +24,4 @@ double relative(const Change& change, const EnsembleFit& fit);
 /// "would change the tensions by 0.8 %, that of fibre 7 by 0.05 nN"; "by at most 3 %"
 std::string sentence(const Change& change, const EnsembleFit& fit);
 
-/// Columns effect, fibre_id, change_nN.
-void write_changes(const std::filesystem::path& file, const std::vector<Change>& changes, const EnsembleFit& fit);
-
 }  // namespace mbtfm::tensions

@@ -11,6 +11,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/magnitude_interval.h"
 
 namespace mbtfm::tensions {
 
@@ -72,6 +73,7 @@ std::vector<Tension> tensions_of(const EnsembleFit& fit) {
                         .tension_nN = e.value,
                         .low_nN = interval.low,
                         .high_nN = std::isfinite(interval.high) ? std::optional(interval.high) : std::nullopt,
+                        .sigma_nN = std::isfinite(e.standard_error) ? std::optional(e.standard_error) : std::nullopt,
                         .identifiable = e.standard_error < scale});
   }
   return tensions;
@@ -89,11 +91,18 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
     const auto at = 2 * static_cast<Eigen::Index>(a);
     const Vec2 network_nN{fit.forces_nN[at], fit.forces_nN[at + 1]};
     const double about_origin_nN_um = fit.torques_nN_um[static_cast<Eigen::Index>(a)];
+    const Vec2 force_nN{exerted_nN[at], exerted_nN[at + 1]};
+    const Estimate& magnitude_nN = fit.force_magnitudes_nN[a];
+    const double student = quantile_975(magnitude_nN) / kNormal95;  // as in interval_95
+    const numerics::MagnitudeInterval interval =
+        numerics::magnitude_interval_95(norm(force_nN), student * magnitude_nN.standard_error);
     forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
-                      .force_nN = {exerted_nN[at], exerted_nN[at + 1]},
-                      .sigma_nN = fit.force_magnitudes_nN[a].standard_error,
+                      .force_nN = force_nN,
+                      .sigma_nN = magnitude_nN.standard_error,
                       .connected = connected.contains(cell.adhesions[a].adhesion_id),
-                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, network_nN)});
+                      .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, network_nN),
+                      .low_nN = interval.low,
+                      .high_nN = interval.high});
   }
   return forces;
 }

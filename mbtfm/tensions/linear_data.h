@@ -18,20 +18,20 @@ namespace mbtfm::tensions {
 /// White noise of W u is white in y.
 struct ReducedData {
   std::shared_ptr<const Eigen::MatrixXd> compliance;  ///< C: 2·adhesions × 2·adhesions; shared, as it may be large
-  Eigen::VectorXd target;                             ///< y
+  Eigen::VectorXd target;                             ///< y: 2·adhesions
   double floor_squared = 0;                           ///< what no force can explain
   Eigen::Index n_components = 0;                      ///< of the beads' displacements that it stands for
   Eigen::Index n_felt = 0;                            ///< directions of the forces that any bead feels
   bool is_upper = false;                              ///< C is an upper triangle
 };
-/// C F
+/// C F: 2·adhesions × any number
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads = 1);
 
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
-  Eigen::VectorXd displacement_um;     ///< u, in the same order
-  Eigen::VectorXd weight_per_um;       ///< W, diagonal: 1/sigma; 0 where the bead is not used
+  Eigen::VectorXd displacement_um;     ///< u: 2·beads, in the same order
+  Eigen::VectorXd weight_per_um;       ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
   Eigen::VectorXd motion_precision;    ///< Λ, diagonal: by motion, the inverse of the variance that is expected of its
@@ -73,9 +73,9 @@ Eigen::MatrixXd motion_in(const LinearData& data, const Eigen::MatrixXd& displac
 /// Forces that adhesions have of their own, E a beside R: the a that explain best what R leaves. Linear in R, so
 /// R + E a = left · R + found, and what the beads' noise makes of a given R is covariance times its variance.
 struct OwnForces {
-  Eigen::MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G
-  Eigen::VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u
-  Eigen::MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ
+  Eigen::MatrixXd left;        ///< 1 − E (MᵀW²M + Λ)⁻¹ MᵀW²G: 2·adhesions square
+  Eigen::VectorXd found_nN;    ///< E (MᵀW²M + Λ)⁻¹ MᵀW²u: 2·adhesions
+  Eigen::MatrixXd covariance;  ///< E (MᵀW²M + Λ)⁻¹ Eᵀ: 2·adhesions square
 };
 /// None where no motion comes of them.
 std::optional<OwnForces> own_forces_in(const LinearData& data);
@@ -83,16 +83,16 @@ std::optional<OwnForces> own_forces_in(const LinearData& data);
 /// What no motion explains of these displacements: P D, P = 1 − M (MᵀW²M + Λ)⁻¹ MᵀW². With Λ, W²P is the inverse of the
 /// covariance W⁻² + M Λ⁻¹ Mᵀ of noise and motions together.
 Eigen::MatrixXd less_motion(const LinearData& data, Eigen::MatrixXd displacements);
-/// What forces and motions leave: P (u − G R), um.
+/// What forces and motions leave: P (u − G R), um, 2·beads.
 Eigen::VectorXd residual_um(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
-/// W² and the weights by bead, by component.
+/// W² and the weights by bead: 2·beads.
 Eigen::VectorXd squared_weights(const LinearData& data);
 
-/// Forces independent of each other that explain the beads best: C⁻¹ y.
+/// Forces independent of each other that explain the beads best: C⁻¹ y, 2·adhesions.
 /// @param reduced  of reduce(), as for the next one
 Eigen::VectorXd free_forces_nN(const ReducedData& reduced);
-/// (CᵀC)⁻¹ X
+/// (CᵀC)⁻¹ X, both 2·adhesions × any number
 Eigen::MatrixXd solve_normal(const ReducedData& reduced, Eigen::MatrixXd X);
 
 /// Answers to the displacements of the beads, M Gᵀ W², some rows at a time: a whole is too large for large scenes.
@@ -112,7 +112,7 @@ class BeadAnswers {
 /// Sum of the magnitudes of forces (fx, fy by adhesion).
 double total_nN(const Eigen::VectorXd& forces_nN);
 
-/// residual_um, times W
+/// residual_um, times W: 2·beads
 Eigen::VectorXd weighted_residual(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
 /// What no force explains of these displacements (um, 2·beads) in place of the data's: reduced.floor_squared of them.

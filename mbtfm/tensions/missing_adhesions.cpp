@@ -7,8 +7,6 @@
 #include <limits>
 #include <map>
 
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
 
@@ -206,14 +204,6 @@ std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const Lin
   }
   std::ranges::stable_sort(found, std::greater(), &MissingAdhesion::chi_squared_gain);
   return found;
-}
-
-void write_missing_adhesions(const Path& file, const std::vector<MissingAdhesion>& adhesions) {
-  files::CsvText csv({"x_um", "y_um", "fx_nN", "fy_nN", "chi_squared_gain"});
-  for (const MissingAdhesion& a : adhesions) {
-    csv.add(a.position_um.x).add(a.position_um.y).add(a.force_nN.x).add(a.force_nN.y).add(a.chi_squared_gain).end_row();
-  }
-  files::write_text(file, csv.str());
 }
 
 }  // namespace mbtfm::tensions

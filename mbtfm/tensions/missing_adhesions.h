@@ -8,20 +8,10 @@
 
 namespace mbtfm::tensions {
 
-/// A place in the cell, away from its adhesions, where a force would explain more than chance of what the model leaves.
-struct MissingAdhesion {
-  Vec2 position_um;
-  Vec2 force_nN;                ///< of the cell on the gel
-  double chi_squared_gain = 0;  ///< of two numbers; noise and the model's error counted
-};
-
 /// The best ones. A score test at places one micrometre apart, of a force spread over a disc of 0.5 um: with g its
 /// displacement of the beads around, less their mean, q = gᵀ W² (u − G R) is compared with its covariance. A gain is
 /// kept where chance would reach it in one cell of twenty, all places tried (Bonferroni).
 std::vector<MissingAdhesion> missing_adhesions(const EnsembleFit& fit, const LinearData& data, const Cell& cell,
                                                const Gel& gel, int threads);
-
-/// Columns x_um, y_um, fx_nN, fy_nN, chi_squared_gain.
-void write_missing_adhesions(const Path& file, const std::vector<MissingAdhesion>& adhesions);
 
 }  // namespace mbtfm::tensions

@@ -6,8 +6,6 @@
 #include <cmath>
 #include <numeric>
 
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
 #include "pipeline/numerics/dense.h"
 
 namespace mbtfm::tensions {
@@ -204,44 +202,6 @@ std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vect
     if (!is_taken) best.push_back(f);
   }
   return best;
-}
-
-void write_correlations(const Path& file, const EnsembleFit& fit) {
-  const Eigen::MatrixXd correlation = correlation_of(fit);
-  files::CsvText csv({"fibre_id", "other_fibre_id", "correlation"});
-  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
-    for (std::size_t j = i + 1; j < fit.fibre_ids.size(); ++j) {
-      csv.add(fit.fibre_ids[i]).add(fit.fibre_ids[j]);
-      csv.add(correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))).end_row();
-    }
-  }
-  files::write_text(file, csv.str());
-}
-
-void write_models(const Path& file, const std::vector<ModelScore>& models) {
-  files::CsvText csv({"model", "n_parameters", "chi_squared", "relative_l2", "aic", "bic"});
-  for (const ModelScore& m : models) {
-    csv.add(m.name).add(m.n_parameters).add(m.chi_squared).add(m.relative_l2).add(m.aic).add(m.bic).end_row();
-  }
-  files::write_text(file, csv.str());
-}
-
-void write_fibres_left_out(const Path& file, const std::vector<FibreLeftOut>& fibres) {
-  files::CsvText csv({"fibre_id", "chi_squared_rise", "aic_rise", "supported", "n_informing_beads"});
-  for (const FibreLeftOut& f : fibres) {
-    csv.add(f.fibre_id).add(f.chi_squared_rise).add(f.aic_rise).add(f.aic_rise > 0 ? "true" : "false");
-    csv.add(f.n_informing_beads).end_row();
-  }
-  files::write_text(file, csv.str());
-}
-
-void write_missing_fibres(const Path& file, const std::vector<MissingFibre>& fibres) {
-  files::CsvText csv({"start_adhesion_id", "end_adhesion_id", "tension_nN", "chi_squared_gain", "sigma_nN"});
-  for (const MissingFibre& f : fibres) {
-    csv.add(f.start_adhesion_id).add(f.end_adhesion_id).add(f.tension_nN).add(f.chi_squared_gain);
-    csv.add(f.tension_nN / std::sqrt(f.chi_squared_gain)).end_row();
-  }
-  files::write_text(file, csv.str());
 }
 
 }  // namespace mbtfm::tensions

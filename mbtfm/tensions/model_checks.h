@@ -52,20 +52,9 @@ struct FibreLeftOut {
 };
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 
-/// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
-struct MissingFibre {
-  int start_adhesion_id = 0, end_adhesion_id = 0;
-  double tension_nN = 0;
-  double chi_squared_gain = 0;  ///< the other tensions following, in units of the noise
-};
 /// The best ones, no adhesion twice. A gain is kept where chance would reach it in one cell of twenty, all pairs tried
 /// (Bonferroni).
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
                                          int threads = 1);
-
-void write_correlations(const Path& file, const EnsembleFit& fit);
-void write_models(const Path& file, const std::vector<ModelScore>& models);
-void write_fibres_left_out(const Path& file, const std::vector<FibreLeftOut>& fibres);
-void write_missing_fibres(const Path& file, const std::vector<MissingFibre>& fibres);
 
 }  // namespace mbtfm::tensions

@@ -47,7 +47,7 @@ WeighedFit fit_reweighted(LinearData data, const network::Contractile& network, 
 
 /// The factor on (Jᵀ Cᵀ C J)⁻¹ that makes it the covariance. Squares: chi² per degree of freedom, but not below 1 where
 /// the beads state their errors; else the same from the asymptotic variance of the loss (Maronna et al., 10.3):
-/// s² <psi²/2> / <(psi' + psi/r)/2>² <w>.
+/// s² E(psi²/2) E(w) / E((psi' + psi/r)/2)², E the mean over the beads.
 double misfit_variance(const LinearData& data, const Eigen::VectorXd& forces_nN, Eigen::Index n_tensions, Loss loss);
 
 }  // namespace mbtfm::tensions

@@ -5,12 +5,12 @@
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
+#include "mbtfm/tensions/tables.h"
 #include "pipeline/charts/chart.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/hash.h"
-#include "pipeline/files/text.h"
 
 namespace mbtfm::tensions {
 
@@ -62,18 +62,15 @@ FrameData good_beads_of(const SeriesFrame& frame, const substrate::SharedRespons
 }
 
 FrameFit described(const SeriesFrame& frame, const EnsembleFit& fit) {
-  FrameFit result{.frame = frame.frame,
-                  .refused = {},
-                  .displacement_sha256 = frame.sha256,
-                  .tensions = tensions_of(fit),
-                  .sigmas_nN = {},
-                  .total_force_nN = fit.total_force_nN,
-                  .network_force_nN = fit.network_force_nN,
-                  .relative_l2 = relative_l2(fit.data, fit.forces_nN),
-                  .chi_squared_per_degree = fit.chi_squared_per_degree,
-                  .converged = fit.report.converged};
-  for (const Estimate& e : fit.tensions_nN) result.sigmas_nN.push_back(e.standard_error);
-  return result;
+  return {.frame = frame.frame,
+          .refused = {},
+          .displacement_sha256 = frame.sha256,
+          .tensions = tensions_of(fit),
+          .total_force_nN = fit.total_force_nN,
+          .network_force_nN = fit.network_force_nN,
+          .relative_l2 = relative_l2(fit.data, fit.forces_nN),
+          .chi_squared_per_degree = fit.chi_squared_per_degree,
+          .converged = fit.report.converged};
 }
 
 Eigen::VectorXd values_of(const FrameFit& fit) {
@@ -81,11 +78,6 @@ Eigen::VectorXd values_of(const FrameFit& fit) {
   for (Eigen::Index i = 0; i < values_nN.size(); ++i)
     values_nN[i] = fit.tensions[static_cast<std::size_t>(i)].tension_nN;
   return values_nN;
-}
-
-/// Of a force that a table holds: value and standard error, whatever that is made of.
-Estimate estimate(const files::CsvTable& table, int row, const std::string& name) {
-  return {.value = table.number(row, name + "_nN"), .standard_error = table.number(row, name + "_sigma_nN")};
 }
 
 std::string type_name(const Tension& tension, const std::vector<Fibre>& fibres) {
@@ -178,13 +170,10 @@ charts::Chart force_chart(const std::vector<FrameFit>& fits, std::optional<doubl
 }  // namespace
 
 std::vector<SeriesFrame> read_series(const Path& folder) {
-  const files::CsvTable table(folder / "frames.csv");
-  table.require({"frame", "refused"});
   std::vector<SeriesFrame> frames;
   const DisplacementField* first = nullptr;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    frames.push_back({.frame = table.integer(row, "frame", 1), .refused = table.text(row, "refused"), .beads = {}});
-  }
+  for (const files::FrameRow& row : files::read(folder / "frames.csv", files::frame_table()))
+    frames.push_back({.frame = row.frame, .refused = row.refused, .beads = {}});
   for (SeriesFrame& frame : frames) {
     if (!frame.refused.empty()) continue;
     const Path file = folder / files::displacement_of_frame(frame.frame);
@@ -251,63 +240,32 @@ std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const n
 
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,
                   std::optional<double> interval_s) {
-  files::CsvText csv(
-      {"frame", "time_s", "fibre_id", "type", "tension_nN", "low_nN", "high_nN", "sigma_nN", "identifiable"});
+  std::vector<TrackRow> rows;
   for (const FrameFit& f : fits) {
-    for (std::size_t i = 0; i < f.tensions.size(); ++i) {
-      const Tension& t = f.tensions[i];
-      csv.add(f.frame).add(time_s(f.frame, interval_s)).add(t.fibre_id).add(type_name(t, fibres)).add(t.tension_nN);
-      csv.add(t.low_nN).add(t.high_nN).add(f.sigmas_nN[i]).add(t.identifiable ? "true" : "false").end_row();
-    }
+    for (const files::FibreTension& fibre : files::with_types(f.tensions, fibres))
+      rows.push_back({.frame = f.frame, .time_s = time_s(f.frame, interval_s), .fibre = fibre});
   }
-  files::write_text(file, csv.str());
+  files::write(file, track_table(), rows);
 }
 
 void write_frames(const Path& file, const std::vector<FrameFit>& fits, std::optional<double> interval_s) {
-  files::CsvText csv({"frame", "time_s", "total_force_nN", "total_force_sigma_nN", "network_force_nN",
-                      "network_force_sigma_nN", "fibre_force_nN", "relative_l2", "chi_squared_per_degree", "converged",
-                      "refused", "displacement_sha256"});
-  for (const FrameFit& f : fits) {
-    csv.add(f.frame).add(time_s(f.frame, interval_s));
-    if (f.refused.empty()) {
-      csv.add(f.total_force_nN.value).add(f.total_force_nN.standard_error);
-      csv.add(f.network_force_nN.value).add(f.network_force_nN.standard_error);
-      csv.add(f.total_force_nN.value - f.network_force_nN.value).add(f.relative_l2).add(f.chi_squared_per_degree);
-      csv.add(f.converged ? "true" : "false");
-    } else {
-      for (int column = 0; column < 8; ++column) csv.add("");
-    }
-    csv.add(f.refused).add(f.displacement_sha256).end_row();
-  }
-  files::write_text(file, csv.str());
+  std::vector<FitOfFrame> rows;
+  for (const FrameFit& f : fits) rows.push_back({.fit = f, .time_s = time_s(f.frame, interval_s)});
+  files::write(file, frame_fit_table(), rows);
 }
 
 std::vector<FrameFit> read_fits(const Path& folder) {
   if (!std::filesystem::is_regular_file(folder / "frames.csv")) return {};
   if (!std::filesystem::is_regular_file(folder / "tracks.csv")) return {};
-  const files::CsvTable frames(folder / "frames.csv"), tracks(folder / "tracks.csv");
-  if (!frames.has("displacement_sha256")) return {};  // of a version that did not tell
+  if (!files::CsvTable(folder / "frames.csv").has("displacement_sha256")) return {};  // of a version that did not tell
   std::map<int, FrameFit> fits;
-  for (int row = 0; row < frames.n_rows(); ++row) {
-    FrameFit& fit = fits[frames.integer(row, "frame", 1)];
-    fit.frame = frames.integer(row, "frame", 1);
-    fit.refused = frames.text(row, "refused");
-    fit.displacement_sha256 = frames.text(row, "displacement_sha256");
-    if (!fit.refused.empty()) continue;
-    fit.total_force_nN = estimate(frames, row, "total_force");
-    fit.network_force_nN = estimate(frames, row, "network_force");
-    fit.relative_l2 = frames.number(row, "relative_l2");
-    fit.chi_squared_per_degree = frames.number(row, "chi_squared_per_degree");
-    fit.converged = frames.text(row, "converged") == "true";
+  for (FitOfFrame& row : files::read(folder / "frames.csv", frame_fit_table())) {
+    const int frame = row.fit.frame;
+    fits[frame] = std::move(row.fit);
   }
-  for (int row = 0; row < tracks.n_rows(); ++row) {
-    FrameFit& fit = fits[tracks.integer(row, "frame", 1)];
-    fit.tensions.push_back({.fibre_id = tracks.integer(row, "fibre_id", 0),
-                            .tension_nN = tracks.number(row, "tension_nN"),
-                            .low_nN = tracks.optional_number(row, "low_nN"),
-                            .high_nN = tracks.optional_number(row, "high_nN"),
-                            .identifiable = tracks.text(row, "identifiable") == "true"});
-    fit.sigmas_nN.push_back(tracks.number(row, "sigma_nN"));
+  for (const TrackRow& row : files::read(folder / "tracks.csv", track_table())) {
+    fits[row.frame].frame = row.frame;
+    fits[row.frame].tensions.push_back(row.fibre.tension);
   }
   std::vector<FrameFit> result;
   for (auto& [frame, fit] : fits) result.push_back(std::move(fit));

@@ -44,7 +44,6 @@ struct FrameFit {
   std::string refused;                   ///< why it has no fit
   std::string displacement_sha256 = {};  ///< of the file that it was fitted to
   std::vector<Tension> tensions = {};
-  std::vector<double> sigmas_nN = {};  ///< standard errors of the tensions
   Estimate total_force_nN = {}, network_force_nN = {};
   double relative_l2 = 0, chi_squared_per_degree = 0;
   bool converged = false;

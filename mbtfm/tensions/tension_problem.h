@@ -14,10 +14,10 @@ namespace mbtfm::tensions {
 
 /// One trial of the tensions. Knows its equilibrium, so that the next trial can start there.
 struct Trial {
-  Eigen::VectorXd tensions_nN;
+  Eigen::VectorXd tensions_nN;  ///< by label: the network, then the fibres
   std::shared_ptr<const network::AtRest> rest;
-  Eigen::VectorXd forces_nN;  ///< by adhesion of the data: fx, fy
-  Eigen::VectorXd residual;   ///< C R − y
+  Eigen::VectorXd forces_nN;  ///< 2·adhesions of the data: fx, fy
+  Eigen::VectorXd residual;   ///< C R − y: as long
   double objective = 0;
 };
 
@@ -47,13 +47,13 @@ class TensionProblem {
                  std::optional<double> force_tolerance = {}) const;
   /// Torque of the cell on the substrate about the origin, by adhesion of the data: those of its vertices together.
   Eigen::VectorXd torques_nN_um(const Trial& trial) const;
-  /// The part of the forces that the actin network brings, by adhesion of the data.
+  /// The part of the forces that the actin network brings: 2·adhesions of the data.
   Eigen::VectorXd network_part_nN(const Trial& trial) const;
   /// dR/dt by adhesion of the data: 2·adhesions × tensions, from the implicit function theorem.
   Eigen::MatrixXd force_derivatives(const Trial& trial) const;
-  /// d(C R)/dt
+  /// d(C R)/dt: 2·adhesions × tensions
   Eigen::MatrixXd jacobian(const Trial& trial) const { return displace(data_, force_derivatives(trial), threads_); }
-  /// dPhi/dt, exact.
+  /// dPhi/dt by tension, exact.
   Eigen::VectorXd gradient(const Trial& trial) const { return jacobian(trial).transpose() * trial.residual; }
   /// dPhi/dt by central differences over threads, as the thesis does (3.2.5); for comparison.
   Eigen::VectorXd finite_difference_gradient(const Trial& trial, int threads) const;

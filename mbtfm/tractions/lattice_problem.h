@@ -43,9 +43,9 @@ class LatticeProblem {
   const NodeField& spread_data() const { return spread_; }
   /// Pᵀ z of random signs: tells the trace of the influence matrix (Hutchinson 1990).
   NodeField spread_signs() const;
-  /// u, components in turn
+  /// u: 2·beads, components in turn
   Eigen::VectorXd data() const;
-  /// Rows of beads' components times the roots of their weights.
+  /// 2·beads × any number: rows of beads' components times the roots of their weights.
   Eigen::MatrixXd weighted(Eigen::MatrixXd by_component) const;
   /// Pᵀ of weighted components
   NodeField spread_of(const Eigen::VectorXd& components) const;

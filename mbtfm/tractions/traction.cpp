@@ -3,9 +3,9 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
-#include "pipeline/files/text.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/magnitude_interval.h"
 #include "pipeline/numerics/memory.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
@@ -39,7 +39,9 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
            "adhesion-forces: the same for an ellipse turned by this (degrees)");
 }
 
-Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
+namespace {
+
+Reconstruction reconstruct_by_method(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
   switch (parameters.method) {
     case TractionMethod::fttc:
       return reconstruct_fttc(inputs, parameters, threads);
@@ -53,6 +55,23 @@ Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameter
       return reconstruct_adhesion_forces(inputs, parameters, threads);
   }
   throw InternalError("unknown method");
+}
+
+void add_intervals(std::vector<AdhesionForce>& forces) {
+  for (AdhesionForce& f : forces) {
+    if (!f.sigma_nN) continue;
+    const numerics::MagnitudeInterval interval = numerics::magnitude_interval_95(norm(f.force_nN), *f.sigma_nN);
+    f.low_nN = interval.low;
+    f.high_nN = interval.high;
+  }
+}
+
+}  // namespace
+
+Reconstruction reconstruct(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
+  Reconstruction r = reconstruct_by_method(inputs, parameters, threads);
+  add_intervals(r.forces);
+  return r;
 }
 
 namespace {
@@ -183,14 +202,51 @@ TractionSums sums_of(const Reconstruction& reconstruction, const TractionInputs&
   return sums;
 }
 
-void write_tractions(const Path& file, const std::vector<Patch>& patches) {
-  files::CsvText csv({"x_um", "y_um", "tx_kPa", "ty_kPa", "area_um2", "ux_um", "uy_um"});
-  for (const Patch& p : patches) {
-    csv.add(p.position_um.x).add(p.position_um.y).add(p.traction_kPa.x).add(p.traction_kPa.y).add(p.area_um2);
-    csv.add(p.displacement_um.x).add(p.displacement_um.y).end_row();
-  }
-  files::write_text(file, csv.str());
+namespace {
+
+constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+
+const files::Table<Patch>& patch_table() {
+  static const files::Table<Patch> table{
+      .file = "traction.csv",
+      .row = "each point or patch of `mbtfm-traction`",
+      .columns = {{"x_um", "the point", files::x_of(&Patch::position_um)},
+                  {"y_um", "the point", files::y_of(&Patch::position_um)},
+                  {"tx_kPa", "traction of the cell on the gel", files::x_of(&Patch::traction_kPa)},
+                  {"ty_kPa", "traction of the cell on the gel", files::y_of(&Patch::traction_kPa)},
+                  {"area_um2", "of the patch around the point", &Patch::area_um2},
+                  {"ux_um", "the model's displacement there", files::x_of(&Patch::displacement_um), kResult},
+                  {"uy_um", "the model's displacement there", files::y_of(&Patch::displacement_um), kResult}}};
+  return table;
 }
+
+struct LambdaRow {
+  ScanPoint point;
+  double length_um = 0, gcv = 0, curvature = 0, evidence = 0, risk = 0;
+};
+const files::Table<LambdaRow>& lambda_table() {
+  using Row = LambdaRow;
+  const auto of = [](auto member) { return [member](const Row& row) { return row.point.*member; }; };
+  static const files::Table<Row> table{
+      .file = "traction_lambda.csv",
+      .row = "each penalty λ that was tried (fttc, trpf, bem)",
+      .columns = {{"lambda", "the penalty, in the method's own unit", of(&ScanPoint::lambda), kResult},
+                  {"length_um", "λE, the same for every method", &Row::length_um, kResult},
+                  {"misfit", "what the model leaves of the displacement", of(&ScanPoint::misfit), kResult},
+                  {"norm", "of the tractions", of(&ScanPoint::norm), kResult},
+                  {"degrees", "of freedom that the tractions use", of(&ScanPoint::degrees), kResult},
+                  {"gcv", "generalised cross-validation; small is good", &Row::gcv, kResult},
+                  {"l_curve_curvature", "of the L-curve; large is good", &Row::curvature, kResult},
+                  {"log_evidence", "Bayesian evidence; large is good", &Row::evidence, kResult},
+                  {"risk", "expected error of the tractions; small is good", &Row::risk, kResult}}};
+  return table;
+}
+
+}  // namespace
+
+std::string pages_of_tables() { return page_of(patch_table()) + page_of(lambda_table()); }
+
+void write_tractions(const Path& file, const std::vector<Patch>& patches) { write(file, patch_table(), patches); }
 
 void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches) {
   std::vector<Vec2> positions;
@@ -207,14 +263,13 @@ void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches) {
 }
 
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda) {
-  files::CsvText csv(
-      {"lambda", "length_um", "misfit", "norm", "degrees", "gcv", "l_curve_curvature", "log_evidence", "risk"});
+  std::vector<LambdaRow> rows;
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& p = scan.points[i];
-    csv.add(p.lambda).add(p.lambda * length_um_per_lambda).add(p.misfit).add(p.norm).add(p.degrees);
-    csv.add(scan.gcv[i]).add(scan.curvature[i]).add(scan.evidence[i]).add(scan.risk[i]).end_row();
+    rows.push_back(
+        {p, p.lambda * length_um_per_lambda, scan.gcv[i], scan.curvature[i], scan.evidence[i], scan.risk[i]});
   }
-  files::write_text(file, csv.str());
+  write(file, lambda_table(), rows);
 }
 
 std::vector<files::PointArray> columns_of(const std::vector<Sensitivity>& sensitivities) {

@@ -132,6 +132,8 @@ std::vector<int> adhesion_of_patches(const std::vector<Vec2>& positions_um, cons
                                      double grow_um);
 
 // files beside traction.csv
+/// Their part of docs/columns.md.
+std::string pages_of_tables();
 void write_tractions(const Path& file, const std::vector<Patch>& patches);
 void write_tractions_vtp(const Path& file, const std::vector<Patch>& patches);
 void write_lambda_scan(const Path& file, const LambdaScan& scan, double length_um_per_lambda);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <type_traits>
 
 namespace mbtfm {
 
@@ -10,7 +11,11 @@ std::string listed(const Texts& texts) {
   std::string list;
   for (const auto& text : texts) {
     if (!list.empty()) list += ", ";
-    list += text;
+    if constexpr (std::is_integral_v<std::remove_cvref_t<decltype(text)>>) {
+      list += std::to_string(text);
+    } else {
+      list += text;
+    }
   }
   return list;
 }

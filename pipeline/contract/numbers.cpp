@@ -11,6 +11,12 @@ std::string shortest(double value) {
   return {buffer, result.ptr};
 }
 
+std::string significant(double value, int digits) {
+  char buffer[64];
+  const auto result = std::to_chars(buffer, buffer + sizeof buffer, value, std::chars_format::general, digits);
+  return {buffer, result.ptr};
+}
+
 std::string brief(double value) {
   char text[32];
   std::snprintf(text, sizeof text, "%.3g", value);

@@ -23,7 +23,8 @@ struct Report {
   std::string reason;  ///< one sentence; where not converged: the likely cause and the numbers that tell
 };
 
-using Value = std::variant<bool, std::int64_t, double, std::string>;
+using Value =
+    std::variant<bool, std::int64_t, double, std::string, std::vector<std::int64_t>, std::vector<std::string>>;
 /// Named figures in the order they were added.
 using Figures = std::vector<std::pair<std::string, Value>>;
 

@@ -11,4 +11,6 @@ double total(const ErrorParts& parts) {
   return std::sqrt(sum);
 }
 
+double sigma_nN(const MissingFibre& f) { return f.tension_nN / std::sqrt(f.chi_squared_gain); }
+
 }  // namespace mbtfm

@@ -13,6 +13,7 @@ struct Tension {
   int fibre_id = 0;  ///< 0: the actin network
   double tension_nN = 0;
   std::optional<double> low_nN, high_nN;  ///< 95 % interval
+  std::optional<double> sigma_nN{};       ///< standard error
   bool identifiable = true;
 };
 
@@ -20,8 +21,24 @@ struct AdhesionForce {
   int adhesion_id = 0;
   Vec2 force_nN;  ///< of the cell on the substrate
   std::optional<double> sigma_nN;
-  bool connected = false;              ///< a segmented fibre ends on it
-  std::optional<double> moment_nN_um;  ///< about the adhesion's centre, from +x towards +y
+  bool connected = false;                     ///< a segmented fibre ends on it
+  std::optional<double> moment_nN_um;         ///< about the adhesion's centre, from +x towards +y
+  std::optional<double> low_nN{}, high_nN{};  ///< 95 % interval of the magnitude
+};
+
+/// A straight fibre between two adhesions that would explain more than chance of what the model leaves.
+struct MissingFibre {
+  int start_adhesion_id = 0, end_adhesion_id = 0;
+  double tension_nN = 0;
+  double chi_squared_gain = 0;  ///< the other tensions following, in units of the noise
+};
+double sigma_nN(const MissingFibre& fibre);
+
+/// A force that the beads call for away from all adhesions.
+struct MissingAdhesion {
+  Vec2 position_um;
+  Vec2 force_nN;                ///< of the cell on the gel
+  double chi_squared_gain = 0;  ///< of two numbers; noise and the model's error counted
 };
 
 /// What each source adds to a standard error. In squares they add up.

@@ -7,7 +7,7 @@
 
 #include "pipeline/charts/chart.h"
 #include "pipeline/cost/labels.h"
-#include "pipeline/files/csv.h"
+#include "pipeline/files/columns.h"
 #include "pipeline/files/text.h"
 
 namespace mbtfm::cost {
@@ -24,23 +24,51 @@ std::string name_of(const Rung& rung) { return rung.value.empty() ? rung.knob : 
 
 std::string stages_of(const Study& study) { return study.has_images ? "all stages" : "network and fit"; }
 
+struct CostRow {
+  Measurement measured;
+  bool is_on_front = false;
+};
+
+const files::Table<CostRow>& cost_table() {
+  using Row = CostRow;
+  constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+  const auto of = [](auto member) {  // empty where it was not measured
+    return [member](const Row& row) {
+      const Measurement& m = row.measured;
+      return is_measured(m) ? std::optional(m.*member) : std::nullopt;
+    };
+  };
+  static const files::Table<Row> table{
+      .file = "cost/cost.csv",
+      .row = "each value of each knob that was tried",
+      .columns = {{"knob", "the parameter", [](const Row& row) { return row.measured.rung.knob; }},
+                  {"value", "its value", [](const Row& row) { return row.measured.rung.value; }},
+                  {"seconds", "of all stages where the cell has its images, else of network and fit",
+                   of(&Measurement::seconds), kResult},
+                  {"cpu_seconds", "the same of all threads", of(&Measurement::cpu_seconds), kResult},
+                  {"peak_memory_MB", "the largest of the stages", of(&Measurement::peak_memory_MB), kResult},
+                  {"n_runs", "of which the times are the median", of(&Measurement::n_runs)},
+                  {"tension_error",
+                   "‖t − reference‖/‖reference‖ over the fibres; the reference is the truth where it "
+                   "is known, else the finest choice",
+                   of(&Measurement::tension_error), kResult},
+                  {"force_error", "of the total force, relative", of(&Measurement::force_error), kResult},
+                  {"stated_tension_error", "what the error budget says", of(&Measurement::stated_error), kResult},
+                  {"n_fibres", "that the reference knows, too", of(&Measurement::n_fibres)},
+                  {"is_on_front", "nothing else is both faster and more exact", &Row::is_on_front},
+                  {"failure", "why there is no figure",
+                   [](const Row& row) { return row.measured.n_runs == 0 ? "no time left" : row.measured.failure; }}}};
+  return table;
+}
+
 void write_csv(const fs::path& file, const Study& study) {
-  files::CsvText csv({"knob", "value", "seconds", "cpu_seconds", "peak_memory_MB", "n_runs", "tension_error",
-                      "force_error", "stated_tension_error", "n_fibres", "is_on_front", "failure"});
   const std::vector<int> front = front_of(study.measurements);
-  for (std::size_t i = 0; i < study.measurements.size(); ++i) {
-    const Measurement& m = study.measurements[i];
-    const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(i)) != front.end();
-    csv.add(m.rung.knob).add(m.rung.value);
-    if (is_measured(m)) {
-      csv.add(m.seconds).add(m.cpu_seconds).add(m.peak_memory_MB).add(m.n_runs);
-      csv.add(m.tension_error).add(m.force_error).add(m.stated_error).add(m.n_fibres);
-    } else {
-      for (int column = 0; column < 8; ++column) csv.add("");
-    }
-    csv.add(is_on_front ? 1 : 0).add(m.n_runs == 0 ? "no time left" : m.failure).end_row();
+  std::vector<CostRow> rows;
+  for (const Measurement& m : study.measurements) {
+    const bool is_on_front = std::find(front.begin(), front.end(), static_cast<int>(rows.size())) != front.end();
+    rows.push_back({m, is_on_front});
   }
-  files::write_text(file, csv.str());
+  files::write(file, cost_table(), rows);
 }
 
 std::vector<Vec2> points_of(const std::vector<Measurement>& measurements, const std::vector<int>& indices) {
@@ -214,5 +242,7 @@ void write_study(const fs::path& folder, const Study& study, const std::string& 
   draw(folder / "cost.svg", study, cell_name);
   files::write_text(folder / "cost.md", page(study, cell_name));
 }
+
+std::string pages_of_tables() { return page_of(cost_table()); }
 
 }  // namespace mbtfm::cost

@@ -19,4 +19,7 @@ double distance_to_front(const std::vector<Measurement>& measurements, int index
 /// cost.csv, cost.svg and cost.md in this folder. @throws OutputError
 void write_study(const std::filesystem::path& folder, const Study& study, const std::string& cell_name);
 
+/// The part of docs/columns.md.
+std::string pages_of_tables();
+
 }  // namespace mbtfm::cost

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <unordered_set>
 
 #include "pipeline/contract/errors.h"
@@ -155,6 +156,18 @@ int CsvTable::integer(int row, const std::string& column, int smallest) const {
 std::optional<int> CsvTable::optional_integer(int row, const std::string& column, int smallest) const {
   if (text(row, column).empty()) return std::nullopt;
   return integer(row, column, smallest);
+}
+
+bool CsvTable::truth(int row, const std::string& column) const {
+  const std::string& field = rows_[row].fields[index_of(column)];
+  const bool is_true = field == "TRUE" || field == "true" || field == "True";
+  if (!is_true && field != "FALSE" && field != "false" && field != "False") fail(row, column, "TRUE or FALSE");
+  return is_true;
+}
+
+int smallest_integer(const Range& range) {
+  constexpr int kLeast = std::numeric_limits<int>::min();
+  return range.low < kLeast ? kLeast : static_cast<int>(range.low);
 }
 
 CsvText::CsvText(const std::vector<std::string>& header) {

@@ -30,6 +30,7 @@ class CsvTable {
   std::optional<double> optional_number(int row, const std::string& column) const;
   int integer(int row, const std::string& column, int smallest) const;
   std::optional<int> optional_integer(int row, const std::string& column, int smallest) const;
+  bool truth(int row, const std::string& column) const;  ///< TRUE, True and true are true
 
   [[noreturn]] void fail(int row, const std::string& column, const std::string& expected,
                          const std::string& hint = {}) const;
@@ -45,6 +46,9 @@ class CsvTable {
   std::vector<Row> rows_;
   std::string label_column_, label_kind_;
 };
+
+/// Of a range of whole numbers, its lower end.
+int smallest_integer(const Range& range);
 
 /// Collects rows and writes them whole.
 class CsvText {

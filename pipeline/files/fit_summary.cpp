@@ -93,7 +93,7 @@ FitSummary read_fit_summary(const Path& file) {
     bool is_named = false;
     for_each_member(summary, [&](const char* known, auto&) { is_named = is_named || name == known; });
     if (name == "error_budget") summary.error_budget = budget_of(value);
-    const bool is_figure = value.json().is_primitive() && !value.json().is_null();
+    const bool is_figure = !value.json().is_object() && !value.json().is_null();
     if (!is_named && name != "error_budget" && is_figure) summary.more.emplace_back(name, value.figure());
   }
   return summary;

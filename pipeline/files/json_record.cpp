@@ -1,5 +1,6 @@
 #include "pipeline/files/json_record.h"
 
+#include <algorithm>
 #include <limits>
 
 #include "pipeline/contract/errors.h"
@@ -128,7 +129,12 @@ Value JsonRecord::figure() const {
   const bool is_too_large = value_->is_number_unsigned() && value_->get<std::uint64_t>() > kMost;
   if (value_->is_number_integer() && !is_too_large) return value_->get<std::int64_t>();
   if (value_->is_number()) return value_->get<double>();
-  if (!value_->is_string()) fail("a number, a text, true or false");
+  const auto all = [&](bool (Json::*is)() const noexcept) {
+    return value_->is_array() && std::all_of(value_->begin(), value_->end(), [&](const Json& v) { return (v.*is)(); });
+  };
+  if (all(&Json::is_number_integer)) return value_->get<std::vector<std::int64_t>>();
+  if (all(&Json::is_string)) return value_->get<std::vector<std::string>>();
+  if (!value_->is_string()) fail("a number, a text, true or false, or a list of whole numbers or of texts");
   return value_->get<std::string>();
 }
 

@@ -37,7 +37,7 @@ class JsonRecord {
   bool is_true() const;
   double number() const;  ///< finite: JSON has no other
   int integer() const;
-  Value figure() const;  ///< a truth value, a number or a text
+  Value figure() const;  ///< a truth value, a number, a text, or a list
 
   // of a member that may lack; @throws InputError where it is there and of another type
   std::string text_or(const std::string& key, const std::string& otherwise) const;

@@ -237,7 +237,7 @@ Figure segmentation_map(const CellResults& results) {
         {by_id.at(f.start_adhesion_id)->position_um, by_id.at(f.end_adhesion_id)->position_um},
         std::string("stroke-width:2.2;stroke-dasharray:7 5;stroke:") + (is_dark ? "#ffe14d" : "#b00020"),
         fmt::format("called for by the beads, not segmented\nfrom adhesion {} to {}\n{} ± {} nN", f.start_adhesion_id,
-                    f.end_adhesion_id, charts::readable(f.tension_nN), charts::readable(f.sigma_nN)));
+                    f.end_adhesion_id, charts::readable(f.tension_nN), charts::readable(sigma_nN(f))));
   }
   for (const MissingAdhesion& a : results.missing_adhesions) {
     const Adhesion circle{.adhesion_id = 0, .position_um = a.position_um, .major_axis_um = 2, .minor_axis_um = 2};

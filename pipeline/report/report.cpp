@@ -1,4 +1,5 @@
 #include "pipeline/report/report.h"
+#include "pipeline/contract/listed.h"
 
 #include <fmt/format.h>
 
@@ -123,6 +124,8 @@ std::string figure_pairs(const CellResults& results) {
     pairs.emplace_back(name, std::visit(
                                  [](const auto& v) -> std::string {
                                    using V = std::decay_t<decltype(v)>;
+                                   if constexpr (!std::is_arithmetic_v<V> && !std::is_same_v<V, std::string>)
+                                     return listed(v);
                                    if constexpr (std::is_same_v<V, std::string>) return v;
                                    if constexpr (std::is_same_v<V, bool>) return v ? "yes" : "no";
                                    if constexpr (std::is_same_v<V, double>) return charts::readable(v);

@@ -3,10 +3,10 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/parameters.h"
 
@@ -35,41 +35,28 @@ std::optional<Residual> residual_of(const DisplacementField& measured, const Pat
 std::optional<Images> images_of(const Path& segmentation) {
   const Path file = segmentation / "images.jpg", place = segmentation / "images.csv";
   if (!files::is_own_file(file) || !files::is_own_file(place)) return {};
-  const files::CsvTable table(place);
-  if (table.n_rows() != 1) throw InputError(place.string(), "one row", std::to_string(table.n_rows()));
-  const Vec2 low_um{table.number(0, "x_um"), table.number(0, "y_um")};
-  return Images{file, low_um, low_um + Vec2{table.number(0, "width_um"), table.number(0, "height_um")}};
+  const std::vector<files::ImagePlace> rows = files::read(place, files::image_place_table());
+  if (rows.size() != 1) throw InputError(place.string(), "one row", std::to_string(rows.size()));
+  return Images{file, rows[0].low_um, rows[0].low_um + rows[0].size_um};
+}
+
+/// Of a file that a fit of this version writes; none where it is not there.
+template <class Row>
+std::vector<Row> rows_in(const Path& file, const files::Table<Row>& table) {
+  return files::is_own_file(file) ? files::read(file, table) : std::vector<Row>();
 }
 
 std::vector<MissingFibre> missing_fibres_in(const Path& file, const Cell& cell) {
-  std::vector<MissingFibre> fibres;
-  if (!files::is_own_file(file)) return fibres;
-  const files::CsvTable table(file);
   const auto by_id = adhesions_by_id(cell);
-  for (int row = 0; row < table.n_rows(); ++row) {
-    MissingFibre fibre{.start_adhesion_id = table.integer(row, "start_adhesion_id", 1),
-                       .end_adhesion_id = table.integer(row, "end_adhesion_id", 1),
-                       .tension_nN = table.number(row, "tension_nN"),
-                       .sigma_nN = table.number(row, "sigma_nN")};
+  std::vector<MissingFibre> fibres = rows_in(file, files::missing_fibre_table());
+  for (const MissingFibre& fibre : fibres) {
     for (const int id : {fibre.start_adhesion_id, fibre.end_adhesion_id}) {
       if (!by_id.contains(id))
         throw InputError(file.string(), "adhesions of 1_segment/adhesions.csv", "adhesion " + std::to_string(id),
                          "run the fit again: mbtfm run --redo fit");
     }
-    fibres.push_back(fibre);
   }
   return fibres;
-}
-
-std::vector<MissingAdhesion> missing_adhesions_in(const Path& file) {
-  std::vector<MissingAdhesion> adhesions;
-  if (!files::is_own_file(file)) return adhesions;
-  const files::CsvTable table(file);
-  for (int row = 0; row < table.n_rows(); ++row) {
-    adhesions.push_back({.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
-                         .force_nN = {table.number(row, "fx_nN"), table.number(row, "fy_nN")}});
-  }
-  return adhesions;
 }
 
 }  // namespace
@@ -94,7 +81,7 @@ CellResults read_results(const Path& cell) {
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
   results.images = images_of(cell / "1_segment");
   results.missing_fibres = missing_fibres_in(cell / "4_fit/missing_fibres.csv", results.cell);
-  results.missing_adhesions = missing_adhesions_in(cell / "4_fit/missing_adhesions.csv");
+  results.missing_adhesions = rows_in(cell / "4_fit/missing_adhesions.csv", files::missing_adhesion_table());
   return results;
 }
 

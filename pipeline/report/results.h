@@ -26,17 +26,6 @@ struct Images {
   Vec2 low_um, high_um;
 };
 
-/// A fibre between two adhesions that was not segmented and that the beads call for.
-struct MissingFibre {
-  int start_adhesion_id = 0, end_adhesion_id = 0;
-  double tension_nN = 0, sigma_nN = 0;
-};
-
-/// A force that the beads call for away from all adhesions.
-struct MissingAdhesion {
-  Vec2 position_um, force_nN;
-};
-
 struct CellResults {
   Path folder;
   std::string name;

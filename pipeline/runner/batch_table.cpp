@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/numbers.h"
-#include "pipeline/files/csv.h"
+#include "pipeline/contract/listed.h"
+#include "pipeline/files/columns.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
@@ -30,12 +30,13 @@ struct StageSays {
 
 std::string text_of(const Value& value) {
   return std::visit(
-      [](const auto& v) -> std::string {
+      [](const auto& v) {
         using V = std::decay_t<decltype(v)>;
-        if constexpr (std::is_same_v<V, std::string>) return v;
-        if constexpr (std::is_same_v<V, bool>) return v ? "true" : "false";
-        if constexpr (std::is_same_v<V, double>) return shortest(v);
-        if constexpr (std::is_same_v<V, std::int64_t>) return std::to_string(v);
+        if constexpr (std::is_arithmetic_v<V> || std::is_same_v<V, std::string>) {
+          return files::field_of(v, 0);
+        } else {
+          return listed(v);
+        }
       },
       value);
 }
@@ -57,6 +58,33 @@ std::optional<StageSays> record_of(const fs::path& cell, const Stage& stage) {
   }
 }
 
+struct BatchRow {
+  BatchCell cell;
+  std::vector<Finding> findings = {};
+  std::map<std::string, std::string> figures = {};  ///< by column
+};
+
+files::Table<BatchRow> batch_table(const fs::path& folder) {
+  const auto of = [](auto member) { return [member](const BatchRow& row) { return row.cell.*member; }; };
+  return {
+      .file = "batch.csv",
+      .row = "each cell of a batch",
+      .columns = {{"cell", "its folder, below the batch's",
+                   [folder](const BatchRow& row) { return row.cell.cell.lexically_relative(folder).generic_string(); }},
+                  {"exit_code", "of `mbtfm run`", of(&BatchCell::exit_code)},
+                  {"seconds", "it took", of(&BatchCell::seconds), {.digits = files::kForPeople}},
+                  {"message", "why it failed", of(&BatchCell::message)},
+                  {"failed_stage", "where it failed", of(&BatchCell::failed_stage)},
+                  {"findings", "that are open", [](const BatchRow& row) { return open_ids(row.findings); }}}};
+}
+
+files::Column<BatchRow> figure_column(const std::string& name) {
+  return {name, "a figure that a stage reported", [name](const BatchRow& row) {
+            const auto figure = row.figures.find(name);
+            return figure == row.figures.end() ? std::string() : figure->second;
+          }};
+}
+
 }  // namespace
 
 std::string last_summary(const fs::path& cell, const std::vector<std::string>& only) {
@@ -71,37 +99,25 @@ std::string last_summary(const fs::path& cell, const std::vector<std::string>& o
 
 void write_batch_table(const fs::path& file, const fs::path& folder, const std::vector<BatchCell>& cells,
                        const std::vector<std::string>& only) {
-  std::vector<std::string> header = {"cell", "exit_code", "seconds", "message", "failed_stage", "findings"};
-  const std::size_t n_fixed = header.size();
-  std::set<std::string> columns;  // of the header
-  std::vector<std::map<std::string, std::string>> rows(cells.size());
-  std::vector<std::vector<Finding>> findings(cells.size());
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    if (cells[i].exit_code != 0) continue;  // what it has on disk may be of an earlier run
+  files::Table<BatchRow> table = batch_table(folder);
+  std::set<std::string> columns;
+  std::vector<BatchRow> rows;
+  for (const BatchCell& cell : cells) {
+    BatchRow& row = rows.emplace_back(BatchRow{.cell = cell});
+    if (cell.exit_code != 0) continue;  // what it has on disk may be of an earlier run
     for (const Stage& stage : stages()) {
       if (!is_asked(stage, only)) continue;
-      const auto record = record_of(cells[i].cell, stage);
+      const auto record = record_of(cell.cell, stage);
       if (!record) continue;
-      findings[i].insert(findings[i].end(), record->findings.begin(), record->findings.end());
+      row.findings.insert(row.findings.end(), record->findings.begin(), record->findings.end());
       for (const auto& [name, value] : record->figures) {
         const std::string column = stage.name + "." + name;
-        if (columns.insert(column).second) header.push_back(column);
-        rows[i][column] = value;
+        row.figures[column] = value;
+        if (columns.insert(column).second) table.columns.push_back(figure_column(column));
       }
     }
   }
-  files::CsvText csv(header);
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    csv.add(cells[i].cell.lexically_relative(folder).generic_string())
-        .add(cells[i].exit_code)
-        .add(cells[i].seconds)
-        .add(cells[i].message)
-        .add(cells[i].failed_stage)
-        .add(open_ids(findings[i]));
-    for (std::size_t k = n_fixed; k < header.size(); ++k) csv.add(rows[i][header[k]]);
-    csv.end_row();
-  }
-  files::write_whole(file, csv.str());
+  files::write_whole(file, text_of(table, rows));
 }
 
 std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& cells) {
@@ -122,6 +138,12 @@ std::string failure_table(const fs::path& folder, const std::vector<BatchCell>& 
       text << (k == 0 ? "\n  " : "   ") << std::left << std::setw(static_cast<int>(widths[k])) << row[k];
   }
   return text.str();
+}
+
+std::string pages_of_tables() {
+  files::Table<BatchRow> table = batch_table({});
+  table.columns.push_back(figure_column("stage.figure"));
+  return page_of(table);
 }
 
 }  // namespace mbtfm::runner

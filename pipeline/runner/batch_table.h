@@ -13,14 +13,15 @@ namespace mbtfm::runner {
 /// @param only  of these stages; empty: of all
 std::string last_summary(const std::filesystem::path& cell, const std::vector<std::string>& only);
 
-/// Write a table with a row for each cell: cell (relative to the folder), exit_code, seconds, message, failed_stage,
-/// findings (identities of the open ones), and every figure
-/// that a stage of any of the cells reports, as stage.figure; a field is empty where a cell has no such figure.
+/// Write batch.csv (docs/columns.md), with a column for every figure that a stage of any of the cells reports.
 /// @throws OutputError
 void write_batch_table(const std::filesystem::path& file, const std::filesystem::path& folder,
                        const std::vector<BatchCell>& cells, const std::vector<std::string>& only);
 
 /// The cells that failed, for people: a line each with the stage, how it ended, and why. Empty where none did.
 std::string failure_table(const std::filesystem::path& folder, const std::vector<BatchCell>& cells);
+
+/// The part of docs/columns.md.
+std::string pages_of_tables();
 
 }  // namespace mbtfm::runner

@@ -16,7 +16,7 @@ struct ImagePattern {
 /// @throws UsageError where the key is none of [images], or the pattern does not contain {cell} exactly once
 ImagePattern parse_pattern(const std::string& text);
 
-/// Make FOLDER/<cell>/cell.toml for each cell that the patterns find: the settings of `template_toml` (empty: none) and
+/// Make FOLDER/CELL/cell.toml for each cell that the patterns find: the settings of `template_toml` (empty: none) and
 /// an [images] table. A cell.toml that is there already stays as it is.
 /// @returns the names of the cells, in alphabetical order
 /// @throws InputError where no file fits, two files are the same image of one cell, or the template has [images] itself

@@ -5,11 +5,11 @@
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 
@@ -65,12 +65,10 @@ bool are_of_series(const std::vector<Difference>& differences) {
 
 /// Those of a time series that the tracker wrote, one for each frame that it did not refuse.
 std::vector<std::string> frames_read(const fs::path& cell, const std::string& list) {
-  const files::CsvTable table(cell / list);
-  table.require({"frame", "refused"});
   std::vector<std::string> names;
-  for (int row = 0; row < table.n_rows(); ++row) {
-    if (!table.text(row, "refused").empty()) continue;
-    const fs::path file = fs::path(list).parent_path() / files::displacement_of_frame(table.integer(row, "frame", 1));
+  for (const files::FrameRow& frame : files::read(cell / list, files::frame_table())) {
+    if (!frame.refused.empty()) continue;
+    const fs::path file = fs::path(list).parent_path() / files::displacement_of_frame(frame.frame);
     names.push_back(file.generic_string());
   }
   return names;

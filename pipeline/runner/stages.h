@@ -23,7 +23,7 @@ struct PathArgument {
 };
 
 struct Stage {
-  std::string name;    ///< the executable is mbtfm-<name>
+  std::string name;    ///< the executable is mbtfm-NAME
   std::string folder;  ///< of its outputs and its record
   std::vector<ImageInput> images;
   std::optional<ImageInput> instead = {};   ///< of the images, where [images] names it

@@ -23,7 +23,7 @@ struct FileArgument {
 };
 
 struct StageDescription {
-  std::string name;  ///< the executable is mbtfm-<name>
+  std::string name;  ///< the executable is mbtfm-NAME
   std::string purpose;
   std::vector<FileArgument> files;
 };

@@ -12,6 +12,9 @@ namespace mbtfm::statistics {
 /// Every table with the name of its file.
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis);
 
+/// Their part of docs/columns.md.
+std::string pages_of_tables();
+
 /// Charts that belong together, with a caption; without charts the caption says why there are none.
 struct Figure {
   std::string name;  ///< of its files, without the ending

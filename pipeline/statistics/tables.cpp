@@ -3,296 +3,518 @@
 #include <cmath>
 #include <map>
 
-#include "pipeline/files/csv.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
 namespace {
 
-files::CsvText& add(files::CsvText& csv, const std::optional<Interval>& interval) {
-  return csv.add(interval ? std::optional(interval->low) : std::nullopt)
-      .add(interval ? std::optional(interval->high) : std::nullopt);
+using files::Column;
+using files::Table;
+
+constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+
+/// Both ends. @param access  of an optional Interval
+template <class Row, class Access>
+std::vector<Column<Row>> ends_of(const std::string& low, const std::string& high, const std::string& of,
+                                 Access access) {
+  const auto end = [access](double Interval::*which) {
+    return [access, which](const Row& row) -> std::optional<double> {
+      const std::optional<Interval> interval = std::invoke(access, row);
+      return interval ? std::optional((*interval).*which) : std::nullopt;
+    };
+  };
+  return {{low, "lower end of the 95 % interval of " + of, end(&Interval::low), kResult},
+          {high, "upper end of the 95 % interval of " + of, end(&Interval::high), kResult}};
 }
 
-std::string cells_csv(const Study& study) {
-  const std::vector<std::string> header = {"cell",
-                                           "condition",
-                                           "included",
-                                           "reason",
-                                           "n_adhesions",
-                                           "n_fibres",
-                                           "n_dorsal",
-                                           "n_arc",
-                                           "n_ventral",
-                                           "cell_area_um2",
-                                           "adhesion_area_um2",
-                                           "total_force_nN",
-                                           "network_force_nN",
-                                           "fibre_force_nN",
-                                           "network_tension_nN",
-                                           "network_surface_tension_nN_per_um",
-                                           "relative_l2",
-                                           "expected_relative_l2",
-                                           "noise_um",
-                                           "n_meshes",
-                                           "converged",
-                                           "findings",
-                                           "n_edge"};
-  files::CsvText csv(header);
-  for (const StudyCell& c : study.cells) {
-    std::map<FibreType, int> n_of;
-    for (const Fibre& fibre : c.cell.fibres) ++n_of[fibre.type];
-    const CellFigures figures = figures_of(c);
-    std::optional<double> network_tension;
-    for (const Tension& t : c.tensions) {
-      if (t.fibre_id == 0) network_tension = t.tension_nN;
-    }
-    csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(1).add("");
-    csv.add(static_cast<int>(figures.n_adhesions)).add(static_cast<int>(c.cell.fibres.size()));
-    for (const FibreType type : {FibreType::dorsal, FibreType::arc, FibreType::ventral}) csv.add(n_of[type]);
-    csv.add(figures.cell_area_um2).add(figures.adhesion_area_um2);
-    const auto where_known = [&](double value) { return is_network_known(c) ? std::optional(value) : std::nullopt; };
-    csv.add(c.fit.total_force_nN).add(where_known(c.fit.network_force_nN)).add(where_known(c.fit.fibre_force_nN));
-    csv.add(network_tension)
-        .add(where_known(c.fit.network_surface_tension_nN_per_um))
-        .add(c.fit.relative_l2)
-        .add(c.fit.expected_relative_l2);
-    csv.add(c.fit.noise_um).add(c.fit.n_meshes).add(c.fit.converged ? 1 : 0).add(open_ids(c.findings));
-    csv.add(n_of[FibreType::edge]);
-    csv.end_row();
-  }
-  for (const LeftOutCell& c : study.left_out) {
-    csv.add(c.name).add(c.condition).add(0).add(c.reason);
-    for (std::size_t i = 4; i < header.size(); ++i) csv.add("");
-    csv.end_row();
-  }
-  return csv.str();
+const std::string& condition_of(const Study& study, const StudyCell& cell) {
+  return study.conditions[static_cast<std::size_t>(cell.condition)];
 }
 
-std::string adhesions_csv(const Study& study) {
-  files::CsvText csv({"cell", "condition", "adhesion_id", "x_um", "y_um", "area_um2", "eccentricity", "fx_nN", "fy_nN",
-                      "force_nN", "traction_kPa", "sigma_nN", "connected", "origin"});
+/// A row of what belongs to a cell.
+template <class Of>
+struct InCell {
+  std::string cell, condition;
+  Of of;
+};
+template <class Of>
+std::vector<Column<InCell<Of>>> cell_columns() {
+  using Row = InCell<Of>;
+  return {{"cell", "its folder below the study's", &Row::cell},
+          {"condition", "empty: none was asked for", &Row::condition}};
+}
+
+struct CellRow {
+  std::string reason = {};          ///< why it was left out
+  const StudyCell* cell = nullptr;  ///< none where it was
+
+  std::optional<int> n_fibres(std::optional<FibreType> type = {}) const {
+    if (!cell) return std::nullopt;
+    const auto& fibres = cell->cell.fibres;
+    return static_cast<int>(
+        std::count_if(fibres.begin(), fibres.end(), [&](const Fibre& f) { return !type || f.type == *type; }));
+  }
+  /// What has no meaning where the network's tension is not known.
+  std::optional<double> of_network(double FitSummary::*figure) const {
+    return cell && is_network_known(*cell) ? std::optional(cell->fit.*figure) : std::nullopt;
+  }
+  std::optional<double> network_tension_nN() const {
+    if (!cell) return std::nullopt;
+    const auto found =
+        std::find_if(cell->tensions.begin(), cell->tensions.end(), [](const Tension& t) { return t.fibre_id == 0; });
+    return found == cell->tensions.end() ? std::nullopt : std::optional(found->tension_nN);
+  }
+};
+
+/// A figure of a cell that enters; empty of the others.
+template <class Of>
+auto of_cell(Of of) {
+  return [of](const InCell<CellRow>& row) -> std::optional<std::remove_cvref_t<decltype(of(*row.of.cell))>> {
+    if (!row.of.cell) return std::nullopt;
+    return of(*row.of.cell);
+  };
+}
+
+const Table<InCell<CellRow>>& cell_table() {
+  using Row = InCell<CellRow>;
+  const auto fit = [](auto member) { return of_cell([member](const StudyCell& c) { return c.fit.*member; }); };
+  const auto figure = [](auto member) {
+    return of_cell([member](const StudyCell& c) { return figures_of(c).*member; });
+  };
+  const auto network = [](auto member) { return [member](const Row& row) { return row.of.of_network(member); }; };
+  const auto n_of = [](std::optional<FibreType> type) {
+    return [type](const Row& row) { return row.of.n_fibres(type); };
+  };
+  static const Table<Row> table{
+      .file = "statistics/cells.csv",
+      .row = "each cell, also those left out",
+      .columns = files::joined<Row>(
+          {cell_columns<CellRow>(),
+           {{"included", "it enters the statistics", [](const Row& row) { return row.of.cell != nullptr; }},
+            {"reason", "why it does not", [](const Row& row) { return row.of.reason; }},
+            {"n_adhesions", "without anchors and candidates",
+             of_cell([](const StudyCell& c) { return static_cast<int>(figures_of(c).n_adhesions); })},
+            {"n_fibres", "of all types", n_of({})},
+            {"n_dorsal", "dorsal fibres", n_of(FibreType::dorsal)},
+            {"n_arc", "transverse arcs", n_of(FibreType::arc)},
+            {"n_ventral", "ventral fibres, without edge fibres", n_of(FibreType::ventral)},
+            {"cell_area_um2", "inside the outline", figure(&CellFigures::cell_area_um2), kResult},
+            {"adhesion_area_um2", "of all its adhesions", figure(&CellFigures::adhesion_area_um2), kResult},
+            {"total_force_nN", "sum of the adhesions' force magnitudes", fit(&FitSummary::total_force_nN), kResult},
+            {"network_force_nN", "the same of the network alone", network(&FitSummary::network_force_nN), kResult},
+            {"fibre_force_nN", "what the fibres add", network(&FitSummary::fibre_force_nN), kResult},
+            {"network_tension_nN", "of a link of the actin network",
+             [](const Row& row) { return row.of.network_tension_nN(); }, kResult},
+            {"network_surface_tension_nN_per_um", "of the actin network as a sheet",
+             network(&FitSummary::network_surface_tension_nN_per_um), kResult},
+            {"relative_l2", "‖measured − model‖ / ‖measured‖", fit(&FitSummary::relative_l2), kResult},
+            {"expected_relative_l2", "what the beads' noise alone would leave", fit(&FitSummary::expected_relative_l2),
+             kResult},
+            {"noise_um", "of a component of the displacement", fit(&FitSummary::noise_um), kResult},
+            {"n_meshes", "that the fit is the mean of", fit(&FitSummary::n_meshes)},
+            {"converged", "the fit came to its end", fit(&FitSummary::converged)},
+            {"findings", "that are open", of_cell([](const StudyCell& c) { return open_ids(c.findings); })},
+            {"n_edge", "edge fibres", n_of(FibreType::edge)}}})};
+  return table;
+}
+
+std::vector<InCell<CellRow>> cell_rows(const Study& study) {
+  std::vector<InCell<CellRow>> rows;
+  for (const StudyCell& c : study.cells) rows.push_back({c.name, condition_of(study, c), {.cell = &c}});
+  for (const LeftOutCell& c : study.left_out) rows.push_back({c.name, c.condition, {.reason = c.reason}});
+  return rows;
+}
+
+using AdhesionRow = InCell<files::ForceOnAdhesion>;
+const Table<AdhesionRow>& adhesion_table() {
+  const auto adhesion = [](const AdhesionRow& row) -> const Adhesion& { return *row.of.adhesion; };
+  const auto of_adhesion = [=](std::vector<std::string> names) {
+    return files::columns_of<AdhesionRow>(files::adhesion_table(), adhesion, names);
+  };
+  const auto force = files::adhesion_force_table().without({"adhesion_id", "x_um", "y_um", "area_um2"});
+  static const Table<AdhesionRow> table{
+      .file = "statistics/adhesions.csv",
+      .row = "each adhesion",
+      .columns = files::joined<AdhesionRow>({cell_columns<files::ForceOnAdhesion>(),
+                                             of_adhesion({"adhesion_id", "x_um", "y_um", "area_um2", "eccentricity"}),
+                                             files::columns_of<AdhesionRow>(force, &AdhesionRow::of),
+                                             of_adhesion({"origin"})})};
+  return table;
+}
+
+std::vector<AdhesionRow> adhesion_rows(const Study& study) {
+  std::vector<AdhesionRow> rows;
   for (const StudyCell& c : study.cells) {
     std::map<int, const Adhesion*> by_id;
     for (const Adhesion& adhesion : c.cell.adhesions) by_id[adhesion.adhesion_id] = &adhesion;
-    for (const AdhesionForce& force : c.forces) {
-      const Adhesion& a = *by_id.at(force.adhesion_id);
-      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(a.adhesion_id);
-      csv.add(a.position_um.x).add(a.position_um.y).add(a.area_um2).add(a.eccentricity);
-      csv.add(force.force_nN.x).add(force.force_nN.y).add(norm(force.force_nN));
-      csv.add(norm(force.force_nN) / area_stood_for_um2(a)).add(force.sigma_nN).add(force.connected ? 1 : 0);
-      csv.add(name_of(a.origin));
-      csv.end_row();
-    }
+    for (const AdhesionForce& force : c.forces)
+      rows.push_back({c.name, condition_of(study, c), {force, by_id.at(force.adhesion_id)}});
   }
-  return csv.str();
+  return rows;
 }
 
-std::string fibres_csv(const Study& study) {
-  files::CsvText csv({"cell", "condition", "fibre_id", "type", "length_um", "width_um", "confidence", "tension_nN",
-                      "low_nN", "high_nN", "sigma_nN", "identifiable"});
+struct MeasuredTension {
+  const Fibre* fibre = nullptr;
+  files::FibreTension tension;
+};
+using FibreRow = InCell<MeasuredTension>;
+const Table<FibreRow>& fibre_table() {
+  const auto of_fibre = [](std::vector<std::string> names) {
+    return files::columns_of<FibreRow>(
+        files::fibre_table(), [](const FibreRow& row) -> const Fibre& { return *row.of.fibre; }, names);
+  };
+  const auto tension = files::tension_table().without({"fibre_id", "type", "sigma_nN"});
+  const auto of_row = [](const FibreRow& row) -> const files::FibreTension& { return row.of.tension; };
+  static const Table<FibreRow> table{
+      .file = "statistics/fibres.csv",
+      .row = "each fibre with a tension",
+      .columns = files::joined<FibreRow>(
+          {cell_columns<MeasuredTension>(),
+           of_fibre({"fibre_id", "type", "length_um", "width_um", "confidence"}),
+           files::columns_of<FibreRow>(tension, of_row),
+           {{"sigma_nN",
+             "standard error that the statistics take: half the interval over 1.96, the upper half where 0 cuts the "
+             "lower",
+             [](const FibreRow& row) { return standard_error_nN(row.of.tension.tension); }, kResult}}})};
+  return table;
+}
+
+std::vector<FibreRow> fibre_rows(const Study& study) {
+  std::vector<FibreRow> rows;
   for (const StudyCell& c : study.cells) {
     std::map<int, const Tension*> tension;
     for (const Tension& t : c.tensions) tension[t.fibre_id] = &t;
     for (const Fibre& fibre : c.cell.fibres) {
       const auto t = tension.find(fibre.fibre_id);
-      if (t == tension.end()) continue;
-      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(fibre.fibre_id);
-      csv.add(name_of(fibre.type)).add(length_um(fibre.points_um)).add(fibre.width_um).add(fibre.confidence);
-      csv.add(t->second->tension_nN).add(t->second->low_nN).add(t->second->high_nN);
-      csv.add(standard_error_nN(*t->second)).add(t->second->identifiable ? 1 : 0);
-      csv.end_row();
+      if (t != tension.end()) rows.push_back({c.name, condition_of(study, c), {&fibre, {*t->second, fibre.type}}});
     }
   }
-  return csv.str();
+  return rows;
 }
 
-void add_summary(files::CsvText& csv, const Summary& s) {
-  csv.add(s.n_cells).add(s.n).add(s.plain.mean);
-  add(csv, s.mean_interval);
-  csv.add(s.model ? std::optional(s.model->estimate) : std::nullopt);
-  add(csv, s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt);
-  csv.add(s.plain.median);
-  add(csv, s.median_interval);
-  csv.add(s.plain.standard_deviation).add(s.typical_error);
-  csv.add(s.without_error ? std::optional(s.without_error->standard_deviation) : std::nullopt);
+/// @param unit  begins with an underscore or is empty
+template <class Row, class Access>
+std::vector<Column<Row>> summary_columns(const std::string& counted, const std::string& unit, Access access) {
+  const auto of = [access](auto get) {
+    return [access, get](const Row& row) { return get(std::invoke(access, row)); };
+  };
+  using Number = std::optional<double>;
+  const auto model = [](const Summary& s) {
+    return s.model ? std::optional(Interval{s.model->low, s.model->high}) : std::nullopt;
+  };
+  return files::joined<Row>(
+      {{{"n_cells", "cells", of([](const Summary& s) { return s.n_cells; })},
+        {"n_" + counted, counted, of([](const Summary& s) { return s.n; })},
+        {"mean" + unit, "each counts the same", of([](const Summary& s) { return s.plain.mean; }), kResult}},
+       ends_of<Row>("mean_low" + unit, "mean_high" + unit, "the mean, cells drawn anew",
+                    of([](const Summary& s) { return s.mean_interval; })),
+       {{"model_mean" + unit, "mean of the mixed model",
+         of([](const Summary& s) { return s.model ? Number(s.model->estimate) : Number(); }), kResult}},
+       ends_of<Row>("model_low" + unit, "model_high" + unit, "that mean", of(model)),
+       {{"median" + unit, "each counts the same", of([](const Summary& s) { return s.plain.median; }), kResult}},
+       ends_of<Row>("median_low" + unit, "median_high" + unit, "the median, cells drawn anew",
+                    of([](const Summary& s) { return s.median_interval; })),
+       {{"sd" + unit, "standard deviation", of([](const Summary& s) { return s.plain.standard_deviation; }), kResult},
+        {"typical_error" + unit, "root mean square of the standard errors",
+         of([](const Summary& s) { return s.typical_error; }), kResult},
+        {"sd_without_error" + unit, "what is left of the one without the other",
+         of([](const Summary& s) { return s.without_error ? Number(s.without_error->standard_deviation) : Number(); }),
+         kResult}}});
 }
 
-/// Columns of add_summary; `unit` begins with an underscore or is empty.
-std::vector<std::string> summary_columns(const std::string& counted, const std::string& unit) {
-  std::vector<std::string> list = {"n_cells", "n_" + counted};
-  for (const char* name : {"mean", "mean_low", "mean_high", "model_mean", "model_low", "model_high", "median",
-                           "median_low", "median_high", "sd", "typical_error", "sd_without_error"}) {
-    list.push_back(name + unit);
+/// A share of the fibres above a tension; of a cell without its interval.
+struct ShareRow {
+  double value = 0;
+  std::optional<Interval> interval = {};
+  std::optional<double> without_error = {};
+};
+struct TypeRow {
+  Summary summary;
+  std::vector<ShareRow> shares;  ///< by threshold
+};
+
+Table<TypeRow> type_table(const std::vector<double>& thresholds_nN) {
+  Table<TypeRow> table{
+      .file = "statistics/types.csv",
+      .row = "each condition and type, and each cell's",
+      .columns = files::joined<TypeRow>(
+          {{{"condition", "empty: none was asked for", [](const TypeRow& row) { return row.summary.condition; }},
+            {"cell", "`all`, or the cell",
+             [](const TypeRow& row) { return row.summary.cell.empty() ? std::string("all") : row.summary.cell; }},
+            {"type", "of the fibres", [](const TypeRow& row) { return row.summary.kind; }}},
+           summary_columns<TypeRow>("fibres", "_nN", &TypeRow::summary)})};
+  for (std::size_t k = 0; k < thresholds_nN.size(); ++k) {
+    const std::string name = fmt::format("fraction_above_{:g}_nN", thresholds_nN[k]);
+    const auto share = [k](const TypeRow& row) -> std::optional<ShareRow> {
+      return k < row.shares.size() ? std::optional(row.shares[k]) : std::nullopt;
+    };
+    const auto of = [share](auto member) {
+      return [share, member](const TypeRow& row) {
+        return std::optional<double>(share(row).value_or(ShareRow{}).*member);
+      };
+    };
+    table.columns.emplace_back(name, "share of the fibres above this tension", of(&ShareRow::value), kResult);
+    for (const auto& column :
+         ends_of<TypeRow>(name + "_low", name + "_high", "the share (Wilson's, at the effective number of fibres)",
+                          [share](const TypeRow& row) { return share(row).value_or(ShareRow{}).interval; }))
+      table.columns.push_back(column);
+    table.columns.emplace_back(name + "_without_error", "the share, the blur of the errors removed",
+                               of(&ShareRow::without_error), kResult);
   }
-  return list;
+  return table;
 }
 
-std::string types_csv(const Study& study, const Analysis& analysis) {
-  std::vector<std::string> header = {"condition", "cell", "type"};
-  for (const std::string& column : summary_columns("fibres", "_nN")) header.push_back(column);
+std::vector<double> thresholds_of(const Analysis& analysis) {
   std::vector<double> thresholds;
   for (const ShareAbove& s : analysis.shares) {
-    if (std::find(thresholds.begin(), thresholds.end(), s.threshold_nN) != thresholds.end()) continue;
-    thresholds.push_back(s.threshold_nN);
-    for (const char* what : {"", "_low", "_high", "_without_error"})
-      header.push_back(fmt::format("fraction_above_{:g}_nN{}", s.threshold_nN, what));
+    if (std::find(thresholds.begin(), thresholds.end(), s.threshold_nN) == thresholds.end())
+      thresholds.push_back(s.threshold_nN);
   }
-  files::CsvText csv(header);
+  return thresholds;
+}
+
+std::vector<TypeRow> type_rows(const Study& study, const Analysis& analysis) {
+  std::vector<TypeRow> rows;
   for (const Summary& s : analysis.tensions.summaries) {
-    csv.add(s.condition).add("all").add(s.kind);
-    add_summary(csv, s);
+    TypeRow& row = rows.emplace_back(TypeRow{s, {}});
     for (const ShareAbove& share : analysis.shares) {
-      if (share.condition != s.condition || share.kind != s.kind) continue;
-      csv.add(share.share.value).add(share.share.interval.low).add(share.share.interval.high).add(share.without_error);
+      if (share.condition == s.condition && share.kind == s.kind)
+        row.shares.push_back({share.share.value, share.share.interval, share.without_error});
     }
-    csv.end_row();
   }
   const Sample& sample = analysis.tensions.sample;
   for (const Summary& s : analysis.tensions_by_cell) {
-    csv.add(s.condition).add(s.cell).add(s.kind);
-    add_summary(csv, s);
-    for (const double threshold : thresholds) {
-      int n = 0;
-      for (const Observation& o : sample.values) {
-        n += study.cells[static_cast<std::size_t>(o.cell)].name == s.cell && o.value > threshold &&
-             sample.kinds[static_cast<std::size_t>(o.kind)] == s.kind;
-      }
-      csv.add(static_cast<double>(n) / s.n).add("").add("").add("");
+    TypeRow& row = rows.emplace_back(TypeRow{s, {}});
+    for (const double threshold : thresholds_of(analysis)) {
+      const auto n = std::count_if(sample.values.begin(), sample.values.end(), [&](const Observation& o) {
+        return study.cells[static_cast<std::size_t>(o.cell)].name == s.cell && o.value > threshold &&
+               sample.kinds[static_cast<std::size_t>(o.kind)] == s.kind;
+      });
+      row.shares.push_back({.value = static_cast<double>(n) / s.n});
     }
-    csv.end_row();
   }
-  return csv.str();
+  return rows;
 }
 
-std::string summaries_csv(const Analysis& analysis) {
-  std::vector<std::string> header = {"quantity", "condition", "kind"};
-  for (const std::string& column : summary_columns("observations", "")) header.push_back(column);
-  files::CsvText csv(header);
-  for (const Measure* m : analysis.measures()) {
-    for (const Summary& s : m->summaries) {
-      csv.add(m->sample.column).add(s.condition).add(s.kind);
-      add_summary(csv, s);
-      csv.end_row();
-    }
-  }
-  return csv.str();
+struct QuantityRow {
+  std::string quantity;
+  Summary summary;
+};
+const Table<QuantityRow>& summary_table() {
+  using Row = QuantityRow;
+  static const Table<Row> table{
+      .file = "statistics/summaries.csv",
+      .row = "each quantity, condition and kind",
+      .columns = files::joined<Row>(
+          {{{"quantity", "with its unit", &Row::quantity},
+            {"condition", "empty: none was asked for", [](const Row& row) { return row.summary.condition; }},
+            {"kind", "of fibres, adhesions or cells", [](const Row& row) { return row.summary.kind; }}},
+           summary_columns<Row>("observations", "", &Row::summary)})};
+  return table;
+}
+
+struct VarianceRow {
+  std::string quantity, component;
+  std::optional<double> standard_deviation;
+  std::string remark;
+};
+const Table<VarianceRow>& variance_table() {
+  using Row = VarianceRow;
+  static const Table<Row> table{
+      .file = "statistics/variances.csv",
+      .row = "each component of the mixed model's scatter",
+      .columns = {{"quantity", "with its unit", &Row::quantity},
+                  {"component", "between cells, between the kinds of a cell, or within a kind", &Row::component},
+                  {"standard_deviation", "of the component", &Row::standard_deviation, kResult},
+                  {"remark", "why it is zero or empty", &Row::remark}}};
+  return table;
 }
 
 /// The scatter between cells, between the kinds of a cell and within them.
-std::string variances_csv(const Analysis& analysis) {
-  files::CsvText csv({"quantity", "component", "standard_deviation", "remark"});
+std::vector<VarianceRow> variance_rows(const Analysis& analysis) {
+  std::vector<VarianceRow> rows;
   for (const Measure* m : analysis.measures()) {
-    const auto row = [&](const std::string& component, const std::optional<double>& variance) {
+    const auto add = [&](const std::string& component, const std::optional<double>& variance) {
       const char* remark = m->model ? "too few values to tell it from the others" : m->obstacle.c_str();
-      csv.add(m->sample.column).add(component).add(variance ? std::optional(std::sqrt(*variance)) : std::nullopt);
-      csv.add(variance ? *variance > 0 ? "" : "no more than the errors explain" : remark).end_row();
+      if (variance) remark = *variance > 0 ? "" : "no more than the errors explain";
+      rows.push_back(
+          {m->sample.column, component, variance ? std::optional(std::sqrt(*variance)) : std::nullopt, remark});
     };
     const MixedFit fit = m->model ? m->model->fit : MixedFit{};
-    row("cell", fit.cell_variance);
-    row("kind in a cell", fit.cell_kind_variance);
+    add("cell", fit.cell_variance);
+    add("kind in a cell", fit.cell_kind_variance);
     for (std::size_t k = 0; k < m->sample.kinds.size(); ++k)
-      row("within: " + m->sample.kinds[k], k < fit.residual_variance.size() ? fit.residual_variance[k] : std::nullopt);
+      add("within: " + m->sample.kinds[k], k < fit.residual_variance.size() ? fit.residual_variance[k] : std::nullopt);
   }
-  return csv.str();
+  return rows;
 }
 
-std::string tests_csv(const Analysis& analysis) {
-  files::CsvText csv({"quantity", "question", "within", "test", "unit", "group_a", "group_b", "n_a", "n_b", "cells_a",
-                      "cells_b", "statistic", "degrees_of_freedom", "p", "p_holm", "effect", "effect_is", "effect_low",
-                      "effect_high"});
+const Table<Comparison>& test_table() {
+  using Row = Comparison;
+  const auto of_pair = [](int Row::*member) {
+    return [member](const Row& t) { return t.group_b.empty() ? std::nullopt : std::optional(t.*member); };
+  };
+  static const Table<Row> table{
+      .file = "statistics/tests.csv",
+      .row = "each test",
+      .columns = files::joined<Row>(
+          {{{"quantity", "what is compared, with its unit", &Row::column},
+            {"question", "between kinds or between conditions", &Row::question},
+            {"within", "which condition, or kind, all groups share", &Row::within},
+            {"test", "its name", &Row::test},
+            {"unit", "what counts as independent", &Row::unit},
+            {"group_a", "the first group", &Row::group_a},
+            {"group_b", "the second; empty: all groups together", &Row::group_b},
+            {"n_a", "observations of the first group", &Row::n_a},
+            {"n_b", "observations of the second", of_pair(&Row::n_b)},
+            {"cells_a", "cells of the first group", &Row::cells_a},
+            {"cells_b", "cells of the second", of_pair(&Row::cells_b)},
+            {"statistic", "of the test", &Row::statistic, kResult},
+            {"degrees_of_freedom", "of the statistic's denominator", &Row::degrees, kResult},
+            {"p", "chance of such a difference or a larger one where there is none", &Row::p_value, kResult},
+            {"p_holm", "corrected over the pairs that one question compares", &Row::p_holm, kResult},
+            {"effect", "how large the difference is",
+             [](const Row& t) { return t.effect_name.empty() ? std::nullopt : std::optional(t.effect); }, kResult},
+            {"effect_is", "what the effect is", &Row::effect_name}},
+           ends_of<Row>("effect_low", "effect_high", "the effect", &Row::interval)})};
+  return table;
+}
+
+std::vector<Comparison> test_rows(const Analysis& analysis) {
+  std::vector<Comparison> rows;
+  for (const Measure* m : analysis.measures()) rows.insert(rows.end(), m->comparisons.begin(), m->comparisons.end());
+  return rows;
+}
+
+const Table<Correlation>& correlation_table() {
+  using Row = Correlation;
+  static const Table<Row> table{
+      .file = "statistics/correlations.csv",
+      .row = "each force, size and condition",
+      .columns = files::joined<Row>(
+          {{{"force", "column of cells.csv", &Row::force},
+            {"size", "column of cells.csv", &Row::size},
+            {"condition", "empty: none was asked for", &Row::condition},
+            {"n_cells", "cells", [](const Row& c) { return c.line.n; }},
+            {"slope", "of the line through the origin", [](const Row& c) { return c.line.slope; }, kResult},
+            {"slope_error", "its standard error", [](const Row& c) { return c.line.slope_error; }, kResult}},
+           ends_of<Row>("slope_low", "slope_high", "the slope, cells drawn anew", &Row::slope_interval),
+           {{"r", "Pearson's correlation", [](const Row& c) { return c.line.correlation; }, kResult}}})};
+  return table;
+}
+
+const Table<AreaBin>& area_bin_table() {
+  using Row = AreaBin;
+  static const Table<Row> table{
+      .file = "statistics/adhesion_bins.csv",
+      .row = "each condition, connected or not, and bin of area",
+      .columns = files::joined<Row>(
+          {{{"condition", "empty: none was asked for", &Row::condition},
+            {"connected", "fibres end on the adhesions", &Row::is_connected},
+            {"area_low_um2", "lower end of the bin", &Row::low_um2, kResult},
+            {"area_high_um2", "upper end of the bin", &Row::high_um2, kResult},
+            {"n_cells", "cells", &Row::n_cells},
+            {"n_adhesions", "adhesions", &Row::n_adhesions},
+            {"mean_area_um2", "of the adhesions", &Row::mean_area_um2, kResult},
+            {"mean_force_nN", "of the adhesions", &Row::mean_force_nN, kResult}},
+           ends_of<Row>("low_nN", "high_nN", "the mean force, cells drawn anew", &Row::interval_nN)})};
+  return table;
+}
+
+const Table<InCell<Direction>>& direction_table() {
+  using Row = InCell<Direction>;
+  const auto of = [](auto member) { return [member](const Row& row) { return row.of.*member; }; };
+  static const Table<Row> table{
+      .file = "statistics/directions.csv",
+      .row = "each angle at an adhesion",
+      .columns = files::joined<Row>({cell_columns<Direction>(),
+                                     {{"relation", "between what", of(&Direction::relation)},
+                                      {"adhesion_id", "the adhesion", of(&Direction::adhesion_id)},
+                                      {"fibre_id", "the fibre, where there is one", of(&Direction::fibre_id)},
+                                      {"angle_deg", "the angle", of(&Direction::angle_deg), kResult}}})};
+  return table;
+}
+
+const Table<DirectionSummary>& direction_mean_table() {
+  using Row = DirectionSummary;
+  static const Table<Row> table{
+      .file = "statistics/direction_means.csv",
+      .row = "each relation and condition",
+      .columns = files::joined<Row>(
+          {{{"relation", "between what", &Row::relation},
+            {"condition", "empty: none was asked for", &Row::condition},
+            {"n_cells", "cells", &Row::n_cells},
+            {"n", "angles", &Row::n},
+            {"mean_angle_deg", "their mean", &Row::mean_angle_deg, kResult}},
+           ends_of<Row>("low_deg", "high_deg", "the mean, cells drawn anew", &Row::angle_interval_deg),
+           {{"chance_deg", "what chance would give", [](const Row& row) { return largest_angle_deg(row.relation) / 2; },
+             kResult},
+            {"mean_cosine", "the same of the cosines", &Row::mean_cosine, kResult}},
+           ends_of<Row>("cosine_low", "cosine_high", "that mean, cells drawn anew", &Row::cosine_interval)})};
+  return table;
+}
+
+const Table<InCell<Finding>>& finding_table() {
+  using Row = InCell<Finding>;
+  const auto of = [](auto member) { return [member](const Row& row) { return row.of.*member; }; };
+  static const Table<Row> table{
+      .file = "statistics/findings.csv",
+      .row = "each finding of a cell",
+      .columns = files::joined<Row>({cell_columns<Finding>(),
+                                     {{"id", "see findings.md", of(&Finding::id)},
+                                      {"severity", "how much it weighs", of(&Finding::severity)},
+                                      {"number", "what was measured", of(&Finding::number), kResult},
+                                      {"threshold", "from where on it is a finding", of(&Finding::threshold), kResult},
+                                      {"text", "a sentence", of(&Finding::text)}}})};
+  return table;
+}
+
+/// Of what each cell has several of.
+template <class Of>
+std::vector<InCell<Of>> rows_by_cell(const Study& study, std::vector<Of> StudyCell::*list) {
+  std::vector<InCell<Of>> rows;
+  for (const StudyCell& c : study.cells) {
+    for (const Of& of : c.*list) rows.push_back({c.name, condition_of(study, c), of});
+  }
+  return rows;
+}
+
+std::vector<QuantityRow> summary_rows(const Analysis& analysis) {
+  std::vector<QuantityRow> rows;
   for (const Measure* m : analysis.measures()) {
-    for (const Comparison& t : m->comparisons) {
-      const bool is_pair = !t.group_b.empty();
-      csv.add(t.column)
-          .add(name_of(t.question))
-          .add(t.within)
-          .add(name_of(t.test))
-          .add(name_of(t.unit))
-          .add(t.group_a)
-          .add(t.group_b);
-      csv.add(t.n_a).add(is_pair ? std::optional(t.n_b) : std::nullopt);
-      csv.add(t.cells_a).add(is_pair ? std::optional(t.cells_b) : std::nullopt);
-      csv.add(t.statistic).add(t.degrees).add(t.p_value).add(t.p_holm);
-      csv.add(t.effect_name.empty() ? std::nullopt : std::optional(t.effect)).add(t.effect_name);
-      add(csv, t.interval).end_row();
-    }
+    for (const Summary& s : m->summaries) rows.push_back({m->sample.column, s});
   }
-  return csv.str();
-}
-
-std::string correlations_csv(const Analysis& analysis) {
-  files::CsvText csv({"force", "size", "condition", "n_cells", "slope", "slope_error", "slope_low", "slope_high", "r"});
-  for (const Correlation& c : analysis.correlations) {
-    csv.add(c.force).add(c.size).add(c.condition).add(c.line.n).add(c.line.slope).add(c.line.slope_error);
-    add(csv, c.slope_interval).add(c.line.correlation).end_row();
-  }
-  return csv.str();
-}
-
-std::string area_bins_csv(const Analysis& analysis) {
-  files::CsvText csv({"condition", "connected", "area_low_um2", "area_high_um2", "n_cells", "n_adhesions",
-                      "mean_area_um2", "mean_force_nN", "low_nN", "high_nN"});
-  for (const AreaBin& b : analysis.area_bins) {
-    csv.add(b.condition).add(b.is_connected ? 1 : 0).add(b.low_um2).add(b.high_um2).add(b.n_cells).add(b.n_adhesions);
-    csv.add(b.mean_area_um2).add(b.mean_force_nN);
-    add(csv, b.interval_nN).end_row();
-  }
-  return csv.str();
-}
-
-std::string directions_csv(const Study& study) {
-  files::CsvText csv({"cell", "condition", "relation", "adhesion_id", "fibre_id", "angle_deg"});
-  for (const StudyCell& c : study.cells) {
-    for (const Direction& d : c.directions) {
-      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(name_of(d.relation));
-      csv.add(d.adhesion_id).add(d.fibre_id).add(d.angle_deg).end_row();
-    }
-  }
-  return csv.str();
-}
-
-std::string direction_means_csv(const Analysis& analysis) {
-  files::CsvText csv({"relation", "condition", "n_cells", "n", "mean_angle_deg", "low_deg", "high_deg", "chance_deg",
-                      "mean_cosine", "cosine_low", "cosine_high"});
-  for (const DirectionSummary& s : analysis.directions) {
-    csv.add(name_of(s.relation)).add(s.condition).add(s.n_cells).add(s.n).add(s.mean_angle_deg);
-    add(csv, s.angle_interval_deg).add(largest_angle_deg(s.relation) / 2).add(s.mean_cosine);
-    add(csv, s.cosine_interval).end_row();
-  }
-  return csv.str();
-}
-
-}  // namespace
-
-namespace {
-
-std::string findings_csv(const Study& study) {
-  files::CsvText csv({"cell", "condition", "id", "severity", "number", "threshold", "text"});
-  for (const StudyCell& c : study.cells) {
-    for (const Finding& f : c.findings) {
-      csv.add(c.name).add(study.conditions[static_cast<std::size_t>(c.condition)]).add(f.id).add(name_of(f.severity));
-      csv.add(f.number).add(f.threshold).add(f.text).end_row();
-    }
-  }
-  return csv.str();
+  return rows;
 }
 
 }  // namespace
 
 std::vector<std::pair<std::string, std::string>> tables_of(const Study& study, const Analysis& analysis) {
-  return {{"cells.csv", cells_csv(study)},
-          {"findings.csv", findings_csv(study)},
-          {"adhesions.csv", adhesions_csv(study)},
-          {"fibres.csv", fibres_csv(study)},
-          {"types.csv", types_csv(study, analysis)},
-          {"tests.csv", tests_csv(analysis)},
-          {"summaries.csv", summaries_csv(analysis)},
-          {"variances.csv", variances_csv(analysis)},
-          {"correlations.csv", correlations_csv(analysis)},
-          {"adhesion_bins.csv", area_bins_csv(analysis)},
-          {"directions.csv", directions_csv(study)},
-          {"direction_means.csv", direction_means_csv(analysis)}};
+  std::vector<std::pair<std::string, std::string>> tables;
+  const auto add = [&](const auto& table, const auto& rows) {
+    tables.emplace_back(Path(table.file).filename().string(), text_of(table, rows));
+  };
+  add(cell_table(), cell_rows(study));
+  add(finding_table(), rows_by_cell(study, &StudyCell::findings));
+  add(adhesion_table(), adhesion_rows(study));
+  add(fibre_table(), fibre_rows(study));
+  add(type_table(thresholds_of(analysis)), type_rows(study, analysis));
+  add(test_table(), test_rows(analysis));
+  add(summary_table(), summary_rows(analysis));
+  add(variance_table(), variance_rows(analysis));
+  add(correlation_table(), analysis.correlations);
+  add(area_bin_table(), analysis.area_bins);
+  add(direction_table(), rows_by_cell(study, &StudyCell::directions));
+  add(direction_mean_table(), analysis.directions);
+  return tables;
+}
+
+std::string pages_of_tables() {
+  return page_of(cell_table()) + page_of(finding_table()) + page_of(adhesion_table()) + page_of(fibre_table()) +
+         page_of(type_table({StudyParameters{}.weak_tension_nN})) + page_of(test_table()) + page_of(summary_table()) +
+         page_of(variance_table()) + page_of(correlation_table()) + page_of(area_bin_table()) +
+         page_of(direction_table()) + page_of(direction_mean_table());
 }
 
 }  // namespace mbtfm::statistics

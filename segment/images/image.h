@@ -33,7 +33,7 @@ struct PlaneChoice {
   std::optional<int> time = {};  ///< frame from 1; unset: the only one
   std::optional<int> page = {};  ///< from 1, as it lies in the file, whatever it shows; unset: by the other three
 };
-/// <prefix>_channel, <prefix>_z, <prefix>_time and <prefix>_page. @param image  "the adhesion image"
+/// PREFIX_channel, PREFIX_z, PREFIX_time and PREFIX_page. @param image  "the adhesion image"
 void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);
 
 /// Read a plane of a TIFF (8 or 16 bit, float; any libtiff compression), a PNG or a JPEG.

@@ -5,9 +5,15 @@
 #include <regex>
 #include <sstream>
 
+#include "mbtfm/tensions/tables.h"
+#include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/findings.h"
+#include "pipeline/cost/study_report.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/tables.h"
+#include "pipeline/runner/batch_table.h"
 #include "pipeline/stage/plausible.h"
+#include "pipeline/statistics/study_files.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -50,6 +56,22 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
   const std::string page = parameter_page();
   if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "parameters.md", page);
   EXPECT_EQ(files::read_text(kDocs / "parameters.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
+}
+
+std::string column_page() {
+  return "# Columns\n\nThe tables of the cell folders, as the program declares them; what is between them and around "
+         "is in "
+         "[formats.md](formats.md).\nA column that *may lack* is not in every file that is read. Figures of results "
+         "have six "
+         "significant digits, those that\na later stage computes with have all.\n" +
+         files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
+         runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables();
+}
+
+TEST(Documents, the_page_of_columns_is_what_the_tables_declare) {
+  const std::string page = column_page();
+  if (std::getenv("MBTFM_WRITE_DOCS") != nullptr) files::write_text(kDocs / "columns.md", page);
+  EXPECT_EQ(files::read_text(kDocs / "columns.md"), page) << "MBTFM_WRITE_DOCS=1 build/tests/architecture_documents";
 }
 
 /// The same for the page of findings.

@@ -78,7 +78,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"deal.II/", {"substrate/boxes"}},
     {"cholmod", {}},
     {"metis", {"pipeline/numerics"}},
-    {"boost/math/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/statistics"}},
+    {"boost/math/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/numerics", "pipeline/statistics"}},
     {"boost/", {"mbtfm/tensions", "mbtfm/tractions", "pipeline/numerics"}},
     {"vtk", {"pipeline/files"}},
     {"CLI/", {"pipeline/stage", kPrograms}},

@@ -20,14 +20,13 @@ const fs::path kRoot = MBTFM_SOURCE_DIR;
 const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/vtu_file.cpp", "elements and attributes of VTU"},
     {"pipeline/files/vtu_data.cpp", "VTU's names of compressors"},
-    {"pipeline/files/csv_files.cpp", "true and false in CSV"},
+    {"pipeline/files/csv.cpp", "true and false in CSV"},
     {"pipeline/files/fit_summary.cpp", "keys of fit.json"},
     {"pipeline/stage/parameters.cpp", "tables, true and false of cell.toml and flags"},
     {"segment/images/ome.cpp", "elements of OME-XML"},
     {"segment/images/stack.cpp", "the order of axes in OME-XML"},
     {"segment/rois/roi_set.cpp", "ImageJ's ROIs and their archives"},
     {"segment/beads/given_field.cpp", "other programs' words for a missing number in CSV"},
-    {"mbtfm/tensions/series.cpp", "true and false in CSV"},
 };
 
 /// Paths, names of files, units of what a user types and the like: what no enumeration would make clearer.

@@ -1,6 +1,7 @@
 /// The whole chain on simulated cells, against the truth.
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
 #include <fstream>
 
@@ -11,6 +12,7 @@
 #include "pipeline/report/compare.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
+#include "tests/support/json_schema.h"
 #include "tests/support/program.h"
 
 namespace mbtfm {
@@ -28,6 +30,7 @@ report::Comparison simulate_and_run(const fs::path& cell, const std::string& arg
   EXPECT_EQ(made.code, 0) << made.output;
   const Outcome run = run_program("mbtfm run " + cell.string());
   EXPECT_EQ(run.code, 0) << run.output;
+  test::expect_schemas_hold(cell);
   return report::compare_with_truth(cell);
 }
 
@@ -51,6 +54,23 @@ void expect_no_net_force_and_no_net_torque(const fs::path& cell) {
   EXPECT_LE(std::abs(net_torque_nN_um), 1e-6 * total_torque_nN_um);
 }
 
+/// A key that is not ours, a key that is not there, a value of another type or word.
+void expect_schemas_refuse_spoilt_files(const fs::path& cell, const fs::path& spoilt) {
+  const std::vector<std::array<std::string, 3>> faults = {{"run", "\"threads\": ", "\"threats\": "},
+                                                          {"run", "\"outcome\": \"done\"", "\"outcome\": \"fine\""},
+                                                          {"run", "\"severity\": \"note\"", "\"severity\": 1"},
+                                                          {"fit", "\"converged\": true", "\"converged\": \"true\""},
+                                                          {"fit", "\"relative_l2\": ", "\"relative_l3\": "},
+                                                          {"fit", "\"beads\": ", "\"pearls\": "}};
+  for (const auto& [schema, old, now] : faults) {
+    std::string text = files::read_text(cell / (schema == "run" ? "run.json" : "4_fit/fit.json"));
+    const auto at = text.find(old);
+    ASSERT_NE(at, text.npos) << old;
+    files::write_text(spoilt, text.replace(at, old.size(), now));
+    EXPECT_NE(test::schema_errors(spoilt, schema), "") << now;
+  }
+}
+
 TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
@@ -58,6 +78,7 @@ TEST(Chain, tensions_come_back_from_the_true_segmentation_and_noisy_beads) {
   EXPECT_LE(comparison.relative_error, 0.25);
   EXPECT_NEAR(comparison.total_force_nN / *comparison.true_total_force_nN, 1, 0.1);
   expect_no_net_force_and_no_net_torque(cell);
+  expect_schemas_refuse_spoilt_files(cell, folder / "spoilt.json");
 }
 
 TEST(Chain, tensions_come_back_from_images_alone) {

@@ -217,8 +217,10 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   });
   for (std::size_t i = 0; i < single.tensions_nN.size(); ++i) {
     // the forces whose motions are allowed are those of a rough fit here, of the fit's end there
-    EXPECT_NEAR(allowed.sigmas_nN[i], single.tensions_nN[i].standard_error, 0.02 * allowed.sigmas_nN[i]) << i;
-    EXPECT_GT(allowed.sigmas_nN[i], held.sigmas_nN[i]) << i;
+    EXPECT_NEAR(*allowed.tensions[i].sigma_nN, single.tensions_nN[i].standard_error,
+                0.02 * *allowed.tensions[i].sigma_nN)
+        << i;
+    EXPECT_GT(*allowed.tensions[i].sigma_nN, *held.tensions[i].sigma_nN) << i;
   }
   EXPECT_GT(allowed.total_force_nN.standard_error, held.total_force_nN.standard_error);
 }

@@ -64,8 +64,8 @@ TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_stan
     ASSERT_TRUE(fits[f].refused.empty()) << fits[f].refused;
     for (std::size_t i = 0; i < fits[f].tensions.size(); ++i) {
       const double truth = series.true_nN[f][static_cast<Eigen::Index>(i)];
-      if (truth < 3 * fits[f].sigmas_nN[i]) continue;  // the bound t >= 0 makes those better than stated
-      squares += std::pow((fits[f].tensions[i].tension_nN - truth) / fits[f].sigmas_nN[i], 2);
+      if (truth < 3 * *fits[f].tensions[i].sigma_nN) continue;  // the bound t >= 0 makes those better than stated
+      squares += std::pow((fits[f].tensions[i].tension_nN - truth) / *fits[f].tensions[i].sigma_nN, 2);
       ++n;
     }
     const Estimate& total = fits[f].total_force_nN;
@@ -160,7 +160,6 @@ TEST(Series, time_begins_with_the_first_frame) {
   std::vector<FrameFit> fits(2);
   for (FrameFit& fit : fits) {
     fit.tensions.resize(1);
-    fit.sigmas_nN = {0.1};
   }
   fits[0].frame = 1;
   fits[1].frame = 4;

@@ -231,5 +231,46 @@ TEST(Files, a_candidate_stands_for_the_cell_of_its_lattice) {
   EXPECT_EQ(area_stood_for_um2({.position_um = {}, .area_um2 = 1.5}), 1.5);
 }
 
+TEST(Columns, a_truth_value_is_written_for_r_and_pandas_and_read_as_any_program_writes_it) {
+  const TemporaryFolder folder;
+  files::write_tensions(folder / "tensions.csv", {{.fibre_id = 0, .tension_nN = 1, .low_nN = {}, .high_nN = {}}}, {});
+  EXPECT_NE(files::read_text(folder / "tensions.csv").find(",TRUE\n"), std::string::npos);
+  const auto is_identifiable = [&](const std::string& word) {
+    files::write_text(folder / "tensions.csv", "fibre_id,tension_nN,identifiable\n0,1," + word + "\n");
+    return files::read_tensions(folder / "tensions.csv").at(0).identifiable;
+  };
+  for (const char* word : {"TRUE", "True", "true"}) EXPECT_TRUE(is_identifiable(word));
+  for (const char* word : {"FALSE", "False", "false"}) EXPECT_FALSE(is_identifiable(word));
+  for (const char* word : {"1", "yes", ""}) EXPECT_THROW(is_identifiable(word), InputError);
+}
+
+TEST(Columns, a_table_of_an_older_version_is_read_and_its_later_columns_are_unset) {
+  const TemporaryFolder folder;
+  files::write_text(folder / "tensions.csv",
+                    "fibre_id,type,tension_nN,low_nN,high_nN,identifiable\n1,ventral,4.17,3.37,4.98,true\n");
+  const Tension tension = files::read_tensions(folder / "tensions.csv").at(0);
+  EXPECT_EQ(tension.high_nN, 4.98);
+  EXPECT_FALSE(tension.sigma_nN.has_value());
+  files::write_text(folder / "forces.csv", "adhesion_id,fx_nN,fy_nN,sigma_nN,connected\n3,1,2,0.1,true\n");
+  const AdhesionForce force = files::read_adhesion_forces(folder / "forces.csv").at(0);
+  EXPECT_EQ(force.sigma_nN, 0.1);
+  EXPECT_FALSE(force.low_nN.has_value());
+}
+
+/// What a later stage computes with comes back as it was; a result has the digits that mean something.
+TEST(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
+  const TemporaryFolder folder;
+  const double third = 1.0 / 3;
+  files::write_tensions(folder / "tensions.csv",
+                        {{.fibre_id = 0, .tension_nN = third, .low_nN = third, .high_nN = {}, .sigma_nN = third}}, {});
+  EXPECT_EQ(files::read_text(folder / "tensions.csv"),
+            "fibre_id,type,tension_nN,low_nN,high_nN,sigma_nN,identifiable\n"
+            "0,network,0.333333,0.333333,,0.333333,TRUE\n");
+  const DisplacementField field = {
+      {.position_um = {third, third}, .displacement_um = {third, third}, .sigma_um = third, .flag = {}}};
+  files::write_displacement(folder / "displacement.csv", field);
+  EXPECT_EQ(files::read_displacement(folder / "displacement.csv").at(0).sigma_um, third);
+}
+
 }  // namespace
 }  // namespace mbtfm

@@ -57,7 +57,7 @@ TEST(Study, leaves_out_cells_with_a_reason_that_the_table_keeps) {
   const files::CsvTable cells(tables_of(study, analyse(study, {}))[0].second, "cells.csv");
   ASSERT_EQ(cells.n_rows(), 6);
   EXPECT_EQ(cells.text(4, "cell"), "control/cell_5");
-  EXPECT_EQ(cells.text(4, "included"), "0");
+  EXPECT_EQ(cells.text(4, "included"), "FALSE");
   EXPECT_EQ(cells.text(4, "reason"), "the fit did not converge");
 }
 

@@ -1,0 +1,175 @@
+#include "mbtfm/tensions/tables.h"
+
+namespace mbtfm::tensions {
+
+using files::Table;
+
+namespace {
+
+constexpr files::ColumnOptions kId = {.range = {.low = 1}};
+constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+
+/// A number of a frame that has a fit; the field is empty where it has none.
+template <class Access>
+files::Column<FitOfFrame> of_fit(const std::string& name, const std::string& meaning, Access access,
+                                 files::ColumnOptions options = kResult) {
+  using T = std::remove_cvref_t<std::invoke_result_t<Access, FrameFit&>>;
+  const auto get = [access](const FitOfFrame& row) -> std::optional<T> {
+    return row.fit.refused.empty() ? std::optional<T>(std::invoke(access, row.fit)) : std::nullopt;
+  };
+  const auto put = [access](FitOfFrame& row, const std::optional<T>& value) {
+    if constexpr (std::is_lvalue_reference_v<std::invoke_result_t<Access, FrameFit&>>)
+      if (value) std::invoke(access, row.fit) = *value;
+  };
+  return {name, meaning, get, put, options};
+}
+
+}  // namespace
+
+const Table<TrackRow>& track_table() {
+  static const Table<TrackRow> table{
+      .file = "4_fit/tracks.csv",
+      .row = "the actin network and each fibre in each frame of a time series",
+      .columns = files::joined<TrackRow>({{{"frame", "counts from 1", &TrackRow::frame, kId},
+                                           {"time_s",
+                                            "since the first frame; empty: `frame_interval_s` is not set",
+                                            &TrackRow::time_s,
+                                            {.digits = files::kForPeople, .may_lack = true}}},
+                                          files::columns_of<TrackRow>(files::tension_table(), &TrackRow::fibre)})};
+  return table;
+}
+
+const Table<FitOfFrame>& frame_fit_table() {
+  using Row = FitOfFrame;
+  const auto fit = [](auto member) {
+    return [member](auto& row) -> auto& { return row.fit.*member; };
+  };
+  const auto value = [](auto member) {
+    return [member](auto& f) -> auto& { return (f.*member).value; };
+  };
+  const auto sigma = [](auto member) {
+    return [member](auto& f) -> auto& { return (f.*member).standard_error; };
+  };
+  constexpr files::ColumnOptions kWhole = {};  // their difference is what the next run writes again
+  static const Table<Row> table{
+      .file = "4_fit/frames.csv",
+      .row = "each frame of a time series",
+      .columns = {
+          {"frame", "counts from 1", fit(&FrameFit::frame), kId},
+          {"time_s",
+           "since the first frame; empty: `frame_interval_s` is not set",
+           &Row::time_s,
+           {.digits = files::kForPeople, .may_lack = true}},
+          of_fit("total_force_nN", "sum of the adhesions' force magnitudes", value(&FrameFit::total_force_nN), kWhole),
+          of_fit("total_force_sigma_nN", "its standard error", sigma(&FrameFit::total_force_nN)),
+          of_fit("network_force_nN", "the same of the network alone", value(&FrameFit::network_force_nN), kWhole),
+          of_fit("network_force_sigma_nN", "its standard error", sigma(&FrameFit::network_force_nN)),
+          {"fibre_force_nN", "what the fibres add",
+           [](const Row& row) -> std::optional<double> {
+             if (!row.fit.refused.empty()) return std::nullopt;
+             return row.fit.total_force_nN.value - row.fit.network_force_nN.value;
+           },
+           kResult},
+          of_fit("relative_l2", "‖measured − model‖ / ‖measured‖", &FrameFit::relative_l2),
+          of_fit("chi_squared_per_degree", "1 where the model explains all but the noise",
+                 &FrameFit::chi_squared_per_degree),
+          of_fit("converged", "the fit came to its end", &FrameFit::converged),
+          {"refused", "why the frame has no fit; empty: it has", fit(&FrameFit::refused)},
+          {"displacement_sha256", "of the frame's file", fit(&FrameFit::displacement_sha256)}}};
+  return table;
+}
+
+std::vector<CorrelationRow> correlation_rows(const EnsembleFit& fit) {
+  const Eigen::MatrixXd correlation = correlation_of(fit);
+  std::vector<CorrelationRow> rows;
+  for (std::size_t i = 0; i < fit.fibre_ids.size(); ++i) {
+    for (std::size_t j = i + 1; j < fit.fibre_ids.size(); ++j) {
+      rows.push_back({fit.fibre_ids[i], fit.fibre_ids[j],
+                      correlation(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j))});
+    }
+  }
+  return rows;
+}
+
+const Table<CorrelationRow>& correlation_table() {
+  using Row = CorrelationRow;
+  static const Table<Row> table{.file = "4_fit/correlations.csv",
+                                .row = "each pair of tensions",
+                                .columns = {{"fibre_id", "one of them; 0: the actin network", &Row::fibre_id},
+                                            {"other_fibre_id", "the other", &Row::other_fibre_id},
+                                            {"correlation", "of their errors from noise", &Row::correlation, kResult}}};
+  return table;
+}
+
+const Table<ModelScore>& model_table() {
+  using Row = ModelScore;
+  static const Table<Row> table{
+      .file = "4_fit/models.csv",
+      .row = "each model that is compared",
+      .columns = {{"model", "its name: no-fibres, full, adhesion-forces", &Row::name},
+                  {"n_parameters", "numbers that are fitted", &Row::n_parameters},
+                  {"chi_squared", "misfit in units of the noise", &Row::chi_squared, kResult},
+                  {"relative_l2", "‖measured − model‖ / ‖measured‖", &Row::relative_l2, kResult},
+                  {"aic", "Akaike's criterion", &Row::aic, kResult},
+                  {"bic", "the Bayesian criterion", &Row::bic, kResult}}};
+  return table;
+}
+
+const Table<FibreLeftOut>& fibre_left_out_table() {
+  using Row = FibreLeftOut;
+  static const Table<Row> table{
+      .file = "4_fit/fibres_left_out.csv",
+      .row = "each fibre",
+      .columns = {
+          {"fibre_id", "the fibre that is left out", &Row::fibre_id},
+          {"chi_squared_rise", "by how much the misfit rises without it", &Row::chi_squared_rise, kResult},
+          {"aic_rise", "the same of Akaike's criterion", &Row::aic_rise, kResult},
+          {"supported", "the beads call for the fibre", [](const Row& f) { return f.aic_rise > 0; }},
+          {"n_informing_beads", "over how many beads what tells of it is spread", &Row::n_informing_beads, kResult}}};
+  return table;
+}
+
+std::vector<DrawRow> draw_rows(const CrossValidation& result) {
+  std::vector<DrawRow> rows;
+  for (std::size_t i = 0; i < result.own.size(); ++i)
+    rows.push_back({static_cast<int>(i) + 1, result.own[i], result.exchanged[i]});
+  return rows;
+}
+
+const Table<DrawRow>& draw_table() {
+  static const Table<DrawRow> table{
+      .file = "4_fit/cross_validation.csv",
+      .row = "each draw of tensions (where draws are asked for)",
+      .columns = {{"draw", "counts from 1", &DrawRow::draw},
+                  {"own", "relative L2 of tensions drawn by fibre type", &DrawRow::own, kResult},
+                  {"exchanged", "the same with dorsal and ventral exchanged", &DrawRow::exchanged, kResult}}};
+  return table;
+}
+
+std::vector<ChangeRow> change_rows(const std::vector<Change>& changes, const EnsembleFit& fit) {
+  std::vector<ChangeRow> rows;
+  for (const Change& change : changes) {
+    for (Eigen::Index i = 0; i < change.by_tension_nN.size(); ++i)
+      rows.push_back({change.effect, fit.fibre_ids[static_cast<std::size_t>(i)], change.by_tension_nN[i]});
+  }
+  return rows;
+}
+
+const Table<ChangeRow>& change_table() {
+  using Row = ChangeRow;
+  static const Table<Row> table{
+      .file = "4_fit/effects_left_out.csv",
+      .row = "each tension and each effect that is off (`--explain`)",
+      .columns = {{"effect", "its name", [](const Row& row) { return std::string(name_of(row.effect)); }},
+                  {"fibre_id", "label of the fibre; 0: the actin network", &Row::fibre_id},
+                  {"change_nN", "with the effect, less without", &Row::change_nN, kResult}}};
+  return table;
+}
+
+std::string pages_of_tables() {
+  return page_of(track_table()) + page_of(frame_fit_table()) + page_of(model_table()) +
+         page_of(fibre_left_out_table()) + page_of(correlation_table()) + page_of(draw_table()) +
+         page_of(change_table());
+}
+
+}  // namespace mbtfm::tensions
