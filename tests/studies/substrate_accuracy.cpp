@@ -75,7 +75,10 @@ int run(const std::vector<std::string>& arguments) {
               100 * error.inside, 100 * error.worst_outside);
   for (const auto& [name, value] : model->figures()) {
     std::cout << "  " << name << " ";
-    std::visit([](const auto& v) { std::cout << v << "\n"; }, value);
+    if (const auto* number = std::get_if<double>(&value)) std::cout << *number;
+    if (const auto* whole = std::get_if<std::int64_t>(&value)) std::cout << *whole;
+    if (const auto* text = std::get_if<std::string>(&value)) std::cout << *text;
+    std::cout << "\n";
   }
   for (const Effect& effect : model->effects()) std::cout << "  " << name_of(effect.kind) << ": " << effect.why << "\n";
   return 0;
