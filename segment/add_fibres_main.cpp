@@ -38,11 +38,11 @@ StageReport add_fibres(const AddFibresParameters&, stage::StageContext& context)
   }
   const auto n_segmented = static_cast<std::int64_t>(fibres.size());
   const std::vector<MissingFibre> missing = files::read(missing_file, files::missing_fibre_table());
-  for (const MissingFibre& m : missing) {
+  for (std::size_t k = 0; k < missing.size(); ++k) {
     Roi fibre;
     fibre.shape = RoiShape::polyline;
-    fibre.name = "added " + std::to_string(&m - missing.data() + 1);
-    for (const int id : {m.start_adhesion_id, m.end_adhesion_id})
+    fibre.name = "added " + std::to_string(k + 1);
+    for (const int id : {missing[k].start_adhesion_id, missing[k].end_adhesion_id})
       fibre.points_px.push_back(centre_of_adhesion(rois, id, rois_file.string()));
     fibres.push_back(fibre);
   }

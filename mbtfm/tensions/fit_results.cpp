@@ -60,6 +60,12 @@ std::vector<Vec2> points_of(const DisplacementField& beads) {
   return points;
 }
 
+namespace {
+
+std::optional<double> if_finite(double number) { return std::isfinite(number) ? std::optional(number) : std::nullopt; }
+
+}  // namespace
+
 std::vector<Tension> tensions_of(const EnsembleFit& fit) {
   double largest_nN = 0;
   for (std::size_t i = 1; i < fit.tensions_nN.size(); ++i) largest_nN = std::max(largest_nN, fit.tensions_nN[i].value);
@@ -72,8 +78,8 @@ std::vector<Tension> tensions_of(const EnsembleFit& fit) {
     tensions.push_back({.fibre_id = fit.fibre_ids[i],
                         .tension_nN = e.value,
                         .low_nN = interval.low,
-                        .high_nN = std::isfinite(interval.high) ? std::optional(interval.high) : std::nullopt,
-                        .sigma_nN = std::isfinite(e.standard_error) ? std::optional(e.standard_error) : std::nullopt,
+                        .high_nN = if_finite(interval.high),
+                        .sigma_nN = if_finite(e.standard_error),
                         .identifiable = e.standard_error < scale});
   }
   return tensions;
@@ -98,11 +104,11 @@ std::vector<AdhesionForce> forces_of(const EnsembleFit& fit, const Cell& cell) {
         numerics::magnitude_interval_95(norm(force_nN), student * magnitude_nN.standard_error);
     forces.push_back({.adhesion_id = cell.adhesions[a].adhesion_id,
                       .force_nN = force_nN,
-                      .sigma_nN = magnitude_nN.standard_error,
+                      .sigma_nN = if_finite(magnitude_nN.standard_error),
                       .connected = connected.contains(cell.adhesions[a].adhesion_id),
                       .moment_nN_um = about_origin_nN_um - cross(cell.adhesions[a].position_um, network_nN),
                       .low_nN = interval.low,
-                      .high_nN = interval.high});
+                      .high_nN = if_finite(interval.high)});
   }
   return forces;
 }

@@ -59,11 +59,9 @@ TEST(Documents, the_parameter_page_is_what_the_programs_declare) {
 }
 
 std::string column_page() {
-  return "# Columns\n\nThe tables of the cell folders, as the program declares them; what is between them and around "
-         "is in "
-         "[formats.md](formats.md).\nA column that *may lack* is not in every file that is read. Figures of results "
-         "have six "
-         "significant digits, those that\na later stage computes with have all.\n" +
+  return "# Columns\n\nEvery table of a cell folder, a batch and a study, column by column. The other files are in\n"
+         "[formats.md](formats.md). *May lack*: older files, or files made elsewhere, need not have this column.\n"
+         "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
          runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables();
 }
