@@ -12,13 +12,13 @@ namespace {
 
 constexpr int kCornersOfEllipse = 256;  // perimeter and area to 1e-4
 constexpr int kPointsPerEdge = 4;       // of the fine line that fibres cross, a sixteenth of an edge off at most
-constexpr double kBind = 0.25;          // nearer to the boundary (in edges) the boundary itself is the rim
+constexpr double kNearRim = 0.25;       // nearer to the boundary (in edges) the boundary itself is the rim
 
 enum class Side { kept, outside, covered };
 
 Side side_of(Vec2 point, const std::vector<Adhesion>& others, const Boundary& boundary, double edge_um) {
   const BoundaryPlace place = boundary.place(point);
-  if (!place.is_inside || place.distance_um < kBind * edge_um) return Side::outside;
+  if (!place.is_inside || place.distance_um < kNearRim * edge_um) return Side::outside;
   const bool is_covered =
       std::any_of(others.begin(), others.end(), [&](const Adhesion& other) { return covers(other, point); });
   return is_covered ? Side::covered : Side::kept;

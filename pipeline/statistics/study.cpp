@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/numerics/parallel.h"
@@ -54,6 +55,38 @@ std::string obstacle(const Path& cell) {
     if (!files::is_own_file(cell / file)) return "no fit: " + file + " is not there";
   }
   return {};
+}
+
+Vec2 mean_of(const Polygon& polygon) {
+  Vec2 sum;
+  for (const Vec2 p : polygon) sum = sum + p;
+  return (1.0 / static_cast<double>(polygon.size())) * sum;
+}
+
+/// Two cells of one picture share the field, and lie beside each other.
+bool overlap(const Cell& a, const Cell& b) {
+  if (a.outline_um.empty() || b.outline_um.empty()) return false;
+  return contains(a.outline_um, mean_of(b.outline_um)) || contains(b.outline_um, mean_of(a.outline_um));
+}
+
+/// A folder that was copied is no further cell: of those of one field and place the first enters.
+void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::string>& names,
+                      const std::vector<std::optional<StudyCell>>& read, std::vector<std::string>& reasons) {
+  std::multimap<std::string, std::size_t> by_field;
+  for (std::size_t i = 0; i < folders.size(); ++i) {
+    const Path field = folders[i] / further_files_of_a_cell()[0];
+    if (!reasons[i].empty() || !files::is_own_file(field)) continue;
+    const std::string hash = files::sha256_of_file(field);
+    const auto [first, last] = by_field.equal_range(hash);
+    const auto same =
+        std::find_if(first, last, [&](const auto& other) { return overlap(read[i]->cell, read[other.second]->cell); });
+    if (same == last) {
+      by_field.emplace(hash, i);
+    } else {
+      reasons[i] = "the same cell as " + names[same->second] + ": their " + further_files_of_a_cell()[0] +
+                   " are the same bytes and their outlines overlap";
+    }
+  }
 }
 
 void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell) {
@@ -143,6 +176,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     if (!reasons[i].empty()) return;
     if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
   });
+  leave_out_copies(folders, names, read, reasons);
   Study study;
   study.n_fibre_types = parameters.fibre_types;
   std::vector<std::string> condition_of_cell;

@@ -58,7 +58,7 @@ const std::vector<std::string>& further_files_of_a_cell();
 
 /// @param table  column `cell` (a cell's folder), any columns of conditions, and `exclude` with the reason why a cell
 ///               must not enter, empty for those that do; or none
-/// A cell whose files are malformed, or lead out of it, is left out.
+/// A cell whose files are malformed, or lead out of it, is left out, and so is a copy of another cell.
 /// @throws InputError where no cell is left, or the table is malformed or names a cell that is not there
 Study read_study(const Path& folder, const StudyParameters& parameters, const std::optional<Path>& table, int threads);
 

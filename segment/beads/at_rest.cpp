@@ -89,7 +89,7 @@ AffineMotion fitted(const RestingField& field, const std::vector<double>& weight
 
 double misfit(const FieldCell& cell, const AffineMotion& motion) { return norm(cell.u - motion.at(cell.place)); }
 
-struct Followed {
+struct Standing {
   AffineMotion motion;
   double score = -1;
 };
@@ -107,7 +107,7 @@ struct Search {
     return s * s;
   }
 
-  Followed from(const std::function<bool(int, int)>& is_in) const {
+  Standing from(const std::function<bool(int, int)>& is_in) const {
     std::vector<double> weights(field.cells.size(), 0), misfits;
     const double typical = numerics::quantile(width_of, 0.5);
     for (int j = 0; j < field.ny; ++j) {
@@ -116,7 +116,7 @@ struct Search {
         weights[k] = field.cells[k].n_beads > 0 && is_in(i, j);
       }
     }
-    Followed result{fitted(field, weights, centre, scale, typical)};
+    Standing result{fitted(field, weights, centre, scale, typical)};
     for (std::size_t k = 0; k < weights.size(); ++k) {
       if (weights[k] > 0) misfits.push_back(misfit(field.cells[k], result.motion));
     }
@@ -156,9 +156,9 @@ AffineMotion mode_of(const Search& search) {
       }
     }
   }
-  Followed best;
+  Standing best;
   for (const Part& part : parts) {
-    const Followed next = search.from([&](int i, int j) { return part(place(i, j)); });
+    const Standing next = search.from([&](int i, int j) { return part(place(i, j)); });
     if (next.score > best.score * (1 + 1e-9)) best = next;
   }
   return best.motion;

@@ -52,19 +52,13 @@ bool is_peak(const Plane& plane, int i, int j) {
   return true;
 }
 
-/// Vertex of the parabola through three values, within half a pixel.
-double vertex(double before, double here, double after) {
-  const double curvature = before - 2 * here + after;
-  return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
-}
-
 std::vector<DetectedBead> peaks(const Plane& band, double threshold, double height_by_answer) {
   std::vector<DetectedBead> result;
   for (int j = 1; j + 1 < band.height; ++j) {
     for (int i = 1; i + 1 < band.width; ++i) {
       if (band.at(i, j) < threshold || !is_peak(band, i, j)) continue;
-      result.push_back({{i + vertex(band.at(i - 1, j), band.at(i, j), band.at(i + 1, j)),
-                         j + vertex(band.at(i, j - 1), band.at(i, j), band.at(i, j + 1))},
+      result.push_back({{i + parabola_vertex(band.at(i - 1, j), band.at(i, j), band.at(i + 1, j)),
+                         j + parabola_vertex(band.at(i, j - 1), band.at(i, j), band.at(i, j + 1))},
                         band.at(i, j) * height_by_answer});
     }
   }

@@ -8,6 +8,7 @@
 
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "segment/beads/plane.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -23,11 +24,6 @@ cv::Mat cut(const Plane& plane, int left, int top, int n, int side) {
   const cv::Mat source = whole(cv::Range(top + j0, top + j1), cv::Range(left + i0, left + i1));
   cv::subtract(source, cv::mean(source), inside);
   return result;
-}
-
-double vertex(double before, double here, double after) {
-  const double curvature = before - 2 * here + after;
-  return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
 }
 
 /// Place of the highest value of a periodic map, to a fraction of a pixel; nothing where it is not within the first
@@ -50,8 +46,8 @@ std::optional<Vec2> peak_of(const cv::Mat& map, int n, double least_ratio) {
     }
   }
   const auto value = [&](int i, int j) { return map.at<float>(best.y + j, best.x + i); };
-  return Vec2{best.x + vertex(value(-1, 0), value(0, 0), value(1, 0)),
-              best.y + vertex(value(0, -1), value(0, 0), value(0, 1))};
+  return Vec2{best.x + parabola_vertex(value(-1, 0), value(0, 0), value(1, 0)),
+              best.y + parabola_vertex(value(0, -1), value(0, 0), value(0, 1))};
 }
 
 /// Shift, of up to half a window, between a window of the reference and the place in the target where it is expected.

@@ -9,7 +9,7 @@
 namespace mbtfm::beads {
 namespace {
 
-struct Witness {
+struct StillBead {
   Vec2 offset, u;
   double near = 1;  ///< weight by its distance
   double weight = 1;
@@ -23,10 +23,10 @@ struct Fitted {
 };
 
 /// Weighted least squares of u = u₀ + G d, the gradient held by a small ridge where beads lie on a line.
-Fitted weighted_fit(const std::vector<Witness>& witnesses, double reach) {
+Fitted weighted_fit(const std::vector<StillBead>& witnesses, double reach) {
   cv::Matx33d normal;
   cv::Vec3d x, y;
-  for (const Witness& w : witnesses) {
+  for (const StillBead& w : witnesses) {
     const cv::Vec3d row(1, w.offset.x, w.offset.y);
     for (int a = 0; a < 3; ++a) {
       const double weighted = w.weight * row[a];
@@ -37,7 +37,7 @@ Fitted weighted_fit(const std::vector<Witness>& witnesses, double reach) {
   const double total = normal(0, 0);
   double squares = 0;
   if (witnesses.size() < 6) {
-    for (const Witness& w : witnesses) squares += w.weight * w.weight;
+    for (const StillBead& w : witnesses) squares += w.weight * w.weight;
     return {{{x[0] / total, y[0] / total}, 0, 0, 0, 0}, squares / (total * total)};
   }
   constexpr double kRidge = 0.01;  // of the weight at full reach
@@ -46,7 +46,7 @@ Fitted weighted_fit(const std::vector<Witness>& witnesses, double reach) {
   for (const auto& [a, b] : {std::pair(0, 1), std::pair(0, 2), std::pair(1, 2)}) normal(a, b) = normal(b, a);
   const cv::Matx33d inverse = normal.inv(cv::DECOMP_CHOLESKY);
   const cv::Vec3d a = inverse * x, b = inverse * y;
-  for (const Witness& w : witnesses) {
+  for (const StillBead& w : witnesses) {
     const double share = w.weight * (inverse(0, 0) + inverse(0, 1) * w.offset.x + inverse(0, 2) * w.offset.y);
     squares += share * share;
   }
@@ -60,14 +60,14 @@ std::optional<LocalMotion> local_motion(Vec2 place, const std::vector<int>& othe
   if (others.empty()) return std::nullopt;
   LocalMotion result;
   result.n_beads = static_cast<int>(others.size());
-  std::vector<Witness> witnesses;
+  std::vector<StillBead> witnesses;
   witnesses.reserve(others.size());
   for (const int k : others) {
     witnesses.push_back({.offset = positions[k] - place, .u = motions[k].u});
     result.reach_px = std::max(result.reach_px, length(witnesses.back().offset));
   }
   const double per_reach = 1 / std::max(result.reach_px, 1e-9);
-  for (Witness& w : witnesses) {
+  for (StillBead& w : witnesses) {
     w.near = w.weight = std::exp(-2 * per_reach * per_reach * dot(w.offset, w.offset));
   }
   const double n = static_cast<double>(witnesses.size());

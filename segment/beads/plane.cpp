@@ -115,6 +115,11 @@ double bead_sigma_of(const Plane& plane) {
   return numerics::quantile(sigmas, 0.5);
 }
 
+double parabola_vertex(double before, double here, double after) {
+  const double curvature = before - 2 * here + after;
+  return curvature < 0 ? std::clamp(0.5 * (before - after) / curvature, -0.5, 0.5) : 0.0;
+}
+
 Neighbours::Neighbours(std::vector<Vec2> points, double cell) : points_(std::move(points)), cell_(cell) {
   if (points_.empty()) return;
   Vec2 last = points_[0];

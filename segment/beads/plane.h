@@ -31,6 +31,9 @@ double noise_of(const Plane& plane);
 /// lag alone carries the noise; the median over tiles, so that a bright clump does not decide. 0: nothing but noise.
 double bead_sigma_of(const Plane& plane);
 
+/// Vertex of the parabola through three values of which the middle one is highest, within half a pixel of it.
+double parabola_vertex(double before, double here, double after);
+
 /// Points sorted into square cells.
 class Neighbours {
  public:

@@ -15,7 +15,7 @@ constexpr int kTile_px = 640;    // three beside each other fill a screen
 constexpr int kCaption_px = 84;  // two lines
 constexpr int kGap_px = 10;
 constexpr std::size_t kMostPictures = 64;
-const cv::Scalar kPaper(255, 255, 255), kInk(15, 15, 15), kFaint(90, 90, 90);
+const cv::Scalar kPaper(255, 255, 255), kInk(15, 15, 15), kGrey(90, 90, 90);
 
 SheetAxis parse_axis(const std::string& text) {
   SheetAxis axis;
@@ -127,7 +127,7 @@ images::Picture draw_contact_sheet(const std::optional<images::Channel>& adhesio
     const int k = static_cast<int>(i);
     const cv::Point corner(kGap_px + k % n_columns * step.width, kGap_px + k / n_columns * step.height);
     write_line(sheet, trials[i].values, corner + cv::Point(0, 30), 0.8, kInk);
-    write_line(sheet, trials[i].outcome, corner + cv::Point(0, 66), 0.65, kFaint);
+    write_line(sheet, trials[i].outcome, corner + cv::Point(0, 66), 0.65, kGrey);
     tiles[i].copyTo(sheet(cv::Rect(corner + cv::Point(0, kCaption_px), tiles[i].size())));
   }
   return {sheet.cols, sheet.rows, std::vector<std::uint8_t>(sheet.data, sheet.data + sheet.total() * 3)};

@@ -13,19 +13,19 @@ namespace mbtfm::cells {
 
 namespace {
 
-constexpr double kInward_um = 0.8;     ///< how far the edge may lie inside the ring: a blurred mask bulges
-constexpr double kOutward_um = 0.4;    ///< … and outside
-constexpr double kMargin_um = 0.7;     ///< of the profile beyond the furthest places
-constexpr double kStep_um = 0.05;      ///< between places: a tenth of the ring's spacing
-constexpr double kTurn_um = 0.1;       ///< neighbours' places differ by this
-constexpr double kEdgeBlur_um = 0.15;  ///< standard deviation of the microscope's blur
+constexpr double kInward_um = 0.8;      ///< how far the edge may lie inside the ring: a blurred mask bulges
+constexpr double kOutward_um = 0.4;     ///< … and outside
+constexpr double kMargin_um = 0.7;      ///< of the profile beyond the furthest places
+constexpr double kPlaceStep_um = 0.05;  ///< between places: a tenth of the ring's spacing
+constexpr double kTurn_um = 0.1;        ///< neighbours' places differ by this
+constexpr double kEdgeBlur_um = 0.15;   ///< standard deviation of the microscope's blur
 constexpr std::array kLineWidths_um = {0.15, 0.22, 0.32};  ///< standard deviation of the line: blur and cortex
 constexpr int kColumns = 4;                                ///< ground, slope, step, line
 
 using Profile = std::vector<double>;
 
 /// Orthonormal functions on the profile's samples; the last ones are what step and line add to those before.
-struct Model {
+struct EdgeModel {
   std::vector<Profile> basis;
 };
 
@@ -36,7 +36,7 @@ double product(const Profile& a, const Profile& b) {
 }
 
 /// Gram–Schmidt.
-void add_to(Model& model, Profile column) {
+void add_to(EdgeModel& model, Profile column) {
   for (const Profile& before : model.basis) {
     const double share = product(before, column);
     for (std::size_t i = 0; i < column.size(); ++i) column[i] -= share * before[i];
@@ -48,7 +48,7 @@ void add_to(Model& model, Profile column) {
 
 /// Offsets of the samples along the outward normal, um.
 Profile offsets_of(double pixel_um) {
-  const double step = std::max(pixel_um, kStep_um);
+  const double step = std::max(pixel_um, kPlaceStep_um);
   Profile offsets;
   for (double d = -kInward_um - kMargin_um; d <= kOutward_um + kMargin_um; d += step) offsets.push_back(d);
   return offsets;
@@ -56,13 +56,13 @@ Profile offsets_of(double pixel_um) {
 
 std::vector<double> places() {
   std::vector<double> result;
-  for (int k = 0; k <= std::lround((kInward_um + kOutward_um) / kStep_um); ++k)
-    result.push_back(-kInward_um + k * kStep_um);
+  for (int k = 0; k <= std::lround((kInward_um + kOutward_um) / kPlaceStep_um); ++k)
+    result.push_back(-kInward_um + k * kPlaceStep_um);
   return result;
 }
 
-std::array<Model, kLineWidths_um.size()> models_at(double place, const Profile& offsets) {
-  std::array<Model, kLineWidths_um.size()> models;
+std::array<EdgeModel, kLineWidths_um.size()> models_at(double place, const Profile& offsets) {
+  std::array<EdgeModel, kLineWidths_um.size()> models;
   for (std::size_t w = 0; w < models.size(); ++w) {
     std::array<Profile, kColumns> columns;
     for (const double d : offsets) {
@@ -82,11 +82,11 @@ struct Residuals {
   double step, line;
 };
 
-Residuals residuals_of(const Profile& profile, const std::array<Model, kLineWidths_um.size()>& models) {
+Residuals residuals_of(const Profile& profile, const std::array<EdgeModel, kLineWidths_um.size()>& models) {
   double rest = product(profile, profile), line = 0;
   for (int k = 0; k < 2; ++k) rest -= std::pow(product(profile, models[0].basis[k]), 2);
   const double step = product(profile, models[0].basis[2]);
-  for (const Model& model : models) line = std::max(line, product(profile, model.basis[3]));
+  for (const EdgeModel& model : models) line = std::max(line, product(profile, model.basis[3]));
   return {rest - (step > 0 ? step * step : 0), rest - step * step - line * line};
 }
 
@@ -121,7 +121,7 @@ Profile profile_at(const cv::Mat& image, cv::Point2d point, cv::Point2d normal, 
 std::vector<int> cheapest_round(const std::vector<std::vector<double>>& cost) {
   const int n = static_cast<int>(cost.size()), m = static_cast<int>(cost[0].size());
   constexpr int kLargestJump = 6;  // 0.3 um from point to point
-  const double bend = std::pow(kStep_um / kTurn_um, 2) / 2;
+  const double bend = std::pow(kPlaceStep_um / kTurn_um, 2) / 2;
   // twice round: the middle half does not feel where it began
   std::vector<std::vector<int>> from(2 * static_cast<std::size_t>(n), std::vector<int>(m));
   std::vector<double> total(m, 0), next(m);
@@ -171,7 +171,7 @@ std::vector<cv::Point2d> on_edge(const cv::Mat& image, const std::vector<cv::Poi
                                  const std::vector<bool>& may_move, double pixel_um) {
   const Profile offsets = offsets_of(pixel_um);
   const std::vector<double> at = places();
-  std::vector<std::array<Model, kLineWidths_um.size()>> models;
+  std::vector<std::array<EdgeModel, kLineWidths_um.size()>> models;
   for (const double place : at) models.push_back(models_at(place, offsets));
   const auto normals = outward_normals(ring);
   std::vector<std::vector<Residuals>> residuals(ring.size(), std::vector<Residuals>(at.size()));
@@ -183,7 +183,8 @@ std::vector<cv::Point2d> on_edge(const cv::Mat& image, const std::vector<cv::Poi
     }
   });
   std::vector<std::vector<double>> cost = costs_of(residuals, offsets.size());
-  const int rest = static_cast<int>(std::lround(kInward_um / kStep_um));  // the place of a point that does not move
+  const int rest =
+      static_cast<int>(std::lround(kInward_um / kPlaceStep_um));  // the place of a point that does not move
   constexpr double kHeld = 1e6;
   for (std::size_t i = 0; i < ring.size(); ++i)
     for (int k = 0; k < static_cast<int>(at.size()); ++k)

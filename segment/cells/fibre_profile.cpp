@@ -10,7 +10,7 @@ namespace mbtfm::cells {
 
 namespace {
 
-constexpr double kStep = 0.5;  // px: bilinear samples carry no more
+constexpr double kColumnStep = 0.5;  // px: bilinear samples carry no more
 
 struct Column {
   double level;
@@ -48,9 +48,9 @@ double half_width(const std::vector<Column>& profile, int middle, int direction,
 }  // namespace
 
 Profile profile_across(const cv::Mat& image, const std::vector<cv::Point2d>& points, double reach_px) {
-  const int half = std::max(2, static_cast<int>(std::ceil(reach_px / kStep)));
+  const int half = std::max(2, static_cast<int>(std::ceil(reach_px / kColumnStep)));
   std::vector<Column> columns;
-  for (int i = -half; i <= half; ++i) columns.push_back(column_at(image, points, i * kStep));
+  for (int i = -half; i <= half; ++i) columns.push_back(column_at(image, points, i * kColumnStep));
   const auto lowest = [&](int from, int to) {
     return *std::min_element(columns.begin() + from, columns.begin() + to,
                              [](const Column& a, const Column& b) { return a.level < b.level; });
@@ -67,8 +67,8 @@ Profile profile_across(const cv::Mat& image, const std::vector<cv::Point2d>& poi
   p.height = (p.lower_drop + p.upper_drop) / 2;
   p.side = top - p.height;
   p.noise = std::hypot(columns[static_cast<std::size_t>(peak)].error, std::max(left.error, right.error));
-  p.width_px = kStep * (half_width(columns, peak, -1, top - (top - right.level) / 2) +
-                        half_width(columns, peak, +1, top - (top - left.level) / 2));
+  p.width_px = kColumnStep * (half_width(columns, peak, -1, top - (top - right.level) / 2) +
+                              half_width(columns, peak, +1, top - (top - left.level) / 2));
   return p;
 }
 

@@ -23,7 +23,7 @@ namespace mbtfm::cells {
 namespace {
 
 /// The part of the image that holds the cell, shrunk until the narrowest filter spans no more pixels than it needs.
-struct Field {
+struct Crop {
   cv::Mat image;
   cv::Mat is_inside;  ///< CV_8U: of the cell's outline
   double pixel_um = 0;
@@ -43,10 +43,10 @@ cv::Rect box_of(const Polygon& outline_um, cv::Size size, double pixel_um, doubl
   return box.empty() ? whole : box;
 }
 
-Field field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
+Crop field_of(const cv::Mat& image, const Polygon& outline_um, double pixel_um, const FibreParameters& p) {
   const cv::Rect box = box_of(outline_um, image.size(), pixel_um, 2 * p.fibre_averaging_um);
   const int factor = grid_factor(p, pixel_um);
-  Field field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
+  Crop field{shrink(image(box), factor), {}, pixel_um * factor, {box.x * pixel_um, box.y * pixel_um}};
   field.is_inside = cv::Mat(field.image.size(), CV_8U, cv::Scalar(outline_um.empty() ? 255 : 0));
   if (outline_um.empty()) return field;
   std::vector<std::vector<cv::Point>> corners(1);
@@ -79,18 +79,18 @@ struct Candidate {
 };
 
 double significance_of(const std::vector<cv::Point2d>& points, const std::vector<double>& height, const Ridges& ridges,
-                       const Field& field, const FibreParameters& p) {
+                       const Crop& field, const FibreParameters& p) {
   return significance(ridges, points, height, independent_px(p, field.pixel_um));
 }
 
-Polyline in_um(const std::vector<cv::Point2d>& points, const Field& field) {
+Polyline in_um(const std::vector<cv::Point2d>& points, const Crop& field) {
   Polyline line;
   for (const cv::Point2d& point : points) line.push_back(field.in_um(point));
   return line;
 }
 
 /// From the lines that do not lie beside fibres: those are faint fibres as often as texture.
-TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
+TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ridges, const Crop& field,
                               const FibreParameters& p) {
   std::vector<double> all, apart;
   for (const Trace& t : traces) all.push_back(significance_of(t.points, t.own_height(), ridges, field, p));
@@ -103,7 +103,7 @@ TextureLines texture_lines_of(const std::vector<Trace>& traces, const Ridges& ri
 }
 
 /// Where the cell's texture is to be seen: inside of it, and away from lines that cannot be texture.
-cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, const Field& field,
+cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, const Crop& field,
                        const FibreParameters& p) {
   const TextureLines texture = texture_lines_of(traces, ridges, field, p);
   cv::Mat is_free = field.is_inside.clone();
@@ -118,7 +118,7 @@ cv::Mat free_of_fibres(const std::vector<Trace>& traces, const Ridges& ridges, c
 
 /// Looks at one traced line after another.
 struct Judge {
-  const Field& field;
+  const Crop& field;
   const Ridges& ridges;
   const TraceRule& rule;
   const Polygon& outline_um;
@@ -185,7 +185,7 @@ std::vector<Candidate> significant(std::vector<Candidate> candidates, const Fibr
 
 /// Of the ridges along the outline: the height of the cell's cortex, seen from its side. Infinite without an outline.
 double height_of_cortex(const Judge& judge) {
-  const Field& field = judge.field;
+  const Crop& field = judge.field;
   if (judge.outline_um.empty()) return std::numeric_limits<double>::infinity();
   std::vector<double> heights;
   const Polygon& ring = judge.outline_um;
@@ -239,7 +239,7 @@ std::vector<Candidate> judged(const std::vector<Trace>& traces, const Judge& jud
 
 /// Actin as bright as these fibres, away from them and from the folds at the cell's edge.
 std::vector<Polyline> unexplained(const std::vector<Candidate>& fibres, const Judge& judge) {
-  const Field& field = judge.field;
+  const Crop& field = judge.field;
   std::vector<std::vector<cv::Point2d>> points;
   for (const Candidate& c : fibres) {
     points.emplace_back();
@@ -294,7 +294,7 @@ void declare(stage::ParameterList& list, FibreParameters& p) {
 
 TracedLines trace_fibres(const images::Image& image, const Polygon& outline_um, double pixel_size_um,
                          const FibreParameters& p) {
-  const Field field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
+  const Crop field = field_of(matrix_of(image), outline_um, pixel_size_um, p);
   const RidgeScales scales = scales_of(p, field.pixel_um);
   const TraceRule rule = rule_of(p, field.pixel_um);
   Ridges ridges = find_ridges(field.image, field.is_inside, scales);

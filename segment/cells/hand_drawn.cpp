@@ -35,7 +35,7 @@ void require_inside(const std::vector<Vec2>& points_px, const Field& field, cons
   }
 }
 
-std::vector<Vec2> in_um(const std::vector<Vec2>& points_px, double pixel_um) {
+std::vector<Vec2> line_um(const std::vector<Vec2>& points_px, double pixel_um) {
   std::vector<Vec2> points_um;
   for (const Vec2 p : points_px) {
     if (points_um.empty() || !(pixel_um * p == points_um.back())) points_um.push_back(pixel_um * p);
@@ -52,7 +52,7 @@ Polygon area_um(const RoiSet& set, const rois::Roi& roi, const Field& field) {
   if (roi.is_spline) require_inside(roi.points_px, field, where);  // before it is drawn
   const Polygon polygon_px = rois::area_px(roi);
   require_inside(polygon_px, field, where);
-  Polygon polygon_um = in_um(polygon_px, field.pixel_um);
+  Polygon polygon_um = line_um(polygon_px, field.pixel_um);
   if (polygon_um.size() > 1 && polygon_um.front() == polygon_um.back()) polygon_um.pop_back();
   if (polygon_um.size() < 3)
     throw InputError(where, "at least three points", std::to_string(polygon_um.size()) + " different ones");
@@ -198,7 +198,7 @@ Fibre drawn_fibre(const RoiSet& set, const rois::Roi& roi, const Field& field) {
   const Polyline line = rois::line_px(roi);
   require_inside(line, field, where);
   Fibre fibre;
-  fibre.points_um = in_um(line, field.pixel_um);
+  fibre.points_um = line_um(line, field.pixel_um);
   if (fibre.points_um.size() < 2)
     throw InputError(where, "at least two points", std::to_string(fibre.points_um.size()) + " different ones");
   if (length_um(fibre.points_um) < field.pixel_um)

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "pipeline/contract/errors.h"
+#include "segment/images/file_handle.h"
 #include "segment/images/image_file.h"
 #include "segment/images/png.h"
 #include "segment/images/stack.h"
@@ -49,11 +50,6 @@ bool write_all(jpeg_compress_struct& jpeg, Failure& failure, std::FILE* stream, 
   return true;
 }
 
-struct FileCloser {
-  void operator()(std::FILE* stream) const { std::fclose(stream); }
-};
-using FileHandle = std::unique_ptr<std::FILE, FileCloser>;
-
 /// Data that end early or contradict themselves: libjpeg would go on, with grey for what it has not.
 void fail_on_damage(j_common_ptr jpeg, int level) {
   if (level < 0) fail(jpeg);
@@ -70,22 +66,22 @@ void limit_passes(j_common_ptr jpeg) {
 }
 
 /// libjpeg's state; everything that a longjmp must not skip lives here, outside of the functions that jump.
-struct Reading {
+struct JpegReading {
   Failure failure{};
   jpeg_progress_mgr progress{};
   jpeg_decompress_struct jpeg{};
   std::vector<JSAMPLE> bytes;
-  Reading() {
+  JpegReading() {
     jpeg.err = jpeg_std_error(&failure.manager);
     failure.manager.error_exit = fail;
     failure.manager.emit_message = fail_on_damage;
     progress.progress_monitor = limit_passes;
   }
-  Reading(const Reading&) = delete;
-  ~Reading() { jpeg_destroy_decompress(&jpeg); }
+  JpegReading(const JpegReading&) = delete;
+  ~JpegReading() { jpeg_destroy_decompress(&jpeg); }
 };
 
-bool read_header(Reading& r, std::FILE* stream) {
+bool read_jpeg_header(JpegReading& r, std::FILE* stream) {
   if (setjmp(r.failure.back)) return false;
   jpeg_create_decompress(&r.jpeg);
   r.jpeg.progress = &r.progress;
@@ -94,7 +90,7 @@ bool read_header(Reading& r, std::FILE* stream) {
   return true;
 }
 
-bool read_rows(Reading& r) {
+bool read_jpeg_rows(JpegReading& r) {
   if (setjmp(r.failure.back)) return false;
   jpeg_start_decompress(&r.jpeg);
   const std::size_t row_bytes = static_cast<std::size_t>(r.jpeg.output_width) * r.jpeg.output_components;
@@ -107,7 +103,7 @@ bool read_rows(Reading& r) {
 }
 
 /// The mean of `n_colours` samples of each pixel from `first` on.
-Image to_image(const Reading& r, int n_channels, int first, int n_colours) {
+Image to_image(const JpegReading& r, int n_channels, int first, int n_colours) {
   Image image;
   image.width = static_cast<int>(r.jpeg.image_width);
   image.height = static_cast<int>(r.jpeg.image_height);
@@ -127,13 +123,13 @@ Image to_image(const Reading& r, int n_channels, int first, int n_colours) {
 Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice) {
   const FileHandle stream(std::fopen(file.c_str(), "rb"));
   if (!stream) throw InputError(file.string(), "a readable JPEG image", "a file that cannot be opened");
-  Reading r;
+  JpegReading r;
   const auto expect = [&](bool is_read) {
     if (is_read) return;
     throw InputError(file.string(), "a whole JPEG image", r.failure.message[0] ? r.failure.message : "damaged data",
                      "the file may be truncated or damaged: copy or export it again");
   };
-  expect(read_header(r, stream.get()));
+  expect(read_jpeg_header(r, stream.get()));
   const J_COLOR_SPACE kind = r.jpeg.jpeg_color_space;
   if (kind != JCS_GRAYSCALE && kind != JCS_YCbCr && kind != JCS_RGB) {
     throw InputError(file.string(), "a grey or RGB image", "a JPEG image in the colours of a printer",
@@ -149,7 +145,7 @@ Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice) {
   const bool is_mean = is_rgb && choice.channel.empty();
   const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};
   const int first = is_mean ? 0 : chosen_channel(names, choice, file.string());
-  expect(read_rows(r));
+  expect(read_jpeg_rows(r));
   return to_image(r, n_channels, first, is_mean ? 3 : 1);
 }
 

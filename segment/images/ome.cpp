@@ -21,7 +21,7 @@ std::string local_name(const char* name) {
   return std::string(whole.substr(whole.find(':') == std::string_view::npos ? 0 : whole.find(':') + 1));
 }
 
-struct Reader {
+struct OmeReader {
   OmeImage image;
   bool is_in_pixels = false;  // of the first image
   bool has_pixels = false;    // the first image's are read: what follows are other images
@@ -100,16 +100,16 @@ struct Reader {
 void on_begin(void* reader, const char* element, const char** attributes) {
   Attributes named;
   for (; *attributes; attributes += 2) named[local_name(attributes[0])] = attributes[1];
-  static_cast<Reader*>(reader)->begin(local_name(element), named);
+  static_cast<OmeReader*>(reader)->begin(local_name(element), named);
 }
-void on_end(void* reader, const char* element) { static_cast<Reader*>(reader)->end(local_name(element)); }
+void on_end(void* reader, const char* element) { static_cast<OmeReader*>(reader)->end(local_name(element)); }
 void on_text(void* reader, const char* text, int length) {
-  auto* r = static_cast<Reader*>(reader);
+  auto* r = static_cast<OmeReader*>(reader);
   if (r->is_in_uuid) r->image.pages.back().uuid.append(text, static_cast<std::size_t>(length));
 }
 
 /// What is wrong with the XML; XML_ERROR_NONE: nothing.
-XML_Error parse(const std::string& xml, const char* encoding, Reader& reader) {
+XML_Error parse(const std::string& xml, const char* encoding, OmeReader& reader) {
   const std::unique_ptr<std::remove_pointer_t<XML_Parser>, decltype(&XML_ParserFree)> parser(XML_ParserCreate(encoding),
                                                                                              &XML_ParserFree);
   XML_SetUserData(parser.get(), &reader);
@@ -127,10 +127,10 @@ bool is_ome(std::string_view description) {
 }
 
 OmeImage parse_ome(const std::string& xml) {
-  Reader reader;
+  OmeReader reader;
   XML_Error error = parse(xml, nullptr, reader);
   if (error == XML_ERROR_INVALID_TOKEN) {
-    reader = Reader{};
+    reader = OmeReader{};
     error = parse(xml, "ISO-8859-1", reader);
   }
   if (error != XML_ERROR_NONE) throw InvalidData("OME-XML", "well-formed XML", XML_ErrorString(error));

@@ -8,16 +8,12 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "segment/images/file_handle.h"
 #include "segment/images/image_file.h"
 #include "segment/images/stack.h"
 
 namespace mbtfm::images {
 namespace {
-
-struct FileCloser {
-  void operator()(std::FILE* stream) const { std::fclose(stream); }
-};
-using FileHandle = std::unique_ptr<std::FILE, FileCloser>;
 
 /// What libpng complains of, in a fixed buffer: libpng leaves by longjmp, which runs no destructor.
 struct Message {
@@ -33,7 +29,7 @@ void keep_error(png_structp png, png_const_charp text) {
 void ignore_warning(png_structp, png_const_charp) {}
 
 /// libpng's state; everything that a longjmp must not skip lives here, outside of the functions that jump.
-struct Reading {
+struct PngReading {
   Message message;
   png_structp png = png_create_read_struct(PNG_LIBPNG_VER_STRING, &message, keep_error, ignore_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
@@ -41,12 +37,12 @@ struct Reading {
   int bits = 0, channels = 0;
   std::vector<unsigned char> bytes;
   std::vector<unsigned char*> rows;
-  Reading() = default;
-  Reading(const Reading&) = delete;
-  ~Reading() { png_destroy_read_struct(&png, &info, nullptr); }
+  PngReading() = default;
+  PngReading(const PngReading&) = delete;
+  ~PngReading() { png_destroy_read_struct(&png, &info, nullptr); }
 };
 
-bool read_header(Reading& r, std::FILE* stream) {
+bool read_png_header(PngReading& r, std::FILE* stream) {
   if (setjmp(png_jmpbuf(r.png))) return false;
   png_init_io(r.png, stream);
   png_read_info(r.png, r.info);
@@ -65,7 +61,7 @@ bool read_header(Reading& r, std::FILE* stream) {
   return true;
 }
 
-bool read_rows(Reading& r) {
+bool read_png_rows(PngReading& r) {
   if (setjmp(png_jmpbuf(r.png))) return false;
   png_read_image(r.png, r.rows.data());
   png_read_end(r.png, nullptr);
@@ -73,7 +69,7 @@ bool read_rows(Reading& r) {
 }
 
 /// The mean of `n_colours` samples of each pixel from `first` on.
-Image to_image(const Reading& r, int first, int n_colours) {
+Image to_image(const PngReading& r, int first, int n_colours) {
   Image image;
   image.width = static_cast<int>(r.width);
   image.height = static_cast<int>(r.height);
@@ -112,13 +108,13 @@ bool write_all(png_structp png, png_infop info, std::FILE* stream, const Picture
 
 Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
   const FileHandle stream(std::fopen(file.c_str(), "rb"));
-  Reading r;
+  PngReading r;
   if (!stream || !r.info) throw InputError(file.string(), "a readable PNG image", "a file that cannot be opened");
   const auto fail = [&] {
     throw InputError(file.string(), "a whole PNG image", r.message.text[0] ? r.message.text : "damaged data",
                      "the file may be truncated or damaged: copy or export it again");
   };
-  if (!read_header(r, stream.get())) fail();
+  if (!read_png_header(r, stream.get())) fail();
   require_plausible_size(file, r.width, r.height);
   const std::size_t row_bytes = static_cast<std::size_t>(r.width) * r.channels * (r.bits == 16 ? 2 : 1);
   require_plausible_bytes(file, row_bytes * r.height);
@@ -128,7 +124,7 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
   const bool is_mean = is_rgb && choice.channel.empty();
   const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};
   const int first = is_mean ? 0 : chosen_channel(names, choice, file.string());
-  if (!read_rows(r)) fail();
+  if (!read_png_rows(r)) fail();
   return to_image(r, first, is_mean ? 3 : 1);
 }
 

@@ -27,9 +27,9 @@ struct Layout {
   bool is_inverted = false;  ///< 0 is white
 };
 
-class Reader {
+class TiffReader {
  public:
-  explicit Reader(const std::filesystem::path& file) : file_(file), tiff_(open_tiff(file, "r", messages_)) {
+  explicit TiffReader(const std::filesystem::path& file) : file_(file), tiff_(open_tiff(file, "r", messages_)) {
     if (!tiff_ || !messages_.first_error.empty()) fail("a whole TIFF image");
     of_first_page_ = calibration();
     calibration_ = pixel_size_um(of_first_page_);
@@ -370,6 +370,6 @@ class Reader {
 
 }  // namespace
 
-Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return Reader(file).read(choice); }
+Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return TiffReader(file).read(choice); }
 
 }  // namespace mbtfm::images

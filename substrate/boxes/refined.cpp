@@ -20,8 +20,8 @@ namespace mbtfm::boxes {
 namespace {
 
 const double kFall = std::pow(2, 1.5);  // of the error at a load's rim when the elements there halve
-constexpr double kAim = 0.9;    // of the tolerance: a second try costs more than what is spared by just reaching it
-constexpr int kMostLevels = 8;  // of refinement: 2^8 times finer than asked for no memory holds
+constexpr double kAim = 0.9;  // of the tolerance: a second try costs more than what is spared by just reaching it
+constexpr int kMostRefinements = 8;  // of refinement: 2^8 times finer than asked for no memory holds
 
 void add_loads(const std::vector<std::vector<NodeWeight>>& loads, const LoadCase& forces,
                const numerics::NodalColumn& b) {
@@ -50,13 +50,13 @@ std::vector<int> columns_by_place(const std::vector<substrate::Ellipse>& ellipse
   return columns;
 }
 
-constexpr substrate::Capabilities kCan{
+constexpr substrate::Capabilities kRefinedCan{
     .base = true, .sides = true, .grading = true, .inside = true, .normal_displacement = true};
 
 class Refined final : public substrate::Substrate {
  public:
   Refined(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : Substrate(parameters, kCan),
+      : Substrate(parameters, kRefinedCan),
         material_{gel, substrate::profile_of(parameters.modulus_profile)},
         threads_(threads),
         order_(parameters.element == substrate::FiniteElement::q1_p0 ? 1 : 2) {}
@@ -171,7 +171,7 @@ class Refined final : public substrate::Substrate {
   /// @return the estimated error of each adhesion's columns
   std::vector<double> refine_until_right(Fineness& fineness, const Request& request, Eigen::MatrixXd& columns) const {
     std::vector<double> errors(request.ellipses.size(), std::numeric_limits<double>::infinity());
-    for (int level = 0; level < kMostLevels; ++level) {
+    for (int level = 0; level < kMostRefinements; ++level) {
       const std::vector<std::size_t> finer_ones = worst(errors);
       for (const std::size_t j : finer_ones) ++fineness.halvings[j];
       fineness.growth /= far_step();
@@ -182,10 +182,10 @@ class Refined final : public substrate::Substrate {
       columns.swap(finer);
       if (mean(errors) <= parameters_.displacement_tolerance) return errors;
     }
-    throw NotSolved(Report{.iterations = kMostLevels,
+    throw NotSolved(Report{.iterations = kMostRefinements,
                            .last_change = mean(errors),
                            .reason = "the substrate's error is still estimated as " + brief(mean(errors)) + " after " +
-                                     std::to_string(kMostLevels) +
+                                     std::to_string(kMostRefinements) +
                                      " refinements: ask for a larger displacement_tolerance"});
   }
 
@@ -309,7 +309,7 @@ class Refined final : public substrate::Substrate {
 }  // namespace
 
 substrate::Model refined() {
-  return {.kind = substrate::ModelKind::refined, .can = kCan, .make = substrate::make_model<Refined>};
+  return {.kind = substrate::ModelKind::refined, .can = kRefinedCan, .make = substrate::make_model<Refined>};
 }
 
 }  // namespace mbtfm::boxes

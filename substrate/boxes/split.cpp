@@ -38,7 +38,7 @@ greens::PointForceField averaged_field(const Gel& gel, const substrate::Ellipse&
   return sum;
 }
 
-constexpr substrate::Capabilities kCan{.base = true, .sides = true, .normal_displacement = true};
+constexpr substrate::Capabilities kSplitCan{.base = true, .sides = true, .normal_displacement = true};
 
 /// With 2 cells of the grid over the thickness (docs/accuracy.md); it falls as the cube of their size.
 constexpr double kErrorOfTwoCells = 1e-3;
@@ -57,7 +57,7 @@ bool follows_sides(const Gel& gel, const substrate::SubstrateParameters& p) {
 class Split final : public substrate::Substrate {
  public:
   Split(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : Substrate(parameters, kCan), gel_(gel), threads_(threads) {}
+      : Substrate(parameters, kSplitCan), gel_(gel), threads_(threads) {}
 
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
@@ -230,7 +230,7 @@ class Split final : public substrate::Substrate {
 
 substrate::Model split() {
   return {.kind = substrate::ModelKind::split,
-          .can = kCan,
+          .can = kSplitCan,
           .make = substrate::make_model<Split>,
           .within = with_cells_for,
           .follows = follows_sides};

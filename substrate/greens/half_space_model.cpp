@@ -5,12 +5,12 @@
 namespace mbtfm::greens {
 namespace {
 
-constexpr substrate::Capabilities kCan{.normal_displacement = true, .incompressible = true};
+constexpr substrate::Capabilities kHalfSpaceCan{.normal_displacement = true, .incompressible = true};
 
 class HalfSpace final : public GreensModel {
  public:
   HalfSpace(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : GreensModel(gel, parameters, kCan, threads) {}
+      : GreensModel(gel, parameters, kHalfSpaceCan, threads) {}
   Figures figures() const override { return {{"substrate_model", "half-space"}}; }
 
  private:
@@ -35,7 +35,7 @@ class HalfSpace final : public GreensModel {
 }  // namespace
 
 substrate::Model half_space() {
-  return {.kind = substrate::ModelKind::half_space, .can = kCan, .make = substrate::make_model<HalfSpace>};
+  return {.kind = substrate::ModelKind::half_space, .can = kHalfSpaceCan, .make = substrate::make_model<HalfSpace>};
 }
 
 }  // namespace mbtfm::greens

@@ -7,12 +7,12 @@
 namespace mbtfm::greens {
 namespace {
 
-constexpr substrate::Capabilities kCan{.base = true, .normal_displacement = true, .incompressible = true};
+constexpr substrate::Capabilities kLayerCan{.base = true, .normal_displacement = true, .incompressible = true};
 
 class LayerModel final : public GreensModel {
  public:
   LayerModel(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : GreensModel(gel, parameters, kCan, threads), layer_(gel) {}
+      : GreensModel(gel, parameters, kLayerCan, threads), layer_(gel) {}
   Figures figures() const override {
     return {{"substrate_model", "layer"}, {"substrate_thickness_um", gel_.thickness_um}};
   }
@@ -41,7 +41,7 @@ class LayerModel final : public GreensModel {
 }  // namespace
 
 substrate::Model layer() {
-  return {.kind = substrate::ModelKind::layer, .can = kCan, .make = substrate::make_model<LayerModel>};
+  return {.kind = substrate::ModelKind::layer, .can = kLayerCan, .make = substrate::make_model<LayerModel>};
 }
 
 }  // namespace mbtfm::greens

@@ -19,10 +19,10 @@ namespace {
 using std::numbers::pi;
 
 // As in layer.cpp: over half a thickness the singularity at r = 2i is 8 half lengths away, 15^-9 = 3e-11.
-constexpr int kPiecesPerUnit = 2, kOrder = 10;
+constexpr int kPiecesPerUnit = 2, kNodes = 10;
 constexpr int kPieces = kPiecesPerUnit * static_cast<int>(LayerTable::kReach);
 
-double node(int k) { return std::cos(pi * (k + 0.5) / kOrder); }
+double node(int k) { return std::cos(pi * (k + 0.5) / kNodes); }
 
 }  // namespace
 
@@ -46,7 +46,7 @@ double layer_vertical_factor(double nu, double x) {
   return w_at_surface.dot(rows.fullPivLu().solve(Eigen::Vector4d(0, 0, -1, 0)));
 }
 
-LayerVertical::LayerVertical(const Gel& gel) : gel_(gel), values_(kPieces * kOrder) {
+LayerVertical::LayerVertical(const Gel& gel) : gel_(gel), values_(kPieces * kNodes) {
   constexpr int kPanels = 48;  // of 1/2 with 20 Gauss points, as the layer's other transforms
   const numerics::GaussRule gauss = numerics::gauss_legendre(20);
   std::vector<double> at, weight;
@@ -57,8 +57,8 @@ LayerVertical::LayerVertical(const Gel& gel) : gel_(gel), values_(kPieces * kOrd
                        (layer_vertical_factor(gel.poisson_ratio, at.back()) - 0.5 * (1 - 2 * gel.poisson_ratio)));
     }
   }
-  for (int k = 0; k < kPieces * kOrder; ++k) {
-    const double r = (k / kOrder + 0.5 * (1 + node(k % kOrder))) / kPiecesPerUnit;
+  for (int k = 0; k < kPieces * kNodes; ++k) {
+    const double r = (k / kNodes + 0.5 * (1 + node(k % kNodes))) / kPiecesPerUnit;
     for (std::size_t i = 0; i < at.size(); ++i) values_[k] += weight[i] * ::j1(at[i] * r);
     values_[k] /= r;  // smooth and even in r
   }
@@ -71,10 +71,10 @@ double LayerVertical::correction(double r) const {
   const int piece = static_cast<int>(scaled);
   const double t = 2 * (scaled - piece) - 1;
   double above = 0, below = 0;  // barycentric, Chebyshev nodes of the first kind
-  for (int k = 0; k < kOrder; ++k) {
-    const double value = values_[piece * kOrder + k], gap = t - node(k);
+  for (int k = 0; k < kNodes; ++k) {
+    const double value = values_[piece * kNodes + k], gap = t - node(k);
     if (gap == 0) return r * value;
-    const double weight = (k % 2 == 0 ? 1 : -1) * std::sin(pi * (k + 0.5) / kOrder) / gap;
+    const double weight = (k % 2 == 0 ? 1 : -1) * std::sin(pi * (k + 0.5) / kNodes) / gap;
     above += weight * value;
     below += weight;
   }

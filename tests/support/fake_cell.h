@@ -108,7 +108,9 @@ inline void write_given_stages(const fs::path& folder, const Cell& cell) {
   files::write_adhesions(folder / "1_segment/adhesions.csv", cell.adhesions);
   files::write_fibres(folder / "1_segment/fibres.csv", folder / "1_segment/fibre_points.csv", cell.fibres);
   files::write_outline(folder / "1_segment/outline.csv", cell.outline_um);
-  std::mt19937 random(1);
+  const std::string name = folder.filename().string();
+  std::seed_seq seed(name.begin(), name.end());  // each cell has beads of its own
+  std::mt19937 random(seed);
   std::uniform_real_distribution<double> place(5, 55);
   std::normal_distribution<double> noise(0, 0.01);
   DisplacementField field;

@@ -61,6 +61,20 @@ TEST(Study, leaves_out_cells_with_a_reason_that_the_table_keeps) {
   EXPECT_EQ(cells.text(4, "reason"), "the fit did not converge");
 }
 
+TEST(Study, a_copy_of_a_cell_is_no_further_cell_and_a_neighbour_in_the_same_picture_is) {
+  const FakeStudy fake;
+  const auto of_1 = fake.folder / "control/cell_1";
+  std::filesystem::copy(of_1, fake.folder / "treated/again", std::filesystem::copy_options::recursive);
+  std::filesystem::copy(of_1, fake.folder / "treated/beside", std::filesystem::copy_options::recursive);
+  Polygon outline = files::read_cell(of_1 / "1_segment").outline_um;
+  for (Vec2& p : outline) p.x += 60;
+  files::write_outline(fake.folder / "treated/beside/1_segment/outline.csv", outline);
+  const Study study = fake.read();
+  EXPECT_EQ(study.cells.size(), 5u);
+  EXPECT_EQ(reason_of(study, "treated/again").substr(0, 36), "the same cell as control/cell_1: the");
+  EXPECT_EQ(reason_of(study, "treated/beside"), "");
+}
+
 TEST(Study, conditions_come_from_a_folder_or_a_table) {
   const FakeStudy fake;
   const Study by_folder = fake.read({.condition_from = "folder"});
