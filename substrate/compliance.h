@@ -91,6 +91,7 @@ struct Capabilities {
   bool grading = false;              ///< its modulus may change with depth
   bool inside = false;               ///< volume()
   bool normal_displacement = false;  ///< of the surface, into the gel
+  bool space = false;                ///< forces into the gel, too, and points below its surface
   bool incompressible = false;       ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
   bool linear = true;                ///< a response is a matrix
 };

@@ -21,9 +21,13 @@ Eigen::Index Observations::size() const {
   return static_cast<Eigen::Index>(std::visit([](const auto& points) { return points.size(); }, points_um));
 }
 
-const std::vector<Ellipse>& ellipses_of(const Loads& loads) {
+bool are_in_space(const Loads& loads, const Observations& observations) {
+  return loads.n_components > 2 || !std::holds_alternative<std::vector<Vec2>>(observations.points_um);
+}
+
+const std::vector<Ellipse>& ellipses_of(const Loads& loads, int most_components) {
   const auto* ellipses = std::get_if<std::vector<Ellipse>>(&loads.shapes);
-  if (!ellipses || loads.n_components != 2)
+  if (!ellipses || loads.n_components > most_components)
     throw UsageError("the model of the gel takes forces along a flat surface, on ellipses: take another");
   check(*ellipses);
   return *ellipses;
@@ -34,6 +38,22 @@ const std::vector<Vec2>& surface_points_of(const Observations& observations) {
   if (!points) throw UsageError("the model knows the gel's flat surface alone: take another");
   check_points(*points);
   return *points;
+}
+
+std::vector<std::array<double, 3>> points_in_space(const Observations& observations) {
+  std::vector<std::array<double, 3>> points;
+  if (const auto* surface = std::get_if<std::vector<Vec2>>(&observations.points_um)) {
+    for (const Vec2 p : *surface) points.push_back({p.x, p.y, 0});
+  } else {
+    points = std::get<std::vector<std::array<double, 3>>>(observations.points_um);
+  }
+  std::vector<Vec2> planar;
+  for (const auto& [x, y, z] : points) {
+    planar.push_back({x, y});
+    planar.push_back({z, 0});
+  }
+  check_points(planar);
+  return points;
 }
 
 }  // namespace mbtfm::substrate

@@ -45,9 +45,15 @@ struct Observations {
   Eigen::Index size() const;
 };
 
+/// Forces into the gel, too, or points in space: only models with that capability take them.
+bool are_in_space(const Loads& loads, const Observations& observations);
+
 /// The ellipses or points, checked, where a model takes no others.
-/// @throws UsageError where they are others or a load has three components, InvalidData as check()
-const std::vector<Ellipse>& ellipses_of(const Loads& loads);
+/// @param most_components  of a load
+/// @throws UsageError where they are others, InvalidData as check()
+const std::vector<Ellipse>& ellipses_of(const Loads& loads, int most_components = 2);
 const std::vector<Vec2>& surface_points_of(const Observations& observations);
+/// Points in space as they are, those of the surface at depth 0. @throws InvalidData where one is not finite
+std::vector<std::array<double, 3>> points_in_space(const Observations& observations);
 
 }  // namespace mbtfm::substrate

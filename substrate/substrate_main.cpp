@@ -11,6 +11,8 @@
 #include "pipeline/stage/stage.h"
 #include "substrate/choice/factory.h"
 #include "substrate/gel_vtu.h"
+#include "substrate/loads.h"
+#include "substrate/response.h"
 
 namespace mbtfm {
 namespace {
@@ -30,6 +32,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
 struct Load {
   std::vector<substrate::Ellipse> ellipses;
   std::vector<Vec2> forces_nN;
+  std::vector<double> into_the_gel_nN;  ///< by ellipse; empty: all lie along the surface
 };
 
 Load read_forces(const Path& adhesions_file, const Path& file) {
@@ -38,6 +41,10 @@ Load read_forces(const Path& adhesions_file, const Path& file) {
     ellipse_of_id[adhesion.adhesion_id] = substrate::ellipse_of(adhesion);
   }
   Load load;
+  const files::CsvTable table(file);
+  if (table.has("fz_nN")) {
+    for (int row = 0; row < table.n_rows(); ++row) load.into_the_gel_nN.push_back(table.number(row, "fz_nN"));
+  }
   for (const AdhesionForce& force : files::read_adhesion_forces(file)) {
     const auto found = ellipse_of_id.find(force.adhesion_id);
     if (found == ellipse_of_id.end()) {
@@ -75,13 +82,15 @@ Vec2 spacing_of(const std::vector<Vec2>& points, const Path& file) {
 Load read_tractions(const Path& file) {
   const files::CsvTable table(file);
   const std::vector<Vec2> points = files::read_points(file);
-  const bool has_areas = table.has("area_um2");
+  const bool has_areas = table.has("area_um2"), is_in_space = table.has("tz_kPa");
   const Vec2 spacing = has_areas ? Vec2{} : spacing_of(points, file);
   Load load;
   for (int row = 0; row < table.n_rows(); ++row) {
     const double area = has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y;
     const Vec2 traction = {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")};
-    if (traction.x == 0 && traction.y == 0) continue;
+    const double into_the_gel = is_in_space ? table.number(row, "tz_kPa") : 0;
+    if (traction.x == 0 && traction.y == 0 && into_the_gel == 0) continue;
+    if (is_in_space) load.into_the_gel_nN.push_back(area * into_the_gel);
     const double radius = std::sqrt(area / std::numbers::pi);
     load.ellipses.push_back({points[row], radius, radius, 0});
     load.forces_nN.push_back(area * traction);
@@ -97,6 +106,41 @@ Load read_load(stage::StageContext& context) {
   }
   if (has_tractions) return read_tractions(context.input("traction"));
   return read_forces(context.input("adhesions"), context.input("forces"));
+}
+
+/// displacement_3d.csv at points of the gel's inside, or by forces into it.
+void write_in_space(stage::StageContext& context, const substrate::Substrate& model, const Load& load,
+                    Figures& figures) {
+  const Path file = context.input("points");
+  const files::CsvTable table(file);
+  const bool has_depth = table.has("z_um");
+  std::vector<std::array<double, 3>> points;
+  for (const Vec2 p : files::read_points(file)) {
+    const int row = static_cast<int>(points.size());
+    points.push_back({p.x, p.y, has_depth ? table.number(row, "z_um", Range::not_negative()) : 0});
+  }
+  const auto n = static_cast<Eigen::Index>(load.ellipses.size());
+  Eigen::VectorXd forces_nN = Eigen::VectorXd::Zero(3 * n);
+  for (Eigen::Index j = 0; j < n; ++j) {
+    const auto at = static_cast<std::size_t>(j);
+    forces_nN.segment<2>(3 * j) << load.forces_nN[at].x, load.forces_nN[at].y;
+    if (!load.into_the_gel_nN.empty()) forces_nN[3 * j + 2] = load.into_the_gel_nN[at];
+  }
+  const Eigen::VectorXd u =
+      model.response({load.ellipses, 3}, {points, substrate::Components::all})->displace(forces_nN).col(0);
+  files::CsvText csv({"x_um", "y_um", "z_um", "ux_um", "uy_um", "uz_um", "sigma_um", "sigma_z_um", "flag"});
+  double largest_um = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const Eigen::Vector3d at_point = u.segment<3>(3 * static_cast<Eigen::Index>(i));
+    for (const double coordinate : points[i]) csv.add(coordinate);
+    for (const double component : at_point) csv.add(component);
+    csv.add(0.0).add(0.0).add("");
+    csv.end_row();
+    largest_um = std::max(largest_um, at_point.norm());
+  }
+  files::write_text(context.output("out"), csv.str());
+  figures.emplace_back("n_points", static_cast<std::int64_t>(points.size()));
+  figures.emplace_back("largest_displacement_um", largest_um);
 }
 
 /// displacement.csv at the points; uz_um after its columns where the model has it.
@@ -123,7 +167,12 @@ void write_at_points(stage::StageContext& context, const substrate::Substrate& m
 }
 
 void write_result(stage::StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
-  if (context.has_input("points")) return write_at_points(context, model, load, figures);
+  const bool is_in_space = !load.into_the_gel_nN.empty();
+  if (context.has_input("points")) {
+    const bool is_inside = files::CsvTable(context.input("points")).has("z_um");
+    return (is_inside || is_in_space ? write_in_space : write_at_points)(context, model, load, figures);
+  }
+  if (is_in_space) throw UsageError("expected --points where forces point into the gel: pictures show those along it");
   const Path file = context.output("out");
   if (context.outputs_.at("out").extension() != ".vtu") {
     throw UsageError("expected --points, or an --out that ends with .vtu or volume.vtu");
@@ -169,12 +218,14 @@ int main(int argc, char** argv) {
       {.name = "substrate",
        .purpose = "displace a gel by forces spread over adhesions, or by tractions",
        .files = {{"adhesions", Kind::optional_input, "adhesions.csv: the ellipses"},
-                 {"forces", Kind::optional_input, "adhesion_forces.csv: adhesion_id, fx_nN, fy_nN"},
+                 {"forces", Kind::optional_input, "adhesion_forces.csv: adhesion_id, fx_nN, fy_nN; fz_nN into the gel"},
                  {"traction", Kind::optional_input,
-                  "instead of those: tractions on a lattice: x_um, y_um, tx_kPa, ty_kPa; area_um2 where it is none"},
-                 {"points", Kind::optional_input, "points of the surface: x_um, y_um"},
+                  "instead of those: tractions on a lattice: x_um, y_um, tx_kPa, ty_kPa; tz_kPa into the "
+                  "gel; area_um2 where it is none"},
+                 {"points", Kind::optional_input, "points: x_um, y_um; z_um below the surface"},
                  {"out", Kind::output,
-                  "displacement.csv at the points; without points a .vtu of the surface, or of the gel's inside where "
+                  "displacement.csv at the points, with z_um or forces into the gel displacement_3d.csv; without "
+                  "points a .vtu of the surface, or of the gel's inside where "
                   "its name ends with volume.vtu"}}},
       argc, argv, run);
 }

@@ -17,8 +17,9 @@ namespace mbtfm::choice {
 namespace {
 
 SceneSize size_of(const substrate::Loads& loads, const substrate::Observations& observations) {
-  const std::vector<Vec2>& points_um = surface_points_of(observations);
-  const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads);
+  std::vector<Vec2> points_um;
+  for (const auto& p : points_in_space(observations)) points_um.push_back({p[0], p[1]});
+  const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads, 3);
   if (points_um.empty() && ellipses.empty()) return {};
   const substrate::Extent extent = substrate::extent_of(points_um, ellipses);
   SceneSize size{.width_um = norm(extent.high_um - extent.low_um)};
@@ -28,18 +29,24 @@ SceneSize size_of(const substrate::Loads& loads, const substrate::Observations& 
   return size;
 }
 
-const substrate::Model& cheapest(const std::function<bool(const substrate::Model&)>& can) {
-  const auto model = std::find_if(models().begin(), models().end(), can);
-  MBTFM_ASSERT(model != models().end());
-  return *model;
+/// None of them: the end of the table.
+auto cheapest(const std::function<bool(const substrate::Model&)>& can) {
+  return std::find_if(models().begin(), models().end(), can);
 }
 
+/// @throws UsageError where forces into the gel or points below its surface meet an effect that no such model has
 const substrate::Model& model_for(const Gel& gel, const substrate::SubstrateParameters& p,
-                                  const substrate::GelEffects& effects) {
-  return cheapest([&](const substrate::Model& model) {
-    return (model.can.base || !effects.thickness.is_on) && (model.can.sides || !effects.sides.is_on) &&
-           (model.can.grading || !effects.grading.is_on) && (!model.follows || model.follows(gel, p));
+                                  const substrate::GelEffects& effects, bool is_in_space) {
+  const auto model = cheapest([&](const substrate::Model& m) {
+    return (m.can.space || !is_in_space) && (m.can.base || !effects.thickness.is_on) &&
+           (m.can.sides || !effects.sides.is_on) && (m.can.grading || !effects.grading.is_on) &&
+           (!m.follows || m.follows(gel, p));
   });
+  if (model != models().end()) return *model;
+  MBTFM_ASSERT(is_in_space);
+  throw UsageError(
+      "forces into the gel and points below its surface are known of an even gel without sides: switch the effects "
+      "finite_sides and depth_graded_gel off");
 }
 
 class Automatic final : public substrate::Substrate {
@@ -75,7 +82,7 @@ class Automatic final : public substrate::Substrate {
   substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
                                 const std::vector<Vec2>& forces_nN) const override {
     substrate::SubstrateParameters parameters = parameters_;
-    parameters.model = cheapest([](const substrate::Model& model) { return model.can.inside; }).kind;
+    parameters.model = cheapest([](const substrate::Model& model) { return model.can.inside; })->kind;
     return make_substrate(gel_, parameters, threads_)->volume(ellipses, forces_nN);
   }
   substrate::Capabilities capabilities() const override {
@@ -110,7 +117,7 @@ class Automatic final : public substrate::Substrate {
     if (model_) return *model_;
     effects_ = decide(gel_, parameters_, size_of(loads, observations));
     substrate::SubstrateParameters parameters = substrate::without_what_is_off(parameters_, effects_);
-    parameters.model = model_for(gel_, parameters, effects_).kind;
+    parameters.model = model_for(gel_, parameters, effects_, are_in_space(loads, observations)).kind;
     stage::EffectSwitches decided;  // as the model has them: the switches are obeyed by now
     decided.vertical_displacement = switched(effects_.vertical.is_on);
     parameters.effects = decided;

@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "substrate/greens/inside.h"
 #include "substrate/models.h"
 
 namespace mbtfm::greens {
@@ -13,6 +15,7 @@ using substrate::Components;
 
 substrate::LazyResponse GreensModel::response(const substrate::Loads& loads,
                                               const substrate::Observations& observations) const {
+  if (are_in_space(loads, observations)) return in_space(loads, observations);
   const std::vector<Vec2>& points_um = surface_points_of(observations);
   const auto along = [&](auto matrix) {
     if (observations.components != Components::along || loads.n_components != 2)
@@ -35,6 +38,34 @@ substrate::LazyResponse GreensModel::response(const substrate::Loads& loads,
          return into_the_gel(points_um, ellipses, forces_nN);
        }});
   return observations.components == Components::normal ? normal : joined(of_ellipses, normal);
+}
+
+substrate::LazyResponse GreensModel::in_space(const substrate::Loads& loads,
+                                              const substrate::Observations& observations) const {
+  const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads, 3);
+  const std::vector<std::array<double, 3>> points_um = points_in_space(observations);
+  for (const auto& p : points_um) {
+    if (p[2] >= 0 && p[2] <= base_um().value_or(p[2])) continue;
+    throw InvalidData("point (" + shortest(p[0]) + ", " + shortest(p[1]) + ", " + shortest(p[2]) + ") um",
+                      "a depth between 0, the surface, and the gel's thickness", shortest(p[2]) + " um");
+  }
+  const Index n_columns = loads.n_components, n_rows = observations.n_components();
+  const Index first_row = observations.components == Components::normal ? 2 : 0;
+  const auto matrix = [=, this] {
+    const std::optional<LayerInside> layer = base_um() ? std::optional<LayerInside>(gel_) : std::nullopt;
+    MatrixXd G(n_rows * static_cast<Index>(points_um.size()), n_columns * static_cast<Index>(ellipses.size()));
+    numerics::parallel_for(static_cast<int>(ellipses.size()), threads_, [&](int j) {
+      const EllipseInside field(gel_, layer ? &*layer : nullptr, ellipses[static_cast<std::size_t>(j)]);
+      for (std::size_t i = 0; i < points_um.size(); ++i) {
+        const auto& [x, y, z] = points_um[i];
+        G.block(n_rows * static_cast<Index>(i), n_columns * j, n_rows, n_columns) =
+            field.compliance_um_per_nN({x, y}, z).block(first_row, 0, n_rows, n_columns);
+      }
+    });
+    return G;
+  };
+  return substrate::lazy_response(
+      {.rows = n_rows * observations.size(), .cols = n_columns * loads.size(), .matrix = matrix});
 }
 
 MatrixXd GreensModel::by_squares(const std::vector<Vec2>& points_um,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <chrono>
+#include <optional>
 
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
@@ -53,10 +54,13 @@ class GreensModel : public substrate::Substrate {
   virtual std::vector<double> into_the_gel_um(const std::vector<Vec2>& points_um,
                                               const std::vector<substrate::Ellipse>& ellipses,
                                               const std::vector<Vec2>& forces_nN) const = 0;
+  /// The deepest point, um; none: there is no base.
+  virtual std::optional<double> base_um() const = 0;
   Gel gel_;
   int threads_;
 
  private:
+  substrate::LazyResponse in_space(const substrate::Loads& loads, const substrate::Observations& observations) const;
   Eigen::MatrixXd by_squares(const std::vector<Vec2>& points_um, const std::vector<substrate::Square>& squares) const;
   Eigen::MatrixXd by_waves(const std::vector<Vec2>& points_um, const std::vector<substrate::Wave>& waves) const;
   Eigen::MatrixXd into_the_gel(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,

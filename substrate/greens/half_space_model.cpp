@@ -5,7 +5,7 @@
 namespace mbtfm::greens {
 namespace {
 
-constexpr substrate::Capabilities kHalfSpaceCan{.normal_displacement = true, .incompressible = true};
+constexpr substrate::Capabilities kHalfSpaceCan{.normal_displacement = true, .space = true, .incompressible = true};
 
 class HalfSpace final : public GreensModel {
  public:
@@ -14,6 +14,7 @@ class HalfSpace final : public GreensModel {
   Figures figures() const override { return {{"substrate_model", "half-space"}}; }
 
  private:
+  std::optional<double> base_um() const override { return std::nullopt; }
   Eigen::MatrixXd by_ellipses(const std::vector<Vec2>& points_um,
                               const std::vector<substrate::Ellipse>& ellipses) const override {
     return compliance_by_columns(points_um, ellipses, threads_,

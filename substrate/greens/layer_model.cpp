@@ -7,7 +7,8 @@
 namespace mbtfm::greens {
 namespace {
 
-constexpr substrate::Capabilities kLayerCan{.base = true, .normal_displacement = true, .incompressible = true};
+constexpr substrate::Capabilities kLayerCan{
+    .base = true, .normal_displacement = true, .space = true, .incompressible = true};
 
 class LayerModel final : public GreensModel {
  public:
@@ -18,6 +19,7 @@ class LayerModel final : public GreensModel {
   }
 
  private:
+  std::optional<double> base_um() const override { return gel_.thickness_um; }
   Eigen::MatrixXd by_ellipses(const std::vector<Vec2>& points_um,
                               const std::vector<substrate::Ellipse>& ellipses) const override {
     return compliance_by_columns(points_um, ellipses, threads_,

@@ -105,6 +105,28 @@ double largest(vtkDataSetAttributes* attributes, const char* name, vtkIdType n, 
   return std::max(std::abs(range[0]), std::abs(range[1]));
 }
 
+TEST_F(SubstrateProgram, moves_its_inside_and_answers_to_forces_into_it) {
+  write("points_3d.csv", "x_um,y_um,z_um\n20,20,0\n23,20,5\n20,26,20\n");
+  write("lifted.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN,fz_nN\n1,20,20,3.141592653589793,3,1,-2\n");
+  const std::string inside = " --points " + file("points_3d.csv") + " --out ";
+  ASSERT_EQ(run(forces() + inside + file("along.csv")).code, 0);
+  ASSERT_EQ(
+      run("--adhesions " + file("adhesions.csv") + " --forces " + file("lifted.csv") + inside + file("up.csv")).code,
+      0);
+  ASSERT_EQ(run(forces() + "--points " + file("points.csv") + " --out " + file("flat.csv")).code, 0);
+  const files::CsvTable along(folder_ / "along.csv"), up(folder_ / "up.csv"), flat(folder_ / "flat.csv");
+  EXPECT_NEAR(along.number(0, "ux_um"), flat.number(0, "ux_um"), 1e-6 * flat.number(0, "ux_um"));
+  EXPECT_LT(up.number(0, "uz_um"), along.number(0, "uz_um"));  // lifted where it is pulled up
+  for (const char* u : {"ux_um", "uy_um", "uz_um"}) EXPECT_NEAR(up.number(2, u), 0, 1e-9);  // the base
+  write("deep.csv", "x_um,y_um,z_um\n20,20,21\n");
+  const test::Outcome deep = run(forces() + "--points " + file("deep.csv") + " --out " + file("no.csv"));
+  EXPECT_NE(deep.code, 0);
+  EXPECT_NE(deep.output.find("thickness"), std::string::npos) << deep.output;
+  EXPECT_FALSE(fs::exists(folder_ / "no.csv"));
+  const test::Outcome split = run(forces() + "--model split" + inside + file("no.csv"));
+  EXPECT_NE(split.code, 0);
+}
+
 TEST_F(SubstrateProgram, writes_a_surface_that_vtk_opens) {
   ASSERT_EQ(run(forces() + "--model layer --out " + file("surface.vtu")).code, 0);
   const auto grid = opened(file("surface.vtu"));
