@@ -28,14 +28,18 @@ bool are_in_space(const Loads& loads, const Observations& observations) {
 const std::vector<Ellipse>& ellipses_of(const Loads& loads, int most_components) {
   const auto* ellipses = std::get_if<std::vector<Ellipse>>(&loads.shapes);
   if (!ellipses || loads.n_components > most_components)
-    throw UsageError("the model of the gel takes forces along a flat surface, on ellipses: take another");
+    throw UsageError(
+        "this model of the gel takes forces along its flat surface, on ellipses: forces into the gel need "
+        "substrate.model = half-space or layer");
   check(*ellipses);
   return *ellipses;
 }
 
 const std::vector<Vec2>& surface_points_of(const Observations& observations) {
   const auto* points = std::get_if<std::vector<Vec2>>(&observations.points_um);
-  if (!points) throw UsageError("the model knows the gel's flat surface alone: take another");
+  if (!points)
+    throw UsageError(
+        "this model knows the gel's flat surface alone: points below it need substrate.model = half-space or layer");
   check_points(*points);
   return *points;
 }

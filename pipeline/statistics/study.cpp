@@ -57,16 +57,19 @@ std::string obstacle(const Path& cell) {
   return {};
 }
 
-Vec2 mean_of(const Polygon& polygon) {
-  Vec2 sum;
-  for (const Vec2 p : polygon) sum = sum + p;
-  return (1.0 / static_cast<double>(polygon.size())) * sum;
-}
-
-/// Two cells of one picture share the field, and lie beside each other.
-bool overlap(const Cell& a, const Cell& b) {
-  if (a.outline_um.empty() || b.outline_um.empty()) return false;
-  return contains(a.outline_um, mean_of(b.outline_um)) || contains(b.outline_um, mean_of(a.outline_um));
+/// By half of the smaller one. Two cells of one picture share the field, and lie beside each other.
+bool overlap(const Polygon& a, const Polygon& b) {
+  if (a.empty() || b.empty()) return false;
+  const auto [left, right] = std::minmax_element(a.begin(), a.end(), [](Vec2 p, Vec2 q) { return p.x < q.x; });
+  const auto [top, bottom] = std::minmax_element(a.begin(), a.end(), [](Vec2 p, Vec2 q) { return p.y < q.y; });
+  constexpr int kLines = 64;  // of the lattice over a: its area to some percent
+  const Vec2 step{(right->x - left->x) / kLines, (bottom->y - top->y) / kLines};
+  double shared_um2 = 0;
+  for (int i = 0; i < kLines * kLines; ++i) {
+    const Vec2 p{left->x + (i % kLines + 0.5) * step.x, top->y + (i / kLines + 0.5) * step.y};
+    if (contains(a, p) && contains(b, p)) shared_um2 += step.x * step.y;
+  }
+  return shared_um2 > 0.5 * std::min(std::abs(signed_area_um2(a)), std::abs(signed_area_um2(b)));
 }
 
 /// A folder that was copied is no further cell: of those of one field and place the first enters.
@@ -78,8 +81,9 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
     if (!reasons[i].empty() || !files::is_own_file(field)) continue;
     const std::string hash = files::sha256_of_file(field);
     const auto [first, last] = by_field.equal_range(hash);
-    const auto same =
-        std::find_if(first, last, [&](const auto& other) { return overlap(read[i]->cell, read[other.second]->cell); });
+    const auto same = std::find_if(first, last, [&](const auto& other) {
+      return overlap(read[i]->cell.outline_um, read[other.second]->cell.outline_um);
+    });
     if (same == last) {
       by_field.emplace(hash, i);
     } else {

@@ -4,7 +4,6 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
-#include "substrate/greens/inside.h"
 #include "substrate/models.h"
 
 namespace mbtfm::greens {
@@ -52,10 +51,11 @@ substrate::LazyResponse GreensModel::in_space(const substrate::Loads& loads,
   const Index n_columns = loads.n_components, n_rows = observations.n_components();
   const Index first_row = observations.components == Components::normal ? 2 : 0;
   const auto matrix = [=, this] {
-    const std::optional<LayerInside> layer = base_um() ? std::optional<LayerInside>(gel_) : std::nullopt;
+    if (base_um()) std::call_once(inside_once_, [this] { inside_.emplace(gel_); });
+    const LayerInside* layer = inside_ ? &*inside_ : nullptr;
     MatrixXd G(n_rows * static_cast<Index>(points_um.size()), n_columns * static_cast<Index>(ellipses.size()));
     numerics::parallel_for(static_cast<int>(ellipses.size()), threads_, [&](int j) {
-      const EllipseInside field(gel_, layer ? &*layer : nullptr, ellipses[static_cast<std::size_t>(j)]);
+      const EllipseInside field(gel_, layer, ellipses[static_cast<std::size_t>(j)]);
       for (std::size_t i = 0; i < points_um.size(); ++i) {
         const auto& [x, y, z] = points_um[i];
         G.block(n_rows * static_cast<Index>(i), n_columns * j, n_rows, n_columns) =

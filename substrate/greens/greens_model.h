@@ -2,10 +2,12 @@
 #pragma once
 
 #include <chrono>
+#include <mutex>
 #include <optional>
 
 #include "pipeline/numerics/parallel.h"
 #include "substrate/greens/half_space.h"
+#include "substrate/greens/inside.h"
 #include "substrate/greens/wave.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
@@ -65,6 +67,8 @@ class GreensModel : public substrate::Substrate {
   Eigen::MatrixXd by_waves(const std::vector<Vec2>& points_um, const std::vector<substrate::Wave>& waves) const;
   Eigen::MatrixXd into_the_gel(const std::vector<Vec2>& points_um, const std::vector<substrate::Ellipse>& ellipses,
                                const Eigen::MatrixXd& forces_nN) const;
+  mutable std::once_flag inside_once_;
+  mutable std::optional<LayerInside> inside_;  ///< its table takes a fraction of a second
 };
 
 }  // namespace mbtfm::greens

@@ -9,6 +9,7 @@
 
 #include "pipeline/numerics/quadrature.h"
 #include "substrate/greens/half_space.h"
+#include "substrate/greens/transforms.h"
 #include "substrate/material.h"
 
 namespace mbtfm::greens {
@@ -22,15 +23,13 @@ using std::numbers::pi;
 constexpr int kPiecesOfR = 2, kNodesOfR = 12, kNodesOfZ = 24;
 constexpr int kPiecesInReach = kPiecesOfR * static_cast<int>(BaseTable::kReach);
 
-double chebyshev(int n, int k) { return std::cos(pi * (k + 0.5) / n); }
-
 /// Barycentric weights of the values at the n Chebyshev nodes of the first kind for the place t in [-1, 1].
 template <int n>
 std::array<double, n> interpolation_weights(double t) {
   std::array<double, n> weights{};
   double sum = 0;
   for (int k = 0; k < n; ++k) {
-    const double gap = t - chebyshev(n, k);
+    const double gap = t - chebyshev_node(n, k);
     if (gap == 0) {
       weights.fill(0);
       weights[k] = 1;
@@ -95,8 +94,6 @@ double across(double x, double z) {  // sinh(x (1 - z)) / cosh x - exp(-x z)
   return -std::exp(-x * (2 - z)) * (1 + std::exp(-2 * x * z)) / (1 + std::exp(-2 * x));
 }
 
-double bessel_2(double x, double j0, double j1) { return x < 1e-2 ? x * x / 8 * (1 - x * x / 12) : 2 * j1 / x - j0; }
-
 }  // namespace
 
 Eigen::Matrix3d half_space_inside_um_per_nN(const Gel& gel, Vec2 offset, double z) {
@@ -116,19 +113,18 @@ BaseTable::BaseTable(double nu) {
   constexpr int kPanels = 100;  // of 1/2 with 20 Gauss points: the factors fall as x² exp(-x), or faster
   const numerics::GaussRule gauss = numerics::gauss_legendre(20);
   const double kappa = 3 - 4 * nu;
-  const auto n_x = kPanels * static_cast<Eigen::Index>(gauss.nodes.size());
+  const auto n_gauss = static_cast<Eigen::Index>(gauss.nodes.size()), n_x = kPanels * n_gauss;
   Eigen::VectorXd x(n_x);
   // By function, integrands without their Bessel function: rows are x, columns depths.
   std::array<Eigen::MatrixXd, kFunctions> factor;
   factor.fill(Eigen::MatrixXd(n_x, kNodesOfZ));
   for (Eigen::Index i = 0; i < n_x; ++i) {
-    const auto g = static_cast<std::size_t>(i) % gauss.nodes.size();
-    x[i] = 0.5 * (static_cast<double>(i) / static_cast<double>(gauss.nodes.size()) -
-                  static_cast<double>(g) / static_cast<double>(gauss.nodes.size()) + 0.5 * (1 + gauss.nodes[g]));
+    const auto g = static_cast<std::size_t>(i % n_gauss);
+    x[i] = 0.5 * (static_cast<double>(i / n_gauss) + 0.5 * (1 + gauss.nodes[g]));
     const double weight = 0.25 * gauss.weights[g];
     const auto coefficients = base_part(nu, x[i]);
     for (int k = 0; k < kNodesOfZ; ++k) {
-      const double z = 0.5 * (1 + chebyshev(kNodesOfZ, k));
+      const double z = 0.5 * (1 + chebyshev_node(kNodesOfZ, k));
       const Wave along = sum_of(coefficients[0], kappa, x[i], x[i] * z);
       const Wave down = sum_of(coefficients[1], kappa, x[i], x[i] * z);
       const double t = across(x[i], z);
@@ -141,9 +137,9 @@ BaseTable::BaseTable(double nu) {
   }
   Eigen::MatrixXd j0(kPiecesInReach * kNodesOfR, n_x), j1(j0.rows(), n_x), j2(j0.rows(), n_x);
   for (Eigen::Index row = 0; row < j0.rows(); ++row) {
-    const double r =
-        (static_cast<double>(row / kNodesOfR) + 0.5 * (1 + chebyshev(kNodesOfR, static_cast<int>(row % kNodesOfR)))) /
-        kPiecesOfR;
+    const double r = (static_cast<double>(row / kNodesOfR) +
+                      0.5 * (1 + chebyshev_node(kNodesOfR, static_cast<int>(row % kNodesOfR)))) /
+                     kPiecesOfR;
     for (Eigen::Index i = 0; i < n_x; ++i) {
       j0(row, i) = ::j0(x[i] * r);
       j1(row, i) = ::j1(x[i] * r);
@@ -230,32 +226,29 @@ Eigen::Matrix3d EllipseInside::half_space(Vec2 point, double z) const {
     const double squared = beyond - z * beyond / R - q * (beyond - 2 * z * log);
     const double first = hyperbolic - z * s / R, second = s - hyperbolic;
     const double down = first + q * second, out = first - q * second;
-    Eigen::Matrix3d m;                                                 // the point lies at -d from where the force acts
+    Eigen::Matrix3d m;
+    // the point lies at -d from where the force acts
     m << even + e.x * e.x * squared, e.x * e.y * squared, -e.x * out,  //
         e.x * e.y * squared, even + e.y * e.y * squared, -e.y * out,   //
         -e.x * down, -e.y * down, z * beyond / R + (1 + q) * beyond;
     return Eigen::Matrix3d(swept * m);
   };
-  const auto sum_of = [&](int n, double first) {
+  const auto mean_of = [&](int n, double first) {
     Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
     for (int k = 0; k < n; ++k) sum += part(2 * pi * (k + first) / n);
-    return sum;
+    return Eigen::Matrix3d(1.0 / n * sum);
   };
-  Eigen::Matrix3d sum = sum_of(kFewest, 0);
-  for (int n = kFewest; n < kMost; n *= 2) {
-    const Eigen::Matrix3d between = sum_of(n, 0.5);
-    const double change = (between - sum).cwiseAbs().maxCoeff();
-    sum += between;
-    if (change <= kTolerance * sum.cwiseAbs().maxCoeff()) {
-      sum *= 1.0 / (2 * n);
-      break;
-    }
-    if (2 * n == kMost) sum *= 1.0 / kMost;
+  Eigen::Matrix3d mean = mean_of(kFewest, 0);  // over the rim's parameter
+  double change = 1;
+  for (int n = kFewest; n < kMost && change > kTolerance; n *= 2) {
+    const Eigen::Matrix3d finer = 0.5 * (mean + mean_of(n, 0.5));
+    change = (finer - mean).cwiseAbs().maxCoeff() / finer.cwiseAbs().maxCoeff();
+    mean = finer;
   }
   Eigen::Matrix3d turn;
   turn << cos_, -sin_, 0, sin_, cos_, 0, 0, 0, 1;
   const double scale = 1 / (4 * pi * substrate::shear_modulus_kPa(gel_) * pi * a * b);
-  return 2 * pi * scale * (turn * sum * turn.transpose());  // sum: the mean over the rim's parameter
+  return 2 * pi * scale * (turn * mean * turn.transpose());
 }
 
 Eigen::Matrix3d EllipseInside::half_space_at_surface(Vec2 point) const {

@@ -57,7 +57,6 @@ class LayerInside {
   Eigen::Matrix3d compliance_um_per_nN(Vec2 offset_um, double z_um) const;
   /// What the base adds to the half-space's; smooth everywhere.
   Eigen::Matrix3d base_part_um_per_nN(Vec2 offset_um, double z_um) const;
-  const Gel& gel() const { return gel_; }
 
  private:
   Gel gel_;

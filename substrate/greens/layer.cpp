@@ -7,6 +7,7 @@
 #include <numbers>
 
 #include "pipeline/numerics/quadrature.h"
+#include "substrate/greens/transforms.h"
 #include "substrate/material.h"
 
 namespace mbtfm::greens {
@@ -55,15 +56,11 @@ Value integrate(const Transform& transform, double r) {
   for (std::size_t i = 0; i < transform.x.size(); ++i) {
     const double xr = transform.x[i] * r;
     const double bessel_0 = ::j0(xr);
-    // J2 = 2 J1(x)/x - J0 cancels at small x, where its series does not
-    const double bessel_2 = xr < 1e-2 ? xr * xr / 8 * (1 - xr * xr / 12) : 2 * ::j1(xr) / xr - bessel_0;
     value.s += transform.s_weight[i] * bessel_0;
-    value.d += transform.d_weight[i] * bessel_2;
+    value.d += transform.d_weight[i] * bessel_2(xr, bessel_0, ::j1(xr));
   }
   return value;
 }
-
-double chebyshev_node(int n, int k) { return std::cos(pi * (k + 0.5) / n); }
 
 /// sum of c_k T_k(t) on [-1, 1]
 struct ChebyshevSeries {

@@ -69,8 +69,15 @@ TEST(Study, a_copy_of_a_cell_is_no_further_cell_and_a_neighbour_in_the_same_pict
   Polygon outline = files::read_cell(of_1 / "1_segment").outline_um;
   for (Vec2& p : outline) p.x += 60;
   files::write_outline(fake.folder / "treated/beside/1_segment/outline.csv", outline);
+  // a crescent, whose vertices' mean lies outside of it
+  const auto crescent = fake.folder / "treated/crescent";
+  std::filesystem::copy(fake.folder / "treated/cell_2", crescent, std::filesystem::copy_options::recursive);
+  const Polygon bow = {{0, 0}, {60, 0}, {60, 60}, {0, 60}, {0, 55}, {55, 55}, {55, 5}, {0, 5}};
+  for (const auto& folder : {crescent, fake.folder / "treated/cell_2"})
+    files::write_outline(folder / "1_segment/outline.csv", bow);
   const Study study = fake.read();
   EXPECT_EQ(study.cells.size(), 5u);
+  EXPECT_EQ(reason_of(study, "treated/crescent").substr(0, 36), "the same cell as treated/cell_2: the");
   EXPECT_EQ(reason_of(study, "treated/again").substr(0, 36), "the same cell as control/cell_1: the");
   EXPECT_EQ(reason_of(study, "treated/beside"), "");
 }
