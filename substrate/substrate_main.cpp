@@ -108,6 +108,12 @@ Load read_load(stage::StageContext& context) {
   return read_forces(context.input("adhesions"), context.input("forces"));
 }
 
+/// Points below the surface, or forces into the gel.
+bool is_in_space(stage::StageContext& context, const Load& load) {
+  return !load.into_the_gel_nN.empty() ||
+         (context.has_input("points") && files::CsvTable(context.input("points")).has("z_um"));
+}
+
 /// displacement_3d.csv at points of the gel's inside, or by forces into it.
 void write_in_space(stage::StageContext& context, const substrate::Substrate& model, const Load& load,
                     Figures& figures) {
@@ -167,12 +173,9 @@ void write_at_points(stage::StageContext& context, const substrate::Substrate& m
 }
 
 void write_result(stage::StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
-  const bool is_in_space = !load.into_the_gel_nN.empty();
-  if (context.has_input("points")) {
-    const bool is_inside = files::CsvTable(context.input("points")).has("z_um");
-    return (is_inside || is_in_space ? write_in_space : write_at_points)(context, model, load, figures);
-  }
-  if (is_in_space) throw UsageError("expected --points where forces point into the gel: pictures show those along it");
+  const bool in_space = is_in_space(context, load);
+  if (context.has_input("points")) return (in_space ? write_in_space : write_at_points)(context, model, load, figures);
+  if (in_space) throw UsageError("expected --points where forces point into the gel: pictures show those along it");
   const Path file = context.output("out");
   if (context.outputs_.at("out").extension() != ".vtu") {
     throw UsageError("expected --points, or an --out that ends with .vtu or volume.vtu");
@@ -187,10 +190,10 @@ void write_result(stage::StageContext& context, const substrate::Substrate& mode
 StageReport run(const Parameters& given, stage::StageContext& context) {
   Parameters parameters = given;
   Switch& vertical = parameters.substrate.effects.vertical_displacement;
-  if (vertical == Switch::automatic && !context.has_input("points"))
-    vertical = Switch::on;  // a surface in space has three components
-  const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   const Load load = read_load(context);
+  if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load)))
+    vertical = Switch::on;  // what is written has three components
+  const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   context.progress(0.1, "solving for the substrate");
   StageReport report;
   write_result(context, *model, load, report.figures);
@@ -203,7 +206,8 @@ StageReport run(const Parameters& given, stage::StageContext& context) {
     if (e.kind != EffectKind::vertical_displacement) continue;
     if (given.substrate.effects.vertical_displacement != Switch::automatic) continue;
     e.setting = Switch::automatic;
-    if (e.is_on) e.why = "a surface in space is written";
+    if (e.is_on)
+      e.why = context.has_input("points") ? "displacements in space are written" : "a surface in space is written";
   }
   return report;
 }

@@ -71,7 +71,7 @@ class EllipseInside {
  public:
   /// @param layer  null: the half-space; else it must outlive this
   EllipseInside(const Gel& gel, const LayerInside* layer, const substrate::Ellipse& ellipse);
-  /// To 1e-8 of the largest component; deeper than 1e-3 semi-axes or on the surface itself.
+  /// To 1e-8 of the largest component, on the surface itself, too; nearer to the rim than 1e-3 semi-axes to 1e-5.
   Eigen::Matrix3d compliance_um_per_nN(Vec2 point_um, double z_um) const;
 
  private:
