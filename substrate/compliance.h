@@ -32,9 +32,10 @@ enum class ModelKind {
   layer,       ///< the base
   split,       ///< sides, too, by finite elements of what is smooth
   refined,     ///< all, by finite elements refined at the adhesions
+  curved,      ///< a surface that is not flat, by finite elements bent onto it
   automatic    ///< the cheapest that has the effects that are on
 };
-constexpr auto words(ModelKind) { return std::array{"half-space", "layer", "split", "refined", "auto"}; }
+constexpr auto words(ModelKind) { return std::array{"half-space", "layer", "split", "refined", "curved", "auto"}; }
 constexpr ModelKind kind_of(GelModel model) {
   return model == GelModel::layer ? ModelKind::layer : ModelKind::half_space;
 }
@@ -92,6 +93,7 @@ struct Capabilities {
   bool inside = false;               ///< volume()
   bool normal_displacement = false;  ///< of the surface, into the gel
   bool space = false;                ///< forces into the gel, too, and points below its surface
+  bool surface = false;              ///< the gel's surface may be curved
   bool incompressible = false;       ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
   bool linear = true;                ///< a response is a matrix
 };

@@ -33,11 +33,25 @@ void check(const std::vector<Ellipse>& ellipses) {
   }
 }
 
+namespace {
+
+[[noreturn]] void refuse_point(std::size_t i, const std::string& coordinates) {
+  throw InvalidData("point " + std::to_string(i), "finite coordinates", "'" + coordinates + "'");
+}
+
+}  // namespace
+
 void check_points(const std::vector<Vec2>& points_um) {
   for (std::size_t i = 0; i < points_um.size(); ++i) {
-    if (is_finite(points_um[i])) continue;
-    throw InvalidData("point " + std::to_string(i), "finite coordinates",
-                      "'" + std::to_string(points_um[i].x) + ", " + std::to_string(points_um[i].y) + "'");
+    const Vec2 p = points_um[i];
+    if (!is_finite(p)) refuse_point(i, std::to_string(p.x) + ", " + std::to_string(p.y));
+  }
+}
+
+void check_points(const std::vector<Vec3>& points_um) {
+  for (std::size_t i = 0; i < points_um.size(); ++i) {
+    const Vec3& p = points_um[i];
+    if (!is_finite(p)) refuse_point(i, std::to_string(p.x) + ", " + std::to_string(p.y) + ", " + std::to_string(p.z));
   }
 }
 

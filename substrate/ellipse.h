@@ -11,6 +11,7 @@ namespace mbtfm::substrate {
 void check(const std::vector<Ellipse>& ellipses);
 /// @throws InvalidData where a coordinate is not finite
 void check_points(const std::vector<Vec2>& points_um);
+void check_points(const std::vector<Vec3>& points_um);
 
 /// A point of a quadrature rule on the unit disc; the weights of a rule sum to 1.
 struct DiscPoint {

@@ -6,8 +6,8 @@
 namespace mbtfm::substrate {
 
 Eigen::Index Loads::size() const {
-  const auto* surface = std::get_if<SurfaceFaces>(&shapes);
-  if (surface) return static_cast<Eigen::Index>(surface->faces.size());
+  const auto* surface = std::get_if<SurfaceMesh>(&shapes);
+  if (surface) return static_cast<Eigen::Index>(surface->points_um.size());
   const auto n = [](const auto& list) -> std::size_t {
     if constexpr (requires { list.size(); })
       return list.size();
@@ -39,24 +39,20 @@ const std::vector<Vec2>& surface_points_of(const Observations& observations) {
   const auto* points = std::get_if<std::vector<Vec2>>(&observations.points_um);
   if (!points)
     throw UsageError(
-        "this model knows the gel's flat surface alone: points below it need substrate.model = half-space or layer");
+        "this model knows the gel's flat surface alone: points below it need substrate.model = half-space, layer or "
+        "curved");
   check_points(*points);
   return *points;
 }
 
-std::vector<std::array<double, 3>> points_in_space(const Observations& observations) {
-  std::vector<std::array<double, 3>> points;
+std::vector<Vec3> points_in_space(const Observations& observations) {
+  std::vector<Vec3> points;
   if (const auto* surface = std::get_if<std::vector<Vec2>>(&observations.points_um)) {
     for (const Vec2 p : *surface) points.push_back({p.x, p.y, 0});
   } else {
-    points = std::get<std::vector<std::array<double, 3>>>(observations.points_um);
+    points = std::get<std::vector<Vec3>>(observations.points_um);
   }
-  std::vector<Vec2> planar;
-  for (const auto& [x, y, z] : points) {
-    planar.push_back({x, y});
-    planar.push_back({z, 0});
-  }
-  check_points(planar);
+  check_points(points);
   return points;
 }
 

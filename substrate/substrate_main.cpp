@@ -120,7 +120,7 @@ void write_in_space(stage::StageContext& context, const substrate::Substrate& mo
   const Path file = context.input("points");
   const files::CsvTable table(file);
   const bool has_depth = table.has("z_um");
-  std::vector<std::array<double, 3>> points;
+  std::vector<Vec3> points;
   for (const Vec2 p : files::read_points(file)) {
     const int row = static_cast<int>(points.size());
     points.push_back({p.x, p.y, has_depth ? table.number(row, "z_um", Range::not_negative()) : 0});
@@ -138,7 +138,7 @@ void write_in_space(stage::StageContext& context, const substrate::Substrate& mo
   double largest_um = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d at_point = u.segment<3>(3 * static_cast<Eigen::Index>(i));
-    for (const double coordinate : points[i]) csv.add(coordinate);
+    csv.add(points[i].x).add(points[i].y).add(points[i].z);
     for (const double component : at_point) csv.add(component);
     csv.add(0.0).add(0.0).add("");
     csv.end_row();

@@ -43,21 +43,14 @@ class StiffnessOfBox {
   std::map<std::array<long, 4>, Eigen::MatrixXd> known_;
 };
 
-/// Merge weights of equal nodes, by rising node.
-void merge(std::vector<NodeWeight>& weights) {
-  std::sort(weights.begin(), weights.end(), [](const NodeWeight& a, const NodeWeight& b) { return a.node < b.node; });
-  std::size_t last = 0;
-  for (std::size_t k = 1; k < weights.size(); ++k) {
-    if (weights[k].node == weights[last].node) {
-      weights[last].weight += weights[k].weight;
-    } else {
-      weights[++last] = weights[k];
-    }
-  }
-  if (!weights.empty()) weights.resize(last + 1);
-}
-
 std::string shown(Vec2 point) { return "(" + std::to_string(point.x) + ", " + std::to_string(point.y) + ")"; }
+
+/// The bottom's coordinate is a grid line: reached to rounding.
+std::vector<char> is_on_bottom(const BlockMesh& mesh) {
+  std::vector<char> is_bottom;
+  for (const auto& position : mesh.position_um) is_bottom.push_back(position[2] > mesh.thickness_um() * (1 - 1e-9));
+  return is_bottom;
+}
 
 std::string extent_of(const GridLines& lines) {
   return shown({lines.x_um.front(), lines.y_um.front()}) + " to " + shown({lines.x_um.back(), lines.y_um.back()});
@@ -72,97 +65,24 @@ double allowed_GB(double memory_limit_GB) {
 
 ElasticSystem::ElasticSystem(const substrate::Material& material, BlockMesh mesh,
                              const numerics::FactorOptions& options)
-    : mesh_(std::move(mesh)), factor_((number_nodes(), assemble(material)), options) {}
-
-void ElasticSystem::number_nodes() {
-  const std::size_t n_nodes = mesh_.position_um.size();
-  for (std::size_t node = 0; node < n_nodes; ++node) own_.push_back({static_cast<int>(node), 1});
-  free_of_node_.assign(n_nodes, -1);
-  bottom_of_node_.assign(n_nodes, -1);
-  for (std::size_t node = 0; node < n_nodes; ++node) {
-    if (!mesh_.hanging[node].empty()) continue;
-    // the bottom's coordinate is a grid line: reached to rounding
-    if (mesh_.position_um[node][2] > mesh_.thickness_um() * (1 - 1e-9)) {
-      bottom_of_node_[node] = static_cast<int>(bottom_nodes_.size());
-      bottom_nodes_.push_back(static_cast<int>(node));
-    } else {
-      free_of_node_[node] = n_free_++;
-    }
-  }
-}
-
-std::span<const NodeWeight> ElasticSystem::carriers(int node) const {
-  const std::vector<NodeWeight>& hanging = mesh_.hanging[node];
-  return hanging.empty() ? std::span(&own_[node], 1) : std::span(hanging);
-}
-
-numerics::BlockMatrix<3> ElasticSystem::pattern() const {
-  std::vector<std::vector<int>> nodes_of_cell(mesh_.cells.size());
-  std::vector<std::vector<int>> cells_of_node(n_free_);
-  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
-    std::vector<int>& nodes = nodes_of_cell[cell];
-    for (int k = 0; k < mesh_.nodes_per_cell(); ++k) {
-      for (const NodeWeight& carrier : carriers(mesh_.nodes_of(static_cast<int>(cell))[k])) {
-        if (free_of_node_[carrier.node] >= 0) nodes.push_back(free_of_node_[carrier.node]);
-      }
-    }
-    std::sort(nodes.begin(), nodes.end());
-    nodes.erase(std::unique(nodes.begin(), nodes.end()), nodes.end());
-    for (const int node : nodes) cells_of_node[node].push_back(static_cast<int>(cell));
-  }
-  numerics::BlockMatrix<3> matrix;
-  matrix.n = n_free_;
-  matrix.start = {0};
-  std::vector<int> seen(n_free_, -1);
-  for (int column = 0; column < n_free_; ++column) {
-    const auto first = static_cast<std::ptrdiff_t>(matrix.row.size());
-    for (const int cell : cells_of_node[column]) {
-      for (const int row : nodes_of_cell[cell]) {
-        if (row < column || seen[row] == column) continue;
-        seen[row] = column;
-        matrix.row.push_back(row);
-      }
-    }
-    std::sort(matrix.row.begin() + first, matrix.row.end());
-    matrix.start.push_back(static_cast<int>(matrix.row.size()));
-  }
-  matrix.value.assign(9 * matrix.row.size(), 0.0);
-  return matrix;
-}
+    : mesh_(std::move(mesh)),
+      nodes_(mesh_.cell_nodes, mesh_.nodes_per_cell(), mesh_.hanging, is_on_bottom(mesh_)),
+      factor_(assemble(material), options) {}
 
 numerics::BlockMatrix<3> ElasticSystem::assemble(const substrate::Material& material) {
-  numerics::BlockMatrix<3> matrix = pattern();
+  numerics::BlockMatrix<3> matrix = nodes_.pattern();
   std::vector<Eigen::Triplet<double>> bottom;
-  const auto add = [&](const NodeWeight& at_a, const NodeWeight& at_b, const auto& block) {
-    const int row = free_of_node_[at_a.node];
-    const int column = free_of_node_[at_b.node];
-    const int fixed = bottom_of_node_[at_b.node];
-    if (row < 0 || (column >= 0 && row < column)) return;  // the lower triangle is kept
-    const double weight = at_a.weight * at_b.weight;
-    double* value = column >= 0 ? matrix.block(row, column) : nullptr;
+  const auto add_bottom = [&](int row, int node, const Eigen::Matrix3d& block) {
+    const int fixed = nodes_.held_index_of(node);
     for (int p = 0; p < 3; ++p) {
-      for (int q = 0; q < 3; ++q) {
-        if (value) {
-          value[3 * p + q] += weight * block(p, q);
-        } else {
-          bottom.emplace_back(3 * row + p, 3 * fixed + q, weight * block(p, q));
-        }
-      }
+      for (int q = 0; q < 3; ++q) bottom.emplace_back(3 * row + p, 3 * fixed + q, block(p, q));
     }
   };
   StiffnessOfBox stiffness_of(material, mesh_.order);
-  for (std::size_t cell = 0; cell < mesh_.cells.size(); ++cell) {
-    const Eigen::MatrixXd stiffness = stiffness_of(mesh_.cells[cell]);
-    const int* nodes = mesh_.nodes_of(static_cast<int>(cell));
-    for (int b = 0; b < mesh_.nodes_per_cell(); ++b) {
-      for (int a = 0; a < mesh_.nodes_per_cell(); ++a) {
-        for (const NodeWeight& at_b : carriers(nodes[b])) {
-          for (const NodeWeight& at_a : carriers(nodes[a])) add(at_a, at_b, stiffness.block<3, 3>(3 * a, 3 * b));
-        }
-      }
-    }
+  for (int cell = 0; cell < nodes_.n_cells(); ++cell) {
+    nodes_.add(cell, stiffness_of(mesh_.cells[cell]), matrix, add_bottom);
   }
-  bottom_stiffness_.resize(3 * n_free_, 3 * static_cast<Eigen::Index>(bottom_nodes_.size()));
+  bottom_stiffness_.resize(n_unknowns(), 3 * static_cast<Eigen::Index>(nodes_.held().size()));
   bottom_stiffness_.setFromTriplets(bottom.begin(), bottom.end());
   return matrix;
 }
@@ -170,8 +90,8 @@ numerics::BlockMatrix<3> ElasticSystem::assemble(const substrate::Material& mate
 std::vector<std::array<double, 3>> ElasticSystem::at_all_nodes(const numerics::NodalColumn& u) const {
   std::vector<std::array<double, 3>> values(mesh_.position_um.size());
   for (std::size_t node = 0; node < values.size(); ++node) {
-    for (const NodeWeight& carrier : carriers(static_cast<int>(node))) {
-      const int from = free_of_node_[carrier.node];
+    for (const NodeWeight& carrier : nodes_.carriers(static_cast<int>(node))) {
+      const int from = nodes_.index_of(carrier.node);
       for (int axis = 0; from >= 0 && axis < 3; ++axis) values[node][axis] += carrier.weight * u(from, axis);
     }
   }
@@ -186,13 +106,9 @@ std::vector<NodeWeight> ElasticSystem::cell_weights(int cell, std::array<double,
   for (int k = 0; k < mesh_.nodes_per_cell(); ++k) {
     const double shape = value[0][k % n] * value[1][k / n % n] * value[2][k / (n * n)];
     if (shape == 0) continue;
-    for (const NodeWeight& carrier : carriers(mesh_.nodes_of(cell)[k])) {
-      const int node = free_of_node_[carrier.node];
-      if (node >= 0) weights.push_back({node, shape * carrier.weight});
-    }
+    weights.push_back({mesh_.nodes_of(cell)[k], shape});
   }
-  merge(weights);
-  return weights;
+  return nodes_.on_free_nodes(weights);
 }
 
 std::vector<NodeWeight> ElasticSystem::surface_weights(Vec2 point_um) const {

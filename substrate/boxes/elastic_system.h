@@ -8,10 +8,10 @@
 #pragma once
 
 #include <Eigen/SparseCore>
-#include <span>
 
 #include "pipeline/numerics/cholesky.h"
 #include "substrate/boxes/block_mesh.h"
+#include "substrate/boxes/free_nodes.h"
 #include "substrate/ellipse.h"
 #include "substrate/material.h"
 
@@ -24,7 +24,7 @@ class ElasticSystem {
 
   const BlockMesh& mesh() const { return mesh_; }
   const numerics::SparseCholesky& factor() const { return factor_; }
-  int n_unknowns() const { return 3 * n_free_; }
+  int n_unknowns() const { return 3 * nodes_.size(); }
 
   /// The load of an ellipse on the free nodes: the share of the force that each takes.
   /// @throws InvalidData where a part of it lies outside the block
@@ -35,7 +35,7 @@ class ElasticSystem {
   std::vector<NodeWeight> cell_weights(int cell, std::array<double, 3> unit) const;
 
   /// Nodes on the bottom, in the order of the columns of bottom_stiffness(), three each.
-  const std::vector<int>& bottom_nodes() const { return bottom_nodes_; }
+  const std::vector<int>& bottom_nodes() const { return nodes_.held(); }
   /// Rows: free unknowns.
   const Eigen::SparseMatrix<double>& bottom_stiffness() const { return bottom_stiffness_; }
   /// The solution at every node of the mesh, free or not.
@@ -44,18 +44,10 @@ class ElasticSystem {
   std::vector<int> touched_cells(const substrate::Ellipse& ellipse) const;
 
  private:
-  void number_nodes();
-  /// The nodes that carry a node: itself, or what it hangs on.
-  std::span<const NodeWeight> carriers(int node) const;
-  numerics::BlockMatrix<3> pattern() const;
   numerics::BlockMatrix<3> assemble(const substrate::Material& material);
 
   BlockMesh mesh_;
-  int n_free_ = 0;
-  std::vector<int> free_of_node_;    ///< -1: on the bottom, or hanging
-  std::vector<int> bottom_of_node_;  ///< -1: not on the bottom
-  std::vector<int> bottom_nodes_;
-  std::vector<NodeWeight> own_;  ///< by node: itself, with weight 1
+  FreeNodes nodes_;  ///< those on the bottom are held
   Eigen::SparseMatrix<double> bottom_stiffness_;
   numerics::SparseCholesky factor_;
 };

@@ -18,7 +18,7 @@ namespace {
 
 SceneSize size_of(const substrate::Loads& loads, const substrate::Observations& observations) {
   std::vector<Vec2> points_um;
-  for (const auto& p : points_in_space(observations)) points_um.push_back({p[0], p[1]});
+  for (const Vec3& p : points_in_space(observations)) points_um.push_back({p.x, p.y});
   const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads, 3);
   if (points_um.empty() && ellipses.empty()) return {};
   const substrate::Extent extent = substrate::extent_of(points_um, ellipses);
@@ -45,8 +45,8 @@ const substrate::Model& model_for(const Gel& gel, const substrate::SubstratePara
   if (model != models().end()) return *model;
   MBTFM_ASSERT(is_in_space);
   throw UsageError(
-      "forces into the gel and points below its surface are known of an even gel without sides: switch the effects "
-      "finite_sides and depth_graded_gel off");
+      "forces into the gel and points below its surface are known of an even gel alone: switch the effect "
+      "depth_graded_gel off");
 }
 
 class Automatic final : public substrate::Substrate {

@@ -1,13 +1,14 @@
 #include "substrate/choice/factory.h"
 
 #include "substrate/boxes/models.h"
+#include "substrate/curved/models.h"
 #include "substrate/greens/models.h"
 
 namespace mbtfm::choice {
 
 const std::vector<substrate::Model>& models() {
   static const std::vector<substrate::Model> table = {greens::half_space(), greens::layer(), boxes::split(),
-                                                      boxes::refined()};
+                                                      boxes::refined(), curved::curved_gel()};
   return table;
 }
 

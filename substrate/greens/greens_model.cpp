@@ -42,11 +42,11 @@ substrate::LazyResponse GreensModel::response(const substrate::Loads& loads,
 substrate::LazyResponse GreensModel::in_space(const substrate::Loads& loads,
                                               const substrate::Observations& observations) const {
   const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads, 3);
-  const std::vector<std::array<double, 3>> points_um = points_in_space(observations);
-  for (const auto& p : points_um) {
-    if (p[2] >= 0 && p[2] <= base_um().value_or(p[2])) continue;
-    throw InvalidData("point (" + shortest(p[0]) + ", " + shortest(p[1]) + ", " + shortest(p[2]) + ") um",
-                      "a depth between 0, the surface, and the gel's thickness", shortest(p[2]) + " um");
+  const std::vector<Vec3> points_um = points_in_space(observations);
+  for (const Vec3& p : points_um) {
+    if (p.z >= 0 && p.z <= base_um().value_or(p.z)) continue;
+    throw InvalidData("point (" + shortest(p.x) + ", " + shortest(p.y) + ", " + shortest(p.z) + ") um",
+                      "a depth between 0, the surface, and the gel's thickness", shortest(p.z) + " um");
   }
   const Index n_columns = loads.n_components, n_rows = observations.n_components();
   const Index first_row = observations.components == Components::normal ? 2 : 0;

@@ -127,7 +127,7 @@ TEST(Layer, equals_independent_values_of_an_ellipse_in_every_row) {
           relative_difference(greens::LayerEllipse(layer_of(gel), ellipse).compliance_um_per_nN(point), reference);
     }
     // the rules leave out less than 1e-8 of the nearby field
-    EXPECT_LT(difference, 1e-8) << "nu " << row[1] << " h " << row[2] << " r " << norm({row[6], row[7]});
+    EXPECT_LT(difference, 1e-8) << "nu " << row[1] << " h " << row[2] << " r " << norm(Vec2{row[6], row[7]});
   }
 }
 

@@ -390,7 +390,7 @@ TEST(Panel, squares_that_fill_a_disc_add_up_to_it_and_far_away_to_a_point) {
   std::vector<Vec2> squares;
   for (double y = -kRadius + kSide / 2; y < kRadius; y += kSide) {
     for (double x = -kRadius + kSide / 2; x < kRadius; x += kSide) {
-      if (norm({x, y}) <= kRadius) squares.push_back({x, y});
+      if (norm(Vec2{x, y}) <= kRadius) squares.push_back({x, y});
     }
   }
   const double area = kSide * kSide * static_cast<double>(squares.size());

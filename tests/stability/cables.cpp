@@ -100,7 +100,7 @@ TEST(HardCables, two_adhesions_pull_each_other) {
   const cables::Equilibrium equilibrium = solved(cables, tensions);
   const Eigen::VectorXd f = cables.adhesion_forces_nN(tensions, equilibrium);
   const Vec2 between = net.vertices_um.back() - net.vertices_um.front();
-  EXPECT_NEAR(cross({f[0], f[1]}, between), 0, 1e-6 * norm({f[0], f[1]}) * norm(between));
+  EXPECT_NEAR(cross({f[0], f[1]}, between), 0, 1e-6 * norm(Vec2{f[0], f[1]}) * norm(between));
   EXPECT_GT(dot({f[0], f[1]}, between), 0);
 }
 

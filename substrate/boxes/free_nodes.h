@@ -1,0 +1,56 @@
+/// The nodes of a mesh that carry the unknowns: neither held nor hanging; and the matrix over them.
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <span>
+
+#include "pipeline/numerics/block_cholesky.h"
+#include "substrate/boxes/block_mesh.h"
+
+namespace mbtfm::boxes {
+
+class FreeNodes {
+ public:
+  FreeNodes() = default;
+  /// @param cell_nodes  nodes_per_cell each
+  /// @param hanging     by node: what it hangs on; empty: a node of its own
+  /// @param is_held     by node: its displacement is given
+  FreeNodes(std::vector<int> cell_nodes, int nodes_per_cell, std::vector<std::vector<NodeWeight>> hanging,
+            const std::vector<char>& is_held);
+
+  int size() const { return n_free_; }
+  int n_cells() const { return static_cast<int>(cell_nodes_.size()) / nodes_per_cell_; }
+  /// Of a node; -1: held, or hanging.
+  int index_of(int node) const { return free_of_node_[node]; }
+  /// Nodes that are held, rising, and the place of each among them; -1: it is not held.
+  const std::vector<int>& held() const { return held_; }
+  int held_index_of(int node) const { return held_of_node_[node]; }
+  /// The nodes that carry a node: itself, or what it hangs on.
+  std::span<const NodeWeight> carriers(int node) const;
+  const int* nodes_of(int cell) const { return &cell_nodes_[static_cast<std::size_t>(cell) * nodes_per_cell_]; }
+
+  /// Zero, with a place for every two free nodes of one cell.
+  numerics::BlockMatrix<3> pattern() const;
+  /// Called with blocks of which the row is a free node's, the column any node's that is none that hangs.
+  using AddHeld = std::function<void(int row, int node, const Eigen::Matrix3d& block)>;
+  /// Add the stiffness of a cell, (3 nodes)²; `add_held` takes what belongs to nodes held; empty: nobody does.
+  void add(int cell, const Eigen::MatrixXd& stiffness, numerics::BlockMatrix<3>& matrix,
+           const AddHeld& add_held = {}) const;
+
+  /// Values of nodes, as weights of free ones: what is held does not move.
+  std::vector<NodeWeight> on_free_nodes(const std::vector<NodeWeight>& weights) const;
+
+ private:
+  std::vector<int> cell_nodes_;
+  int nodes_per_cell_ = 1;
+  std::vector<std::vector<NodeWeight>> hanging_;
+  int n_free_ = 0;
+  std::vector<int> free_of_node_, held_of_node_, held_;
+  std::vector<NodeWeight> own_;  ///< by node: itself, with weight 1
+};
+
+/// Merge weights of equal nodes, by rising node.
+void merge(std::vector<NodeWeight>& weights);
+
+}  // namespace mbtfm::boxes

@@ -1,0 +1,373 @@
+/// A gel under a surface that is not flat: finite elements bent onto it.
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <mutex>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/parallel.h"
+#include "substrate/boxes/elastic_system.h"
+#include "substrate/curved/linear.h"
+#include "substrate/curved/models.h"
+#include "substrate/curved/surface_loads.h"
+#include "substrate/ellipse.h"
+#include "substrate/material.h"
+#include "substrate/response.h"
+
+namespace mbtfm::curved {
+namespace {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+
+constexpr substrate::Capabilities kCurvedCan{
+    .base = true, .sides = true, .inside = true, .normal_displacement = true, .space = true, .surface = true};
+
+/// How fine a mesh is.
+struct Fineness {
+  double across;         ///< of targets_of
+  double growth;         ///< of a cell's side over its distance to the nearest load, at most
+  int layers = 2;        ///< of the coarsest cells over the gel's depth
+  double misfit = 0.01;  ///< of the mesh to the surface, over the side and the distance, at most
+
+  Fineness coarser() const { return {across / 2, growth * kFarStep, std::max(1, layers / 2), 8 * misfit}; }
+  Fineness finer() const { return {across * 2, growth / kFarStep, layers, misfit / 8}; }
+
+ private:
+  // at a patch's rim the error falls as the side to the power 3/2, far away as its cube: there it may shrink less
+  static constexpr double kFarStep = std::numbers::sqrt2;
+};
+
+/// A mesh with its factor, its loads and its points.
+struct System {
+  Block block;
+  Space space;
+  numerics::SparseCholesky factor;
+  std::vector<std::vector<boxes::NodeWeight>> loads, points;
+
+  System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at,
+         const numerics::FactorOptions& options)
+      : block(std::move(made)),
+        space(block.mesh(), options.threads),
+        factor(space.assemble(stiffness_of(gel)), options),
+        loads(load_weights(block, space, of)) {
+    if (const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um)) {
+      for (const Vec2 p : *on_surface) points.push_back(space.weights_at(block.on_surface(p)));
+    } else {
+      for (const Vec3& p : std::get<std::vector<Vec3>>(at.points_um)) {
+        points.push_back(space.weights_at(block.locate(p)));
+      }
+    }
+  }
+
+ private:
+  std::function<MatrixXd(int)> stiffness_of(const Gel& gel) const {
+    const double mu = substrate::shear_modulus_kPa(gel);
+    const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
+    return [=, this](int cell) { return linear_stiffness(Element(block.mesh().positions_of(cell)), mu, lambda); };
+  }
+};
+
+/// Rows of a vector that hold a load's or a point's axes.
+struct Axes {
+  Index first = 0, n = 3;  ///< the first axis, and how many
+  Index row(std::size_t at, Index axis) const { return n * static_cast<Index>(at) + axis - first; }
+};
+
+/// K⁻¹ between two lists of weighted nodes: symmetric, so that exchanging them transposes it exactly.
+MatrixXd solve_between(const System& system, const std::vector<std::vector<boxes::NodeWeight>>& from, Axes from_axes,
+                       const MatrixXd& values, const std::vector<std::vector<boxes::NodeWeight>>& to, Axes to_axes) {
+  std::vector<int> needed;
+  for (const auto& weights : to) {
+    for (const auto& w : weights) needed.push_back(w.node);
+  }
+  std::sort(needed.begin(), needed.end());
+  needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
+  MatrixXd answers = MatrixXd::Zero(to_axes.n * static_cast<Index>(to.size()), values.cols());
+  system.factor.solve(
+      static_cast<int>(values.cols()), needed,
+      [&](int column, const numerics::NodalColumn& b) {
+        for (std::size_t j = 0; j < from.size(); ++j) {
+          for (Index axis = from_axes.first; axis < from_axes.first + from_axes.n; ++axis) {
+            const double value = values(from_axes.row(j, axis), column);
+            if (value == 0) continue;
+            for (const auto& [node, weight] : from[j]) b(node, static_cast<int>(axis)) += weight * value;
+          }
+        }
+      },
+      [&](int column, const numerics::NodalColumn& u) {
+        for (std::size_t i = 0; i < to.size(); ++i) {
+          for (Index axis = to_axes.first; axis < to_axes.first + to_axes.n; ++axis) {
+            double& sum = answers(to_axes.row(i, axis), column);
+            for (const auto& [node, weight] : to[i]) sum += weight * u(node, static_cast<int>(axis));
+          }
+        }
+      });
+  return answers;
+}
+
+class CurvedGel;
+
+class CurvedResponse final : public substrate::Response {
+ public:
+  CurvedResponse(const CurvedGel& gel, substrate::Loads loads, substrate::Observations observations)
+      : gel_(gel), loads_(std::move(loads)), observations_(std::move(observations)) {}
+
+  Index rows() const override { return observations_.n_components() * observations_.size(); }
+  Index cols() const override { return loads_.n_components * loads_.size(); }
+  MatrixXd displace(const MatrixXd& forces) const override {
+    MBTFM_ASSERT(forces.rows() == cols());
+    if (is_empty()) return MatrixXd::Zero(rows(), forces.cols());
+    const System& s = system();
+    return solve_between(s, s.loads, load_axes(), forces, s.points, point_axes());
+  }
+  MatrixXd pull_back(const MatrixXd& displacements) const override {
+    MBTFM_ASSERT(displacements.rows() == rows());
+    if (is_empty()) return MatrixXd::Zero(cols(), displacements.cols());
+    const System& s = system();
+    return solve_between(s, s.points, point_axes(), displacements, s.loads, load_axes());
+  }
+  MatrixXd matrix() const override {
+    if (cols() <= rows()) return displace(MatrixXd::Identity(cols(), cols()));
+    return pull_back(MatrixXd::Identity(rows(), rows())).transpose();
+  }
+  substrate::SharedResponse kept() const override;
+
+ private:
+  bool is_empty() const { return rows() == 0 || cols() == 0; }
+  Axes load_axes() const { return {0, loads_.n_components}; }
+  Axes point_axes() const {
+    return {observations_.components == substrate::Components::normal ? 2 : 0, observations_.n_components()};
+  }
+  const System& system() const;
+
+  const CurvedGel& gel_;
+  substrate::Loads loads_;
+  substrate::Observations observations_;
+  mutable std::once_flag once_;
+  mutable std::unique_ptr<const System> system_;
+};
+
+class CurvedGel final : public substrate::Substrate {
+ public:
+  CurvedGel(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
+      : Substrate(parameters, kCurvedCan), gel_(gel), shape_(shape_of(gel)), threads_(threads) {}
+
+  substrate::LazyResponse response(const substrate::Loads& loads,
+                                   const substrate::Observations& observations) const override {
+    targets_of(loads, 1);  // refuses what is no load before anything is computed
+    const std::vector<Vec3> points = points_in_space(observations);
+    if (std::holds_alternative<std::vector<Vec3>>(observations.points_um)) {
+      for (const Vec3& p : points) check_inside(shape_, p);
+    }
+    return std::make_shared<const CurvedResponse>(*this, loads, observations);
+  }
+
+  double stated_error() const override {
+    const std::lock_guard lock(mutex_);
+    return error_;
+  }
+  Figures figures() const override {
+    const std::lock_guard lock(mutex_);
+    return figures_;
+  }
+  int threads() const { return threads_; }
+
+  /// On a mesh whose estimated error is below the tolerance, as far as memory goes; the first one, where that is 0.
+  std::unique_ptr<const System> system_for(const substrate::Loads& loads, const substrate::Observations& observations,
+                                           Axes load_axes, Axes point_axes) const {
+    const auto start = std::chrono::steady_clock::now();
+    Fineness fineness = first_fineness();
+    auto system = make_system(fineness, loads, observations);
+    const double tolerance = parameters_.displacement_tolerance;
+    double error = std::numeric_limits<double>::infinity();
+    if (tolerance > 0) {
+      const MatrixXd probes = probes_of(loads);
+      const auto displaced = [&](const System& s) {
+        return solve_between(s, s.loads, load_axes, probes, s.points, point_axes);
+      };
+      MatrixXd before = displaced(*make_system(fineness.coarser(), loads, observations)), now = displaced(*system);
+      error = estimated_error(before, now);
+      for (int level = 0; error > tolerance; ++level) {
+        if (level == kMostHalvings) {
+          throw NotSolved(Report{.reason = "the gel's displacement is still estimated to be off by " + brief(error) +
+                                           " after " + std::to_string(kMostHalvings) +
+                                           " refinements: ask for a larger displacement_tolerance"});
+        }
+        fineness = fineness.finer();
+        system.reset();  // two factors at a time are too many
+        system = make_system(fineness, loads, observations);
+        before = std::move(now);
+        now = displaced(*system);
+        error = estimated_error(before, now);
+      }
+    }
+    note(*system, error, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    return system;
+  }
+
+  substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
+                                const std::vector<Vec2>& forces_nN) const override {
+    check(ellipses);
+    substrate::check_forces(ellipses, forces_nN);
+    const substrate::Loads loads{ellipses};
+    const auto system = make_system(first_fineness(), loads, {});
+    Vectors forces(system->space.nodes().size(), Eigen::Vector3d::Zero());
+    for (std::size_t j = 0; j < ellipses.size(); ++j) {
+      for (const auto& [node, weight] : system->loads[j]) {
+        forces[node] += weight * Eigen::Vector3d(forces_nN[j].x, forces_nN[j].y, 0);
+      }
+    }
+    const Vectors u = system->space.spread(solve(system->factor, forces));
+    return volume_field(system->space, gel_, u, parameters_.stress);
+  }
+
+ private:
+  static constexpr int kMostHalvings = 4;
+
+  /// Points lie at any depth: cells grow four times less with the distance than where the surface alone is asked.
+  Fineness first_fineness() const { return {parameters_.elements_across_adhesion, parameters_.growth / 4}; }
+
+  static Shape shape_of(const Gel& gel) {
+    return {[](Vec2) { return 0.0; }, gel.thickness_um};
+  }
+
+  /// Random signs, always the same.
+  static MatrixXd probes_of(const substrate::Loads& loads) {
+    constexpr int kProbes = 4;
+    MatrixXd probes(loads.n_components * loads.size(), kProbes);
+    std::uint32_t state = 1;
+    for (Index k = 0; k < probes.size(); ++k) {
+      state = 1664525u * state + 1013904223u;  // Numerical Recipes' quick generator: its high bits are random enough
+      probes.data()[k] = state >> 31 ? 1 : -1;
+    }
+    return probes;
+  }
+
+  /// As `refined` has it: the finer solution's error is orthogonal to the difference, and falls by 2^(3/2).
+  static double estimated_error(const MatrixXd& coarse, const MatrixXd& fine) {
+    const double fall = std::pow(2, 1.5), size = fine.norm();
+    return size == 0 ? 0 : (fine - coarse).norm() / (std::sqrt(fall * fall - 1) * size);
+  }
+
+  std::unique_ptr<const System> make_system(const Fineness& fineness, const substrate::Loads& loads,
+                                            const substrate::Observations& observations) const {
+    const double limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB);
+    const auto most = static_cast<std::int64_t>(1e9 * limit_GB / 1e5);  // as `refined` counts
+    const std::vector<Target> targets = targets_of(loads, fineness.across);
+    Extent extent;
+    for (const Target& t : targets) extent.add(t.low_um), extent.add(t.high_um);
+    for (const Vec3& p : substrate::points_in_space(observations)) extent.add({p.x, p.y});
+    const double margin = substrate::margin_um(gel_, parameters_);
+    const double depth = mean_depth_um(extent);
+    const double coarsest = depth / fineness.layers;
+    const boxes::GridLines lines = {lines_over(extent.low.x - margin, extent.high.x + margin, coarsest),
+                                    lines_over(extent.low.y - margin, extent.high.y + margin, coarsest),
+                                    layers_um(depth, fineness.layers)};
+    const auto is_too_large = [&](const boxes::Box& box) {
+      const double side = std::max({box.size_um[0], box.size_um[1], box.size_um[2]});
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Target& target : targets) {
+        const double away = distance_um(box, target);
+        nearest = std::min(nearest, away);
+        if (side > target.side_um * (1 + 1e-9) && side > fineness.growth * away) return true;
+      }
+      return box.low_um[2] == 0 && misfit_um(box) > fineness.misfit * (side + nearest);
+    };
+    return std::make_unique<const System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), gel_, loads,
+                                          observations,
+                                          numerics::FactorOptions{.threads = threads_, .memory_limit_GB = limit_GB});
+  }
+
+  struct Extent {
+    Vec2 low{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
+    Vec2 high{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
+    void add(Vec2 p) {
+      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+    }
+  };
+
+  /// Nearly cubes.
+  static std::vector<double> lines_over(double low, double high, double side) {
+    const int n = std::max(1, static_cast<int>(std::ceil((high - low) / side - 1e-9)));
+    std::vector<double> lines;
+    for (int k = 0; k <= n; ++k) lines.push_back(low + (high - low) * k / n);
+    return lines;
+  }
+
+  double mean_depth_um(const Extent& extent) const {
+    constexpr int kSamples = 16;
+    double sum = 0;
+    for (int k = 0; k < kSamples * kSamples; ++k) {
+      const Vec2 share = {(k % kSamples + 0.5) / kSamples, (k / kSamples + 0.5) / kSamples};
+      sum += shape_.height_um({extent.low.x + share.x * (extent.high.x - extent.low.x),
+                               extent.low.y + share.y * (extent.high.y - extent.low.y)});
+    }
+    return shape_.base_um - sum / (kSamples * kSamples);
+  }
+
+  static double distance_um(const boxes::Box& box, const Target& target) {
+    const auto outside = [](double low, double size, double from, double to) {
+      return std::max({0.0, low - to, from - low - size});
+    };
+    return std::hypot(outside(box.low_um[0], box.size_um[0], target.low_um.x, target.high_um.x),
+                      outside(box.low_um[1], box.size_um[1], target.low_um.y, target.high_um.y), box.low_um[2]);
+  }
+
+  /// From the surface to the biquadratic one through nine points over the box, at most.
+  double misfit_um(const boxes::Box& box) const {
+    const auto height = [&](double x, double y) {
+      return shape_.height_um({box.low_um[0] + x * box.size_um[0], box.low_um[1] + y * box.size_um[1]});
+    };
+    std::array<double, 9> at_nodes;
+    for (int k = 0; k < 9; ++k) at_nodes[k] = height(0.5 * (k % 3), 0.5 * (k / 3));
+    constexpr std::array kPlaces = {0.2, 0.8};
+    double largest = 0;
+    for (const double y : kPlaces) {
+      for (const double x : kPlaces) {
+        const auto along = boxes::shape_values(2, x), across = boxes::shape_values(2, y);
+        double value = 0;
+        for (int k = 0; k < 9; ++k) value += along[k % 3] * across[k / 3] * at_nodes[k];
+        largest = std::max(largest, std::abs(value - height(x, y)));
+      }
+    }
+    return largest;
+  }
+
+  void note(const System& system, double error, double total_s) const {
+    const std::lock_guard lock(mutex_);
+    error_ = std::isfinite(error) ? error : 0;
+    figures_ = {{"substrate_model", "curved"},
+                {"substrate_thickness_um", gel_.thickness_um},
+                {"substrate_unknowns", std::int64_t{system.space.n_unknowns()}},
+                {"substrate_elements", std::int64_t{system.block.mesh().n_cells()}},
+                {"substrate_factor_GB", system.factor.factor_GB()},
+                {"substrate_total_s", total_s}};
+    if (std::isfinite(error)) figures_.emplace_back("substrate_estimated_error", error);
+  }
+
+  Gel gel_;
+  Shape shape_;
+  int threads_;
+  mutable std::mutex mutex_;
+  mutable double error_ = 0;
+  mutable Figures figures_ = {{"substrate_model", "curved"}};  // of the last call
+};
+
+const System& CurvedResponse::system() const {
+  std::call_once(once_, [&] { system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes()); });
+  return *system_;
+}
+
+substrate::SharedResponse CurvedResponse::kept() const { return substrate::dense_response(matrix(), gel_.threads()); }
+
+}  // namespace
+
+substrate::Model curved_gel() {
+  return {.kind = substrate::ModelKind::curved, .can = kCurvedCan, .make = substrate::make_model<CurvedGel>};
+}
+
+}  // namespace mbtfm::curved

@@ -1,0 +1,171 @@
+#include "substrate/curved/mesh.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::curved {
+namespace {
+
+constexpr double kLeastScaledJacobian = 0.1;
+constexpr int kMostLevels = 14;  // of halving
+
+std::string shown(const Eigen::Vector3d& p) {
+  return "(" + brief(p.x()) + ", " + brief(p.y()) + ", " + brief(p.z()) + ") um";
+}
+
+/// Of the box of a level that holds a point: 4 bits for the level, 20 for each index.
+std::uint64_t key_of(const boxes::GridLines& lines, int level, const std::array<double, 3>& point) {
+  std::uint64_t key = static_cast<std::uint64_t>(level);
+  int axis = 0;
+  for (const auto* line : {&lines.x_um, &lines.y_um, &lines.z_um}) {
+    const double x = point[axis++];
+    const auto above = std::upper_bound(line->begin() + 1, line->end() - 1, x);
+    const double low = *(above - 1), step = *above - low;
+    const double n = std::ldexp(1, level);
+    const double within = std::clamp(std::floor((x - low) / step * n), 0.0, n - 1);
+    key = key << 20 | static_cast<std::uint64_t>(static_cast<double>(above - line->begin() - 1) * n + within);
+  }
+  return key;
+}
+
+std::array<double, 3> middle_of(const boxes::Box& box) {
+  std::array<double, 3> middle;
+  for (int axis = 0; axis < 3; ++axis) middle[axis] = box.low_um[axis] + 0.5 * box.size_um[axis];
+  return middle;
+}
+
+/// How often an interval of the lines was halved to have the box's side.
+int level_of(const boxes::GridLines& lines, const boxes::Box& box) {
+  const double x = box.low_um[0] + 0.5 * box.size_um[0];
+  const auto above = std::upper_bound(lines.x_um.begin() + 1, lines.x_um.end() - 1, x);
+  return static_cast<int>(std::lround(std::log2((*above - *(above - 1)) / box.size_um[0])));
+}
+
+}  // namespace
+
+void check_inside(const Shape& shape, const Vec3& point_um) {
+  const double surface = shape.height_um({point_um.x, point_um.y});
+  const double rounding = 1e-9 * (shape.base_um - surface);
+  if (point_um.z >= surface - rounding && point_um.z <= shape.base_um + rounding) return;
+  throw InvalidData("point " + shown({point_um.x, point_um.y, point_um.z}),
+                    "one between the gel's surface and its base",
+                    "z = " + brief(point_um.z) + " um, with the surface there at " + brief(surface) +
+                        " um and the base at " + brief(shape.base_um) + " um");
+}
+
+NodePositions Mesh::positions_of(int cell) const {
+  NodePositions positions;
+  for (int k = 0; k < kNodes; ++k) positions.col(k) = position_um[nodes_of(cell)[k]];
+  return positions;
+}
+
+Block::Block(Shape shape, const boxes::GridLines& lines, const std::function<bool(const boxes::Box&)>& is_too_large,
+             Sides sides, std::int64_t most_cells, int threads)
+    : shape_(std::move(shape)), boxes_(boxes::make_block_mesh(lines, 2, is_too_large, most_cells, threads)) {
+  mesh_.cell_nodes = boxes_.cell_nodes;
+  mesh_.hanging = boxes_.hanging;
+  const double depth = lines.z_um.back();
+  const auto is_end = [](const std::vector<double>& line, double x) { return x == line.front() || x == line.back(); };
+  for (const auto& [x, y, z] : boxes_.position_um) {
+    const double surface = shape_.height_um({x, y}), share = z / depth;
+    mesh_.position_um.emplace_back(x, y, surface + share * (shape_.base_um - surface));
+    const bool is_side = is_end(lines.x_um, x) || is_end(lines.y_um, y);
+    mesh_.is_held.push_back(share > 1 - 1e-9 || (sides == Sides::held && is_side));  // the base: a line, to rounding
+  }
+  // a hanging node lies on the face of its larger neighbour, so that there is no gap
+  for (std::size_t node = 0; node < mesh_.hanging.size(); ++node) {
+    if (mesh_.hanging[node].empty()) continue;
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    for (const auto& [carrier, weight] : mesh_.hanging[node]) position += weight * mesh_.position_um[carrier];
+    mesh_.position_um[node] = position;
+  }
+  for (int cell = 0; cell < mesh_.n_cells(); ++cell) {
+    const boxes::Box& box = boxes_.cells[cell];
+    cell_at_[key_of(lines, boxes_.cell_levels[cell], middle_of(box))] = cell;
+    if (box.low_um[2] == 0) mesh_.surface_cells.push_back(cell);
+    MBTFM_ASSERT(boxes_.cell_levels[cell] < kMostLevels);
+    const NodePositions nodes = mesh_.positions_of(cell);
+    const double jacobian = least_scaled_jacobian(nodes);
+    if (jacobian >= kLeastScaledJacobian) continue;
+    throw InvalidData("the gel's surface at " + shown(nodes.rowwise().mean()),
+                      "no wall so steep, and no surface so near the base, that an element between them is crushed (a "
+                      "scaled Jacobian of 0.1 or more)",
+                      brief(jacobian));
+  }
+}
+
+Location Block::on_surface(Vec2 point_um) const {
+  const int cell = surface_cell(point_um);
+  if (cell < 0) {
+    throw InvalidData("point (" + brief(point_um.x) + ", " + brief(point_um.y) + ") um", "one in the gel's block",
+                      "it outside");
+  }
+  const boxes::Box& box = boxes_.cells[cell];
+  return {cell, {(point_um.x - box.low_um[0]) / box.size_um[0], (point_um.y - box.low_um[1]) / box.size_um[1], 0}};
+}
+
+Location Block::locate(const Vec3& point_um) const {
+  check_inside(shape_, point_um);
+  const boxes::GridLines& lines = boxes_.lines;
+  const Eigen::Vector3d point(point_um.x, point_um.y, point_um.z);
+  const auto is_within = [](const std::vector<double>& line, double x) {
+    return x >= line.front() && x <= line.back();
+  };
+  if (!is_within(lines.x_um, point.x()) || !is_within(lines.y_um, point.y())) {
+    throw InvalidData("point " + shown(point), "one in the gel's block", "it outside");
+  }
+  const double surface = shape_.height_um({point.x(), point.y()}), depth = lines.z_um.back();
+  constexpr double kRounding = 1e-9;
+  double z = std::clamp(depth * (point.z() - surface) / (shape_.base_um - surface), 0.0, depth);
+  for (int step = 0; step < 8; ++step) {  // the pulled lines of hanging cells differ a little from the shape's own
+    int cell = -1;
+    for (int level = 0; level < kMostLevels && cell < 0; ++level) {
+      const auto found = cell_at_.find(key_of(lines, level, {point.x(), point.y(), z}));
+      if (found != cell_at_.end()) cell = found->second;
+    }
+    MBTFM_ASSERT(cell >= 0);
+    const boxes::Box& box = boxes_.cells[cell];
+    Eigen::Vector3d unit((point.x() - box.low_um[0]) / box.size_um[0], (point.y() - box.low_um[1]) / box.size_um[1],
+                         (z - box.low_um[2]) / box.size_um[2]);
+    const NodePositions nodes = mesh_.positions_of(cell);
+    double slope = 0, error = 0;
+    for (int newton = 0; newton < 8; ++newton) {
+      error = point.z() - nodes.row(2).dot(shapes_at(unit));
+      slope = nodes.row(2).dot(unit_slopes_at(unit).col(2));
+      if (std::abs(error) < 1e-10 * depth) break;
+      unit.z() += error / slope;
+    }
+    const bool is_above = unit.z() < 0 && box.low_um[2] == 0;
+    const bool is_below = unit.z() > 1 && box.low_um[2] + box.size_um[2] > depth * (1 - 1e-9);
+    // the mesh cuts corners of the surface: a point between the two is beyond its cell by so much
+    if (is_above || is_below || (unit.z() >= -kRounding && unit.z() <= 1 + kRounding)) return {cell, unit};
+    z = box.low_um[2] + (unit.z() < 0 ? -1e-6 : 1 + 1e-6) * box.size_um[2];
+  }
+  throw InternalError("no cell of the gel's block holds a point of it");
+}
+
+void Marked::add(const boxes::Box& box, int level) {
+  for (; level >= 0; --level) keys_.insert(key_of(lines_, level, middle_of(box)));
+}
+
+bool Marked::contains(const boxes::Box& box) const {
+  const int level = level_of(lines_, box);
+  return level >= 0 && keys_.contains(key_of(lines_, level, middle_of(box)));
+}
+
+boxes::GridLines every_second(const boxes::GridLines& lines) {
+  const auto thinned = [](const std::vector<double>& line) {
+    std::vector<double> kept;
+    for (std::size_t k = 0; k < line.size(); ++k) {
+      if (line.size() % 2 == 0 || k % 2 == 0) kept.push_back(line[k]);
+    }
+    return kept;
+  };
+  return {thinned(lines.x_um), thinned(lines.y_um), thinned(lines.z_um)};
+}
+
+}  // namespace mbtfm::curved

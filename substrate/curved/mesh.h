@@ -1,0 +1,89 @@
+/// Meshes of bent hexahedra: the block of a gel under a curved surface, and what every such mesh has.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "substrate/boxes/block_mesh.h"
+#include "substrate/curved/element.h"
+
+namespace mbtfm::curved {
+
+struct Mesh {
+  std::vector<int> cell_nodes;                          ///< kNodes a cell; the face z = 0 of a cell is its outer one
+  std::vector<Eigen::Vector3d> position_um;             ///< by node
+  std::vector<std::vector<boxes::NodeWeight>> hanging;  ///< by node: what it hangs on, in position, too; empty: nothing
+  std::vector<char> is_held;                            ///< by node: its displacement is given
+  std::vector<int> surface_cells;                       ///< those whose outer face carries tractions
+
+  int n_cells() const { return static_cast<int>(cell_nodes.size()) / kNodes; }
+  const int* nodes_of(int cell) const { return &cell_nodes[static_cast<std::size_t>(cell) * kNodes]; }
+  NodePositions positions_of(int cell) const;
+};
+
+/// A gel on a plane base, z = base_um, under its surface z = height_um(x, y); z points into the gel.
+struct Shape {
+  std::function<double(Vec2)> height_um;
+  double base_um = 0;
+};
+
+/// @throws InvalidData where the point lies above the surface or below the base
+void check_inside(const Shape& shape, const Vec3& point_um);
+
+enum class Sides { free, held };
+
+/// Where a point lies: in which cell, and where in it.
+struct Location {
+  int cell = 0;
+  Eigen::Vector3d unit;
+};
+
+/// The part of a gel over a rectangle: a block of boxes [x] × [y] × [0, depth] whose lines along z are pulled, each
+/// evenly, onto the surface. x and y stay as they are, so that any height field gives a mesh that is not turned over.
+class Block {
+ public:
+  /// @param lines         of the block before it is pulled, its depth that of the gel in the mean
+  /// @param is_too_large  of its boxes: see make_block_mesh
+  /// @throws InvalidData where a cell is bent so much that its scaled Jacobian falls below 0.1, by place; NotSolved
+  ///         where the cells grow beyond `most_cells`
+  Block(Shape shape, const boxes::GridLines& lines, const std::function<bool(const boxes::Box&)>& is_too_large,
+        Sides sides, std::int64_t most_cells, int threads);
+
+  const Mesh& mesh() const { return mesh_; }
+  const boxes::BlockMesh& boxes() const { return boxes_; }
+  const Shape& shape() const { return shape_; }
+  /// The cell of the surface under a place; -1 outside of the block.
+  int surface_cell(Vec2 point_um) const { return boxes::surface_cell(boxes_, point_um); }
+  /// A place of the surface, seen from above. @throws InvalidData where it lies outside the block
+  Location on_surface(Vec2 point_um) const;
+  /// @throws InvalidData where the point lies outside the block, above its surface or below its base
+  Location locate(const Vec3& point_um) const;
+
+ private:
+  Shape shape_;
+  boxes::BlockMesh boxes_;
+  Mesh mesh_;
+  std::unordered_map<std::uint64_t, int> cell_at_;  ///< by key of a box
+};
+
+/// Boxes of a block that are to be halved, and with them all that they are parts of.
+class Marked {
+ public:
+  explicit Marked(boxes::GridLines lines) : lines_(std::move(lines)) {}
+  /// So that it is halved.
+  void add(const boxes::Box& box, int level);
+  /// As make_block_mesh asks.
+  bool contains(const boxes::Box& box) const;
+
+ private:
+  boxes::GridLines lines_;
+  std::unordered_set<std::uint64_t> keys_;
+};
+
+/// Every second line, so that cells are twice as large; the others stay where their number is odd.
+boxes::GridLines every_second(const boxes::GridLines& lines);
+
+}  // namespace mbtfm::curved

@@ -1,0 +1,199 @@
+#include "substrate/curved/surface_loads.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/quadrature.h"
+#include "substrate/boxes/ellipse_load.h"
+#include "substrate/ellipse.h"
+
+namespace mbtfm::curved {
+namespace {
+
+using boxes::NodeWeight;
+using boxes::Rectangle;
+
+Rectangle rectangle_of(const substrate::Square& square) {
+  const Vec2 half = {0.5 * square.side_um, 0.5 * square.side_um};
+  return {square.centre_um - half, square.centre_um + half};
+}
+
+/// @throws InvalidData where it is no rectangle along the axes
+Rectangle rectangle_of(const substrate::SurfaceMesh& mesh, const std::array<int, 4>& face) {
+  Rectangle r{mesh.points_um.at(face[0]), mesh.points_um.at(face[0])};
+  for (const int corner : face) {
+    const Vec2 p = mesh.points_um.at(corner);
+    r = {{std::min(r.low_um.x, p.x), std::min(r.low_um.y, p.y)},
+         {std::max(r.high_um.x, p.x), std::max(r.high_um.y, p.y)}};
+  }
+  const double size = std::max(r.high_um.x - r.low_um.x, r.high_um.y - r.low_um.y);
+  const auto is_end = [size](double low, double high, double x) {
+    return std::min(std::abs(x - low), std::abs(x - high)) <= 1e-9 * size;
+  };
+  int corners = 0;  // each met once
+  for (const int corner : face) {
+    const Vec2 p = mesh.points_um[corner];
+    if (!is_end(r.low_um.x, r.high_um.x, p.x) || !is_end(r.low_um.y, r.high_um.y, p.y)) continue;
+    corners |= 1 << ((p.x - r.low_um.x > 0.5 * (r.high_um.x - r.low_um.x)) +
+                     2 * (p.y - r.low_um.y > 0.5 * (r.high_um.y - r.low_um.y)));
+  }
+  if (corners == 0b1111) return r;
+  throw InvalidData("a quad of the surface at (" + brief(r.low_um.x) + ", " + brief(r.low_um.y) + ") um",
+                    "a rectangle along x and y, seen from above", "another shape");
+}
+
+/// Sums forces on nodes, by cell of the surface that a rectangle overlaps.
+class Sum {
+ public:
+  Sum(const Block& block, const Space& space) : block_(block), space_(space) {}
+
+  /// At a place within a cell of the surface: so much of a unit force.
+  void add(int cell, Vec2 unit, double force) {
+    const Shapes shapes = shapes_at({unit.x, unit.y, 0});
+    for (int k = 0; k < kNodes; ++k) {
+      if (shapes[k] != 0) at_nodes_.push_back({block_.mesh().nodes_of(cell)[k], force * shapes[k]});
+    }
+    total_ += force;
+  }
+
+  /// The integral of a function over a rectangle of the surface. @return its area, seen from above
+  template <class Function>
+  double integrate(const Rectangle& over, const Function& function) {
+    constexpr int kPoints = 4;
+    const numerics::GaussRule gauss = numerics::gauss_legendre(kPoints);
+    double covered = 0;
+    for (const int cell : block_.mesh().surface_cells) {
+      const boxes::Box& box = block_.boxes().cells[cell];
+      const Vec2 low = {std::max(over.low_um.x, box.low_um[0]), std::max(over.low_um.y, box.low_um[1])};
+      const Vec2 high = {std::min(over.high_um.x, box.low_um[0] + box.size_um[0]),
+                         std::min(over.high_um.y, box.low_um[1] + box.size_um[1])};
+      if (low.x >= high.x || low.y >= high.y) continue;
+      covered += (high.x - low.x) * (high.y - low.y);
+      const NodePositions nodes = block_.mesh().positions_of(cell);
+      const double share = (high.x - low.x) * (high.y - low.y) / (box.size_um[0] * box.size_um[1]);
+      for (int k = 0; k < kPoints * kPoints; ++k) {
+        const int i = k % kPoints, j = k / kPoints;
+        const Vec2 at = {low.x + 0.5 * (1 + gauss.nodes[i]) * (high.x - low.x),
+                         low.y + 0.5 * (1 + gauss.nodes[j]) * (high.y - low.y)};
+        const Vec2 unit = {(at.x - box.low_um[0]) / box.size_um[0], (at.y - box.low_um[1]) / box.size_um[1]};
+        const double area =
+            0.25 * gauss.weights[i] * gauss.weights[j] * share * face_point(nodes, unit.x, unit.y).area_um2.norm();
+        add(cell, unit, area * function(at));
+      }
+    }
+    return covered;
+  }
+
+  double total() const { return total_; }
+  /// Each times a factor.
+  std::vector<NodeWeight> on_free_nodes(double factor) const {
+    std::vector<NodeWeight> weights = space_.nodes().on_free_nodes(at_nodes_);
+    for (NodeWeight& w : weights) w.weight *= factor;
+    return weights;
+  }
+
+ private:
+  const Block& block_;
+  const Space& space_;
+  std::vector<NodeWeight> at_nodes_;
+  double total_ = 0;
+};
+
+void require_inside(bool is_inside, Vec2 at) {
+  if (is_inside) return;
+  throw InvalidData("the load at (" + brief(at.x) + ", " + brief(at.y) + ") um", "all of it on the gel's block",
+                    "a part of it outside");
+}
+
+/// Spread evenly over the area of the surface within the ellipse, seen from above.
+std::vector<NodeWeight> ellipse_weights(const Block& block, const Space& space, const substrate::Ellipse& ellipse) {
+  Sum sum(block, space);
+  double share = 0;
+  const Vec2 half = substrate::half_extent_um(ellipse), c = ellipse.centre_um;
+  for (const int cell : block.mesh().surface_cells) {
+    const boxes::Box& box = block.boxes().cells[cell];
+    const Vec2 low = {box.low_um[0], box.low_um[1]}, size = {box.size_um[0], box.size_um[1]};
+    if (low.x > c.x + half.x || low.x + size.x < c.x - half.x || low.y > c.y + half.y || low.y + size.y < c.y - half.y)
+      continue;
+    const NodePositions nodes = block.mesh().positions_of(cell);
+    for (const substrate::DiscPoint& p : boxes::clipped_ellipse_rule(ellipse, {low, low + size})) {
+      const Vec2 unit = {(p.position.x - low.x) / size.x, (p.position.y - low.y) / size.y};
+      const double stretch = face_point(nodes, unit.x, unit.y).area_um2.norm() / (size.x * size.y);
+      sum.add(cell, unit, p.weight * stretch);
+      share += p.weight;
+    }
+  }
+  require_inside(std::abs(share - 1) < 1e-9, c);  // the rules add up to rounding
+  return sum.on_free_nodes(1 / sum.total());
+}
+
+std::vector<NodeWeight> square_weights(const Block& block, const Space& space, const substrate::Square& square) {
+  Sum sum(block, space);
+  const double covered = sum.integrate(rectangle_of(square), [](Vec2) { return 1.0; });
+  require_inside(std::abs(covered / (square.side_um * square.side_um) - 1) < 1e-9, square.centre_um);
+  return sum.on_free_nodes(1);
+}
+
+std::vector<std::vector<NodeWeight>> vertex_weights(const Block& block, const Space& space,
+                                                    const substrate::SurfaceMesh& mesh) {
+  std::vector<Sum> sums(mesh.points_um.size(), Sum(block, space));
+  for (const std::array<int, 4>& face : mesh.faces) {
+    const Rectangle r = rectangle_of(mesh, face);
+    const Vec2 size = r.high_um - r.low_um;
+    for (const int corner : face) {
+      const Vec2 at = mesh.points_um[corner];
+      const double covered = sums[corner].integrate(
+          r, [&](Vec2 p) { return (1 - std::abs(p.x - at.x) / size.x) * (1 - std::abs(p.y - at.y) / size.y); });
+      require_inside(std::abs(covered / (size.x * size.y) - 1) < 1e-9, at);
+    }
+  }
+  std::vector<std::vector<NodeWeight>> weights;
+  for (const Sum& sum : sums) weights.push_back(sum.on_free_nodes(1));
+  return weights;
+}
+
+}  // namespace
+
+std::vector<Target> targets_of(const substrate::Loads& loads, double across) {
+  std::vector<Target> targets;
+  if (const auto* ellipses = std::get_if<std::vector<substrate::Ellipse>>(&loads.shapes)) {
+    check(*ellipses);
+    for (const substrate::Ellipse& e : *ellipses) {
+      const Vec2 half = substrate::half_extent_um(e);
+      const double size = std::sqrt(std::numbers::pi * e.semi_major_um * e.semi_minor_um);
+      targets.push_back({e.centre_um - half, e.centre_um + half, size / across});
+    }
+  } else if (const auto* squares = std::get_if<std::vector<substrate::Square>>(&loads.shapes)) {
+    for (const substrate::Square& s : *squares) {
+      const Rectangle r = rectangle_of(s);
+      targets.push_back({r.low_um, r.high_um, s.side_um / across});
+    }
+  } else if (const auto* mesh = std::get_if<substrate::SurfaceMesh>(&loads.shapes)) {
+    for (const auto& face : mesh->faces) {
+      const Rectangle r = rectangle_of(*mesh, face);
+      const Vec2 size = r.high_um - r.low_um;
+      targets.push_back({r.low_um, r.high_um, std::min(size.x, size.y) / across});
+    }
+  } else {
+    throw UsageError("waves of traction have no end: the model curved takes ellipses, squares and quads");
+  }
+  return targets;
+}
+
+std::vector<std::vector<NodeWeight>> load_weights(const Block& block, const Space& space,
+                                                  const substrate::Loads& loads) {
+  if (const auto* mesh = std::get_if<substrate::SurfaceMesh>(&loads.shapes)) return vertex_weights(block, space, *mesh);
+  std::vector<std::vector<NodeWeight>> weights;
+  if (const auto* ellipses = std::get_if<std::vector<substrate::Ellipse>>(&loads.shapes)) {
+    for (const substrate::Ellipse& e : *ellipses) weights.push_back(ellipse_weights(block, space, e));
+  } else {
+    for (const auto& s : std::get<std::vector<substrate::Square>>(loads.shapes))
+      weights.push_back(square_weights(block, space, s));
+  }
+  return weights;
+}
+
+}  // namespace mbtfm::curved
