@@ -30,7 +30,7 @@ const std::vector<Ellipse>& ellipses_of(const Loads& loads, int most_components)
   if (!ellipses || loads.n_components > most_components)
     throw UsageError(
         "this model of the gel takes forces along its flat surface, on ellipses: forces into the gel need "
-        "substrate.model = half-space or layer");
+        "substrate.model = half-space, layer or curved");
   check(*ellipses);
   return *ellipses;
 }

@@ -141,7 +141,7 @@ TEST(Substrate, names_the_models_it_knows) {
     stage::set_from_text(stage::parameter_named(list, "model"), "layr");
     FAIL();
   } catch (const UsageError& error) {
-    EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, auto"), std::string::npos)
+    EXPECT_NE(std::string(error.what()).find("half-space, layer, split, refined, curved, auto"), std::string::npos)
         << error.what();
   }
   EXPECT_THROW(greens::make_greens(kGel, test::model_named("split"), 1), UsageError);
