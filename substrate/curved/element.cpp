@@ -12,19 +12,19 @@
 namespace mbtfm::curved {
 namespace {
 
-constexpr int kPoints = 27;
+constexpr int kRulePoints = 27;
 
 struct UnitRule {
-  std::array<double, kPoints> weight{};
-  std::array<Shapes, kPoints> shapes;
-  std::array<Slopes, kPoints> slopes;
+  std::array<double, kRulePoints> weight{};
+  std::array<Shapes, kRulePoints> shapes;
+  std::array<Slopes, kRulePoints> slopes;
 };
 
 const UnitRule& unit_rule() {
   static const UnitRule rule = [] {
     const numerics::GaussRule gauss = numerics::gauss_legendre(3);
     UnitRule made;
-    for (int point = 0; point < kPoints; ++point) {
+    for (int point = 0; point < kRulePoints; ++point) {
       const int index[3] = {point % 3, point / 3 % 3, point / 9};
       Eigen::Vector3d unit;
       made.weight[point] = 1;
@@ -74,9 +74,9 @@ Eigen::Vector4d pressures_at(const NodePositions& nodes_um, const Eigen::Vector3
 
 const Shapes& shapes_of_point(int q) { return unit_rule().shapes[q]; }
 
-Element::Element(const NodePositions& nodes_um) : points(kPoints), mass(Eigen::Matrix4d::Zero()) {
+Element::Element(const NodePositions& nodes_um) : points(kRulePoints), mass(Eigen::Matrix4d::Zero()) {
   const UnitRule& rule = unit_rule();
-  for (int q = 0; q < kPoints; ++q) {
+  for (int q = 0; q < kRulePoints; ++q) {
     QuadraturePoint& point = points[q];
     const Eigen::Matrix3d jacobian = nodes_um * rule.slopes[q];  // d position_i / d unit_j
     point.position_um = nodes_um * rule.shapes[q];
@@ -99,9 +99,9 @@ double least_scaled_jacobian(const NodePositions& nodes_um) {
 
 Eigen::MatrixXd linear_stiffness(const Element& element, double mu_kPa, double lambda_kPa) {
   // by axis: the slopes of all points, scaled so that a product is an integral
-  std::array<Eigen::Matrix<double, kPoints, kNodes>, 3> slopes;
+  std::array<Eigen::Matrix<double, kRulePoints, kNodes>, 3> slopes;
   Eigen::Matrix<double, kUnknowns, kPressures> divergence = Eigen::Matrix<double, kUnknowns, kPressures>::Zero();
-  for (int q = 0; q < kPoints; ++q) {
+  for (int q = 0; q < kRulePoints; ++q) {
     const QuadraturePoint& point = element.points[q];
     for (int axis = 0; axis < 3; ++axis) {
       slopes[axis].row(q) = std::sqrt(mu_kPa * point.volume_um3) * point.slopes.col(axis).transpose();
