@@ -14,26 +14,29 @@ void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
   list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on");
   list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
-           "refined: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is refined "
+           "refined, curved: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is "
+           "refined "
            "until it is estimated to have; 0: the first mesh, no error estimated");
   list.add("modulus_profile", p.modulus_profile,
            "depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
            "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
-  list.add(
-      "margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
-      "split, refined: from the adhesions and beads to the sides of the block where the gel's own are far away, in "
-      "gel thicknesses");
+  list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
+           "split, refined, curved: from the adhesions and beads to the sides of the block where the gel's own are far "
+           "away, in "
+           "gel thicknesses");
   list.add("cells_per_thickness", p.cells_per_thickness, Range::between(1, 20),
            "split: cells of the correction's grid over the gel's thickness");
   list.add("element", p.element, "refined: finite element");
   list.add("elements_across_adhesion", p.elements_across_adhesion, Range::between(0.25, 100),
-           "refined: square root of an adhesion's area over the side of the elements that carry it, in the first mesh");
+           "refined, curved: square root of an adhesion's area over the side of the elements that carry it, in the "
+           "first mesh");
   list.add("precision", p.precision,
            "refined: of the factor; auto: single up to a Poisson ratio of 0.495, above it double");
   list.add("elements_per_adhesion", p.elements_per_adhesion, Range::between(1, 10000),
            "refined: elements that touch each adhesion, at least");
-  list.add("growth", p.growth, Range::between(0.1, 10),
-           "refined: largest side of an element over its distance to the nearest adhesion");
+  list.add(
+      "growth", p.growth, Range::between(0.1, 10),
+      "refined: largest side of an element over its distance to the nearest adhesion; curved takes a quarter of it");
   list.add("side_distance_um", p.side_distance_um, Range::between(1e-3, 1e5),
            "from the adhesions and beads to the gel's own sides (um); unset: they are far away");
   list.add("surface_tilt_deg", p.surface_tilt_deg, Range{.low = 0, .high = 90, .excludes_high = true},
@@ -42,9 +45,9 @@ void declare(stage::ParameterList& list, SubstrateParameters& p) {
            "root mean square height of the gel's surface about its plane (um); likewise");
   list.add("cache_folder", p.cache_folder,
            "split: folder where factors of the grid are kept for other runs of the same gel; empty: none");
-  list.add("stress", p.stress, "write the stress inside the gel, too (refined)");
+  list.add("stress", p.stress, "write the stress inside the gel, too (refined, curved)");
   list.add("memory_limit_GB", p.memory_limit_GB, Range::between(0, 1e6),
-           "split, refined: memory the solution may take (GB); 0: four fifths of the machine's");
+           "split, refined, curved: memory the solution may take (GB); 0: four fifths of the machine's");
 }
 
 void check_forces(const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN) {

@@ -10,6 +10,10 @@
 namespace mbtfm::substrate {
 
 inline double shear_modulus_kPa(const Gel& gel) { return gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio)); }
+/// Lamé's first; infinite at a Poisson ratio of 1/2.
+inline double lame_modulus_kPa(const Gel& gel) {
+  return 2 * shear_modulus_kPa(gel) * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
+}
 
 /// Young's modulus (kPa) at a depth (um) below the surface.
 struct ModulusAtDepth {

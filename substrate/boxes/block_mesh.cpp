@@ -54,8 +54,6 @@ std::uint64_t surface_key(const GridLines& lines, int level, Vec2 point) {
   return static_cast<std::uint64_t>(level) << 58 | index(lines.x_um, point.x) << 29 | index(lines.y_um, point.y);
 }
 
-constexpr int kMostLevels = 20;  // of halving: the key has 29 bits for a position
-
 }  // namespace
 
 BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function<bool(const Box&)>& is_too_large,
@@ -78,6 +76,14 @@ BlockMesh make_block_mesh(const GridLines& lines, int order, const std::function
     mesh.cell_at_surface[surface_key(lines, mesh.cell_levels[cell], centre)] = static_cast<int>(cell);
   }
   return mesh;
+}
+
+std::vector<double> even_lines(double low, double high, double margin_um, double step_um) {
+  const double length = high - low + 2 * margin_um;
+  const int n = std::max(1, static_cast<int>(std::ceil(length / step_um - 1e-9)));
+  std::vector<double> values;
+  for (int k = 0; k <= n; ++k) values.push_back(0.5 * (low + high) + (static_cast<double>(k) / n - 0.5) * length);
+  return values;
 }
 
 int surface_cell(const BlockMesh& mesh, Vec2 point_um) {

@@ -21,6 +21,11 @@ struct GridLines {
   std::vector<double> x_um, y_um, z_um;
 };
 
+constexpr int kMostLevels = 20;  ///< of halving: keys have 29 bits and more for a position
+
+/// Evenly from low - margin to high + margin, so many that no step is longer than `step_um`.
+std::vector<double> even_lines(double low, double high, double margin_um, double step_um);
+
 struct NodeWeight {
   int node = 0;
   double weight = 0;

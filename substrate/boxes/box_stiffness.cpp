@@ -38,7 +38,7 @@ Eigen::MatrixXd box_stiffness(const substrate::Material& material, int order, co
   const Gel& gel = material.gel;
   const std::array<double, 3>& size_um = box.size_um;
   const double mu = substrate::shear_modulus_kPa(gel);
-  const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
+  const double lambda = substrate::lame_modulus_kPa(gel);
   const int n_nodes = (order + 1) * (order + 1) * (order + 1);
   const int n_pressures = order == 1 ? 1 : 4;  // 1, and x, y, z from the centre
   const double volume = size_um[0] * size_um[1] * size_um[2];

@@ -42,14 +42,8 @@ double coarsest_side_um(const substrate::Material& material) {
 /// Boxes over the scene and its margin, nearly cubes; flatter over thin layers.
 GridLines boxes_around(const substrate::Extent& scene, const substrate::Material& material, double margin_um) {
   const double side = coarsest_side_um(material);
-  const auto line = [&](double low, double high) {
-    const double length = high - low + 2 * margin_um;
-    const int n = std::max(1, static_cast<int>(std::ceil(length / side - 1e-9)));
-    std::vector<double> values;
-    for (int k = 0; k <= n; ++k) values.push_back(0.5 * (low + high) + (static_cast<double>(k) / n - 0.5) * length);
-    return values;
-  };
-  return {line(scene.low_um.x, scene.high_um.x), line(scene.low_um.y, scene.high_um.y), depths_of(material, side)};
+  return {even_lines(scene.low_um.x, scene.high_um.x, margin_um, side),
+          even_lines(scene.low_um.y, scene.high_um.y, margin_um, side), depths_of(material, side)};
 }
 
 /// Elements of a uniform grid that an ellipse touches.

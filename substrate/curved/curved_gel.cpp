@@ -13,8 +13,8 @@
 #include "substrate/curved/models.h"
 #include "substrate/curved/surface_loads.h"
 #include "substrate/ellipse.h"
-#include "substrate/material.h"
 #include "substrate/response.h"
+#include "substrate/scene.h"
 
 namespace mbtfm::curved {
 namespace {
@@ -51,7 +51,7 @@ struct System {
          const numerics::FactorOptions& options)
       : block(std::move(made)),
         space(block.mesh(), options.threads),
-        factor(space.assemble(stiffness_of(gel)), options),
+        factor(space.assemble(linear_stiffness_of(gel, block.mesh())), options),
         loads(load_weights(block, space, of)) {
     if (const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um)) {
       for (const Vec2 p : *on_surface) points.push_back(space.weights_at(block.on_surface(p)));
@@ -60,13 +60,6 @@ struct System {
         points.push_back(space.weights_at(block.locate(p)));
       }
     }
-  }
-
- private:
-  std::function<MatrixXd(int)> stiffness_of(const Gel& gel) const {
-    const double mu = substrate::shear_modulus_kPa(gel);
-    const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
-    return [=, this](int cell) { return linear_stiffness(Element(block.mesh().positions_of(cell)), mu, lambda); };
   }
 };
 
@@ -180,15 +173,17 @@ class CurvedGel final : public substrate::Substrate {
                                            Axes load_axes, Axes point_axes) const {
     const auto start = std::chrono::steady_clock::now();
     Fineness fineness = first_fineness();
-    auto system = make_system(fineness, loads, observations);
     const double tolerance = parameters_.displacement_tolerance;
+    const MatrixXd probes = probes_of(loads);
+    const auto displaced = [&](const System& s) {
+      return solve_between(s, s.loads, load_axes, probes, s.points, point_axes);
+    };
+    MatrixXd before;  // two factors at a time are too many: of the coarser mesh these are kept
+    if (tolerance > 0) before = displaced(*make_system(fineness.coarser(), loads, observations));
+    auto system = make_system(fineness, loads, observations);
     double error = std::numeric_limits<double>::infinity();
     if (tolerance > 0) {
-      const MatrixXd probes = probes_of(loads);
-      const auto displaced = [&](const System& s) {
-        return solve_between(s, s.loads, load_axes, probes, s.points, point_axes);
-      };
-      MatrixXd before = displaced(*make_system(fineness.coarser(), loads, observations)), now = displaced(*system);
+      MatrixXd now = displaced(*system);
       error = estimated_error(before, now);
       for (int level = 0; error > tolerance; ++level) {
         if (level == kMostHalvings) {
@@ -197,7 +192,7 @@ class CurvedGel final : public substrate::Substrate {
                                            " refinements: ask for a larger displacement_tolerance"});
         }
         fineness = fineness.finer();
-        system.reset();  // two factors at a time are too many
+        system.reset();
         system = make_system(fineness, loads, observations);
         before = std::move(now);
         now = displaced(*system);
@@ -257,14 +252,16 @@ class CurvedGel final : public substrate::Substrate {
     const double limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB);
     const auto most = static_cast<std::int64_t>(1e9 * limit_GB / 1e5);  // as `refined` counts
     const std::vector<Target> targets = targets_of(loads, fineness.across);
-    Extent extent;
-    for (const Target& t : targets) extent.add(t.low_um), extent.add(t.high_um);
-    for (const Vec3& p : substrate::points_in_space(observations)) extent.add({p.x, p.y});
+    std::vector<Vec2> places;
+    for (const Target& t : targets) places.insert(places.end(), {t.low_um, t.high_um});
+    for (const Vec3& p : substrate::points_in_space(observations)) places.push_back({p.x, p.y});
+    const substrate::Extent scene = substrate::extent_of(places, {});
     const double margin = substrate::margin_um(gel_, parameters_);
-    const double depth = mean_depth_um(extent);
+    const double depth = mean_depth_um(scene);
     const double coarsest = depth / fineness.layers;
-    const boxes::GridLines lines = {lines_over(extent.low.x - margin, extent.high.x + margin, coarsest),
-                                    lines_over(extent.low.y - margin, extent.high.y + margin, coarsest),
+    substrate::check_size(scene, coarsest, most);
+    const boxes::GridLines lines = {boxes::even_lines(scene.low_um.x, scene.high_um.x, margin, coarsest),
+                                    boxes::even_lines(scene.low_um.y, scene.high_um.y, margin, coarsest),
                                     layers_um(depth, fineness.layers)};
     const auto is_too_large = [&](const boxes::Box& box) {
       const double side = std::max({box.size_um[0], box.size_um[1], box.size_um[2]});
@@ -281,30 +278,13 @@ class CurvedGel final : public substrate::Substrate {
                                           numerics::FactorOptions{.threads = threads_, .memory_limit_GB = limit_GB});
   }
 
-  struct Extent {
-    Vec2 low{std::numeric_limits<double>::infinity(), std::numeric_limits<double>::infinity()};
-    Vec2 high{-std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity()};
-    void add(Vec2 p) {
-      low = {std::min(low.x, p.x), std::min(low.y, p.y)};
-      high = {std::max(high.x, p.x), std::max(high.y, p.y)};
-    }
-  };
-
-  /// Nearly cubes.
-  static std::vector<double> lines_over(double low, double high, double side) {
-    const int n = std::max(1, static_cast<int>(std::ceil((high - low) / side - 1e-9)));
-    std::vector<double> lines;
-    for (int k = 0; k <= n; ++k) lines.push_back(low + (high - low) * k / n);
-    return lines;
-  }
-
-  double mean_depth_um(const Extent& extent) const {
+  double mean_depth_um(const substrate::Extent& scene) const {
     constexpr int kSamples = 16;
+    const Vec2 size = scene.high_um - scene.low_um;
     double sum = 0;
     for (int k = 0; k < kSamples * kSamples; ++k) {
       const Vec2 share = {(k % kSamples + 0.5) / kSamples, (k / kSamples + 0.5) / kSamples};
-      sum += shape_.height_um({extent.low.x + share.x * (extent.high.x - extent.low.x),
-                               extent.low.y + share.y * (extent.high.y - extent.low.y)});
+      sum += shape_.height_um(scene.low_um + Vec2{share.x * size.x, share.y * size.y});
     }
     return shape_.base_um - sum / (kSamples * kSamples);
   }

@@ -21,13 +21,15 @@ Eigen::Matrix3d Field::gradient(const Location& location) const {
   return space->values_of(location.cell, at_nodes_um) * slopes * jacobian.inverse();
 }
 
+std::function<Eigen::MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh) {
+  const double mu = substrate::shear_modulus_kPa(gel), lambda = substrate::lame_modulus_kPa(gel);
+  return [=, &mesh](int cell) { return linear_stiffness(Element(mesh.positions_of(cell)), mu, lambda); };
+}
+
 Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loading& loading,
                    const numerics::FactorOptions& options) {
   const auto space = std::make_shared<const Space>(block->mesh(), options.threads);
-  const double mu = substrate::shear_modulus_kPa(gel);
-  const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
-  const Mesh& mesh = space->mesh();
-  const auto stiffness_of = [&](int cell) { return linear_stiffness(Element(mesh.positions_of(cell)), mu, lambda); };
+  const auto stiffness_of = linear_stiffness_of(gel, block->mesh());
   Vectors forces(space->nodes().size(), Eigen::Vector3d::Zero());
   if (loading.traction_kPa) forces = space->traction_forces_nN(loading.traction_kPa);
   if (loading.held_um) {
@@ -89,7 +91,8 @@ std::vector<double> gradient_gaps(const Field& field) {
 namespace {
 
 /// The cells with the largest gaps, until they hold most of the sum of squares, or would take too many unknowns.
-void mark(const Field& field, int most_unknowns, Marked& marked) {
+/// @return whether there are any
+bool mark(const Field& field, int most_unknowns, Marked& marked) {
   constexpr double kShare = 0.97;
   constexpr double kUnknownsOfMark = 7 * 24 * 1.1;  // seven cells more, and what neighbours halve with them
   const std::vector<double> gaps = gradient_gaps(field);
@@ -99,12 +102,15 @@ void mark(const Field& field, int most_unknowns, Marked& marked) {
   double rest = 0, room = most_unknowns - field.space->n_unknowns();
   for (const double gap : gaps) rest += gap * gap;
   rest *= kShare;
+  bool is_any = false;
   for (const int cell : order) {
     room -= kUnknownsOfMark;
     if (rest <= 0 || room < 0) break;
+    is_any = true;
     rest -= gaps[cell] * gaps[cell];
     marked.add(field.block->boxes().cells[cell], field.block->boxes().cell_levels[cell]);
   }
+  return is_any;
 }
 
 /// Whether a box of twice the size is too large: where any of its halves is.
@@ -152,13 +158,15 @@ Adapted solve_adapted(const Gel& gel, const Shape& shape, const boxes::GridLines
   const auto has_half = [&](const boxes::Box& box) { return has_marked_half(marked, box); };
   Adapted adapted{solve_on(lines, is_marked)};
   while (true) {
-    const bool is_last = 4 * adapted.field.space->n_unknowns() > 3 * adaptivity.most_unknowns;
+    Marked finer = marked;
+    const bool is_last = 4 * adapted.field.space->n_unknowns() > 3 * adaptivity.most_unknowns ||
+                         !mark(adapted.field, adaptivity.most_unknowns, finer);
     if (is_last || adaptivity.tolerance > 0) {
       const Field coarse = solve_on(every_second(lines), has_half);
       adapted.estimated_error = estimated_error(at_points(coarse, points_um), at_points(adapted.field, points_um));
       if (is_last || adapted.estimated_error <= adaptivity.tolerance) return adapted;
     }
-    mark(adapted.field, adaptivity.most_unknowns, marked);
+    marked = std::move(finer);
     adapted.field = solve_on(lines, is_marked);
   }
 }

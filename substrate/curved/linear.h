@@ -24,6 +24,9 @@ struct Field {
   Eigen::Matrix3d gradient(const Location& location) const;  ///< [i][j] = d u_i / d x_j
 };
 
+/// By cell of a mesh, which must outlive it.
+std::function<Eigen::MatrixXd(int cell)> linear_stiffness_of(const Gel& gel, const Mesh& mesh);
+
 /// @throws NotSolved where memory would not suffice
 Field solve_linear(const Gel& gel, std::shared_ptr<const Block> block, const Loading& loading,
                    const numerics::FactorOptions& options);

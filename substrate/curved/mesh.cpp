@@ -11,23 +11,21 @@ namespace mbtfm::curved {
 namespace {
 
 constexpr double kLeastScaledJacobian = 0.1;
-constexpr int kMostLevels = 14;  // of halving
 
 std::string shown(const Eigen::Vector3d& p) {
   return "(" + brief(p.x()) + ", " + brief(p.y()) + ", " + brief(p.z()) + ") um";
 }
 
-/// Of the box of a level that holds a point: 4 bits for the level, 20 for each index.
-std::uint64_t key_of(const boxes::GridLines& lines, int level, const std::array<double, 3>& point) {
-  std::uint64_t key = static_cast<std::uint64_t>(level);
-  int axis = 0;
-  for (const auto* line : {&lines.x_um, &lines.y_um, &lines.z_um}) {
-    const double x = point[axis++];
-    const auto above = std::upper_bound(line->begin() + 1, line->end() - 1, x);
-    const double low = *(above - 1), step = *above - low;
-    const double n = std::ldexp(1, level);
-    const double within = std::clamp(std::floor((x - low) / step * n), 0.0, n - 1);
-    key = key << 20 | static_cast<std::uint64_t>(static_cast<double>(above - line->begin() - 1) * n + within);
+/// Of the box of a level that holds a point.
+BoxKey key_of(const boxes::GridLines& lines, int level, const std::array<double, 3>& point) {
+  BoxKey key = {static_cast<std::uint32_t>(level)};
+  const std::array line_of = {&lines.x_um, &lines.y_um, &lines.z_um};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const std::vector<double>& line = *line_of[axis];
+    const auto above = std::upper_bound(line.begin() + 1, line.end() - 1, point[axis]);
+    const double low = *(above - 1), n = std::ldexp(1, level);
+    const double within = std::clamp(std::floor((point[axis] - low) / (*above - low) * n), 0.0, n - 1);
+    key[axis + 1] = static_cast<std::uint32_t>(static_cast<double>(above - line.begin() - 1) * n + within);
   }
   return key;
 }
@@ -87,7 +85,6 @@ Block::Block(Shape shape, const boxes::GridLines& lines, const std::function<boo
     const boxes::Box& box = boxes_.cells[cell];
     cell_at_[key_of(lines, boxes_.cell_levels[cell], middle_of(box))] = cell;
     if (box.low_um[2] == 0) mesh_.surface_cells.push_back(cell);
-    MBTFM_ASSERT(boxes_.cell_levels[cell] < kMostLevels);
     const NodePositions nodes = mesh_.positions_of(cell);
     const double jacobian = least_scaled_jacobian(nodes);
     if (jacobian >= kLeastScaledJacobian) continue;
@@ -123,7 +120,7 @@ Location Block::locate(const Vec3& point_um) const {
   double z = std::clamp(depth * (point.z() - surface) / (shape_.base_um - surface), 0.0, depth);
   for (int step = 0; step < 8; ++step) {  // the pulled lines of hanging cells differ a little from the shape's own
     int cell = -1;
-    for (int level = 0; level < kMostLevels && cell < 0; ++level) {
+    for (int level = 0; level < boxes::kMostLevels && cell < 0; ++level) {
       const auto found = cell_at_.find(key_of(lines, level, {point.x(), point.y(), z}));
       if (found != cell_at_.end()) cell = found->second;
     }

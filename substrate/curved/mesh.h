@@ -1,16 +1,20 @@
 /// Meshes of bent hexahedra: the block of a gel under a curved surface, and what every such mesh has.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <functional>
-#include <unordered_map>
-#include <unordered_set>
+#include <map>
+#include <set>
 #include <vector>
 
 #include "substrate/boxes/block_mesh.h"
 #include "substrate/curved/element.h"
 
 namespace mbtfm::curved {
+
+/// Of a box: its level of halving, and its place among the boxes of that level.
+using BoxKey = std::array<std::uint32_t, 4>;
 
 struct Mesh {
   std::vector<int> cell_nodes;                          ///< kNodes a cell; the face z = 0 of a cell is its outer one
@@ -66,7 +70,7 @@ class Block {
   Shape shape_;
   boxes::BlockMesh boxes_;
   Mesh mesh_;
-  std::unordered_map<std::uint64_t, int> cell_at_;  ///< by key of a box
+  std::map<BoxKey, int> cell_at_;
 };
 
 /// Boxes of a block that are to be halved, and with them all that they are parts of.
@@ -80,7 +84,7 @@ class Marked {
 
  private:
   boxes::GridLines lines_;
-  std::unordered_set<std::uint64_t> keys_;
+  std::set<BoxKey> keys_;
 };
 
 /// Every second line, so that cells are twice as large; the others stay where their number is odd.

@@ -21,7 +21,7 @@ Eigen::Vector4d projected_divergence(const Element& element, const NodeValues& u
 substrate::VolumeField volume_field(const Space& space, const Gel& gel, const Vectors& at_nodes_um, bool with_stress) {
   const Mesh& mesh = space.mesh();
   const double mu = substrate::shear_modulus_kPa(gel);
-  const double lambda = 2 * mu * gel.poisson_ratio / (1 - 2 * gel.poisson_ratio);
+  const double lambda = substrate::lame_modulus_kPa(gel);
   substrate::VolumeField field;
   const auto numbers = [](const Eigen::Vector3d& v) { return std::array{v.x(), v.y(), v.z()}; };
   for (std::size_t node = 0; node < mesh.position_um.size(); ++node) {

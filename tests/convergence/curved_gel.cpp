@@ -308,6 +308,34 @@ TEST(FlatSurface, is_displaced_as_a_layer) {
   RecordProperty("error", std::to_string((found - exact).norm() / exact.norm()));
 }
 
+TEST(AMeshThatFollows, ends_where_nothing_is_loaded_and_where_no_cell_may_be_halved) {
+  const CurvedCase scene = curved_case("eggbox");
+  const Gel gel = scene.gel(0.3);
+  const auto adapted = [&](const Loading& loading, int most_unknowns) {
+    return solve_adapted(gel, {scene.height_um, scene.base_um}, lines_of(scene, 3), Sides::held, loading, {{1, 2, 20}},
+                         {.most_unknowns = most_unknowns}, kFactor);
+  };
+  EXPECT_EQ(adapted({}, 60000).estimated_error, 0);
+  const FieldUnderASurface exact = scene.field(0.3);
+  const Adapted first = adapted(exact_loading(exact), 200);   // not above what the first mesh has by a mark's worth
+  EXPECT_EQ(first.field.space->n_unknowns(), 3 * 5 * 5 * 2);  // nodes within the sides, above the base
+}
+
+TEST(CurvedModel, takes_the_thickest_gel_and_refuses_a_point_too_far_for_any_mesh) {
+  const std::vector<substrate::Ellipse> ellipses = {{{0, 0}, 0.5, 0.5, 0}};
+  const Gel thick{8, 0.45, 1e5};
+  const std::vector<Vec3> points = {{5, 5, 3}, {-3, 2, 0.5}};
+  const auto matrix = [&](const char* model) {
+    return gel_of(thick, model, 0.02)->response({ellipses, 3}, {points, substrate::Components::all})->matrix();
+  };
+  const Eigen::MatrixXd exact = matrix("half-space");
+  EXPECT_LE((matrix("curved") - exact).norm(), 0.02 * exact.norm());
+  const Gel thin{8, 0.45, 1};
+  const std::vector<Vec3> far = {{1e5, 1e5, 0.5}};
+  EXPECT_THROW(gel_of(thin, "curved")->response({ellipses, 3}, {far, substrate::Components::all})->matrix(),
+               OutOfMemory);
+}
+
 TEST(TractionsOfASurfaceMesh, pull_back_exactly_as_they_displace_and_add_up_to_the_force_of_an_even_one) {
   substrate::SurfaceMesh mesh;
   for (int j = 0; j < 4; ++j) {
