@@ -47,10 +47,18 @@ enum class FiniteElement {
 };
 constexpr auto words(FiniteElement) { return std::array{"q2-p1disc", "q1-p0"}; }
 
+/// What relates stress to strain.
+enum class MaterialLaw {
+  linear,    ///< small strains
+  neo_hooke  ///< large ones, too, where a load calls for it
+};
+constexpr auto words(MaterialLaw) { return std::array{"linear", "neo-hooke"}; }
+
 struct SubstrateParameters {
   ModelKind model = ModelKind::automatic;  ///< how, not what
   double displacement_tolerance = 0.02;    ///< a third of the beads' noise in good experiments
-  std::string modulus_profile = {};        ///< empty: youngs_modulus_kPa at every depth
+  MaterialLaw material = MaterialLaw::linear;
+  std::string modulus_profile = {};  ///< empty: youngs_modulus_kPa at every depth
 
   // split and refined: the block
   double margin_thicknesses = 4;  ///< from the scene to the sides: they change a column by 0.1 % at 4 h, 1 % at 2.5 h
@@ -94,6 +102,7 @@ struct Capabilities {
   bool normal_displacement = false;  ///< of the surface, into the gel
   bool space = false;                ///< forces into the gel, too, and points below its surface
   bool surface = false;              ///< the gel's surface may be curved
+  bool large_strain = false;         ///< a Neo-Hookean gel
   bool incompressible = false;       ///< Poisson's ratio 0.5: where no bulk modulus, which is infinite then, stands
   bool linear = true;                ///< a response is a matrix
 };

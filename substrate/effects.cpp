@@ -14,6 +14,8 @@ void check_data(const SubstrateParameters& p) {
                      "finite_sides = on: expected substrate.side_distance_um, where the gel's sides are, found none");
   require_of_effects(p.effects.depth_graded_gel != Switch::on || !p.modulus_profile.empty(),
                      "depth_graded_gel = on: expected substrate.modulus_profile, found none");
+  require_of_effects(p.effects.large_strain != Switch::on || p.material == MaterialLaw::neo_hooke,
+                     "large_strain = on: expected substrate.material = neo-hooke, found linear");
 }
 
 GelEffects effects_of_model(const SubstrateParameters& p, const Capabilities& can) {
@@ -42,7 +44,9 @@ GelEffects effects_of_model(const SubstrateParameters& p, const Capabilities& ca
       row(depth_graded_gel, "depth_graded_gel", p.effects.depth_graded_gel, true, true, is_graded, as_model),
       row(vertical_displacement, "vertical_displacement", p.effects.vertical_displacement, can.normal_displacement,
           true, asks_for_vertical(p), asks_for_vertical(p) ? "asked for" : "not asked for"),
-      stage::decided(uneven_surface, Switch::automatic, false, as_model + ": level and smooth")};
+      stage::decided(uneven_surface, Switch::automatic, false, as_model + ": level and smooth"),
+      row(large_strain, "large_strain", p.effects.large_strain, can.large_strain, true, false,
+          p.effects.large_strain == Switch::on ? "asked for" : "not asked for")};
 }
 
 SubstrateParameters without_what_is_off(SubstrateParameters p, const GelEffects& effects) {

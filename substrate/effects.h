@@ -7,10 +7,11 @@
 
 namespace mbtfm::substrate {
 
-/// In this order: finite thickness, finite sides, depth-graded gel, vertical displacement, uneven surface.
+/// In this order: finite thickness, finite sides, depth-graded gel, vertical displacement, uneven surface, large
+/// strain.
 struct GelEffects {
-  Effect thickness, sides, grading, vertical, surface;
-  std::vector<Effect> list() const { return {thickness, sides, grading, vertical, surface}; }
+  Effect thickness, sides, grading, vertical, surface, strain;
+  std::vector<Effect> list() const { return {thickness, sides, grading, vertical, surface, strain}; }
 };
 
 /// What the named model takes into account. @throws UsageError where a switch asks for something else

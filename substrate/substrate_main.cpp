@@ -9,6 +9,7 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/stage.h"
+#include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
 #include "substrate/gel_vtu.h"
 #include "substrate/loads.h"
@@ -25,8 +26,12 @@ struct Parameters {
 void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.gel);
   declare(list, p.substrate);
+  list.add(
+      "material", p.substrate.material,
+      "law of the gel: linear (small strains), or neo-hooke, where the tractions call for large ones (model curved)");
   declare(list, p.substrate.effects,
-          {"finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement", "effect_tolerance"});
+          {"finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement", "large_strain",
+           "effect_tolerance"});
 }
 
 struct Load {
@@ -187,12 +192,25 @@ void write_result(stage::StageContext& context, const substrate::Substrate& mode
   }
 }
 
+/// Along the surface and into the gel, over each patch.
+double largest_traction_kPa(const Load& load) {
+  double largest = 0;
+  for (std::size_t j = 0; j < load.ellipses.size(); ++j) {
+    const double into = load.into_the_gel_nN.empty() ? 0 : load.into_the_gel_nN[j];
+    const double area = std::numbers::pi * load.ellipses[j].semi_major_um * load.ellipses[j].semi_minor_um;
+    largest = std::max(largest, std::hypot(norm(load.forces_nN[j]), into) / area);
+  }
+  return largest;
+}
+
 StageReport run(const Parameters& given, stage::StageContext& context) {
   Parameters parameters = given;
   Switch& vertical = parameters.substrate.effects.vertical_displacement;
   const Load load = read_load(context);
   if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load)))
     vertical = Switch::on;  // what is written has three components
+  const Effect strain = choice::decide_large_strain(parameters.gel, parameters.substrate, largest_traction_kPa(load));
+  parameters.substrate.effects.large_strain = strain.is_on ? Switch::on : Switch::off;
   const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   context.progress(0.1, "solving for the substrate");
   StageReport report;
@@ -203,6 +221,11 @@ StageReport run(const Parameters& given, stage::StageContext& context) {
   for (const auto& figure : model->figures()) report.figures.push_back(figure);
   report.effects = model->effects();
   for (Effect& e : report.effects) {
+    if (e.kind == EffectKind::large_strain) {
+      const double seconds = e.seconds;
+      e = strain;
+      e.seconds = seconds;
+    }
     if (e.kind != EffectKind::vertical_displacement) continue;
     if (given.substrate.effects.vertical_displacement != Switch::automatic) continue;
     e.setting = Switch::automatic;

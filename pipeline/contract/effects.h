@@ -18,6 +18,7 @@ enum class EffectKind {
   depth_graded_gel,
   vertical_displacement,
   uneven_surface,
+  large_strain,
   // the network
   stress_fibres,
   cable_elasticity,
@@ -31,10 +32,10 @@ enum class EffectKind {
 };
 /// For people, and in records.
 constexpr auto words(EffectKind) {
-  return std::array{"affine drift",          "correlation windows",   "finite thickness", "finite sides",
-                    "depth-graded gel",      "vertical displacement", "uneven surface",   "stress fibres",
-                    "elasticity of cables",  "common motion",         "beads under load", "channel shift",
-                    "forces beyond the cut", "robust loss",           "time coupling"};
+  return std::array{"affine drift",     "correlation windows",   "finite thickness", "finite sides",
+                    "depth-graded gel", "vertical displacement", "uneven surface",   "large strain",
+                    "stress fibres",    "elasticity of cables",  "common motion",    "beads under load",
+                    "channel shift",    "forces beyond the cut", "robust loss",      "time coupling"};
 }
 
 struct Effect {

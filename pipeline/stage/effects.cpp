@@ -23,6 +23,8 @@ const std::vector<Key>& switches() {
       {"depth_graded_gel", &S::depth_graded_gel, "modulus_profile; auto: where the modulus differs from even"},
       {"vertical_displacement", &S::vertical_displacement,
        "displacement into the gel; auto: where a three-dimensional surface is written"},
+      {"large_strain", &S::large_strain,
+       "strains that small-strain theory gets wrong; auto: where material = neo-hooke and the tractions call for it"},
       {"drift_affine", &S::drift_affine,
        "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
       {"common_motion", &S::common_motion,

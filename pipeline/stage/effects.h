@@ -20,6 +20,7 @@ struct EffectSwitches {
   Switch finite_sides = Switch::automatic;
   Switch depth_graded_gel = Switch::automatic;
   Switch vertical_displacement = Switch::automatic;
+  Switch large_strain = Switch::automatic;
   Switch drift_affine = Switch::automatic;
   Switch common_motion = Switch::automatic;
   Switch beads_under_load = Switch::automatic;

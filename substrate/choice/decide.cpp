@@ -85,12 +85,35 @@ Effect decide_surface(const substrate::SubstrateParameters& p, const SceneSize& 
   return effect;
 }
 
+/// Of forces that are not known yet.
+Effect decide_strain(const substrate::SubstrateParameters& p) {
+  const Switch setting = p.effects.large_strain;
+  return stage::decided(EffectKind::large_strain, setting, false,
+                        setting == Switch::on ? "asked for" : "not asked for, and no force is known yet");
+}
+
 }  // namespace
+
+Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& p, double largest_traction_kPa) {
+  substrate::check_data(p);
+  const double number = 0.055 * largest_traction_kPa / substrate::shear_modulus_kPa(gel);
+  Effect effect = stage::decided(EffectKind::large_strain, p.effects.large_strain, number, p.effects.effect_tolerance,
+                                 "the largest traction changes the field by some");
+  if (p.material == substrate::MaterialLaw::linear) {
+    if (effect.is_on) effect.why += "; but the material is linear: take substrate.material = neo-hooke";
+    effect.is_on = false;
+  }
+  return effect;
+}
 
 substrate::GelEffects decide(const Gel& gel, const substrate::SubstrateParameters& p, const SceneSize& scene) {
   substrate::check_data(p);
-  substrate::GelEffects effects{decide_thickness(gel, p, scene.width_um), decide_sides(gel, p), decide_grading(gel, p),
-                                decide_vertical(p), decide_surface(p, scene)};
+  substrate::GelEffects effects{decide_thickness(gel, p, scene.width_um),
+                                decide_sides(gel, p),
+                                decide_grading(gel, p),
+                                decide_vertical(p),
+                                decide_surface(p, scene),
+                                decide_strain(p)};
   for (const Effect& needs_block : {effects.sides, effects.grading}) {
     if (!needs_block.is_on || effects.thickness.is_on) continue;
     const std::string name = name_of(needs_block.kind);

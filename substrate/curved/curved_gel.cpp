@@ -11,6 +11,7 @@
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/curved/linear.h"
 #include "substrate/curved/models.h"
+#include "substrate/curved/neo_hooke.h"
 #include "substrate/curved/surface_loads.h"
 #include "substrate/ellipse.h"
 #include "substrate/response.h"
@@ -22,8 +23,13 @@ namespace {
 using Eigen::Index;
 using Eigen::MatrixXd;
 
-constexpr substrate::Capabilities kCurvedCan{
-    .base = true, .sides = true, .inside = true, .normal_displacement = true, .space = true, .surface = true};
+constexpr substrate::Capabilities kCurvedCan{.base = true,
+                                             .sides = true,
+                                             .inside = true,
+                                             .normal_displacement = true,
+                                             .space = true,
+                                             .surface = true,
+                                             .large_strain = true};
 
 /// How fine a mesh is.
 struct Fineness {
@@ -114,6 +120,7 @@ class CurvedResponse final : public substrate::Response {
     MBTFM_ASSERT(forces.rows() == cols());
     if (is_empty()) return MatrixXd::Zero(rows(), forces.cols());
     const System& s = system();
+    if (is_large()) return displace_far(s, forces);
     return solve_between(s, s.loads, load_axes(), forces, s.points, point_axes());
   }
   MatrixXd pull_back(const MatrixXd& displacements) const override {
@@ -135,6 +142,8 @@ class CurvedResponse final : public substrate::Response {
     return {observations_.components == substrate::Components::normal ? 2 : 0, observations_.n_components()};
   }
   const System& system() const;
+  bool is_large() const;
+  MatrixXd displace_far(const System& system, const MatrixXd& forces) const;
 
   const CurvedGel& gel_;
   substrate::Loads loads_;
@@ -146,7 +155,7 @@ class CurvedResponse final : public substrate::Response {
 class CurvedGel final : public substrate::Substrate {
  public:
   CurvedGel(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : Substrate(parameters, kCurvedCan), gel_(gel), shape_(shape_of(gel)), threads_(threads) {}
+      : Substrate(parameters, can_of(parameters)), gel_(gel), shape_(shape_of(gel)), threads_(threads) {}
 
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
@@ -167,6 +176,21 @@ class CurvedGel final : public substrate::Substrate {
     return figures_;
   }
   int threads() const { return threads_; }
+  bool is_large() const { return parameters_.effects.large_strain == Switch::on; }
+
+  /// Under forces on the free nodes.
+  LargeSolution solve_large(const System& system, Vectors forces_nN) const {
+    const auto start = std::chrono::steady_clock::now();
+    LargeSolution solution =
+        solve_neo_hooke(gel_, system.space, {.at_nodes_nN = std::move(forces_nN)}, 1,
+                        {.threads = threads_, .memory_limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB)});
+    const std::lock_guard lock(mutex_);
+    figures_.emplace_back("substrate_load_steps", std::int64_t{solution.load_steps});
+    figures_.emplace_back("substrate_newton_steps", std::int64_t{solution.most_iterations});
+    figures_.emplace_back("substrate_newton_s",
+                          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    return solution;
+  }
 
   /// On a mesh whose estimated error is below the tolerance, as far as memory goes; the first one, where that is 0.
   std::unique_ptr<const System> system_for(const substrate::Loads& loads, const substrate::Observations& observations,
@@ -215,8 +239,14 @@ class CurvedGel final : public substrate::Substrate {
         forces[node] += weight * Eigen::Vector3d(forces_nN[j].x, forces_nN[j].y, 0);
       }
     }
+    const bool with_stress = parameters_.stress;
+    if (is_large()) {
+      const LargeSolution solution = solve_large(*system, forces);
+      return volume_field(system->space, solution.state.at_nodes_um,
+                          with_stress ? large_stress(gel_, solution.state) : StressLaw{});
+    }
     const Vectors u = system->space.spread(solve(system->factor, forces));
-    return volume_field(system->space, gel_, u, parameters_.stress);
+    return volume_field(system->space, u, with_stress ? linear_stress(system->space, gel_, u) : StressLaw{});
   }
 
  private:
@@ -224,6 +254,12 @@ class CurvedGel final : public substrate::Substrate {
 
   /// Points lie at any depth: cells grow four times less with the distance than where the surface alone is asked.
   Fineness first_fineness() const { return {parameters_.elements_across_adhesion, parameters_.growth / 4}; }
+
+  static substrate::Capabilities can_of(const substrate::SubstrateParameters& parameters) {
+    substrate::Capabilities can = kCurvedCan;
+    can.linear = parameters.effects.large_strain != Switch::on;
+    return can;
+  }
 
   static Shape shape_of(const Gel& gel) {
     return {[](Vec2) { return 0.0; }, gel.thickness_um};
@@ -340,6 +376,29 @@ class CurvedGel final : public substrate::Substrate {
 const System& CurvedResponse::system() const {
   std::call_once(once_, [&] { system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes()); });
   return *system_;
+}
+
+bool CurvedResponse::is_large() const { return gel_.is_large(); }
+
+MatrixXd CurvedResponse::displace_far(const System& s, const MatrixXd& forces) const {
+  const Axes from = load_axes(), to = point_axes();
+  MatrixXd answers = MatrixXd::Zero(rows(), forces.cols());
+  for (Index column = 0; column < forces.cols(); ++column) {
+    Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());
+    for (std::size_t j = 0; j < s.loads.size(); ++j) {
+      for (Index axis = from.first; axis < from.first + from.n; ++axis) {
+        for (const auto& [node, weight] : s.loads[j])
+          at_nodes[node][axis] += weight * forces(from.row(j, axis), column);
+      }
+    }
+    const Vectors u = s.space.of_free_nodes(gel_.solve_large(s, std::move(at_nodes)).state.at_nodes_um);
+    for (std::size_t i = 0; i < s.points.size(); ++i) {
+      for (Index axis = to.first; axis < to.first + to.n; ++axis) {
+        for (const auto& [node, weight] : s.points[i]) answers(to.row(i, axis), column) += weight * u[node][axis];
+      }
+    }
+  }
+  return answers;
 }
 
 substrate::SharedResponse CurvedResponse::kept() const { return substrate::dense_response(matrix(), gel_.threads()); }

@@ -80,6 +80,15 @@ Vectors Space::spread(const Vectors& free_um, const OfPlace& held_um) const {
   return values;
 }
 
+Vectors Space::of_free_nodes(const Vectors& at_nodes) const {
+  Vectors free(nodes_.size());
+  for (std::size_t node = 0; node < at_nodes.size(); ++node) {
+    const int index = nodes_.index_of(static_cast<int>(node));
+    if (index >= 0) free[index] = at_nodes[node];
+  }
+  return free;
+}
+
 NodeValues Space::values_of(int cell, const Vectors& at_nodes) const {
   NodeValues values;
   for (int k = 0; k < kNodes; ++k) values.col(k) = at_nodes[mesh_.nodes_of(cell)[k]];

@@ -35,6 +35,8 @@ class Space {
 
   /// Displacements of all nodes from those of the free ones, with those of the nodes held; null: these are 0.
   Vectors spread(const Vectors& free_um, const OfPlace& held_um = {}) const;
+  /// Of all nodes, those of the free ones.
+  Vectors of_free_nodes(const Vectors& at_nodes) const;
   NodeValues values_of(int cell, const Vectors& at_nodes) const;
 
   /// The value at a place, as weights of free nodes.

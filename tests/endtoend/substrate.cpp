@@ -200,5 +200,54 @@ TEST(Programs, load_no_finite_elements_before_they_need_them) {
   }
 }
 
+TEST_F(SubstrateProgram, takes_large_strains_where_the_material_and_the_tractions_call_for_them) {
+  write("points.csv", "x_um,y_um,z_um\n22,20,0\n20,23,2\n16,20,0\n");
+  const std::string rest = "--displacement_tolerance 0 --elements_across_adhesion 0.7 --growth 10 --points " +
+                           file("points.csv") + " --out ";
+  const auto displaced = [&](const std::string& name) {
+    std::vector<double> numbers;
+    const files::CsvTable table(file(name));
+    for (int row = 0; row < table.n_rows(); ++row) {
+      for (const char* column : {"ux_um", "uy_um", "uz_um"}) numbers.push_back(table.number(row, column));
+    }
+    return numbers;
+  };
+  const auto apart = [&](const std::string& a, double times, const std::string& b) {
+    const std::vector<double> x = displaced(a), y = displaced(b);
+    double difference = 0, size = 0;
+    for (std::size_t k = 0; k < x.size(); ++k) {
+      difference += std::pow(times * x[k] - y[k], 2);
+      size += y[k] * y[k];
+    }
+    return std::sqrt(difference / size);
+  };
+  // 1 kPa, a third of the shear modulus
+  ASSERT_EQ(run(forces() + "--model curved " + rest + file("small.csv")).code, 0);
+  ASSERT_EQ(run(forces() + "--material neo-hooke " + rest + file("large.csv")).code, 0);
+  ASSERT_EQ(run(forces() + "--model curved --material neo-hooke --large_strain off " + rest + file("off.csv")).code, 0);
+  EXPECT_EQ(apart("off.csv", 1, "small.csv"), 0);
+  // a hundredth of the force: linear theory holds, up to what the elements of each make of so coarse a mesh
+  write("forces.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN\n1,20,20,3.141592653589793,0.03,0.01\n");
+  ASSERT_EQ(run(forces() + "--material neo-hooke --large_strain on " + rest + file("weak.csv")).code, 0);
+  ASSERT_EQ(run(forces() + "--model curved --material neo-hooke " + rest + file("linear.csv")).code, 0);
+  EXPECT_LT(apart("linear.csv", 100, "small.csv"), 1e-12);
+  EXPECT_LT(apart("weak.csv", 1, "linear.csv"), 0.1);
+  EXPECT_GT(apart("weak.csv", 100, "large.csv"), 0.005);
+  EXPECT_LT(apart("weak.csv", 100, "large.csv"), 0.1);
+  // what cannot be
+  const test::Outcome linear = run(forces() + "--large_strain on " + rest + file("x.csv"));
+  EXPECT_EQ(linear.code, 2);
+  EXPECT_NE(linear.output.find("neo-hooke"), std::string::npos);
+  const test::Outcome layer =
+      run(forces() + "--model layer --material neo-hooke --large_strain on " + rest + file("x.csv"));
+  EXPECT_EQ(layer.code, 2);
+  // a load that turns the gel inside out
+  write("forces.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN\n1,20,20,3.141592653589793,900,0\n");
+  const test::Outcome torn = run(forces() + "--material neo-hooke " + rest + file("torn.csv"));
+  EXPECT_NE(torn.code, 0);
+  EXPECT_NE(torn.output.find("no state at rest beyond"), std::string::npos) << torn.output;
+  EXPECT_FALSE(std::filesystem::exists(file("torn.csv")));
+}
+
 }  // namespace
 }  // namespace mbtfm
