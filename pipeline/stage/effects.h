@@ -35,7 +35,7 @@ struct EffectSwitches {
 /// Declare these keys of [effects]; a stage leaves the others' to them. @param names  members of EffectSwitches
 void declare(ParameterList& list, EffectSwitches& switches, const std::vector<std::string>& names);
 
-/// All keys of [effects].
+/// All keys of [effects] that the run of a cell has.
 std::vector<std::string> effect_keys();
 
 /// Whether an effect is on: as its switch says or, where that is `auto`, where `number` exceeds `threshold`.

@@ -1,0 +1,117 @@
+/// A gel's surface from the beads below it, against surfaces that are known.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <random>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "substrate/surface/beads.h"
+
+namespace mbtfm::surface {
+namespace {
+
+using Height = std::function<double(Vec2)>;
+constexpr double kHalf = 60, kBase = 60, kSigma = 0.3;  // um
+
+double wave(Vec2 p) { return -12 * std::cos(2 * std::numbers::pi * (p.x - 35) / 70); }
+double turned_wave(Vec2 p) { return -10 * std::cos(2 * std::numbers::pi * (0.8 * p.x + 0.6 * p.y - 30) / 60); }
+double groove(Vec2 p) { return 10 * (std::tanh((p.x + 20) / 9) - std::tanh((p.x - 20) / 9)); }
+
+std::vector<Vec3> beads_below(const Height& height, double density_per_um3, unsigned seed) {
+  std::mt19937_64 random(seed);
+  constexpr double kTop = -20;
+  std::uniform_real_distribution<double> across(-kHalf, kHalf), down(kTop, kBase);
+  std::normal_distribution<double> noise(0, kSigma);
+  const int n = std::poisson_distribution<int>(density_per_um3 * 4 * kHalf * kHalf * (kBase - kTop))(random);
+  std::vector<Vec3> beads;
+  for (int k = 0; k < n; ++k) {
+    const Vec3 at = {across(random), across(random), down(random)};
+    if (at.z > height({at.x, at.y})) beads.push_back({at.x, at.y, at.z + noise(random)});
+  }
+  return beads;
+}
+
+SurfaceFit fitted(const std::vector<Vec3>& beads) {
+  return fit_beads(beads, std::vector<double>(beads.size(), kSigma));
+}
+
+struct Misfit {
+  double mean_um = 0, rms_um = 0, rms_over_sigma = 0;
+};
+Misfit misfit_of(const SurfaceFit& fit, const Height& height) {
+  Misfit sum;
+  int n = 0;
+  for (double y = -45; y <= 45; y += 1.5) {
+    for (double x = -45; x <= 45; x += 1.5) {
+      const double error = fit.height_um({x, y}) - height({x, y});
+      sum.mean_um += error;
+      sum.rms_um += error * error;
+      sum.rms_over_sigma += std::pow(error / fit.sigma_um({x, y}), 2);
+      ++n;
+    }
+  }
+  return {sum.mean_um / n, std::sqrt(sum.rms_um / n), std::sqrt(sum.rms_over_sigma / n)};
+}
+
+TEST(SurfaceFromBeads, lies_within_a_third_of_the_beads_distance_and_has_no_bias) {
+  const std::vector<std::pair<std::string, Height>> surfaces = {
+      {"flat", [](Vec2) { return 0.0; }}, {"wave", wave}, {"groove", groove}};
+  for (const double density : {0.003, 0.0062, 0.02}) {
+    const double apart = 1 / std::cbrt(density);
+    const int n_seeds = density < 0.01 ? 5 : 2;
+    for (const auto& [name, height] : surfaces) {
+      Misfit mean;
+      for (int seed = 1; seed <= n_seeds; ++seed) {
+        const SurfaceFit fit = fitted(beads_below(height, density, seed));
+        EXPECT_NEAR(fit.density_per_um3, density, 0.15 * density);
+        const Misfit misfit = misfit_of(fit, height);
+        mean.mean_um += misfit.mean_um / n_seeds;
+        mean.rms_um += misfit.rms_um / n_seeds;
+        mean.rms_over_sigma += misfit.rms_over_sigma / n_seeds;
+      }
+      RecordProperty(name + "_" + brief(density),
+                     brief(mean.rms_um / apart) + " " + brief(mean.mean_um / apart) + " " + brief(mean.rms_over_sigma));
+      EXPECT_LE(mean.rms_um, 0.35 * apart) << name << " " << density;
+      EXPECT_LE(std::abs(mean.mean_um), 0.2 * apart) << name << " " << density;
+    }
+  }
+}
+
+TEST(SurfaceFromBeads, finds_the_direction_of_crests) {
+  const SurfaceFit fit = fitted(beads_below(turned_wave, 0.0062, 1));
+  EXPECT_GT(fit.smoothing.ratio, 1);
+  const double across = std::atan2(0.6, 0.8);
+  EXPECT_LE(std::abs(std::cos(fit.smoothing.crest_rad - across)), 0.1);
+  EXPECT_LE(misfit_of(fit, turned_wave).rms_um, 0.35 / std::cbrt(0.0062));
+}
+
+TEST(SurfaceFromBeads, is_not_lifted_by_stray_beads_and_names_them) {
+  std::vector<Vec3> beads = beads_below(wave, 0.0062, 2);
+  const Misfit without = misfit_of(fitted(beads), wave);
+  const int n = static_cast<int>(beads.size());
+  for (int k = 0; k < 8; ++k) {
+    const Vec2 at = {-40.0 + 10 * k, 35.0 - 9 * k};
+    beads.push_back({at.x, at.y, wave(at) - 8 - k});
+  }
+  const SurfaceFit fit = fitted(beads);
+  for (int k = n; k < n + 8; ++k) {
+    EXPECT_TRUE(std::find(fit.above_surface.begin(), fit.above_surface.end(), k) != fit.above_surface.end()) << k - n;
+  }
+  EXPECT_LE(fit.above_surface.size(), 10u);
+  EXPECT_LE(misfit_of(fit, wave).rms_um, 1.3 * without.rms_um);
+}
+
+TEST(SurfaceFromBeads, refuses_what_tells_no_surface) {
+  EXPECT_THROW(fitted({{0, 0, 1}, {1, 1, 2}}), InvalidData);
+  std::vector<Vec3> beads = beads_below(wave, 0.003, 1);
+  beads[7].z = std::nan("");
+  EXPECT_THROW(fitted(beads), InvalidData);
+  for (Vec3& bead : beads) bead.z = 4;
+  EXPECT_THROW(fitted(beads), InvalidData);
+}
+
+}  // namespace
+}  // namespace mbtfm::surface
