@@ -76,7 +76,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"CGAL/", {"network/mesh"}},
     {"Eigen/",
      {"pipeline/numerics", "pipeline/statistics", "network", "network/cables", "substrate", "substrate/greens",
-      "substrate/boxes", "substrate/curved", "mbtfm/tensions", "mbtfm/tractions"}},
+      "substrate/boxes", "substrate/curved", "substrate/surface", "mbtfm/tensions", "mbtfm/tractions"}},
     {"fftw3", {"mbtfm/tractions"}},
     {"deal.II/", {"substrate/boxes"}},
     {"cholmod", {}},
