@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "substrate/choice/factory.h"
 #include "substrate/greens/layer.h"
 #include "substrate/material.h"
 
@@ -98,7 +99,16 @@ Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters&
   substrate::check_data(p);
   const double number = 0.055 * largest_traction_kPa / substrate::shear_modulus_kPa(gel);
   Effect effect = stage::decided(EffectKind::large_strain, p.effects.large_strain, number, p.effects.effect_tolerance,
-                                 "the largest traction changes the field by some");
+                                 "at the largest traction small-strain theory is off by some");
+  const bool has_model =
+      p.model == substrate::ModelKind::automatic || std::ranges::any_of(models(), [&](const substrate::Model& model) {
+        return model.kind == p.model && model.can.large_strain;
+      });
+  if (effect.is_on && p.material == substrate::MaterialLaw::neo_hooke && !has_model) {
+    throw UsageError("substrate.material = neo-hooke: the forces call for large strains, which the model '" +
+                     std::string(name_of(p.model)) +
+                     "' has not: take the model curved or auto, or switch effects.large_strain off");
+  }
   if (p.material == substrate::MaterialLaw::linear) {
     if (effect.is_on) effect.why += "; but the material is linear: take substrate.material = neo-hooke";
     effect.is_on = false;

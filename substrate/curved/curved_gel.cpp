@@ -50,15 +50,16 @@ struct Fineness {
 struct System {
   Block block;
   Space space;
-  numerics::SparseCholesky factor;
+  std::unique_ptr<const numerics::SparseCholesky> factor;  ///< of small strains; null where nobody asks for them
   std::vector<std::vector<boxes::NodeWeight>> loads, points;
 
-  System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at,
+  System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at, bool is_factorised,
          const numerics::FactorOptions& options)
-      : block(std::move(made)),
-        space(block.mesh(), options.threads),
-        factor(space.assemble(linear_stiffness_of(gel, block.mesh())), options),
-        loads(load_weights(block, space, of)) {
+      : block(std::move(made)), space(block.mesh(), options.threads), loads(load_weights(block, space, of)) {
+    if (is_factorised) {
+      factor = std::make_unique<const numerics::SparseCholesky>(space.assemble(linear_stiffness_of(gel, block.mesh())),
+                                                                options);
+    }
     if (const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um)) {
       for (const Vec2 p : *on_surface) points.push_back(space.weights_at(block.on_surface(p)));
     } else {
@@ -85,7 +86,7 @@ MatrixXd solve_between(const System& system, const std::vector<std::vector<boxes
   std::sort(needed.begin(), needed.end());
   needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
   MatrixXd answers = MatrixXd::Zero(to_axes.n * static_cast<Index>(to.size()), values.cols());
-  system.factor.solve(
+  system.factor->solve(
       static_cast<int>(values.cols()), needed,
       [&](int column, const numerics::NodalColumn& b) {
         for (std::size_t j = 0; j < from.size(); ++j) {
@@ -119,8 +120,8 @@ class CurvedResponse final : public substrate::Response {
   MatrixXd displace(const MatrixXd& forces) const override {
     MBTFM_ASSERT(forces.rows() == cols());
     if (is_empty()) return MatrixXd::Zero(rows(), forces.cols());
+    if (is_large()) return displace_far(forces);
     const System& s = system();
-    if (is_large()) return displace_far(s, forces);
     return solve_between(s, s.loads, load_axes(), forces, s.points, point_axes());
   }
   MatrixXd pull_back(const MatrixXd& displacements) const override {
@@ -143,7 +144,7 @@ class CurvedResponse final : public substrate::Response {
   }
   const System& system() const;
   bool is_large() const;
-  MatrixXd displace_far(const System& system, const MatrixXd& forces) const;
+  MatrixXd displace_far(const MatrixXd& forces) const;
 
   const CurvedGel& gel_;
   substrate::Loads loads_;
@@ -173,7 +174,9 @@ class CurvedGel final : public substrate::Substrate {
   }
   Figures figures() const override {
     const std::lock_guard lock(mutex_);
-    return figures_;
+    Figures all = figures_;
+    all.insert(all.end(), newton_figures_.begin(), newton_figures_.end());
+    return all;
   }
   int threads() const { return threads_; }
   bool is_large() const { return parameters_.effects.large_strain == Switch::on; }
@@ -185,16 +188,17 @@ class CurvedGel final : public substrate::Substrate {
         solve_neo_hooke(gel_, system.space, {.at_nodes_nN = std::move(forces_nN)}, 1,
                         {.threads = threads_, .memory_limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB)});
     const std::lock_guard lock(mutex_);
-    figures_.emplace_back("substrate_load_steps", std::int64_t{solution.load_steps});
-    figures_.emplace_back("substrate_newton_steps", std::int64_t{solution.most_iterations});
-    figures_.emplace_back("substrate_newton_s",
-                          std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    newton_figures_ = {
+        {"substrate_load_steps", std::int64_t{solution.load_steps}},
+        {"substrate_newton_steps", std::int64_t{solution.most_iterations}},
+        {"substrate_newton_s", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count()}};
     return solution;
   }
 
   /// On a mesh whose estimated error is below the tolerance, as far as memory goes; the first one, where that is 0.
+  /// @param keeps_factor  of small strains; else it is gone, with its memory, once the mesh is known
   std::unique_ptr<const System> system_for(const substrate::Loads& loads, const substrate::Observations& observations,
-                                           Axes load_axes, Axes point_axes) const {
+                                           Axes load_axes, Axes point_axes, bool keeps_factor) const {
     const auto start = std::chrono::steady_clock::now();
     Fineness fineness = first_fineness();
     const double tolerance = parameters_.displacement_tolerance;
@@ -204,7 +208,7 @@ class CurvedGel final : public substrate::Substrate {
     };
     MatrixXd before;  // two factors at a time are too many: of the coarser mesh these are kept
     if (tolerance > 0) before = displaced(*make_system(fineness.coarser(), loads, observations));
-    auto system = make_system(fineness, loads, observations);
+    auto system = make_system(fineness, loads, observations, keeps_factor || tolerance > 0);
     double error = std::numeric_limits<double>::infinity();
     if (tolerance > 0) {
       MatrixXd now = displaced(*system);
@@ -224,6 +228,7 @@ class CurvedGel final : public substrate::Substrate {
       }
     }
     note(*system, error, std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    if (!keeps_factor) system->factor.reset();
     return system;
   }
 
@@ -232,7 +237,7 @@ class CurvedGel final : public substrate::Substrate {
     check(ellipses);
     substrate::check_forces(ellipses, forces_nN);
     const substrate::Loads loads{ellipses};
-    const auto system = make_system(first_fineness(), loads, {});
+    const auto system = make_system(first_fineness(), loads, {}, !is_large());
     Vectors forces(system->space.nodes().size(), Eigen::Vector3d::Zero());
     for (std::size_t j = 0; j < ellipses.size(); ++j) {
       for (const auto& [node, weight] : system->loads[j]) {
@@ -245,7 +250,7 @@ class CurvedGel final : public substrate::Substrate {
       return volume_field(system->space, solution.state.at_nodes_um,
                           with_stress ? large_stress(gel_, solution.state) : StressLaw{});
     }
-    const Vectors u = system->space.spread(solve(system->factor, forces));
+    const Vectors u = system->space.spread(solve(*system->factor, forces));
     return volume_field(system->space, u, with_stress ? linear_stress(system->space, gel_, u) : StressLaw{});
   }
 
@@ -283,8 +288,8 @@ class CurvedGel final : public substrate::Substrate {
     return size == 0 ? 0 : (fine - coarse).norm() / (std::sqrt(fall * fall - 1) * size);
   }
 
-  std::unique_ptr<const System> make_system(const Fineness& fineness, const substrate::Loads& loads,
-                                            const substrate::Observations& observations) const {
+  std::unique_ptr<System> make_system(const Fineness& fineness, const substrate::Loads& loads,
+                                      const substrate::Observations& observations, bool is_factorised = true) const {
     const double limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB);
     const auto most = static_cast<std::int64_t>(1e9 * limit_GB / 1e5);  // as `refined` counts
     const std::vector<Target> targets = targets_of(loads, fineness.across);
@@ -309,9 +314,9 @@ class CurvedGel final : public substrate::Substrate {
       }
       return box.low_um[2] == 0 && misfit_um(box) > fineness.misfit * (side + nearest);
     };
-    return std::make_unique<const System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), gel_, loads,
-                                          observations,
-                                          numerics::FactorOptions{.threads = threads_, .memory_limit_GB = limit_GB});
+    return std::make_unique<System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), gel_, loads,
+                                    observations, is_factorised,
+                                    numerics::FactorOptions{.threads = threads_, .memory_limit_GB = limit_GB});
   }
 
   double mean_depth_um(const substrate::Extent& scene) const {
@@ -360,9 +365,10 @@ class CurvedGel final : public substrate::Substrate {
                 {"substrate_thickness_um", gel_.thickness_um},
                 {"substrate_unknowns", std::int64_t{system.space.n_unknowns()}},
                 {"substrate_elements", std::int64_t{system.block.mesh().n_cells()}},
-                {"substrate_factor_GB", system.factor.factor_GB()},
+                {"substrate_factor_GB", system.factor ? system.factor->factor_GB() : 0.0},
                 {"substrate_total_s", total_s}};
     if (std::isfinite(error)) figures_.emplace_back("substrate_estimated_error", error);
+    newton_figures_.clear();
   }
 
   Gel gel_;
@@ -371,17 +377,20 @@ class CurvedGel final : public substrate::Substrate {
   mutable std::mutex mutex_;
   mutable double error_ = 0;
   mutable Figures figures_ = {{"substrate_model", "curved"}};  // of the last call
+  mutable Figures newton_figures_;
 };
 
 const System& CurvedResponse::system() const {
-  std::call_once(once_, [&] { system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes()); });
+  std::call_once(once_, [&] { system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes(), true); });
   return *system_;
 }
 
 bool CurvedResponse::is_large() const { return gel_.is_large(); }
 
-MatrixXd CurvedResponse::displace_far(const System& s, const MatrixXd& forces) const {
+MatrixXd CurvedResponse::displace_far(const MatrixXd& forces) const {
   const Axes from = load_axes(), to = point_axes();
+  const auto made = gel_.system_for(loads_, observations_, from, to, false);  // Newton's method needs the memory
+  const System& s = *made;
   MatrixXd answers = MatrixXd::Zero(rows(), forces.cols());
   for (Index column = 0; column < forces.cols(); ++column) {
     Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());

@@ -171,12 +171,8 @@ class Solver {
       sum.size += size[cell] * size[cell];
       sum.gap = std::max(sum.gap, gap[cell]);
     }
-    double external = 0;
-    for (std::size_t k = 0; k < forces_.size(); ++k) {
-      sum.residual[k] -= share * forces_[k];
-      external += forces_[k].squaredNorm();
-    }
-    sum.size = std::sqrt(sum.size + share * share * external);
+    for (std::size_t k = 0; k < forces_.size(); ++k) sum.residual[k] -= share * forces_[k];
+    sum.size = std::hypot(std::sqrt(sum.size), share * norm_of(forces_));
     return sum;
   }
 
@@ -297,8 +293,8 @@ LargeSolution solve_neo_hooke(const Gel& gel, const Space& space, const LargeLoa
     where = ", where the gel would be turned inside out near x, y, z = " + brief(at->x()) + ", " + brief(at->y()) +
             ", " + brief(at->z()) + " um";
   }
-  throw NotSolved(Report{.reason = "the gel has no state at rest beyond " + brief(100 * solution.share) +
-                                   " % of this load" + where + ": take smaller forces, or larger areas for them"});
+  throw NotSolved(Report{.reason = "found no state at rest beyond " + brief(100 * solution.share) + " % of this load" +
+                                   where + ": take smaller forces (are they in nN?), or larger areas for them"});
 }
 
 StressLaw large_stress(const Gel& gel, const LargeState& state) {

@@ -241,9 +241,15 @@ TEST_F(SubstrateProgram, takes_large_strains_where_the_material_and_the_traction
   const test::Outcome layer =
       run(forces() + "--model layer --material neo-hooke --large_strain on " + rest + file("x.csv"));
   EXPECT_EQ(layer.code, 2);
+  const test::Outcome by_name =
+      run(forces() + "--model layer --material neo-hooke --large_strain auto " + rest + file("x.csv"));
+  EXPECT_EQ(by_name.code, 0) << "0.03 nN need none";
   // a load that turns the gel inside out
   write("forces.csv", "adhesion_id,x_um,y_um,area_um2,fx_nN,fy_nN\n1,20,20,3.141592653589793,900,0\n");
   const test::Outcome torn = run(forces() + "--material neo-hooke " + rest + file("torn.csv"));
+  const test::Outcome not_layer = run(forces() + "--model layer --material neo-hooke " + rest + file("torn.csv"));
+  EXPECT_EQ(not_layer.code, 2);
+  EXPECT_NE(not_layer.output.find("take the model curved or auto"), std::string::npos) << not_layer.output;
   EXPECT_NE(torn.code, 0);
   EXPECT_NE(torn.output.find("no state at rest beyond"), std::string::npos) << torn.output;
   EXPECT_FALSE(std::filesystem::exists(file("torn.csv")));
