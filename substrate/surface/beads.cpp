@@ -9,6 +9,9 @@
 #include <string>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/quadrature.h"
 
 namespace mbtfm::surface {
 namespace {
@@ -33,11 +36,22 @@ struct Spline {
   std::array<double, 4> value, slope, curvature;
 };
 
+/// In sides from the corner.
+Vec2 place_in(const Lattice& l, Vec2 at) {
+  return {(at.x - l.corner_um.x) / l.side_um.x, (at.y - l.corner_um.y) / l.side_um.y};
+}
+Vec2 at_place(const Lattice& l, Vec2 place) { return l.corner_um + Vec2{place.x * l.side_um.x, place.y * l.side_um.y}; }
+/// Column and row of the rectangle that holds a place, or is nearest to it.
+std::array<int, 2> square_of(const Lattice& l, Vec2 at) {
+  const Vec2 place = place_in(l, at);
+  return {std::clamp(static_cast<int>(std::floor(place.x)), 0, l.n_x - 1),
+          std::clamp(static_cast<int>(std::floor(place.y)), 0, l.n_y - 1)};
+}
+
 Weights weights_at(const Lattice& l, Vec2 at) {
-  const double a = (at.x - l.corner_um.x) / l.side_um, b = (at.y - l.corner_um.y) / l.side_um;
-  const int i = std::clamp(static_cast<int>(std::floor(a)), 0, l.n_x - 1);
-  const int j = std::clamp(static_cast<int>(std::floor(b)), 0, l.n_y - 1);
-  const Spline along(a - i), across(b - j);
+  const auto [i, j] = square_of(l, at);
+  const Vec2 place = place_in(l, at);
+  const Spline along(place.x - i), across(place.y - j);
   Weights w{.square = i + (l.n_x + 3) * j};
   for (int k = 0; k < kLocal; ++k) w.of[k] = along.value[k % 4] * across.value[k / 4];
   return w;
@@ -46,22 +60,22 @@ int index_of(const Lattice& l, int square, int k) { return square + k % 4 + (l.n
 
 Band roughness(const Lattice& l, double crest_rad, double ratio) {
   const double c = std::cos(crest_rad), s = std::sin(crest_rad);
-  constexpr std::array kGauss = {0.1127016653792583, 0.5, 0.8872983346207417};
-  constexpr std::array kShare = {5. / 18, 8. / 18, 5. / 18};
+  const Vec2 sides = l.side_um;
+  const numerics::GaussRule gauss = numerics::gauss_legendre(3);
   Eigen::Matrix<double, kLocal, kLocal> square = Eigen::Matrix<double, kLocal, kLocal>::Zero();
   for (int b = 0; b < 3; ++b) {
     for (int a = 0; a < 3; ++a) {
-      const Spline x(kGauss[a]), y(kGauss[b]);
+      const Spline x(0.5 + 0.5 * gauss.nodes[a]), y(0.5 + 0.5 * gauss.nodes[b]);
       Eigen::Matrix<double, kLocal, 1> xx, xy, yy;
       for (int k = 0; k < kLocal; ++k) {
-        xx[k] = x.curvature[k % 4] * y.value[k / 4];
-        xy[k] = x.slope[k % 4] * y.slope[k / 4];
-        yy[k] = x.value[k % 4] * y.curvature[k / 4];
+        xx[k] = x.curvature[k % 4] * y.value[k / 4] / (sides.x * sides.x);
+        xy[k] = x.slope[k % 4] * y.slope[k / 4] / (sides.x * sides.y);
+        yy[k] = x.value[k % 4] * y.curvature[k / 4] / (sides.y * sides.y);
       }
       const Eigen::Matrix<double, kLocal, 1> uu = c * c * xx + 2 * c * s * xy + s * s * yy,
                                              vv = s * s * xx - 2 * c * s * xy + c * c * yy,
                                              uv = c * s * (yy - xx) + (c * c - s * s) * xy;
-      square += kShare[a] * kShare[b] / (l.side_um * l.side_um) *
+      square += 0.25 * gauss.weights[a] * gauss.weights[b] * sides.x * sides.y *
                 (ratio * ratio * uu * uu.transpose() + 2 * ratio * uv * uv.transpose() + vv * vv.transpose());
     }
   }
@@ -90,40 +104,80 @@ double variance_of(const Lattice& l, const Weights& w, const Band& covariance) {
   return sum;
 }
 
-/// Squares about as wide as beads lie apart, over all of them; and the density that says so.
+/// Rectangles about as wide as beads lie apart, over all of them; and the density that says so.
 std::pair<Lattice, double> lattice_for(const std::vector<Vec3>& beads, const std::vector<double>& sigma) {
+  MBTFM_ASSERT(sigma.size() == beads.size());
   constexpr std::size_t kFewest = 30;
-  if (beads.size() < kFewest || sigma.size() != beads.size()) {
-    throw InvalidData("beads in the gel", "at least " + std::to_string(kFewest) + ", each with a standard error",
-                      std::to_string(beads.size()));
+  if (beads.size() < kFewest) {
+    throw InvalidData("beads in the gel", "at least " + std::to_string(kFewest), std::to_string(beads.size()));
   }
-  Vec3 low = beads.front(), high = low;
+  Vec2 low = {beads.front().x, beads.front().y}, high = low;
+  std::vector<double> z_um;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     if (!is_finite(beads[i]) || !std::isfinite(sigma[i]) || sigma[i] <= 0) {
       throw InvalidData("bead " + std::to_string(i), "finite numbers, and a standard error above 0", "others");
     }
-    low = {std::min(low.x, beads[i].x), std::min(low.y, beads[i].y), std::min(low.z, beads[i].z)};
-    high = {std::max(high.x, beads[i].x), std::max(high.y, beads[i].y), std::max(high.z, beads[i].z)};
+    low = {std::min(low.x, beads[i].x), std::min(low.y, beads[i].y)};
+    high = {std::max(high.x, beads[i].x), std::max(high.y, beads[i].y)};
+    z_um.push_back(beads[i].z);
   }
-  const double width = high.x - low.x, height = high.y - low.y, depth = high.z - low.z;
-  if (!(std::min({width, height, depth}) > 0)) {
+  const Vec2 size = high - low;
+  const double depth = numerics::quantile(z_um, 0.99) - numerics::quantile(z_um, 0.01);  // few may lie far off
+  if (!(std::min({size.x, size.y, depth}) > 0)) {
     throw InvalidData("beads in the gel", "beads all over a volume", "all in one plane or line");
   }
-  const double density = static_cast<double>(beads.size()) / (width * height * depth);
-  const double side = std::max(1.1 / std::cbrt(density), std::max(width, height) / 150);
+  const double density = static_cast<double>(beads.size()) / (size.x * size.y * depth);
+  const double side = std::max(1.1 / std::cbrt(density), std::max(size.x, size.y) / 150);
   const auto n = [&](double length) { return std::max(1, static_cast<int>(std::ceil(length / side))); };
-  return {{{low.x, low.y}, side, n(width), n(height)}, density};
+  // no further than the beads: where none can be, nothing holds the surface
+  const int n_x = n(size.x), n_y = n(size.y);
+  return {{low, {size.x / n_x, size.y / n_y}, n_x, n_y}, density};
+}
+
+/// Where no bead holds the surface it would sink without end. @throws InvalidData by place, where a rectangle and all
+/// its neighbours have none: of some ten beads in each that is no chance
+void check_filled(const Lattice& l, const std::vector<Vec3>& beads) {
+  std::vector<char> is_near(static_cast<std::size_t>(l.n_x) * l.n_y, 0);
+  for (const Vec3& bead : beads) {
+    const auto [i, j] = square_of(l, {bead.x, bead.y});
+    for (int b = std::max(0, j - 1); b <= std::min(l.n_y - 1, j + 1); ++b) {
+      for (int a = std::max(0, i - 1); a <= std::min(l.n_x - 1, i + 1); ++a) is_near[a + l.n_x * b] = 1;
+    }
+  }
+  const auto empty = std::ranges::find(is_near, 0);
+  if (empty == is_near.end()) return;
+  const int at = static_cast<int>(empty - is_near.begin());
+  const Vec2 middle = at_place(l, {at % l.n_x + 0.5, at / l.n_x + 0.5});
+  throw InvalidData("beads in the gel",
+                    "beads all over the rectangle that they span: cut it to where they are, and leave out those that "
+                    "lie far off",
+                    "none near x, y = " + brief(middle.x) + ", " + brief(middle.y) + " um");
+}
+
+/// @throws InvalidData where the beads lie in sheets: down to `most_um`, a gap wider than `gap_um`
+void check_even(std::vector<double> depths_um, double most_um, double gap_um) {
+  std::ranges::sort(depths_um);
+  double before = 0;
+  for (const double depth : depths_um) {
+    if (before > most_um) return;
+    if (depth - before > gap_um) {
+      throw InvalidData(
+          "beads in the gel", "beads at every depth",
+          "sheets of them: none between " + brief(before) + " and " + brief(depth) + " um below their surface");
+    }
+    before = std::max(before, depth);
+  }
 }
 
 /// Across the direction in which the surface is steepest, in the mean square.
 double crest_rad(const SurfaceFit& fit) {
   constexpr int kLines = 30;
   const Lattice& l = fit.lattice;
-  const double step = 0.1 * l.side_um;
+  const double step = 0.1 * std::min(l.side_um.x, l.side_um.y);
   double xx = 0, xy = 0, yy = 0;
   for (int j = 1; j < kLines; ++j) {
     for (int i = 1; i < kLines; ++i) {
-      const Vec2 at = l.corner_um + l.side_um / kLines * Vec2{1.0 * i * l.n_x, 1.0 * j * l.n_y};
+      const Vec2 at = at_place(l, {1.0 * i / kLines * l.n_x, 1.0 * j / kLines * l.n_y});
       const double along = fit.height_um(at + Vec2{step, 0}) - fit.height_um(at - Vec2{step, 0});
       const double across = fit.height_um(at + Vec2{0, step}) - fit.height_um(at - Vec2{0, step});
       xx += along * along;
@@ -140,35 +194,45 @@ struct Pull {
 };
 constexpr double kStray = 1e-3;  ///< density of beads above the surface, over that below
 
+/// -log(Phi + stray), 0 far below the surface.
+double cost_of(double depth_um, double sigma_um) {
+  return -std::log((0.5 * std::erfc(-depth_um / (sigma_um * std::numbers::sqrt2)) + kStray) / (1 + kStray));
+}
+
+/// Of a surface without an error.
 Pull at_surface(double depth_um, double sigma_um) {
   const double t = depth_um / sigma_um;
   const double below = 0.5 * std::erfc(-t / std::numbers::sqrt2) + kStray;
   const double m = std::exp(-0.5 * t * t) / std::sqrt(2 * std::numbers::pi) / below;
-  return {-std::log(below / (1 + kStray)), m / sigma_um, m * (m + t) / (sigma_um * sigma_um)};
+  return {cost_of(depth_um, sigma_um), m / sigma_um, m * (m + t) / (sigma_um * sigma_um)};
 }
+
+/// Even steps of a normal distribution, up to 4.5 standard deviations, and the share of each.
+struct NormalRule {
+  NormalRule() {
+    double total = 0;
+    for (std::size_t k = 0; k < at.size(); ++k) {
+      at[k] = 4.5 * (static_cast<double>(k) / 16 - 1);
+      total += share[k] = std::exp(-0.5 * at[k] * at[k]);
+    }
+    for (double& s : share) s /= total;
+  }
+  std::array<double, 33> at{}, share{};
+};
 
 /// The derivatives of an expectation over a Gauss distribution are moments of the value itself (Stein): smooth, however
 /// sharp the surface.
 Pull pull_of(double depth_um, double sigma_um, double variance_um2) {
+  static const NormalRule normal;
   const double spread = std::sqrt(variance_um2);
   Pull sum;
   if (spread < 0.1 * sigma_um) {
     sum = at_surface(depth_um, sigma_um);
   } else {
-    constexpr int kHalf = 16;
-    static const std::array<double, 2 * kHalf + 1> kShares = [] {
-      std::array<double, 2 * kHalf + 1> shares{};
-      double total = 0;
-      for (int k = -kHalf; k <= kHalf; ++k) total += shares[k + kHalf] = std::exp(-0.5 * std::pow(4.5 * k / kHalf, 2));
-      for (double& share : shares) share /= total;
-      return shares;
-    }();
-    for (int k = -kHalf; k <= kHalf; ++k) {
-      const double x = 4.5 * k / kHalf, depth = depth_um - spread * x;
+    for (std::size_t k = 0; k < normal.at.size(); ++k) {
+      const double x = normal.at[k], depth = depth_um - spread * x;
       if (depth > 9 * sigma_um) continue;
-      const double value =
-          kShares[k + kHalf] *
-          -std::log((0.5 * std::erfc(-depth / (sigma_um * std::numbers::sqrt2)) + kStray) / (1 + kStray));
+      const double value = normal.share[k] * cost_of(depth, sigma_um);
       sum.value += value;
       sum.slope += x * value / spread;
       sum.curvature += (x * x - 1) * value / variance_um2;
@@ -182,23 +246,21 @@ class Fitter {
  public:
   Fitter(const std::vector<Vec3>& beads, const std::vector<double>& sigma, const Lattice& lattice, double density)
       : beads_(beads), sigma_(sigma), l_(lattice), density_(density), area_(VectorXd::Zero(lattice.n_splines())) {
-    std::vector<double> depths;
+    std::vector<double> z_um;
     for (const Vec3& bead : beads) {
       weights_.push_back(weights_at(l_, {bead.x, bead.y}));
-      depths.push_back(bead.z);
+      z_um.push_back(bead.z);
     }
     constexpr std::array kOverSquare = {1. / 24, 11. / 24, 11. / 24, 1. / 24};
     for (int j = 0; j < l_.n_y; ++j) {
       for (int i = 0; i < l_.n_x; ++i) {
         for (int k = 0; k < kLocal; ++k) {
           area_[index_of(l_, i + (l_.n_x + 3) * j, k)] +=
-              l_.side_um * l_.side_um * kOverSquare[k % 4] * kOverSquare[k / 4];
+              l_.side_um.x * l_.side_um.y * kOverSquare[k % 4] * kOverSquare[k / 4];
         }
       }
     }
-    const auto low = depths.begin() + static_cast<std::ptrdiff_t>(depths.size() / 100);
-    std::nth_element(depths.begin(), low, depths.end());
-    at_.coefficients_um = VectorXd::Constant(l_.n_splines(), *low);
+    at_.coefficients_um = VectorXd::Constant(l_.n_splines(), numerics::quantile(z_um, 0.01));
     at_.variance_um2.assign(beads.size(), 0);
   }
 
@@ -206,7 +268,9 @@ class Fitter {
   void fit(Smoothing& smoothing) {
     const Band rough = roughness(l_, smoothing.crest_rad, smoothing.ratio);
     if (!is_begun_) {
-      for (double widest = 8; widest > 0.25; widest /= 2) newton(rough, smoothing.stiffness, widest, 4);
+      const double apart = 1 / std::cbrt(density_);
+      for (double widest = 1.5 * apart; widest > 0.05 * apart; widest /= 2)
+        newton(rough, smoothing.stiffness, widest, 4);
       is_begun_ = true;
     }
     double last = 0;
@@ -223,13 +287,9 @@ class Fitter {
       last = reached;
     }
     Band prior = with_gamma(rough, smoothing.stiffness);
+    log_evidence_ = -objective(prior, 0) + 0.5 * at_.held;
     factorise(prior);
-    double log_prior = 0, log_posterior = 0;
-    for (int k = 0; k < prior.n; ++k) {
-      log_prior += std::log(prior.at(k, k));
-      log_posterior += std::log(at_.factor->at(k, k));
-    }
-    log_evidence_ = -objective(with_gamma(rough, smoothing.stiffness), 0) + 0.5 * at_.held + log_prior - log_posterior;
+    for (int k = 0; k < prior.n; ++k) log_evidence_ += std::log(prior.at(k, k) / at_.factor->at(k, k));
   }
 
   double log_evidence() const { return log_evidence_; }
@@ -246,14 +306,16 @@ class Fitter {
   void go_on_from(const State& state) { at_ = state; }
 
   /// Beads below the surface, by volume, down to half the depth of nearly all of them: where they end does not matter.
+  /// @throws InvalidData where they lie in sheets
   double density_per_um3() const {
     std::vector<double> depths;
     for (std::size_t i = 0; i < beads_.size(); ++i) depths.push_back(depth_of(i));
-    const auto deep = depths.begin() + static_cast<std::ptrdiff_t>(0.98 * static_cast<double>(depths.size()));
-    std::nth_element(depths.begin(), deep, depths.end());
-    const double depth = 0.5 * *deep;
-    const auto n = std::count_if(depths.begin(), depths.end(), [&](double d) { return d < depth; });
-    return static_cast<double>(n) / (area_.sum() * depth);
+    const double depth = 0.5 * numerics::quantile(depths, 0.98);
+    const auto n = static_cast<double>(std::ranges::count_if(depths, [&](double d) { return d < depth; }));
+    const double density = n / (area_.sum() * depth);
+    // thicker than beads lie apart, and where twenty should be
+    check_even(std::move(depths), depth, std::max(1 / std::cbrt(density), 20 * depth / n));
+    return density;
   }
   std::vector<int> above() const {
     std::vector<int> found;
@@ -265,9 +327,10 @@ class Fitter {
   }
 
  private:
-  static Band with_gamma(Band rough, double gamma) {
+  /// With a hold on planes, which the plate leaves free: at a thousand times the distance of beads.
+  Band with_gamma(Band rough, double gamma) const {
     for (double& v : rough.values) v *= gamma;
-    for (int k = 0; k < rough.n; ++k) rough.at(k, k) += 1e-8;  // planes are free: a mm for their standard error
+    for (int k = 0; k < rough.n; ++k) rough.at(k, k) += 1e-6 * std::pow(density_, 2. / 3);
     return rough;
   }
   double depth_of(std::size_t i) const {
@@ -280,9 +343,13 @@ class Fitter {
   }
   double sigma_of(std::size_t i, double widest) const { return std::max(sigma_[i], widest); }
 
+  /// What the beads have no part in.
+  double bending(const Band& prior) const {
+    const VectorXd& c = at_.coefficients_um;
+    return -density_ * area_.dot(c) + 0.5 * c.dot(prior.times(c));
+  }
   double objective(const Band& prior, double widest) const {
-    double sum =
-        -density_ * area_.dot(at_.coefficients_um) + 0.5 * at_.coefficients_um.dot(prior.times(at_.coefficients_um));
+    double sum = bending(prior);
     for (std::size_t i = 0; i < beads_.size(); ++i) {
       const double depth = depth_of(i), sigma = sigma_of(i, widest);
       if (matters(i, depth, sigma)) sum += pull_of(depth, sigma, at_.variance_um2[i]).value;
@@ -290,14 +357,13 @@ class Fitter {
     return sum;
   }
 
-  /// True where it still moved.
-  bool newton(const Band& rough, double gamma, double widest, int most) {
+  /// Steps of Newton's method, until they gain nothing. @throws NotSolved where numbers are out of all range
+  void newton(const Band& rough, double gamma, double widest, int most) {
     const Band prior = with_gamma(rough, gamma);
     for (int step = 0; step < most; ++step) {
       Band hessian = prior;
       VectorXd gradient = prior.times(at_.coefficients_um) - density_ * area_;
-      double now =
-          -density_ * area_.dot(at_.coefficients_um) + 0.5 * at_.coefficients_um.dot(prior.times(at_.coefficients_um));
+      double now = bending(prior);
       for (std::size_t i = 0; i < beads_.size(); ++i) {
         const double depth = depth_of(i), sigma = sigma_of(i, widest);
         if (!matters(i, depth, sigma)) continue;
@@ -310,7 +376,7 @@ class Fitter {
           for (int q = 0; q <= p; ++q) hessian.at(row, index_of(l_, w.square, q)) += pull.curvature * w.of[p] * w.of[q];
         }
       }
-      if (!factorise(hessian)) return false;
+      if (!factorise(hessian)) throw NotSolved(Report{.reason = "no smooth surface fits the beads"});
       const VectorXd change = -solve(hessian, gradient);
       at_.factor = std::move(hessian);
       const double gain = -gradient.dot(change);
@@ -321,17 +387,17 @@ class Fitter {
         at_.coefficients_um = from + share * change;
         if (objective(prior, widest) <= now - 0.1 * share * gain) break;
       }
-      if (gain < 1e-2) return false;
+      if (gain < 1e-2) return;
     }
-    return true;
   }
 
   void update_variances() {
     const Band inverse = inverse_within(*at_.factor);
+    const double far = std::pow(0.4, 2) / std::pow(density_, 2. / 3);  // as uncertain as a surface may still become
     at_.held = 0;
     for (std::size_t i = 0; i < beads_.size(); ++i) {
       const double depth = depth_of(i), sigma = sigma_[i];
-      if (depth > 9 * sigma + 4.5 * std::sqrt(std::max(at_.variance_um2[i], 4.0))) continue;
+      if (depth > 9 * sigma + 4.5 * std::sqrt(std::max(at_.variance_um2[i], far))) continue;
       const double v = variance_of(l_, weights_[i], inverse);
       at_.variance_um2[i] = at_.variance_um2[i] == 0 ? v : std::sqrt(v * at_.variance_um2[i]);
       if (matters(i, depth, sigma)) at_.held += pull_of(depth, sigma, at_.variance_um2[i]).curvature * v;
@@ -364,6 +430,7 @@ double SurfaceFit::sigma_um(Vec2 at) const {
 
 SurfaceFit fit_beads(const std::vector<Vec3>& beads_um, const std::vector<double>& sigma_z_um) {
   const auto [lattice, first_density] = lattice_for(beads_um, sigma_z_um);
+  check_filled(lattice, beads_um);
   Fitter fitter(beads_um, sigma_z_um, lattice, first_density);
   SurfaceFit best;
   best.lattice = lattice;

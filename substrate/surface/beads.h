@@ -17,10 +17,10 @@
 
 namespace mbtfm::surface {
 
-/// Squares that carry bicubic B-splines.
+/// Rectangles that carry bicubic B-splines.
 struct Lattice {
   Vec2 corner_um;
-  double side_um = 1;
+  Vec2 side_um = {1, 1};
   int n_x = 1, n_y = 1;
   int n_splines() const { return (n_x + 3) * (n_y + 3); }
 };
@@ -45,7 +45,9 @@ struct SurfaceFit {
 };
 
 /// @param sigma_z_um  by bead, positive
-/// @throws InvalidData where a number is not finite, or beads are fewer than 30 or all in one plane or line
+/// @throws InvalidData where a number is not finite, beads are fewer than 30, in one plane or in sheets, or leave a
+/// part of
+///         the rectangle empty that they span, by place; NotSolved
 SurfaceFit fit_beads(const std::vector<Vec3>& beads_um, const std::vector<double>& sigma_z_um);
 
 }  // namespace mbtfm::surface

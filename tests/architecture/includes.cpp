@@ -46,7 +46,7 @@ const Graph kMayInclude = {
     {"substrate", {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage"}},
     {"substrate/greens", {"pipeline/contract", "pipeline/numerics", "substrate"}},
     {"substrate/boxes", {"pipeline/contract", "pipeline/numerics", "substrate", "substrate/greens"}},
-    {"substrate/surface", {"pipeline/contract"}},
+    {"substrate/surface", {"pipeline/contract", "pipeline/numerics"}},
     {"substrate/curved", {"pipeline/contract", "pipeline/numerics", "substrate", "substrate/boxes"}},
     {"substrate/choice",
      {"pipeline/contract", "pipeline/stage", "substrate", "substrate/greens", "substrate/boxes", "substrate/curved"}},

@@ -104,6 +104,44 @@ TEST(SurfaceFromBeads, is_not_lifted_by_stray_beads_and_names_them) {
   EXPECT_LE(misfit_of(fit, wave).rms_um, 1.3 * without.rms_um);
 }
 
+TEST(SurfaceFromBeads, refuses_by_place_what_no_bead_holds_and_sheets_of_beads) {
+  const auto reason = [](const std::vector<Vec3>& beads) -> std::string {
+    try {
+      fitted(beads);
+    } catch (const InvalidData& e) {
+      return e.what();
+    }
+    return {};
+  };
+  std::vector<Vec3> beads = beads_below(wave, 0.0062, 1);
+  std::vector<Vec3> with_hole = beads;
+  std::erase_if(with_hole, [](const Vec3& p) { return std::hypot(p.x - 30, p.y - 30) < 25; });
+  EXPECT_NE(reason(with_hole).find("none near x, y = "), std::string::npos) << reason(with_hole);
+  std::vector<Vec3> sheets;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> across(-kHalf, kHalf), thick(0, 1);
+  for (int k = 0; k < 6000; ++k) sheets.push_back({across(random), across(random), thick(random) + 30 * (k % 2)});
+  EXPECT_NE(reason(sheets).find("sheets"), std::string::npos) << reason(sheets);
+  beads.push_back({5000, 0, 10});
+  EXPECT_NE(reason(beads).find("none near x, y = "), std::string::npos) << reason(beads);
+}
+
+TEST(SurfaceFromBeads, knows_no_unit_and_bears_a_bead_far_above) {
+  std::vector<Vec3> beads = beads_below(wave, 0.0062, 1);
+  const Misfit alone = misfit_of(fitted(beads), wave);
+  std::vector<Vec3> in_nm = beads;
+  for (Vec3& p : in_nm) p = {1000 * p.x, 1000 * p.y, 1000 * p.z};
+  const SurfaceFit nm = fit_beads(in_nm, std::vector<double>(in_nm.size(), 1000 * kSigma));
+  const SurfaceFit um = fitted(beads);
+  for (const Vec2 at : {Vec2{0, 0}, {20, -30}, {-41, 7}}) {
+    EXPECT_NEAR(nm.height_um(1000 * at) / 1000, um.height_um(at), 0.1);
+  }
+  beads.push_back({0, 0, -900});
+  const SurfaceFit with = fitted(beads);
+  EXPECT_EQ(with.above_surface, (std::vector<int>{static_cast<int>(beads.size()) - 1}));
+  EXPECT_LE(misfit_of(with, wave).rms_um, 1.3 * alone.rms_um);
+}
+
 TEST(SurfaceFromBeads, refuses_what_tells_no_surface) {
   EXPECT_THROW(fitted({{0, 0, 1}, {1, 1, 2}}), InvalidData);
   std::vector<Vec3> beads = beads_below(wave, 0.003, 1);
