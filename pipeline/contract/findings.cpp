@@ -151,6 +151,18 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,
        "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
        "Report this with the cell: it should not happen."},
+      {off_the_surface, "off-the-surface", "surface", caution,
+       "share of the beads that lie above the gel's surface, or of the points that lie off it", 0.01,
+       "a few beads lie on every gel and in the cell; more of them are another surface, or an error of z that is "
+       "larger "
+       "than stated",
+       "Look at the crosses in the picture beside surface.vtp. Take out beads that are not in the gel, or state a "
+       "larger "
+       "error of z."},
+      {surface_repaired, "surface-repaired", "surface", note,
+       "share of the vertices in holes that were filled, and of triangles that were turned over", 0,
+       "holes up to surface.largest_hole_um are filled by the plate that bends least",
+       "Nothing where the holes are small beside the cell's adhesions. Else measure the surface again."},
       {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 where gel.youngs_modulus_sigma_kPa is not given",
        0, "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},

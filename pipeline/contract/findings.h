@@ -60,6 +60,9 @@ enum class FindingKind {
   single_mesh,
   forces_out_of_balance,
   torques_out_of_balance,
+  // surface
+  off_the_surface,
+  surface_repaired,
   // fit: the gel
   modulus_error_unknown
 };

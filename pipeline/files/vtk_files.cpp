@@ -184,6 +184,67 @@ void write_network(const Path& file, const Network& network) {
   write_xml<vtkXMLUnstructuredGridWriter>(file, grid.Get());
 }
 
+HeightMap read_surface(const Path& file) {
+  const VtuFile vtp(read_text(file), file.string());
+  const std::vector<double> xyz_um = vtp.coordinates();
+  const auto n = static_cast<int>(xyz_um.size() / 3);
+  const auto x = [&](int k) { return xyz_um[3 * static_cast<std::size_t>(k)]; };
+  const auto y = [&](int k) { return xyz_um[3 * static_cast<std::size_t>(k) + 1]; };
+  HeightMap map;
+  while (map.n_x < n && y(map.n_x) == y(0)) ++map.n_x;
+  map.n_y = map.n_x > 0 ? n / map.n_x : 0;
+  const std::string where = file.string() + ": array 'Points'";
+  constexpr const char* kHint = "make the file with mbtfm-surface, which reads meshes and tables of points, too";
+  if (n == 0 || map.n_x * map.n_y != n || map.n_x < 2 || map.n_y < 2)
+    throw InputError(where, "the points of a lattice, x running fastest", std::to_string(n) + " others", kHint);
+  map.origin_um = {x(0), y(0)};
+  map.spacing_um = {(x(n - 1) - x(0)) / (map.n_x - 1), (y(n - 1) - y(0)) / (map.n_y - 1)};
+  for (int k = 0; k < n; ++k) {
+    const Vec2 due = map.origin_um + Vec2{k % map.n_x * map.spacing_um.x, k / map.n_x * map.spacing_um.y};
+    constexpr double kRounding = 1e-5;  // of a spacing: single precision of a lattice of a hundred
+    if (std::abs(x(k) - due.x) > kRounding * std::abs(map.spacing_um.x) * map.n_x ||
+        std::abs(y(k) - due.y) > kRounding * std::abs(map.spacing_um.y) * map.n_y) {
+      throw InputError(where + ", point " + std::to_string(k),
+                       "x, y = " + brief(due.x) + ", " + brief(due.y) + " um, of an even lattice",
+                       brief(x(k)) + ", " + brief(y(k)), kHint);
+    }
+    map.z_um.push_back(xyz_um[3 * static_cast<std::size_t>(k) + 2]);
+  }
+  if (vtp.has(VtuSection::point_data, "height_sigma_um"))
+    map.sigma_um = vtp.scalars(VtuSection::point_data, "height_sigma_um");
+  try {
+    check(map);
+  } catch (const InvalidData& error) {
+    throw InputError(file.string() + ": " + error.element, error.expected, error.found, kHint);
+  }
+  return map;
+}
+
+void write_surface(const Path& file, const HeightMap& map) {
+  check(map);
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (int k = 0; k < map.n_x * map.n_y; ++k) {
+    points->InsertNextPoint(map.origin_um.x + k % map.n_x * map.spacing_um.x,
+                            map.origin_um.y + k / map.n_x * map.spacing_um.y, map.z_um[static_cast<std::size_t>(k)]);
+  }
+  vtkNew<vtkCellArray> quads;
+  for (int j = 0; j + 1 < map.n_y; ++j) {
+    for (int i = 0; i + 1 < map.n_x; ++i) {
+      const vtkIdType first = i + vtkIdType{map.n_x} * j, next = first + map.n_x;
+      const vtkIdType corners[] = {first, first + 1, next + 1, next};
+      quads->InsertNextCell(4, corners);
+    }
+  }
+  vtkNew<vtkPolyData> poly;
+  poly->SetPoints(points);
+  poly->SetPolys(quads);
+  if (!map.sigma_um.empty())
+    poly->GetPointData()->AddArray(
+        double_array(PointArray{.name = "height_sigma_um", .scalars = map.sigma_um, .vectors = {}}));
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
 ContractedNetwork read_contracted_network(const Path& file) {
   const VtuFile vtu(read_text(file), file.string());
   return {.network = network_of(vtu, file), .link_force_nN = vtu.scalars(VtuSection::cell_data, "force_nN")};

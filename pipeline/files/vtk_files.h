@@ -8,12 +8,17 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/network.h"
 #include "pipeline/contract/path.h"
+#include "pipeline/contract/surface.h"
 #include "pipeline/files/named_array.h"
 
 namespace mbtfm::files {
 
 Network read_network(const Path& file);
 void write_network(const Path& file, const Network& network);
+
+/// surface.vtp: quadrilaterals of the lattice; `height_sigma_um` by point where the map has errors.
+HeightMap read_surface(const Path& file);
+void write_surface(const Path& file, const HeightMap& map);
 
 /// Values of a grid in space, some numbers each; the name carries the unit.
 struct GridArray {

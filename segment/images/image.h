@@ -32,6 +32,7 @@ struct PlaneChoice {
   std::string z = kProjection;   ///< a slice from 1, or the brightest of all: what stands out is in focus somewhere
   std::optional<int> time = {};  ///< frame from 1; unset: the only one
   std::optional<int> page = {};  ///< from 1, as it lies in the file, whatever it shows; unset: by the other three
+  bool may_lack_pixels = false;  ///< NaN is a pixel without a value, and not an error
 };
 /// PREFIX_channel, PREFIX_z, PREFIX_time and PREFIX_page. @param image  "the adhesion image"
 void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image);
@@ -46,10 +47,9 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = 
 /// A page, from 0, as it lies in the file.
 inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
 
-/// The means of blocks of `binning` x `binning` pixels, and the calibration with them; what fills no block at the right
-/// and at the bottom is left out.
-/// @throws InvalidData where not a single block fits
-Image binned(Image image, int binning);
+/// All slices of a TIFF of one channel and frame, from the first on; all pages of a file that states no dimensions.
+/// @throws InputError as read_image, and where the file is no TIFF or its slices are not of one size
+std::vector<Image> read_slices(const std::filesystem::path& file);
 
 // Of a side in one: beyond it no bead and no adhesion is left.
 inline constexpr int kLargestBinning = 16;

@@ -88,9 +88,13 @@ Image to_image(const PngReading& r, int first, int n_colours) {
   return image;
 }
 
-bool write_all(png_structp png, png_infop info, std::FILE* stream, const Picture& picture) {
+void append(png_structp png, png_bytep data, png_size_t size) {
+  static_cast<std::string*>(png_get_io_ptr(png))->append(reinterpret_cast<const char*>(data), size);
+}
+
+bool write_all(png_structp png, png_infop info, std::string& bytes, const Picture& picture) {
   if (setjmp(png_jmpbuf(png))) return false;
-  png_init_io(png, stream);
+  png_set_write_fn(png, &bytes, append, nullptr);
   png_set_IHDR(png, info, static_cast<png_uint_32>(picture.width), static_cast<png_uint_32>(picture.height), 8,
                PNG_COLOR_TYPE_RGB, PNG_INTERLACE_NONE, PNG_COMPRESSION_TYPE_DEFAULT, PNG_FILTER_TYPE_DEFAULT);
   // a seventh of the default's time for 5 % more bytes, on an overlay
@@ -128,18 +132,26 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
   return to_image(r, first, is_mean ? 3 : 1);
 }
 
-void write_png(const std::filesystem::path& file, const Picture& picture) {
+std::string png_of(const Picture& picture) {
   MBTFM_ASSERT(picture.width > 0 && picture.height > 0 &&
                picture.rgb.size() == 3 * static_cast<std::size_t>(picture.width) * picture.height);
-  FileHandle stream(std::fopen(file.c_str(), "wb"));
-  if (!stream) throw OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
   Message message;
   png_structp png = png_create_write_struct(PNG_LIBPNG_VER_STRING, &message, keep_error, ignore_warning);
   png_infop info = png ? png_create_info_struct(png) : nullptr;
-  bool is_written = info && write_all(png, info, stream.get(), picture);
+  std::string bytes;
+  const bool is_written = info && write_all(png, info, bytes, picture);
   png_destroy_write_struct(&png, &info);
+  if (!is_written) throw OutputError(std::string("a PNG picture cannot be made: ") + message.text);
+  return bytes;
+}
+
+void write_png(const std::filesystem::path& file, const Picture& picture) {
+  const std::string bytes = png_of(picture);
+  FileHandle stream(std::fopen(file.c_str(), "wb"));
+  if (!stream) throw OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
+  bool is_written = std::fwrite(bytes.data(), 1, bytes.size(), stream.get()) == bytes.size();
   is_written = std::fclose(stream.release()) == 0 && is_written;  // a full disk shows here at the latest
-  if (!is_written) throw OutputError(file.string() + ": cannot be written: " + message.text);
+  if (!is_written) throw OutputError(file.string() + ": cannot be written: " + std::strerror(errno));
 }
 
 }  // namespace mbtfm::images

@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace mbtfm::images {
@@ -14,6 +15,8 @@ struct Picture {
   std::vector<std::uint8_t> rgb;
 };
 
+/// The bytes of a PNG file.
+std::string png_of(const Picture& picture);
 /// @throws OutputError
 void write_png(const std::filesystem::path& file, const Picture& picture);
 /// A tenth of the size, with some loss. @throws OutputError

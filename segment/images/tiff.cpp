@@ -2,6 +2,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <numeric>
 #include <string>
 
 #include "pipeline/contract/errors.h"
@@ -48,6 +49,23 @@ class TiffReader {
     return image;
   }
 
+  std::vector<Image> read_slices() {
+    const PlaneChoice all{.prefix = "masks"};
+    std::vector<int> pages(static_cast<std::size_t>(n_pages()));
+    std::iota(pages.begin(), pages.end(), 0);
+    if (const auto stack = stack_of(of_first_page_.description, file_.filename().string()))
+      pages = chosen_pages(*stack, all, file_.string());
+    std::vector<Image> slices;
+    for (const int page : pages) {
+      slices.push_back(read_page(page, all));
+      const Image& first = slices.front();
+      if (slices.size() == 1) require_plausible_bytes(file_, pages.size() * first.pixels.size());
+      if (slices.back().width != first.width || slices.back().height != first.height)
+        refuse("slices of one size", "slices of different sizes");
+    }
+    return slices;
+  }
+
  private:
   /// What the description says of channels, slices and frames; nothing of a file of one image.
   std::optional<Stack> dimensions(const PlaneChoice& choice) {
@@ -83,6 +101,7 @@ class TiffReader {
     }
     layout_ = layout();
     choose_samples(choice);
+    may_lack_pixels_ = choice.may_lack_pixels;
     return is_raw ? read_raw(page) : read();
   }
 
@@ -124,6 +143,7 @@ class TiffReader {
     for (float& value : image.pixels) {
       if (layout_.colours > 1) value /= static_cast<float>(layout_.colours);
       if (layout_.is_inverted) value = static_cast<float>(image.full_scale) - value;
+      if (std::isnan(value) && may_lack_pixels_) continue;
       if (!std::isfinite(value)) refuse("finite pixel values", "NaN or infinity");
     }
   }
@@ -366,9 +386,12 @@ class TiffReader {
   TiffCalibration of_first_page_;
   std::optional<double> calibration_;
   Layout layout_;
+  bool may_lack_pixels_ = false;
 };
 
 }  // namespace
+
+std::vector<Image> read_tiff_slices(const std::filesystem::path& file) { return TiffReader(file).read_slices(); }
 
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return TiffReader(file).read(choice); }
 

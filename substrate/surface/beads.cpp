@@ -11,98 +11,11 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/numerics/order_statistics.h"
-#include "pipeline/numerics/quadrature.h"
 
 namespace mbtfm::surface {
 namespace {
 
 using Eigen::VectorXd;
-
-constexpr int kLocal = 16;  ///< splines over a square
-
-struct Weights {
-  int square = 0;  ///< first coefficient
-  std::array<double, kLocal> of{};
-};
-
-/// Cubic B-splines over one interval, at t in [0, 1]; their slopes and curvatures by interval.
-struct Spline {
-  explicit Spline(double t) {
-    const double u = 1 - t;
-    value = {u * u * u / 6, (3 * t * t * t - 6 * t * t + 4) / 6, (3 * u * u * u - 6 * u * u + 4) / 6, t * t * t / 6};
-    slope = {-u * u / 2, (3 * t * t - 4 * t) / 2, (4 * u - 3 * u * u) / 2, t * t / 2};
-    curvature = {u, 3 * t - 2, 3 * u - 2, t};
-  }
-  std::array<double, 4> value, slope, curvature;
-};
-
-/// In sides from the corner.
-Vec2 place_in(const Lattice& l, Vec2 at) {
-  return {(at.x - l.corner_um.x) / l.side_um.x, (at.y - l.corner_um.y) / l.side_um.y};
-}
-Vec2 at_place(const Lattice& l, Vec2 place) { return l.corner_um + Vec2{place.x * l.side_um.x, place.y * l.side_um.y}; }
-/// Column and row of the rectangle that holds a place, or is nearest to it.
-std::array<int, 2> square_of(const Lattice& l, Vec2 at) {
-  const Vec2 place = place_in(l, at);
-  return {std::clamp(static_cast<int>(std::floor(place.x)), 0, l.n_x - 1),
-          std::clamp(static_cast<int>(std::floor(place.y)), 0, l.n_y - 1)};
-}
-
-Weights weights_at(const Lattice& l, Vec2 at) {
-  const auto [i, j] = square_of(l, at);
-  const Vec2 place = place_in(l, at);
-  const Spline along(place.x - i), across(place.y - j);
-  Weights w{.square = i + (l.n_x + 3) * j};
-  for (int k = 0; k < kLocal; ++k) w.of[k] = along.value[k % 4] * across.value[k / 4];
-  return w;
-}
-int index_of(const Lattice& l, int square, int k) { return square + k % 4 + (l.n_x + 3) * (k / 4); }
-
-Band roughness(const Lattice& l, double crest_rad, double ratio) {
-  const double c = std::cos(crest_rad), s = std::sin(crest_rad);
-  const Vec2 sides = l.side_um;
-  const numerics::GaussRule gauss = numerics::gauss_legendre(3);
-  Eigen::Matrix<double, kLocal, kLocal> square = Eigen::Matrix<double, kLocal, kLocal>::Zero();
-  for (int b = 0; b < 3; ++b) {
-    for (int a = 0; a < 3; ++a) {
-      const Spline x(0.5 + 0.5 * gauss.nodes[a]), y(0.5 + 0.5 * gauss.nodes[b]);
-      Eigen::Matrix<double, kLocal, 1> xx, xy, yy;
-      for (int k = 0; k < kLocal; ++k) {
-        xx[k] = x.curvature[k % 4] * y.value[k / 4] / (sides.x * sides.x);
-        xy[k] = x.slope[k % 4] * y.slope[k / 4] / (sides.x * sides.y);
-        yy[k] = x.value[k % 4] * y.curvature[k / 4] / (sides.y * sides.y);
-      }
-      const Eigen::Matrix<double, kLocal, 1> uu = c * c * xx + 2 * c * s * xy + s * s * yy,
-                                             vv = s * s * xx - 2 * c * s * xy + c * c * yy,
-                                             uv = c * s * (yy - xx) + (c * c - s * s) * xy;
-      square += 0.25 * gauss.weights[a] * gauss.weights[b] * sides.x * sides.y *
-                (ratio * ratio * uu * uu.transpose() + 2 * ratio * uv * uv.transpose() + vv * vv.transpose());
-    }
-  }
-  Band r(l.n_splines(), 3 * (l.n_x + 3) + 3);
-  for (int j = 0; j < l.n_y; ++j) {
-    for (int i = 0; i < l.n_x; ++i) {
-      const int at = i + (l.n_x + 3) * j;
-      for (int p = 0; p < kLocal; ++p) {
-        for (int q = 0; q < kLocal; ++q) {
-          const int row = index_of(l, at, p), column = index_of(l, at, q);
-          if (row >= column) r.at(row, column) += square(p, q);
-        }
-      }
-    }
-  }
-  return r;
-}
-
-double variance_of(const Lattice& l, const Weights& w, const Band& covariance) {
-  double sum = 0;
-  for (int p = 0; p < kLocal; ++p) {
-    for (int q = 0; q < kLocal; ++q) {
-      sum += w.of[p] * w.of[q] * covariance.symmetric(index_of(l, w.square, p), index_of(l, w.square, q));
-    }
-  }
-  return sum;
-}
 
 /// Rectangles about as wide as beads lie apart, over all of them; and the density that says so.
 std::pair<Lattice, double> lattice_for(const std::vector<Vec3>& beads, const std::vector<double>& sigma) {
@@ -333,11 +246,7 @@ class Fitter {
     for (int k = 0; k < rough.n; ++k) rough.at(k, k) += 1e-6 * std::pow(density_, 2. / 3);
     return rough;
   }
-  double depth_of(std::size_t i) const {
-    double s = 0;
-    for (int k = 0; k < kLocal; ++k) s += weights_[i].of[k] * at_.coefficients_um[index_of(l_, weights_[i].square, k)];
-    return beads_[i].z - s;
-  }
+  double depth_of(std::size_t i) const { return beads_[i].z - value_of(l_, weights_[i], at_.coefficients_um); }
   bool matters(std::size_t i, double depth, double sigma) const {
     return depth < 9 * sigma + 4.5 * std::sqrt(at_.variance_um2[i]);
   }
@@ -417,12 +326,7 @@ class Fitter {
 
 }  // namespace
 
-double SurfaceFit::height_um(Vec2 at) const {
-  const Weights w = weights_at(lattice, at);
-  double s = 0;
-  for (int k = 0; k < kLocal; ++k) s += w.of[k] * coefficients_um[index_of(lattice, w.square, k)];
-  return s;
-}
+double SurfaceFit::height_um(Vec2 at) const { return value_of(lattice, weights_at(lattice, at), coefficients_um); }
 
 double SurfaceFit::sigma_um(Vec2 at) const {
   return std::sqrt(variance_of(lattice, weights_at(lattice, at), *covariance_um2));

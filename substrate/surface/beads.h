@@ -14,22 +14,9 @@
 
 #include "pipeline/contract/geometry.h"
 #include "substrate/surface/band.h"
+#include "substrate/surface/splines.h"
 
 namespace mbtfm::surface {
-
-/// Rectangles that carry bicubic B-splines.
-struct Lattice {
-  Vec2 corner_um;
-  Vec2 side_um = {1, 1};
-  int n_x = 1, n_y = 1;
-  int n_splines() const { return (n_x + 3) * (n_y + 3); }
-};
-
-struct Smoothing {
-  double crest_rad = 0;  ///< direction of the crests, from +x towards +y
-  double ratio = 1;      ///< r: how much stiffer the plate is along them
-  double stiffness = 1;  ///< gamma
-};
 
 struct SurfaceFit {
   Lattice lattice;
