@@ -111,6 +111,10 @@ std::unique_ptr<Substrate> make_from(const std::vector<Model>& table, const Gel&
                      " computes with the bulk modulus, which is infinite there: set 0.499, or take the model layer "
                      "or half-space");
   }
+  if (gel.surface && !model->can.surface) {
+    throw UsageError("substrate.model = " + std::string(name_of(model->kind)) +
+                     ": the surface given is not flat, which that model takes it for: take the model curved or auto");
+  }
   return model->make(gel, without_what_is_off(parameters, effects_of_model(parameters, model->can)), threads);
 }
 

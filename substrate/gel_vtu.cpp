@@ -6,7 +6,7 @@
 
 #include "pipeline/files/vtk_files.h"
 #include "pipeline/numerics/memory.h"
-#include "substrate/scene.h"
+#include "substrate/response.h"
 
 namespace mbtfm::substrate {
 
@@ -59,12 +59,17 @@ std::vector<Vec2> tractions_kPa(const std::vector<Ellipse>& ellipses, const std:
 }  // namespace
 
 void write_substrate_vtu(const std::filesystem::path& file, const Substrate& substrate,
-                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN, int n_lines) {
+                         const std::vector<Ellipse>& ellipses, const std::vector<Vec2>& forces_nN, int n_lines,
+                         const std::optional<SurfaceShape>& shape) {
   const Extent scene = extent_of({}, ellipses);
   const Vec2 size = scene.high_um - scene.low_um;
   const double step = std::max(size.x, size.y) / n_lines;
-  const std::vector<double> x = graded_lines(scene.low_um.x, scene.high_um.x, step);
-  const std::vector<double> y = graded_lines(scene.low_um.y, scene.high_um.y, step);
+  std::vector<double> x = graded_lines(scene.low_um.x, scene.high_um.x, step);
+  std::vector<double> y = graded_lines(scene.low_um.y, scene.high_um.y, step);
+  if (shape) {
+    std::erase_if(x, [&](double at) { return at < shape->known.low_um.x || at > shape->known.high_um.x; });
+    std::erase_if(y, [&](double at) { return at < shape->known.low_um.y || at > shape->known.high_um.y; });
+  }
   constexpr double kBytes = 300;  // of a point: itself, what it moves by, the same for its file
   numerics::expect_room_for({.what = "the gel's surface in substrate.vtu",
                              .count = static_cast<double>(x.size()) * static_cast<double>(y.size()),
@@ -84,7 +89,7 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
   grid.point_arrays = {{"displacement_um", 3, {}}};
   grid.cell_arrays = {{"traction_kPa", 3, {}}};
   for (std::size_t i = 0; i < points.size(); ++i) {
-    grid.points_um.push_back({points[i].x, points[i].y, 0});
+    grid.points_um.push_back({points[i].x, points[i].y, shape ? shape->height_um(points[i]) : 0});
     for (const double u : {displacements[i].x, displacements[i].y, vertical[i]}) {
       grid.point_arrays[0].values.push_back(u);
     }
@@ -98,6 +103,18 @@ void write_substrate_vtu(const std::filesystem::path& file, const Substrate& sub
     const Vec2 t = tractions[static_cast<std::size_t>(cell)];
     for (const double value : {t.x, t.y, 0.0}) grid.cell_arrays[0].values.push_back(value);
   }
+  files::write_grid_vtu(file, grid);
+}
+
+void write_traction_vtu(const std::filesystem::path& file, const Substrate& substrate, const SurfaceMesh& mesh,
+                        const Eigen::VectorXd& traction_kPa, const SurfaceShape& shape) {
+  const Eigen::VectorXd u =
+      substrate.response({mesh, 3}, {mesh.points_um, Components::all})->displace(traction_kPa).col(0);
+  files::Grid grid;
+  for (const Vec2 p : mesh.points_um) grid.points_um.push_back({p.x, p.y, shape.height_um(p)});
+  for (const auto& face : mesh.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
+  grid.point_arrays = {{"displacement_um", 3, {u.begin(), u.end()}},
+                       {"traction_kPa", 3, {traction_kPa.begin(), traction_kPa.end()}}};
   files::write_grid_vtu(file, grid);
 }
 

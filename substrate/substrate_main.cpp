@@ -1,19 +1,25 @@
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <map>
+#include <memory>
 #include <numbers>
+#include <optional>
 #include <string>
 
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
 #include "pipeline/stage/stage.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
 #include "substrate/gel_vtu.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
+#include "substrate/surface/height.h"
 
 namespace mbtfm {
 namespace {
@@ -34,10 +40,16 @@ void declare(stage::ParameterList& list, Parameters& p) {
            "effect_tolerance"});
 }
 
+/// Tractions of a lattice on a surface that is not flat: bilinear, as they are.
+struct SurfaceLoad {
+  substrate::SurfaceMesh mesh;
+  Eigen::VectorXd traction_kPa;  ///< three a vertex
+};
 struct Load {
   std::vector<substrate::Ellipse> ellipses;
   std::vector<Vec2> forces_nN;
   std::vector<double> into_the_gel_nN;  ///< by ellipse; empty: all lie along the surface
+  std::optional<SurfaceLoad> lattice;   ///< instead of all these
 };
 
 Load read_forces(const Path& adhesions_file, const Path& file) {
@@ -83,6 +95,41 @@ Vec2 spacing_of(const std::vector<Vec2>& points, const Path& file) {
                    std::to_string(points.size()) + " rows");
 }
 
+SurfaceLoad read_surface_tractions(const Path& file) {
+  const files::CsvTable table(file);
+  const std::vector<Vec2> points = files::read_points(file);
+  const Vec2 spacing = spacing_of(points, file);
+  std::map<std::array<long long, 2>, int> vertex_at;
+  const auto place = [&](Vec2 p) {
+    return std::array{std::llround((p.x - points[0].x) / spacing.x), std::llround((p.y - points[0].y) / spacing.y)};
+  };
+  SurfaceLoad load{{points, {}}, Eigen::VectorXd(3 * static_cast<Eigen::Index>(points.size()))};
+  for (int row = 0; row < table.n_rows(); ++row) {
+    const Vec2 p = points[row];
+    const auto at = place(p);
+    if (!vertex_at.emplace(at, row).second) table.fail(row, "x_um", "each place of the lattice once");
+    const Vec2 off =
+        p - points[0] - Vec2{static_cast<double>(at[0]) * spacing.x, static_cast<double>(at[1]) * spacing.y};
+    if (norm(off) > 0.01 * std::min(spacing.x, spacing.y)) table.fail(row, "x_um", "a place of an even lattice");
+    load.traction_kPa.segment<3>(3 * row) << table.number(row, "tx_kPa"), table.number(row, "ty_kPa"),
+        table.has("tz_kPa") ? table.number(row, "tz_kPa") : 0;
+  }
+  for (const auto& [at, vertex] : vertex_at) {
+    std::array<int, 4> face{};
+    constexpr std::array<std::array<int, 2>, 4> kRound = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
+    bool is_whole = true;
+    for (std::size_t k = 0; k < 4; ++k) {
+      const auto corner = vertex_at.find({at[0] + kRound[k][0], at[1] + kRound[k][1]});
+      is_whole = is_whole && corner != vertex_at.end();
+      if (is_whole) face[k] = corner->second;
+    }
+    if (is_whole) load.mesh.faces.push_back(face);
+  }
+  if (load.mesh.faces.empty())
+    throw InputError(file.string(), "tractions on a lattice", "no four of them around a square");
+  return load;
+}
+
 /// Each patch as a disc of its area: the same force; the second moment is 5 % off, a side away 0.4 % of its field.
 Load read_tractions(const Path& file) {
   const files::CsvTable table(file);
@@ -103,42 +150,68 @@ Load read_tractions(const Path& file) {
   return load;
 }
 
-Load read_load(stage::StageContext& context) {
+Load read_load(stage::StageContext& context, const Gel& gel) {
   const bool has_forces = context.has_input("forces") && context.has_input("adhesions");
   const bool has_tractions = context.has_input("traction");
   if (has_forces == has_tractions) {
     throw UsageError("expected either --adhesions and --forces, or --traction");
   }
-  if (has_tractions) return read_tractions(context.input("traction"));
+  if (has_tractions) {
+    const Path file = context.input("traction");
+    if (!gel.surface || files::CsvTable(file).has("area_um2")) return read_tractions(file);
+    Load load;
+    load.lattice = read_surface_tractions(file);
+    return load;
+  }
   return read_forces(context.input("adhesions"), context.input("forces"));
 }
 
-/// Points below the surface, or forces into the gel.
-bool is_in_space(stage::StageContext& context, const Load& load) {
-  return !load.into_the_gel_nN.empty() ||
+/// A surface that is not flat, points below it, or forces into the gel.
+bool is_in_space(stage::StageContext& context, const Load& load, const Gel& gel) {
+  return gel.surface || !load.into_the_gel_nN.empty() ||
          (context.has_input("points") && files::CsvTable(context.input("points")).has("z_um"));
 }
 
-/// displacement_3d.csv at points of the gel's inside, or by forces into it.
-void write_in_space(stage::StageContext& context, const substrate::Substrate& model, const Load& load,
-                    Figures& figures) {
-  const Path file = context.input("points");
+struct UnitLoads {
+  substrate::Loads loads;
+  Eigen::VectorXd amounts;  ///< nN of each ellipse, kPa at each vertex of a lattice
+};
+UnitLoads in_space(const Load& load) {
+  if (load.lattice) return {{load.lattice->mesh, 3}, load.lattice->traction_kPa};
+  Eigen::VectorXd amounts = Eigen::VectorXd::Zero(3 * static_cast<Eigen::Index>(load.ellipses.size()));
+  for (std::size_t j = 0; j < load.ellipses.size(); ++j) {
+    const double into = load.into_the_gel_nN.empty() ? 0 : load.into_the_gel_nN[j];
+    amounts.segment<3>(3 * static_cast<Eigen::Index>(j)) << load.forces_nN[j].x, load.forces_nN[j].y, into;
+  }
+  return {{load.ellipses, 3}, amounts};
+}
+
+/// Points of the file in space: without z_um those of the surface.
+std::vector<Vec3> read_points_in_space(const Path& file, const Gel& gel) {
   const files::CsvTable table(file);
   const bool has_depth = table.has("z_um");
+  const std::optional<surface::Height> height =
+      gel.surface ? std::optional<surface::Height>(*gel.surface) : std::nullopt;
+  const Range allowed = height ? Range::any() : Range::not_negative();
   std::vector<Vec3> points;
   for (const Vec2 p : files::read_points(file)) {
     const int row = static_cast<int>(points.size());
-    points.push_back({p.x, p.y, has_depth ? table.number(row, "z_um", Range::not_negative()) : 0});
+    const double of_surface = height ? (*height)(p) : 0;
+    points.push_back({p.x, p.y, has_depth ? table.number(row, "z_um", allowed) : of_surface});
   }
-  const auto n = static_cast<Eigen::Index>(load.ellipses.size());
-  Eigen::VectorXd forces_nN = Eigen::VectorXd::Zero(3 * n);
-  for (Eigen::Index j = 0; j < n; ++j) {
-    const auto at = static_cast<std::size_t>(j);
-    forces_nN.segment<2>(3 * j) << load.forces_nN[at].x, load.forces_nN[at].y;
-    if (!load.into_the_gel_nN.empty()) forces_nN[3 * j + 2] = load.into_the_gel_nN[at];
-  }
-  const Eigen::VectorXd u =
-      model.response({load.ellipses, 3}, {points, substrate::Components::all})->displace(forces_nN).col(0);
+  return points;
+}
+
+/// displacement_3d.csv at points of the gel's inside or of a surface that is not flat, or by forces into it.
+void write_in_space(stage::StageContext& context, const substrate::Substrate& model, const Load& load, const Gel& gel,
+                    Figures& figures) {
+  const Path file = context.input("points");
+  const bool has_depth = files::CsvTable(file).has("z_um");
+  const std::vector<Vec3> points = read_points_in_space(file, gel);
+  substrate::Observations observed{points, substrate::Components::all};
+  if (!has_depth) observed.points_um = files::read_points(file);  // on the surface, to the last digit
+  const auto [loads, amounts] = in_space(load);
+  const Eigen::VectorXd u = model.response(loads, observed)->displace(amounts).col(0);
   files::CsvText csv({"x_um", "y_um", "z_um", "ux_um", "uy_um", "uz_um", "sigma_um", "sigma_z_um", "flag"});
   double largest_um = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
@@ -177,24 +250,43 @@ void write_at_points(stage::StageContext& context, const substrate::Substrate& m
   files::write_text(context.output("out"), csv.str());
 }
 
-void write_result(stage::StageContext& context, const substrate::Substrate& model, const Load& load, Figures& figures) {
-  const bool in_space = is_in_space(context, load);
-  if (context.has_input("points")) return (in_space ? write_in_space : write_at_points)(context, model, load, figures);
-  if (in_space) throw UsageError("expected --points where forces point into the gel: pictures show those along it");
+/// Where the gel's surface is, and how far it is known.
+std::optional<substrate::SurfaceShape> shape_of(const Gel& gel) {
+  if (!gel.surface) return std::nullopt;
+  const surface::Height height(*gel.surface);
+  return substrate::SurfaceShape{height, {height.low_um(), height.high_um()}};
+}
+
+void write_result(stage::StageContext& context, const substrate::Substrate& model, const Load& load, const Gel& gel,
+                  Figures& figures) {
+  if (context.has_input("points")) {
+    if (is_in_space(context, load, gel)) return write_in_space(context, model, load, gel, figures);
+    return write_at_points(context, model, load, figures);
+  }
+  if (!load.into_the_gel_nN.empty())
+    throw UsageError("expected --points where forces point into the gel: pictures show those along it");
   const Path file = context.output("out");
   if (context.outputs_.at("out").extension() != ".vtu") {
     throw UsageError("expected --points, or an --out that ends with .vtu or volume.vtu");
   }
   if (context.outputs_.at("out").stem().string().ends_with("volume")) {
+    if (load.lattice)
+      throw UsageError("expected --points or an --out of the surface: volumes are computed of forces on adhesions");
     substrate::write_volume_vtu(file, model.volume(load.ellipses, load.forces_nN));
+  } else if (load.lattice) {
+    substrate::write_traction_vtu(file, model, load.lattice->mesh, load.lattice->traction_kPa, *shape_of(gel));
   } else {
-    substrate::write_substrate_vtu(file, model, load.ellipses, load.forces_nN);
+    substrate::write_substrate_vtu(file, model, load.ellipses, load.forces_nN, substrate::kSurfaceLines, shape_of(gel));
   }
 }
 
 /// Along the surface and into the gel, over each patch.
 double largest_traction_kPa(const Load& load) {
   double largest = 0;
+  if (load.lattice) {
+    for (Eigen::Index k = 0; k < load.lattice->traction_kPa.size(); k += 3)
+      largest = std::max(largest, load.lattice->traction_kPa.segment<3>(k).norm());
+  }
   for (std::size_t j = 0; j < load.ellipses.size(); ++j) {
     const double into = load.into_the_gel_nN.empty() ? 0 : load.into_the_gel_nN[j];
     const double area = std::numbers::pi * load.ellipses[j].semi_major_um * load.ellipses[j].semi_minor_um;
@@ -205,19 +297,21 @@ double largest_traction_kPa(const Load& load) {
 
 StageReport run(const Parameters& given, stage::StageContext& context) {
   Parameters parameters = given;
+  if (context.has_input("surface"))
+    parameters.gel.surface = std::make_shared<const HeightMap>(files::read_surface(context.input("surface")));
   Switch& vertical = parameters.substrate.effects.vertical_displacement;
-  const Load load = read_load(context);
-  if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load)))
+  const Load load = read_load(context, parameters.gel);
+  if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load, parameters.gel)))
     vertical = Switch::on;  // what is written has three components
   const Effect strain = choice::decide_large_strain(parameters.gel, parameters.substrate, largest_traction_kPa(load));
   parameters.substrate.effects.large_strain = strain.is_on ? Switch::on : Switch::off;
   const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   context.progress(0.1, "solving for the substrate");
   StageReport report;
-  write_result(context, *model, load, report.figures);
-  report.summary =
-      std::to_string(load.ellipses.size()) + " loaded patches, model " + name_of(parameters.substrate.model);
-  report.figures.emplace_back("n_loads", static_cast<std::int64_t>(load.ellipses.size()));
+  write_result(context, *model, load, parameters.gel, report.figures);
+  const std::size_t n_loads = load.lattice ? load.lattice->mesh.faces.size() : load.ellipses.size();
+  report.summary = std::to_string(n_loads) + " loaded patches, model " + name_of(parameters.substrate.model);
+  report.figures.emplace_back("n_loads", static_cast<std::int64_t>(n_loads));
   for (const auto& figure : model->figures()) report.figures.push_back(figure);
   report.effects = model->effects();
   for (Effect& e : report.effects) {
@@ -249,7 +343,10 @@ int main(int argc, char** argv) {
                  {"traction", Kind::optional_input,
                   "instead of those: tractions on a lattice: x_um, y_um, tx_kPa, ty_kPa; tz_kPa into the "
                   "gel; area_um2 where it is none"},
-                 {"points", Kind::optional_input, "points: x_um, y_um; z_um below the surface"},
+                 {"surface", Kind::optional_input,
+                  "surface.vtp of mbtfm-surface, where the gel is not flat; its z = 0 is thickness_um above the base"},
+                 {"points", Kind::optional_input,
+                  "points: x_um, y_um; z_um into the gel, from a flat surface or from the z = 0 of surface.vtp"},
                  {"out", Kind::output,
                   "displacement.csv at the points, with z_um or forces into the gel displacement_3d.csv; without "
                   "points a .vtu of the surface, or of the gel's inside where "

@@ -117,6 +117,12 @@ void check(const Gel& gel) {
   require_positive(gel.thickness_um, "thickness_um", "the gel");
   require(std::isfinite(gel.poisson_ratio) && gel.poisson_ratio >= 0 && gel.poisson_ratio <= 0.5,
           "'poisson_ratio' of the gel", "a number from 0 to 0.5", shown(gel.poisson_ratio));
+  if (!gel.surface) return;
+  check(*gel.surface);
+  const double deepest = std::ranges::max(gel.surface->z_um);
+  require(deepest < gel.thickness_um, "the gel's surface",
+          "z above the base, which lies thickness_um = " + shown(gel.thickness_um) + " below z = 0",
+          "z = " + shown(deepest) + " um");
 }
 
 void check(const Network& network) {

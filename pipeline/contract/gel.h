@@ -1,8 +1,10 @@
 /// The elastic gel under the cell.
 #pragma once
 
+#include <memory>
 #include <optional>
 
+#include "pipeline/contract/surface.h"
 #include "pipeline/contract/words.h"
 
 namespace mbtfm {
@@ -10,9 +12,10 @@ namespace mbtfm {
 struct Gel {
   double youngs_modulus_kPa = 0;
   double poisson_ratio = 0.49;
-  double thickness_um = 60;
+  double thickness_um = 60;  ///< from z = 0 to the rigid base
   // standard errors, where the user knows them: the error budget then has a part for the gel
   std::optional<double> youngs_modulus_sigma_kPa{}, poisson_ratio_sigma{}, thickness_sigma_um{};
+  std::shared_ptr<const HeightMap> surface{};  ///< null: flat, at z = 0
 };
 
 /// What is taken for the gel: a layer on a rigid base, or so thick that the base does not matter.

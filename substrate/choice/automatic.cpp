@@ -40,9 +40,15 @@ const substrate::Model& model_for(const Gel& gel, const substrate::SubstratePara
   const auto model = cheapest([&](const substrate::Model& m) {
     return (m.can.space || !is_in_space) && (m.can.base || !effects.thickness.is_on) &&
            (m.can.sides || !effects.sides.is_on) && (m.can.large_strain || !effects.strain.is_on) &&
-           (m.can.grading || !effects.grading.is_on) && (!m.follows || m.follows(gel, p));
+           (m.can.surface || !effects.surface.is_on) && (m.can.grading || !effects.grading.is_on) &&
+           (!m.follows || m.follows(gel, p));
   });
   if (model != models().end()) return *model;
+  if (effects.surface.is_on) {
+    throw UsageError(
+        "a surface that is not flat is computed of a gel with one modulus alone: switch the effect depth_graded_gel "
+        "off");
+  }
   if (effects.strain.is_on) {
     throw UsageError(
         "large strains are computed of a gel with one modulus alone: switch the effect depth_graded_gel off");
@@ -86,10 +92,10 @@ class Automatic final : public substrate::Substrate {
   substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
                                 const std::vector<Vec2>& forces_nN) const override {
     substrate::SubstrateParameters parameters = parameters_;
-    parameters.model =
-        cheapest([&](const substrate::Model& model) {
-          return model.can.inside && (model.can.large_strain || parameters_.effects.large_strain != Switch::on);
-        })->kind;
+    parameters.model = cheapest([&](const substrate::Model& model) {
+                         return model.can.inside && (model.can.surface || !gel_.surface) &&
+                                (model.can.large_strain || parameters_.effects.large_strain != Switch::on);
+                       })->kind;
     return make_substrate(gel_, parameters, threads_)->volume(ellipses, forces_nN);
   }
   substrate::Capabilities capabilities() const override {
@@ -104,7 +110,8 @@ class Automatic final : public substrate::Substrate {
     const std::lock_guard lock(mutex_);
     substrate::GelEffects effects = model_ ? effects_ : decide(gel_, parameters_, {});
     // the model's time stands at the effect that called for it
-    for (Effect* e : {&effects.strain, &effects.grading, &effects.sides, &effects.vertical, &effects.thickness}) {
+    for (Effect* e :
+         {&effects.surface, &effects.strain, &effects.grading, &effects.sides, &effects.vertical, &effects.thickness}) {
       if (!e->is_on) continue;
       e->seconds = seconds_;
       break;
@@ -129,7 +136,9 @@ class Automatic final : public substrate::Substrate {
     decided.vertical_displacement = switched(effects_.vertical.is_on);
     decided.large_strain = switched(effects_.strain.is_on);
     parameters.effects = decided;
-    model_ = make_substrate(gel_, parameters, threads_);
+    Gel gel = gel_;
+    if (!effects_.surface.is_on) gel.surface = nullptr;
+    model_ = make_substrate(gel, parameters, threads_);
     return *model_;
   }
 

@@ -66,14 +66,33 @@ Effect decide_vertical(const substrate::SubstrateParameters& p) {
       setting == Switch::on ? "asked for" : "not asked for, and nothing along the surface depends on it");
 }
 
+// Of the field of an adhesion on a wavy surface, against a flat one at its height: see tests/stability/substrate.cpp.
+constexpr double kChangeBySlope = 1;
+
 double surface_number(const substrate::SubstrateParameters& p, double adhesion_radius_um) {
   const double tilt = 1 - std::cos(p.surface_tilt_deg * std::numbers::pi / 180);
   const double height = adhesion_radius_um > 0 ? p.surface_roughness_um / adhesion_radius_um : 0;
   return std::max(tilt, height);
 }
 
-/// No model has it.
-Effect decide_surface(const substrate::SubstrateParameters& p, const SceneSize& scene) {
+double steepest(const HeightMap& map) {
+  double steepest = 0;
+  for (int j = 0; j < map.n_y; ++j) {
+    for (int i = 0; i < map.n_x; ++i) {
+      const auto z = [&](int a, int b) { return map.z_um[static_cast<std::size_t>(b) * map.n_x + a]; };
+      if (i > 0) steepest = std::max(steepest, std::abs(z(i, j) - z(i - 1, j)) / map.spacing_um.x);
+      if (j > 0) steepest = std::max(steepest, std::abs(z(i, j) - z(i, j - 1)) / map.spacing_um.y);
+    }
+  }
+  return steepest;
+}
+
+/// A surface that is only told to be uneven no model has.
+Effect decide_surface(const Gel& gel, const substrate::SubstrateParameters& p, const SceneSize& scene) {
+  if (gel.surface) {
+    return stage::decided(EffectKind::uneven_surface, Switch::automatic, kChangeBySlope * steepest(*gel.surface),
+                          p.effects.effect_tolerance, "the slopes of the surface change the field by some");
+  }
   if (p.surface_tilt_deg == 0 && p.surface_roughness_um == 0) {
     return stage::decided(EffectKind::uneven_surface, Switch::automatic, false,
                           "level and smooth: no surface_tilt_deg, no surface_roughness_um");
@@ -122,7 +141,7 @@ substrate::GelEffects decide(const Gel& gel, const substrate::SubstrateParameter
                                 decide_sides(gel, p),
                                 decide_grading(gel, p),
                                 decide_vertical(p),
-                                decide_surface(p, scene),
+                                decide_surface(gel, p, scene),
                                 decide_strain(p)};
   for (const Effect& needs_block : {effects.sides, effects.grading}) {
     if (!needs_block.is_on || effects.thickness.is_on) continue;

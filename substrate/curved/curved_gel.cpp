@@ -13,9 +13,11 @@
 #include "substrate/curved/models.h"
 #include "substrate/curved/neo_hooke.h"
 #include "substrate/curved/surface_loads.h"
+#include "substrate/effects.h"
 #include "substrate/ellipse.h"
 #include "substrate/response.h"
 #include "substrate/scene.h"
+#include "substrate/surface/height.h"
 
 namespace mbtfm::curved {
 namespace {
@@ -156,12 +158,18 @@ class CurvedResponse final : public substrate::Response {
 class CurvedGel final : public substrate::Substrate {
  public:
   CurvedGel(const Gel& gel, const substrate::SubstrateParameters& parameters, int threads)
-      : Substrate(parameters, can_of(parameters)), gel_(gel), shape_(shape_of(gel)), threads_(threads) {}
+      : Substrate(parameters, can_of(parameters)),
+        gel_(gel),
+        height_(gel.surface ? std::make_shared<const surface::Height>(*gel.surface) : nullptr),
+        shape_(shape_of(gel, height_)),
+        threads_(threads) {}
 
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
-    targets_of(loads, 1);  // refuses what is no load before anything is computed
+    // refuses what is no load before anything is computed
+    for (const Target& t : targets_of(loads, 1)) check_known({t.low_um, t.high_um}, "a load");
     const std::vector<Vec3> points = points_in_space(observations);
+    for (const Vec3& p : points) check_known({{p.x, p.y}}, "a point");
     if (std::holds_alternative<std::vector<Vec3>>(observations.points_um)) {
       for (const Vec3& p : points) check_inside(shape_, p);
     }
@@ -177,6 +185,14 @@ class CurvedGel final : public substrate::Substrate {
     Figures all = figures_;
     all.insert(all.end(), newton_figures_.begin(), newton_figures_.end());
     return all;
+  }
+  std::vector<Effect> effects() const override {
+    substrate::GelEffects effects = substrate::effects_of_model(parameters_, capabilities());
+    if (height_) {
+      effects.surface.is_on = true;
+      effects.surface.why = "the surface is given";
+    }
+    return effects.list();
   }
   int threads() const { return threads_; }
   bool is_large() const { return parameters_.effects.large_strain == Switch::on; }
@@ -266,8 +282,23 @@ class CurvedGel final : public substrate::Substrate {
     return can;
   }
 
-  static Shape shape_of(const Gel& gel) {
-    return {[](Vec2) { return 0.0; }, gel.thickness_um};
+  static Shape shape_of(const Gel& gel, const std::shared_ptr<const surface::Height>& height) {
+    if (!height) return {[](Vec2) { return 0.0; }, gel.thickness_um};
+    return {[height](Vec2 at) { return (*height)(at); }, gel.thickness_um};
+  }
+
+  /// Beyond its map the surface is made up: smooth enough for the gel far away, and not for a load.
+  /// @throws InvalidData
+  void check_known(const std::vector<Vec2>& places_um, const std::string& what) const {
+    if (!height_) return;
+    for (const Vec2 p : places_um) {
+      if (height_->contains(p)) continue;
+      const Vec2 low = height_->low_um(), high = height_->high_um();
+      throw InvalidData(what + " at x, y = " + brief(p.x) + ", " + brief(p.y) + " um",
+                        "a place where the gel's surface is known: x " + brief(low.x) + " to " + brief(high.x) +
+                            ", y " + brief(low.y) + " to " + brief(high.y) + " um",
+                        "one outside");
+    }
   }
 
   /// Random signs, always the same.
@@ -372,6 +403,7 @@ class CurvedGel final : public substrate::Substrate {
   }
 
   Gel gel_;
+  std::shared_ptr<const surface::Height> height_;  ///< null: flat
   Shape shape_;
   int threads_;
   mutable std::mutex mutex_;

@@ -121,8 +121,8 @@ class PointFitter {
       trust_[i] = (kFreedom + 1) / (kFreedom + (r * r + v) / (s * s));
     }
     scale_ *= std::sqrt(misfit / static_cast<double>(points_.size()));
-    // a surface that goes through all points has no error: no less than a millionth of the spread
-    scale_ = std::max(scale_, given_.empty() ? 1e-6 * spread_um_ : 1.0);
+    // through points without errors it would go on falling: no less than a thousandth of the spread
+    scale_ = std::max(scale_, given_.empty() ? 1e-3 * spread_um_ : 1.0);
     const double bent = coefficients_.dot(rough_.times(coefficients_));
     const double told = std::max(0.5, held - 3);  // the three of a plane are not bent
     stiffness_ = std::clamp(told / std::max(bent, 1e-12 * told), stiffness_ / 10, stiffness_ * 10);
