@@ -307,11 +307,10 @@ Made from_mesh(const Path& file, const Parameters& p) {
   return made;
 }
 
-/// Slices in the order of z into the gel.
-Made from_masks(const Path& file, Parameters p) {
+/// The gel's share of each voxel, slices in the order of z into the gel.
+VoxelStack read_masks(const Path& file, const Parameters& p) {
   std::vector<images::Image> slices = images::read_slices(file);
-  const bool is_upside_down = sign_of(p, "masks") < 0;
-  if (is_upside_down) std::ranges::reverse(slices);
+  if (sign_of(p, "masks") < 0) std::ranges::reverse(slices);
   const images::Image& first = slices.front();
   VoxelStack stack{.n_x = first.width,
                    .n_y = first.height,
@@ -325,12 +324,26 @@ Made from_masks(const Path& file, Parameters p) {
   for (const images::Image& slice : slices) {
     for (const float value : slice.pixels) stack.share.push_back(value / brightest);
   }
-  VoxelSurface sampled_stack = sample_masks(stack);
-  const double deepest = stack.step_um * (stack.n_z - 1);
-  for (double& z : sampled_stack.map.z_um) z -= is_upside_down ? deepest : 0;  // the file's first slice is its z = 0
-  p.z_points = Upwards::into_gel;                                              // by now
-  Made made = finished(std::move(sampled_stack.map), p, "masks", std::to_string(stack.n_z) + " masks");
-  made.figures.emplace_back("n_specks", std::int64_t{sampled_stack.n_specks});
+  return stack;
+}
+
+Made from_masks(const Path& file, const Parameters& p) {
+  const VoxelStack stack = read_masks(file, p);
+  const VoxelPoints found = points_of_masks(stack);
+  // the file's first slice is its z = 0
+  const double offset = sign_of(p, "masks") < 0 ? -stack.step_um * (stack.n_z - 1) : 0;
+  const Rectangle within = rectangle_of(p);
+  Places places;
+  for (std::size_t k = 0; k < found.points_um.size(); ++k) {
+    const Vec3& at = found.points_um[k];
+    if (!within.contains(at.x, at.y)) continue;
+    places.at_um.push_back(at + Vec3{0, 0, offset});
+    places.sigma_um.push_back(found.sigma_um[k]);
+  }
+  const PointFit fit = fit_points(places.at_um, places.sigma_um);
+  Made made{.map = heights_of(fit, p), .from = std::to_string(stack.n_z) + " masks"};
+  made.figures = {{"n_voxels_left_out", found.n_voxels_left_out}};
+  note_off(made, places, fit.strays);
   return made;
 }
 
@@ -338,10 +351,9 @@ Made from_beads(const Path& file, const Parameters& p) {
   const Places places = read_places(file, p, "beads");
   const std::string n = std::to_string(places.at_um.size()) + " beads, method " + name_of(p.method);
   if (p.method == BeadMethod::alpha_shape) {
-    const double apart = places.at_um.empty() ? 1 : suggested_spacing_um(places.at_um);
-    return {.map = alpha_shape_surface(places.at_um, {.slice_um = p.slice_um, .radius_um = p.alpha_radius_um},
-                                       p.spacing_um.value_or(apart)),
-            .from = n};
+    const AlphaParameters alpha{.slice_um = p.slice_um, .radius_um = p.alpha_radius_um};
+    constexpr double kSpacing_um = 1;  // the slices are wider
+    return {.map = alpha_shape_surface(places.at_um, alpha, p.spacing_um.value_or(kSpacing_um)), .from = n};
   }
   if (places.sigma_um.empty()) due(p.sigma_z_um, "sigma_z_um", "beads");
   const SurfaceFit fit = fit_beads(places.at_um, places.sigma_um);

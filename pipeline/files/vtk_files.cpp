@@ -185,7 +185,7 @@ void write_network(const Path& file, const Network& network) {
 }
 
 HeightMap read_surface(const Path& file) {
-  const VtuFile vtp(read_text(file), file.string());
+  const VtuFile vtp(read_text(file), file.string(), VtuKind::poly_data);
   const std::vector<double> xyz_um = vtp.coordinates();
   const auto n = static_cast<int>(xyz_um.size() / 3);
   const auto x = [&](int k) { return xyz_um[3 * static_cast<std::size_t>(k)]; };

@@ -19,7 +19,10 @@ namespace {
 SceneSize size_of(const substrate::Loads& loads, const substrate::Observations& observations) {
   std::vector<Vec2> points_um;
   for (const Vec3& p : points_in_space(observations)) points_um.push_back({p.x, p.y});
-  const std::vector<substrate::Ellipse>& ellipses = ellipses_of(loads, 3);
+  static const std::vector<substrate::Ellipse> none;
+  const auto* mesh = std::get_if<substrate::SurfaceMesh>(&loads.shapes);
+  if (mesh) points_um.insert(points_um.end(), mesh->points_um.begin(), mesh->points_um.end());
+  const std::vector<substrate::Ellipse>& ellipses = mesh ? none : ellipses_of(loads, 3);
   if (points_um.empty() && ellipses.empty()) return {};
   const substrate::Extent extent = substrate::extent_of(points_um, ellipses);
   SceneSize size{.width_um = norm(extent.high_um - extent.low_um)};

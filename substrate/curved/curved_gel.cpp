@@ -301,8 +301,27 @@ class CurvedGel final : public substrate::Substrate {
     }
   }
 
-  /// Random signs, always the same.
+  /// Tractions that a lattice resolves: waves eight of its faces long, in four directions, each along x, y and z in
+  /// turn.
+  static MatrixXd waves_on(const substrate::SurfaceMesh& mesh, int n_components) {
+    constexpr int kDirections = 4, kFaces = 8;
+    const auto& face = mesh.faces.front();
+    const Vec2 diagonal = mesh.points_um[face[2]] - mesh.points_um[face[0]];
+    const double wave_number = 2 * std::numbers::pi / (kFaces * std::min(std::abs(diagonal.x), std::abs(diagonal.y)));
+    MatrixXd waves = MatrixXd::Zero(n_components * std::ssize(mesh.points_um), kDirections);
+    for (int d = 0; d < kDirections; ++d) {
+      const double angle = d * std::numbers::pi / kDirections;
+      const Vec2 k = wave_number * Vec2{std::cos(angle), std::sin(angle)};
+      for (Index i = 0; i < std::ssize(mesh.points_um); ++i)
+        waves(n_components * i + d % n_components, d) = std::cos(dot(k, mesh.points_um[static_cast<std::size_t>(i)]));
+    }
+    return waves;
+  }
+
+  /// What the mesh is chosen by: of separate patches random signs, always the same.
   static MatrixXd probes_of(const substrate::Loads& loads) {
+    if (const auto* mesh = std::get_if<substrate::SurfaceMesh>(&loads.shapes); mesh && !mesh->faces.empty())
+      return waves_on(*mesh, loads.n_components);
     constexpr int kProbes = 4;
     MatrixXd probes(loads.n_components * loads.size(), kProbes);
     std::uint32_t state = 1;

@@ -175,7 +175,8 @@ std::vector<Target> targets_of(const substrate::Loads& loads, double across) {
     for (const auto& face : mesh->faces) {
       const Rectangle r = rectangle_of(*mesh, face);
       const Vec2 size = r.high_um - r.low_um;
-      targets.push_back({r.low_um, r.high_um, std::min(size.x, size.y) / across});
+      constexpr double kFaces = 2;  // bilinear over each and without a rim, tractions are smooth over two
+      targets.push_back({r.low_um, r.high_um, kFaces * std::min(size.x, size.y) / across});
     }
   } else {
     throw UsageError("waves of traction have no end: the model curved takes ellipses, squares and quads");

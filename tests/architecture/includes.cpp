@@ -74,7 +74,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"jpeglib", {"segment/images"}},
     {"zip", {"segment/rois"}},
     {"expat", {"segment/images", "pipeline/files"}},
-    {"CGAL/", {"network/mesh"}},
+    {"CGAL/", {"network/mesh", "substrate/surface"}},
     {"Eigen/",
      {"pipeline/numerics", "pipeline/statistics", "network", "network/cables", "substrate", "substrate/greens",
       "substrate/boxes", "substrate/curved", "substrate/surface", "mbtfm/tensions", "mbtfm/tractions"}},
