@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <limits>
 #include <memory>
 #include <optional>
 #include <type_traits>
@@ -15,9 +16,15 @@
 namespace mbtfm::files {
 namespace {
 
-constexpr const char* kGrid = "an unstructured grid (.vtu)";
 constexpr const char* kDamaged = "the file may be damaged: write it again";
+constexpr std::uint64_t kMost = std::numeric_limits<std::uint64_t>::max();
 constexpr std::string_view kEnd = "</VTKFile>";
+
+/// As people call it.
+const char* words_of(VtuKind kind) {
+  return kind == VtuKind::poly_data ? "polygons (.vtp, type PolyData)" : "an unstructured grid (.vtu)";
+}
+const char* type_of(VtuKind kind) { return kind == VtuKind::poly_data ? "PolyData" : "UnstructuredGrid"; }
 
 std::optional<std::uint64_t> count_of(const std::string& text) {
   const std::size_t begin = text.find_first_not_of(' '), end = text.find_last_not_of(' ');
@@ -33,6 +40,7 @@ std::optional<VtuSection> section_of(std::string_view element) {
   if (element == "CellData") return VtuSection::cell_data;
   if (element == "Points") return VtuSection::points;
   if (element == "Cells") return VtuSection::cells;
+  if (element == "Polys") return VtuSection::polygons;
   return std::nullopt;
 }
 
@@ -46,6 +54,8 @@ std::string name_of(VtuSection section) {
       return "array of points";
     case VtuSection::cells:
       return "array of cells";
+    case VtuSection::polygons:
+      return "array of polygons";
   }
   throw InternalError("unknown section of a VTK file");
 }
@@ -54,6 +64,7 @@ using Attributes = std::map<std::string, std::string>;
 
 /// What the XML says, up to the appended data, which need not be XML.
 struct Structure {
+  VtuKind kind = VtuKind::unstructured_grid;
   XML_Parser parser = nullptr;
   Attributes head, appended;
   std::vector<VtuFile::Piece> pieces;
@@ -69,13 +80,29 @@ struct Structure {
     return value.value_or(0);
   }
 
+  /// Of polygons: kinds of cells that a file lacks need not be named.
+  void count_cells(VtuFile::Piece& piece, Attributes& attributes) {
+    if (kind == VtuKind::unstructured_grid) {
+      piece.n_cells = count(attributes, "NumberOfCells");
+      return;
+    }
+    const auto count_if_named = [&](const char* name) {
+      return attributes.contains(name) ? count(attributes, name) : 0;
+    };
+    piece.n_polygons = count_if_named("NumberOfPolys");
+    piece.n_strips = count_if_named("NumberOfStrips");
+    piece.n_cells = piece.n_polygons;
+    for (const std::uint64_t n : {piece.n_strips, count_if_named("NumberOfVerts"), count_if_named("NumberOfLines")})
+      piece.n_cells = n > kMost - piece.n_cells ? kMost : piece.n_cells + n;
+  }
+
   void begin(const std::string& element, Attributes attributes) {
     open.push_back(element);
     if (element == "VTKFile") head = attributes;
     if (element == "Piece") {
       pieces.emplace_back();
       pieces.back().n_points = count(attributes, "NumberOfPoints");
-      pieces.back().n_cells = count(attributes, "NumberOfCells");
+      count_cells(pieces.back(), attributes);
     }
     if (const auto begun = section_of(element); begun && !pieces.empty()) section = begun;
     if (element == "DataArray" && section) {
@@ -116,8 +143,9 @@ void on_text(void* structure, const char* text, int length) {
   static_cast<Structure*>(structure)->add_text({text, static_cast<std::size_t>(length)});
 }
 
-Structure structure_of(const std::string& text, const std::string& name) {
+Structure structure_of(const std::string& text, const std::string& name, VtuKind kind) {
   Structure structure;
+  structure.kind = kind;
   const std::unique_ptr<std::remove_pointer_t<XML_Parser>, decltype(&XML_ParserFree)> parser(XML_ParserCreate(nullptr),
                                                                                              &XML_ParserFree);
   structure.parser = parser.get();
@@ -129,7 +157,7 @@ Structure structure_of(const std::string& text, const std::string& name) {
     const std::size_t n = std::min(kPart, text.size() - at);
     const auto status = XML_Parse(parser.get(), text.data() + at, static_cast<int>(n), at + n == text.size());
     if (status != XML_STATUS_OK && !structure.appended_begin) {
-      throw InputError(name + ":" + std::to_string(XML_GetCurrentLineNumber(parser.get())), kGrid,
+      throw InputError(name + ":" + std::to_string(XML_GetCurrentLineNumber(parser.get())), words_of(kind),
                        XML_ErrorString(XML_GetErrorCode(parser.get())), kDamaged);
     }
   }
@@ -157,14 +185,14 @@ void require_plausible_counts(const std::vector<VtuFile::Piece>& pieces, std::si
 
 }  // namespace
 
-VtuFile::VtuFile(std::string text, std::string name) : text_(std::move(text)), name_(std::move(name)) {
+VtuFile::VtuFile(std::string text, std::string name, VtuKind kind) : text_(std::move(text)), name_(std::move(name)) {
   if (text_.find(kEnd) == text_.npos)
     throw InputError(name_, "a VTK XML file that ends with " + std::string(kEnd), "an early end or another format");
-  Structure structure = structure_of(text_, name_);
-  if (!structure.error.empty()) throw InputError(name_, "a number of points or cells", structure.error, kDamaged);
+  Structure structure = structure_of(text_, name_, kind);
   const auto word = [&](const char* key) { return structure.head.contains(key) ? structure.head[key] : std::string(); };
-  if (word("type") != "UnstructuredGrid") throw InputError(name_, kGrid, "type '" + word("type") + "'");
-  if (structure.pieces.empty()) throw InputError(name_, kGrid, "no points");
+  if (word("type") != type_of(kind)) throw InputError(name_, words_of(kind), "type '" + word("type") + "'");
+  if (!structure.error.empty()) throw InputError(name_, "a number of points or cells", structure.error, kDamaged);
+  if (structure.pieces.empty()) throw InputError(name_, words_of(kind), "no points");
   require_plausible_counts(structure.pieces, text_.size(), name_);
   encoding_ = {.is_big_endian = word("byte_order") == "BigEndian",
                .header_bytes = word("header_type") == "UInt64" ? 8 : 4,
@@ -262,6 +290,45 @@ std::vector<double> VtuFile::line_ends() const {
     n_points_before += static_cast<double>(piece.n_points);
     n_cells_before += static_cast<double>(piece.n_cells);
   }
+  return all;
+}
+
+void VtuFile::add_polygons(const Piece& piece, int n_points_before, std::vector<std::vector<int>>& all) const {
+  if (piece.n_strips > 0) throw InputError(name_, "polygons", "strips of triangles: save the surface as triangles");
+  if (piece.n_polygons == 0) return;
+  const auto ends = numbers(piece, VtuSection::polygons, "offsets", 1, piece.n_polygons);
+  double begin = 0;
+  for (const double end : ends) {
+    // so much a file may claim; beyond it no offset is a whole number for sure
+    const bool is_one = end >= begin + 3 && end <= static_cast<double>(most_numbers(text_.size()));
+    if (!is_one || end != std::floor(end))
+      throw InputError(name_ + ": array 'offsets'", "three or more corners of each polygon", shortest(end), kDamaged);
+    begin = end;
+  }
+  const auto corners = numbers(piece, VtuSection::polygons, "connectivity", 1, static_cast<std::uint64_t>(ends.back()));
+  for (const double corner : corners) {
+    if (corner >= 0 && corner < static_cast<double>(piece.n_points) && corner == std::floor(corner)) continue;
+    throw InputError(name_ + ": array 'connectivity'", "a point below " + std::to_string(piece.n_points),
+                     shortest(corner), kDamaged);
+  }
+  auto corner = corners.begin();
+  for (const double end : ends) {
+    auto& polygon = all.emplace_back();
+    for (; corner < corners.begin() + static_cast<std::ptrdiff_t>(end); ++corner)
+      polygon.push_back(n_points_before + static_cast<int>(*corner));
+  }
+}
+
+std::vector<std::vector<int>> VtuFile::polygons() const {
+  std::vector<std::vector<int>> all;
+  std::uint64_t n_points = 0;
+  for (const Piece& piece : pieces_) {
+    if (n_points + piece.n_points > std::uint64_t{std::numeric_limits<int>::max()})
+      throw InputError(name_, "fewer than two billion points", "more");
+    add_polygons(piece, static_cast<int>(n_points), all);
+    n_points += piece.n_points;
+  }
+  if (all.empty()) throw InputError(name_, "polygons", "none");
   return all;
 }
 

@@ -4,6 +4,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/vtk_files.h"
+#include "pipeline/files/vtu_file.h"
 #include "tests/support/fake_tables.h"
 #include "tests/support/temporary_folder.h"
 #include "tests/support/vtu_variants.h"
@@ -155,6 +156,56 @@ TEST(VtuFiles, a_cell_is_a_line_between_points_of_the_file) {
                                                                                      {"adhesion_id", "-1"},
                                                                                      {"types", "1e300"}}) {
     EXPECT_NE(refusal(folder, in_array(array, value)), "read") << array << ": " << value;
+  }
+}
+
+/// Two triangles and a quadrilateral, in two pieces, beside a line.
+std::string polygons_in_text() {
+  const auto piece = [](const std::string& counts, const std::string& ends, const std::string& corners) {
+    return "<Piece NumberOfPoints=\"4\" " + counts + R"(><PointData><DataArray type="Float32" Name="sigma_um"
+      format="ascii">1 2 3 4</DataArray></PointData><Points><DataArray type="Float32" Name="Points"
+      NumberOfComponents="3" format="ascii">0 0 5  1 0 5  1 1 5  0 1 5</DataArray></Points><Lines><DataArray
+      type="Int64" Name="connectivity" format="ascii">0 1</DataArray><DataArray type="Int64" Name="offsets"
+      format="ascii">2</DataArray></Lines><Polys><DataArray type="Int64" Name="connectivity" format="ascii">)" +
+           corners + "</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">" + ends +
+           "</DataArray></Polys></Piece>";
+  };
+  return "<VTKFile type=\"PolyData\" version=\"0.1\"><PolyData>" +
+         piece("NumberOfLines=\"1\" NumberOfPolys=\"2\"", "3 6", "0 1 2 0 2 3") +
+         piece("NumberOfLines=\"1\" NumberOfPolys=\"1\"", "4", "0 1 2 3") + "</PolyData></VTKFile>";
+}
+
+TEST(VtuFiles, polygons_are_read_piece_by_piece) {
+  const files::VtuFile file(polygons_in_text(), "surface.vtp", files::VtuKind::poly_data);
+  EXPECT_EQ(file.polygons(), (std::vector<std::vector<int>>{{0, 1, 2}, {0, 2, 3}, {4, 5, 6, 7}}));
+  EXPECT_EQ(file.scalars(files::VtuSection::point_data, "sigma_um"), (std::vector<double>{1, 2, 3, 4, 1, 2, 3, 4}));
+  EXPECT_EQ(file.coordinates().size(), 24u);
+}
+
+TEST(VtuFiles, damaged_polygons_are_refused) {
+  const std::string whole = polygons_in_text();
+  for (const auto& [changed, expected] : std::vector<std::pair<std::string, std::string>>{
+           {with(whole, "NumberOfPolys=\"2\"", "NumberOfPolys=\"3\""), "3 numbers"},
+           {with(whole, "NumberOfPolys=\"2\"", "NumberOfPolys=\"2000000000\""), "as the file can hold"},
+           {with(whole, "NumberOfPolys=\"2\"", "NumberOfPolys=\"18446744073709551615\""), "as the file can hold"},
+           {with(whole, "NumberOfPolys=\"2\"", "NumberOfPolys=\"two\""), "a number of points or cells"},
+           {with(whole, "NumberOfLines", "NumberOfStrips"), "strips of triangles"},
+           {with(whole, ">3 6<", ">3 1e300<"), "three or more corners"},
+           {with(whole, ">3 6<", ">3 2<"), "three or more corners"},
+           {with(whole, ">3 6<", ">3 5<"), "three or more corners"},
+           {with(whole, ">3 6<", ">3 7<"), "7 numbers"},
+           {with(whole, "0 2 3<", "0 2 4<"), "a point below 4"},
+           {with(whole, "0 2 3<", "0 2 -1<"), "a point below 4"},
+           {with(whole, "type=\"PolyData\"", "type=\"UnstructuredGrid\""), "polygons (.vtp"}}) {
+    const auto refusal_of = [](const std::string& text) -> std::string {
+      try {
+        files::VtuFile(text, "surface.vtp", files::VtuKind::poly_data).polygons();
+      } catch (const InputError& error) {
+        return error.what();
+      }
+      return "read";
+    };
+    EXPECT_NE(refusal_of(changed).find(expected), std::string::npos) << expected << ": " << refusal_of(changed);
   }
 }
 
