@@ -52,8 +52,8 @@ class PointFitter {
     }
     middle_um_ = numerics::quantile(z, 0.5);
     for (double& value : z) value = std::abs(value - middle_um_);
-    // half of the spread at first: strays that lie far off do not count from the beginning
-    spread_um_ = std::max(numerics::quantile(z, 0.5), 1e-9);
+    // of four points in five: strays that lie far off do not count from the beginning, even ground does not hide bumps
+    spread_um_ = std::max(numerics::quantile(z, 0.8), 1e-3 * std::min(l_.side_um.x, l_.side_um.y));
     coefficients_ = VectorXd::Zero(l_.n_splines());
     scale_ = given_.empty() ? spread_um_ : std::max(1.0, spread_um_ / numerics::quantile(given_, 0.5));
     trust_.assign(points.size(), 1);

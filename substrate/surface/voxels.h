@@ -1,6 +1,7 @@
 /// Where the gel begins in a stack of masks.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"

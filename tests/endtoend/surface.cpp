@@ -1,0 +1,217 @@
+/// mbtfm-surface on files, and mbtfm-substrate on a gel with such a surface.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <fstream>
+#include <numbers>
+#include <random>
+
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/text.h"
+#include "pipeline/files/vtk_files.h"
+#include "segment/images/image.h"
+#include "tests/support/program.h"
+#include "tests/support/temporary_folder.h"
+
+namespace mbtfm {
+namespace {
+
+double wave(Vec2 p) { return -4 * std::cos(2 * std::numbers::pi * p.x / 40); }
+
+class Surface : public testing::Test {
+ protected:
+  std::string file(const std::string& name) const { return (folder_.path() / name).string(); }
+  test::Outcome run(const std::string& arguments) const {
+    return test::run_program("mbtfm-surface --out " + file("surface.vtp") + " " + arguments);
+  }
+  void write(const std::string& name, const std::string& text) const { files::write_text(file(name), text); }
+  /// Points of a lattice of one micrometre, the heights as `z` has them.
+  template <class Z>
+  std::string table(double half_um, const Z& z) const {
+    std::string text = "x_um,y_um,z_um\n";
+    for (double y = -half_um; y <= half_um; ++y) {
+      for (double x = -half_um; x <= half_um; ++x) text += brief(x) + "," + brief(y) + "," + z(Vec2{x, y}) + "\n";
+    }
+    return text;
+  }
+  double largest_error(const HeightMap& map, double rim_um = 0) const {
+    double largest = 0;
+    for (int k = 0; k < map.n_x * map.n_y; ++k) {
+      const Vec2 at = map.origin_um + Vec2{k % map.n_x * map.spacing_um.x, k / map.n_x * map.spacing_um.y};
+      if (std::max(std::abs(at.x), std::abs(at.y)) > 20 - rim_um) continue;
+      largest = std::max(largest, std::abs(map.z_um[static_cast<std::size_t>(k)] - wave(at)));
+    }
+    return largest;
+  }
+  HeightMap surface() const { return files::read_surface(file("surface.vtp")); }
+
+ private:
+  test::TemporaryFolder folder_;
+};
+
+const std::string kSquare = " --low_x_um -20 --low_y_um -20 --high_x_um 20 --high_y_um 20";
+
+TEST_F(Surface, of_a_formula_a_table_and_its_points_is_the_same) {
+  ASSERT_EQ(run("--formula 'wave amplitude_um=4 period_um=40'" + kSquare).code, 0);
+  EXPECT_LT(largest_error(surface()), 1e-12);
+  EXPECT_NE(files::read_text(file("surface.svg")).find("data:image/png"), std::string::npos);
+  write("lattice.csv", table(20, [](Vec2 p) { return shortest(wave(p)); }));
+  ASSERT_EQ(run("--z_points into-gel --height_map " + file("lattice.csv")).code, 0);
+  EXPECT_LT(largest_error(surface()), 1e-12);
+  write("mirrored.csv", table(20, [](Vec2 p) { return shortest(-wave(p)); }));
+  ASSERT_EQ(run("--z_points out-of-gel --height_map " + file("mirrored.csv")).code, 0);
+  EXPECT_LT(largest_error(surface()), 1e-12);
+  ASSERT_EQ(run("--z_points into-gel --points " + file("lattice.csv")).code, 0);
+  EXPECT_LT(largest_error(surface(), 1), 0.02);  // points without errors: a two-hundredth of the heights' range
+}
+
+TEST_F(Surface, of_an_image_of_heights_has_its_holes_filled_or_refused_by_place) {
+  images::Image image{.width = 80, .height = 80, .pixels = {}, .pixel_size_um = 0.5};
+  for (int k = 0; k < 6400; ++k)
+    image.pixels.push_back(static_cast<float>(std::lround(1000 + 100 * wave({(k % 80 + 0.5) / 2 - 20, 0}))));
+  images::write_tiff(file("map.tif"), image);
+  ASSERT_EQ(run("--z_points into-gel --z_unit_um 0.01 --height_map " + file("map.tif")).code, 0);
+  const HeightMap map = surface();
+  EXPECT_NEAR(map.spacing_um.x, 0.5, 1e-9);
+  EXPECT_NEAR(map.z_um[40], 10 + wave({0.25, 0}), 0.006);  // grey values are whole numbers: half a hundredth
+  EXPECT_EQ(run("--z_points into-gel --height_map " + file("map.tif")).code, 2);  // no z_unit_um
+  write("holes.csv", table(20, [](Vec2 p) { return norm(p) < 1.5 ? std::string() : shortest(wave(p)); }));
+  ASSERT_EQ(run("--z_points into-gel --height_map " + file("holes.csv")).code, 0);
+  EXPECT_LT(largest_error(surface()), 0.05);  // (pi/20)⁴ 4 um r⁴/64, r = 2 um; and as much for the lattice
+  write("hole.csv", table(20, [](Vec2 p) { return norm(p) < 6 ? std::string() : shortest(wave(p)); }));
+  const auto refused = run("--z_points into-gel --height_map " + file("hole.csv"));
+  EXPECT_EQ(refused.code, 3);
+  EXPECT_NE(refused.output.find("near x, y = 0, 0"), std::string::npos) << refused.output;
+}
+
+TEST_F(Surface, from_beads_knows_its_error_and_tells_beads_above_it) {
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> across(-20, 20), down(-10, 40);
+  std::string text = "x_um,y_um,z_um\n";
+  for (int k = 0; k < 3000; ++k) {
+    const Vec3 at = {across(random), across(random), down(random)};
+    if (at.z > wave({at.x, at.y})) text += brief(at.x) + "," + brief(at.y) + "," + brief(at.z) + "\n";
+  }
+  for (int k = 0; k < 40; ++k) text += brief(across(random)) + "," + brief(across(random)) + ",-30\n";
+  write("beads.csv", text);
+  const std::string beads = "--z_points into-gel --beads " + file("beads.csv");
+  EXPECT_EQ(run(beads).code, 2);  // no error of z
+  const auto outcome = run(beads + " --sigma_z_um 0.3");
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("off-the-surface"), std::string::npos) << outcome.output;
+  const HeightMap map = surface();
+  ASSERT_EQ(map.sigma_um.size(), map.z_um.size());
+  EXPECT_LT(largest_error(map, 5), 1.9);  // half of the beads' distance, three standard errors
+  ASSERT_EQ(run(beads + " --method alpha-shape").code, 0);
+  EXPECT_TRUE(surface().sigma_um.empty());
+}
+
+TEST_F(Surface, asks_for_what_no_file_tells) {
+  write("points.csv", table(20, [](Vec2 p) { return shortest(wave(p)); }));
+  const auto no_direction = run("--points " + file("points.csv"));
+  EXPECT_EQ(no_direction.code, 2);
+  EXPECT_NE(no_direction.output.find("z_points"), std::string::npos);
+  EXPECT_EQ(run("").code, 2);
+  EXPECT_EQ(run("--formula 'flat'" + kSquare + " --z_points into-gel --points " + file("points.csv")).code, 2);
+  EXPECT_EQ(run("--formula flat").code, 2);
+  write("broken.csv", "x_um,y_um,z_um\n0,0,nan\n");
+  EXPECT_EQ(run("--z_points into-gel --points " + file("broken.csv")).code, 3);
+  write("mesh.stl", "solid\nendsolid\n");
+  EXPECT_EQ(run("--z_points into-gel --mesh " + file("mesh.stl")).code, 2);  // no unit
+  EXPECT_EQ(run("--z_points into-gel --length_unit_um 1 --mesh " + file("mesh.stl")).code, 3);
+}
+
+class Gel : public Surface {
+ protected:
+  void SetUp() override {
+    write("gel.toml", "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.45\nthickness_um = 30\n");
+    write("forces.csv", "adhesion_id,fx_nN,fy_nN,fz_nN\n1,30,5,0\n2,-20,0,15\n");
+    write("adhesions.csv",
+          "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity\n"
+          "1,-5,2,12.566370614359172,4,4,0,0,1\n2,6,-3,12.566370614359172,4,4,0,0,1\n");
+    std::string points = "x_um,y_um,z_um\n";
+    for (const Vec2 p : {Vec2{-9, 2}, Vec2{0, 0}, Vec2{3, 5}, Vec2{12, -3}})
+      points += brief(p.x) + "," + brief(p.y) + ",5\n";
+    write("points.csv", points);
+  }
+  test::Outcome substrate(const std::string& arguments) const {
+    return test::run_program("mbtfm-substrate --quiet --gel " + file("gel.toml") + " --adhesions " +
+                             file("adhesions.csv") + " --forces " + file("forces.csv") + " " + arguments);
+  }
+  std::vector<Vec3> displaced(const std::string& name) const {
+    const files::CsvTable csv(file(name));
+    std::vector<Vec3> u;
+    for (int row = 0; row < csv.n_rows(); ++row)
+      u.push_back({csv.number(row, "ux_um"), csv.number(row, "uy_um"), csv.number(row, "uz_um")});
+    return u;
+  }
+  double difference(const std::vector<Vec3>& a, const std::vector<Vec3>& b) const {
+    double square = 0, size = 0;
+    for (std::size_t k = 0; k < a.size(); ++k) {
+      square += dot(a[k] - b[k], a[k] - b[k]);
+      size += dot(b[k], b[k]);
+    }
+    return std::sqrt(square / size);
+  }
+};
+
+TEST_F(Gel, under_a_level_surface_anywhere_is_a_flat_one) {
+  ASSERT_EQ(run("--formula 'flat z_um=4' --spacing_um 4" + kSquare).code, 0);
+  const std::string points = " --points " + file("points.csv") + " --out ";
+  const auto outcome = substrate("--model curved --surface " + file("surface.vtp") + points + file("raised.csv"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  write("gel.toml", "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.45\nthickness_um = 26\n");
+  std::string below = "x_um,y_um,z_um\n";
+  for (const Vec2 p : {Vec2{-9, 2}, Vec2{0, 0}, Vec2{3, 5}, Vec2{12, -3}})
+    below += brief(p.x) + "," + brief(p.y) + ",1\n";
+  write("points.csv", below);
+  ASSERT_EQ(substrate("--model layer" + points + file("flat.csv")).code, 0);
+  EXPECT_LT(difference(displaced("raised.csv"), displaced("flat.csv")), 0.04);  // displacement_tolerance 0.02, twice
+}
+
+TEST_F(Gel, whose_surface_is_not_flat_is_computed_by_the_model_that_has_it) {
+  ASSERT_EQ(run("--formula 'wave amplitude_um=4 period_um=40' --spacing_um 1" + kSquare).code, 0);
+  const std::string given = " --surface " + file("surface.vtp") + " --points " + file("points.csv") + " --out ";
+  const auto outcome = substrate("--displacement_tolerance 0.1" + given + file("wavy.csv"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  ASSERT_EQ(substrate("--points " + file("points.csv") + " --out " + file("flat.csv")).code, 0);
+  EXPECT_GT(difference(displaced("wavy.csv"), displaced("flat.csv")), 0.1);
+  const auto refused = substrate("--model layer" + given + file("layer.csv"));
+  EXPECT_EQ(refused.code, 2);
+  EXPECT_NE(refused.output.find("curved or auto"), std::string::npos) << refused.output;
+}
+
+TEST_F(Gel, carries_a_lattice_of_tractions_on_its_surface) {
+  ASSERT_EQ(run("--formula 'wave amplitude_um=4 period_um=40' --spacing_um 1" + kSquare).code, 0);
+  std::string tractions = "x_um,y_um,tx_kPa,ty_kPa,tz_kPa\n";
+  for (double y = -16; y <= 16; y += 4) {
+    for (double x = -16; x <= 16; x += 4)
+      tractions += brief(x) + "," + brief(y) + "," + brief(std::exp(-(x * x + y * y) / 50)) + ",0,0.2\n";
+  }
+  write("tractions.csv", tractions);
+  const std::string gel = "mbtfm-substrate --quiet --displacement_tolerance 0.1 --gel " + file("gel.toml") +
+                          " --surface " + file("surface.vtp") + " --traction " + file("tractions.csv");
+  const auto at_points = test::run_program(gel + " --points " + file("points.csv") + " --out " + file("u.csv"));
+  ASSERT_EQ(at_points.code, 0) << at_points.output;
+  for (const Vec3& u : displaced("u.csv")) EXPECT_GT(u.z, 0);  // pressed into the gel
+  const auto on_surface = test::run_program(gel + " --out " + file("u.vtu"));
+  ASSERT_EQ(on_surface.code, 0) << on_surface.output;
+  EXPECT_NE(files::read_text(file("u.vtu")).find("traction_kPa"), std::string::npos);
+  const auto volume = test::run_program(gel + " --out " + file("volume.vtu"));
+  EXPECT_EQ(volume.code, 2) << volume.output;
+}
+
+TEST_F(Gel, is_known_no_further_than_its_surface) {
+  ASSERT_EQ(
+      run("--formula 'wave amplitude_um=4 period_um=40' --low_x_um -10 --low_y_um -20 --high_x_um 5 --high_y_um 20")
+          .code,
+      0);
+  const auto refused =
+      substrate("--surface " + file("surface.vtp") + " --points " + file("points.csv") + " --out " + file("u.csv"));
+  EXPECT_EQ(refused.code, 3) << refused.output;
+  EXPECT_NE(refused.output.find("surface is known"), std::string::npos) << refused.output;
+}
+
+}  // namespace
+}  // namespace mbtfm

@@ -1,0 +1,161 @@
+/// Surfaces of a gel from what fills its volume: masks, and beads by alpha shapes.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "pipeline/contract/errors.h"
+#include "substrate/surface/alpha_slices.h"
+#include "substrate/surface/height.h"
+#include "substrate/surface/points.h"
+#include "substrate/surface/voxels.h"
+#include "tests/support/hard_case.h"
+
+namespace mbtfm::surface {
+namespace {
+
+using HeightOf = std::function<double(Vec2)>;
+
+double wave(Vec2 p) { return -12 * std::cos(2 * std::numbers::pi * (p.x - 35) / 70); }
+
+VoxelStack masks_of(const HeightOf& height) {
+  VoxelStack s{.n_x = 60, .n_y = 50, .n_z = 40, .pixel_um = 0.5, .step_um = 1, .share = {}};
+  for (int k = 0; k < s.n_z; ++k) {
+    for (int j = 0; j < s.n_y; ++j) {
+      for (int i = 0; i < s.n_x; ++i)
+        s.share.push_back(k * s.step_um > height({(i + 0.5) * s.pixel_um, (j + 0.5) * s.pixel_um}) ? 1 : 0);
+    }
+  }
+  return s;
+}
+float& voxel(VoxelStack& s, int i, int j, int k) {
+  return s.share[static_cast<std::size_t>((k * s.n_y + j) * s.n_x + i)];
+}
+
+double slope(Vec2 p) { return 10 + 0.6 * p.x - 0.3 * p.y; }
+double bump(Vec2 p) { return 20 - 8 * std::exp(-0.02 * (std::pow(p.x - 15, 2) + std::pow(p.y - 12, 2))); }
+
+TEST(Masks, tell_the_surface_far_finer_than_their_slices) {
+  for (const HeightOf& height : {HeightOf(slope), HeightOf(bump)}) {
+    const VoxelPoints found = points_of_masks(masks_of(height));
+    EXPECT_EQ(found.n_voxels_left_out, 0);
+    for (const Vec3& p : found.points_um) EXPECT_LE(std::abs(p.z - height({p.x, p.y})), 0.5 + 1e-9);  // half a slice
+    const PointFit fit = fit_points(found.points_um, found.sigma_um);
+    double square = 0;
+    int n = 0;
+    for (double y = 2; y < 23; y += 0.9) {
+      for (double x = 2; x < 28; x += 0.9, ++n) square += std::pow(fit.height_um({x, y}) - height({x, y}), 2);
+    }
+    EXPECT_LT(std::sqrt(square / n), 1 / std::sqrt(12.0));  // the error of one column
+  }
+}
+
+TEST(Masks, specks_and_bubbles_do_not_matter) {
+  test::hard_case("masks with specks above the gel and bubbles in it", "the same surface, and how many were left out");
+  VoxelStack s = masks_of(slope);
+  const VoxelPoints clean = points_of_masks(s);
+  voxel(s, 5, 5, 2) = voxel(s, 6, 5, 2) = 1;
+  voxel(s, 20, 20, 35) = voxel(s, 40, 20, 38) = voxel(s, 40, 21, 38) = 0;
+  const VoxelPoints found = points_of_masks(s);
+  EXPECT_EQ(found.n_voxels_left_out, 5);
+  ASSERT_EQ(found.points_um.size(), clean.points_um.size());
+  for (std::size_t k = 0; k < clean.points_um.size(); ++k) EXPECT_EQ(found.points_um[k].z, clean.points_um[k].z);
+}
+
+TEST(Masks, an_overhang_is_refused_by_place) {
+  test::hard_case("masks of a gel that overhangs", "refused, with the place");
+  VoxelStack s = masks_of([](Vec2) { return 20; });
+  for (int k = 8; k < 12; ++k) {
+    for (int i = 10; i < 20; ++i) voxel(s, i, 7, k) = 1;  // a roof
+  }
+  for (int k = 8; k < 21; ++k) voxel(s, 10, 7, k) = 1;  // on a wall
+  try {
+    points_of_masks(s);
+    FAIL();
+  } catch (const InvalidData& error) {
+    EXPECT_NE(error.element.find("x, y = 5.75, 3.75"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Masks, with_the_gel_black_or_without_a_surface_are_refused) {
+  EXPECT_THROW(points_of_masks(masks_of([](Vec2) { return 100; })), InvalidData);
+  EXPECT_THROW(points_of_masks(masks_of([](Vec2) { return -1; })), InvalidData);
+  VoxelStack s = masks_of([](Vec2) { return 20; });
+  for (float& share : s.share) share = 1 - share;
+  EXPECT_THROW(points_of_masks(s), InvalidData);
+}
+
+std::vector<Vec3> beads_below(const HeightOf& height, double density_per_um3, unsigned seed) {
+  constexpr double kHalf = 60, kBase = 60, kTop = -20;
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> across(-kHalf, kHalf), down(kTop, kBase);
+  const int n = std::poisson_distribution<int>(density_per_um3 * 4 * kHalf * kHalf * (kBase - kTop))(random);
+  std::vector<Vec3> beads;
+  for (int k = 0; k < n; ++k) {
+    const Vec3 at = {across(random), across(random), down(random)};
+    if (at.z > height({at.x, at.y})) beads.push_back(at);
+  }
+  return beads;
+}
+
+TEST(AlphaShapes, lie_below_the_surface_by_some_of_the_beads_distance) {
+  constexpr double kDensity = 0.0062;
+  const double apart = 1 / std::cbrt(kDensity);
+  for (const auto& [name, height] :
+       {std::pair<std::string, HeightOf>{"flat", [](Vec2) { return 0.0; }}, {"wave", wave}}) {
+    double mean = 0, square = 0;
+    int n = 0;
+    for (unsigned seed = 1; seed <= 3; ++seed) {
+      const Height found(alpha_shape_surface(beads_below(height, kDensity, seed), {}, 2));
+      for (double y = -45; y <= 45; y += 3) {
+        for (double x = -45; x <= 45; x += 3, ++n) {
+          const double error = found({x, y}) - height({x, y});
+          mean += error;
+          square += error * error;
+        }
+      }
+    }
+    RecordProperty(name + "_bias_um", std::to_string(mean / n));
+    RecordProperty(name + "_rms_um", std::to_string(std::sqrt(square / n)));
+    // no bead lies on the surface: the study that brought the method found 1.2 to 4.8 um
+    EXPECT_LT(std::sqrt(square / n), apart) << name;
+    EXPECT_LT(std::abs(mean / n), 0.5 * apart) << name;
+  }
+}
+
+TEST(AlphaShapes, do_not_know_which_way_y_runs) {
+  std::vector<Vec3> beads = beads_below(wave, 0.003, 4);
+  const HeightMap there = alpha_shape_surface(beads, {}, 2);
+  for (Vec3& p : beads) p.y = -p.y;
+  const HeightMap back = alpha_shape_surface(beads, {}, 2);
+  ASSERT_EQ(there.n_y, back.n_y);
+  for (int j = 0; j < there.n_y; ++j) {
+    for (int i = 0; i < there.n_x; ++i)
+      EXPECT_NEAR(there.z_um[j * there.n_x + i], back.z_um[(there.n_y - 1 - j) * there.n_x + i], 1e-9);
+  }
+}
+
+TEST(AlphaShapes, of_too_few_or_degenerate_beads_are_refused) {
+  test::hard_case("beads on a line, in a plane, doubled, or a slice without any", "refused, never a crash");
+  std::vector<Vec3> line, plane, doubled, gap;
+  for (int k = 0; k < 100; ++k) {
+    line.push_back({1.0 * k, 1.0 * k, 1.0 * k});
+    plane.push_back({1.0 * (k % 10), 1.0 * (k / 10), 3});
+    doubled.push_back({1.0 * (k % 2), 0.5 * (k % 2), 2.0 * (k % 2)});
+  }
+  for (const Vec3& p : beads_below(wave, 0.003, 5)) {
+    if (std::abs(p.x) > 25) gap.push_back(p);
+  }
+  EXPECT_THROW(alpha_shape_surface(line, {}, 1), InvalidData);
+  EXPECT_THROW(alpha_shape_surface(plane, {}, 1), InvalidData);
+  EXPECT_THROW(alpha_shape_surface(doubled, {}, 0.1), InvalidData);
+  EXPECT_THROW(alpha_shape_surface(gap, {}, 2), InvalidData);
+  line[3].z = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(alpha_shape_surface(line, {}, 1), InvalidData);
+}
+
+}  // namespace
+}  // namespace mbtfm::surface
