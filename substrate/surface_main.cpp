@@ -406,9 +406,9 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   }
   files::write_surface(context.output("out"), map);
   const std::string picture = images::png_of({map.n_x, map.n_y, colours_of(map)});
-  files::write_text(context.output_beside("out", ".svg"),
-                    picture_of(map, "data:image/png;base64," + files::base64(picture), made.off_um,
-                               "Surface of the gel: " + made.from));
+  files::write_text(
+      context.output_beside("out", ".svg"),
+      picture_of(map, "data:image/png;base64," + files::base64(picture), made.off_um, "From " + made.from + "."));
   StageReport report;
   const auto [low, high] = std::ranges::minmax_element(map.z_um);
   report.summary = made.from + ": z from " + brief(*low) + " to " + brief(*high) + " um";

@@ -70,10 +70,9 @@ std::vector<std::pair<Vec2, Vec2>> contour(const HeightMap& map, double z_um) {
   return pieces;
 }
 
-charts::Chart map_chart(const HeightMap& map, const std::string& image_address, const std::vector<Vec2>& off_um,
-                        const std::string& title) {
+charts::Chart map_chart(const HeightMap& map, const std::string& image_address, const std::vector<Vec2>& off_um) {
   const Vec2 half = 0.5 * map.spacing_um, low = map.origin_um - half, high = map.high_um() + half;
-  charts::Chart chart(title, {.label = "x (µm)", .low = low.x, .high = high.x},
+  charts::Chart chart("Height of the gel's surface", {.label = "x (µm)", .low = low.x, .high = high.x},
                       {.label = "y (µm)", .low = high.y, .high = low.y});
   chart.same_scales();
   chart.picture(low, high, image_address);
@@ -133,6 +132,7 @@ charts::Chart sections_chart(const HeightMap& map) {
     }
   }
   charts::Axis z = charts::axis_over("z, into the gel (µm)", heights, charts::Scale::linear);
+  z.low -= 0.25 * (z.high - z.low);  // room for the key
   std::swap(z.low, z.high);
   charts::Chart chart("Sections through the middle", charts::axis_over("x or y (µm)", places, charts::Scale::linear),
                       z);
@@ -157,11 +157,12 @@ std::vector<std::uint8_t> colours_of(const HeightMap& map) {
 }
 
 std::string picture_of(const HeightMap& map, const std::string& image_address, const std::vector<Vec2>& off_um,
-                       const std::string& title) {
+                       const std::string& from) {
   const std::vector<std::string> caption = {
-      map.sigma_um.empty() ? "z points into the gel."
-                           : "z points into the gel; the bands in the sections are one standard error to each side."};
-  return charts::svg_file({map_chart(map, image_address, off_um, title), sections_chart(map)}, 2, caption);
+      from, map.sigma_um.empty()
+                ? "z points into the gel."
+                : "z points into the gel; the bands in the sections are one standard error to each side."};
+  return charts::svg_file({map_chart(map, image_address, off_um), sections_chart(map)}, 2, caption);
 }
 
 }  // namespace mbtfm::surface

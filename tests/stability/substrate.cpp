@@ -12,6 +12,7 @@
 #include "substrate/effects.h"
 #include "substrate/gel_vtu.h"
 #include "substrate/greens/models.h"
+#include "substrate/surface/formula.h"
 #include "tests/support/hard_case.h"
 #include "tests/support/substrate_scene.h"
 #include "tests/support/temporary_folder.h"
@@ -335,6 +336,37 @@ TEST(Automatic, says_where_an_uneven_surface_matters_that_no_model_has) {
   EXPECT_FALSE(surface_of(10, 0).is_on);
   EXPECT_NEAR(surface_of(60, 0).number.value(), 0.5, 1e-12);
   EXPECT_NEAR(surface_of(0, 0.1).number.value(), 0.2, 1e-12);
+}
+
+TEST(Automatic, a_surface_that_is_given_changes_the_field_by_about_what_its_slopes_say) {
+  test::hard_case("a wavy gel, and one that is nearly flat",
+                  "its own model, or that of a flat gel; what it changes is said");
+  const std::vector<Ellipse> ellipses = {{{-11, 2}, 1, 1, 0}, {{3, 9}, 1, 1, 0}};
+  const std::vector<Vec2> points = {{-20, 3}, {-9, 4}, {1, 2}, {5, 12}, {14, -6}}, forces = {{30, 0}, {-10, 20}};
+  const auto gel_of = [](double amplitude_um) {
+    Gel gel{.youngs_modulus_kPa = 10, .poisson_ratio = 0.45, .thickness_um = 60};
+    const auto wave = surface::formula_of("wave period_um=40 amplitude_um=" + std::to_string(amplitude_um));
+    gel.surface = std::make_shared<const HeightMap>(surface::sampled(wave, {-30, -30}, {30, 30}, 1));
+    return gel;
+  };
+  SubstrateParameters p;
+  p.displacement_tolerance = 0.05;
+  const auto displaced = [&](const Gel& gel) {
+    const auto model = choice::make_substrate(gel, p, 2);
+    return std::pair{model->displacements_um(points, ellipses, forces), model->effects()[4]};
+  };
+  const auto [wavy, effect] = displaced(gel_of(1.3));
+  const auto [flat, none] = displaced(gel_of(0.02));
+  ASSERT_EQ(effect.kind, EffectKind::uneven_surface);
+  EXPECT_TRUE(effect.is_on);
+  EXPECT_FALSE(none.is_on);
+  double change = 0, size = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    change += dot(wavy[k] - flat[k], wavy[k] - flat[k]);
+    size += dot(flat[k], flat[k]);
+  }
+  EXPECT_GT(std::sqrt(change / size), effect.number.value() / 3);  // of five points
+  EXPECT_LT(std::sqrt(change / size), effect.number.value() * 3);
 }
 
 TEST(Automatic, obeys_its_switches) {
