@@ -51,6 +51,7 @@ struct Parameters {
   double largest_hole_um = 5;  ///< about an adhesion
   double slice_um = 0;
   double alpha_radius_um = 0;
+  SlicesAlong slices_along = SlicesAlong::kX;
 };
 
 void declare(stage::ParameterList& list, Parameters& p) {
@@ -88,6 +89,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
            "width of the slices of method alpha-shape (um); 0: by the beads' distance");
   list.add("alpha_radius_um", p.alpha_radius_um, Range::zero_or_size_um(),
            "radius of the alpha shapes' circles (um); 0: the smallest that leaves each slice whole");
+  list.add("slices_along", p.slices_along,
+           "axis along which the slices of method alpha-shape lie one behind the other: that of the crests");
 }
 
 /// What a source gives.
@@ -351,7 +354,7 @@ Made from_beads(const Path& file, const Parameters& p) {
   const Places places = read_places(file, p, "beads");
   const std::string n = std::to_string(places.at_um.size()) + " beads, method " + name_of(p.method);
   if (p.method == BeadMethod::alpha_shape) {
-    const AlphaParameters alpha{.slice_um = p.slice_um, .radius_um = p.alpha_radius_um};
+    const AlphaParameters alpha{.slice_um = p.slice_um, .radius_um = p.alpha_radius_um, .along = p.slices_along};
     constexpr double kSpacing_um = 1;  // the slices are wider
     return {.map = alpha_shape_surface(places.at_um, alpha, p.spacing_um.value_or(kSpacing_um)), .from = n};
   }
@@ -365,32 +368,34 @@ Made from_beads(const Path& file, const Parameters& p) {
   return made;
 }
 
-/// With the file's name in what is said of its data.
-template <class Make>
-Made from_file(const Path& file, const Make& make) {
-  try {
-    return make(file);
-  } catch (const InvalidData& error) {
-    throw InputError(file.string() + ": " + error.element, error.expected, error.found);
-  }
+struct Source {
+  std::string name;  ///< of the file's flag
+  Made (*read)(const Path&, const Parameters&);
+};
+const std::vector<Source>& sources() {
+  static const std::vector<Source> table = {{"height_map", from_height_map},
+                                            {"points", from_points},
+                                            {"mesh", from_mesh},
+                                            {"masks", from_masks},
+                                            {"beads", from_beads}};
+  return table;
 }
 
 Made made_from(stage::StageContext& context, const Parameters& p) {
-  const std::vector<std::string> sources = {"height_map", "points", "mesh", "masks", "beads"};
-  const auto n_files = std::ranges::count_if(sources, [&](const auto& name) { return context.has_input(name); });
-  if (n_files + (p.formula.empty() ? 0 : 1) != 1) {
+  const auto is_given = [&](const Source& source) { return context.has_input(source.name); };
+  const auto n_given = std::ranges::count_if(sources(), is_given) + (p.formula.empty() ? 0 : 1);
+  if (n_given != 1) {
     throw UsageError("expected one of --formula, --height_map, --points, --mesh, --masks and --beads, found " +
-                     std::to_string(n_files + (p.formula.empty() ? 0 : 1)));
+                     std::to_string(n_given));
   }
   if (!p.formula.empty()) return from_formula(p);
-  const auto source = *std::ranges::find_if(sources, [&](const auto& name) { return context.has_input(name); });
-  return from_file(context.input(source), [&](const Path& file) {
-    if (source == "height_map") return from_height_map(file, p);
-    if (source == "points") return from_points(file, p);
-    if (source == "mesh") return from_mesh(file, p);
-    if (source == "masks") return from_masks(file, p);
-    return from_beads(file, p);
-  });
+  const Source& source = *std::ranges::find_if(sources(), is_given);
+  const Path file = context.input(source.name);
+  try {
+    return source.read(file, p);
+  } catch (const InvalidData& error) {
+    throw InputError(file.string() + ": " + error.element, error.expected, error.found);
+  }
 }
 
 StageReport run(const Parameters& p, stage::StageContext& context) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <functional>
 #include <string>
 
 #include "pipeline/contract/errors.h"
@@ -12,7 +13,7 @@
 namespace mbtfm::surface {
 namespace {
 
-/// Voxels of gel and of what is above it, one piece of each once specks and bubbles are left out.
+/// Voxels of gel and of what is above it, once specks and bubbles are left out.
 class Voxels {
  public:
   explicit Voxels(const VoxelStack& s) : s_(s), plane_(static_cast<std::size_t>(s.n_x) * s.n_y) {
@@ -20,21 +21,24 @@ class Voxels {
     seen_.assign(is_gel_.size(), 0);
   }
 
-  /// Turns what hangs together with no largest piece of its kind into the other kind. @return how many voxels
+  /// Gel goes on below the last slice, what is above it over the first: a piece that does not reach that far, and is
+  /// not the largest of its kind, becomes of the other kind. @return how many voxels did
   std::int64_t leave_out_pieces() {
     std::array<Piece, 2> largest;  // above, gel
     std::vector<Piece> pieces;
     for (std::size_t at = 0; at < is_gel_.size(); ++at) {
       if (seen_[at]) continue;
-      const Piece piece{at, mark_piece(at, 1, false)};
+      const Piece piece = mark_piece(at, 1);
       pieces.push_back(piece);
-      Piece& most = largest[is_gel_[at]];
+      Piece& most = largest[static_cast<std::size_t>(is_gel_[at])];
       if (piece.n > most.n) most = piece;
     }
     std::int64_t n = 0;
     for (const Piece& piece : pieces) {
-      if (piece.first == largest[0].first || piece.first == largest[1].first) continue;
-      n += mark_piece(piece.first, 2, true);
+      const bool is_largest = piece.first == largest[0].first || piece.first == largest[1].first;
+      if (is_largest || piece.goes_on) continue;
+      const char kind = is_gel_[piece.first];
+      n += mark_piece(piece.first, 2, [&](std::size_t at) { is_gel_[at] = static_cast<char>(1 - kind); }).n;
     }
     return n;
   }
@@ -48,17 +52,19 @@ class Voxels {
   struct Piece {
     std::size_t first = SIZE_MAX;
     std::int64_t n = 0;
+    bool goes_on = false;  ///< beyond the stack, on its own side
   };
 
-  std::int64_t mark_piece(std::size_t first, char mark, bool turns) {
+  Piece mark_piece(std::size_t first, char mark, const std::function<void(std::size_t)>& change = {}) {
     const char kind = is_gel_[first];
     std::vector<std::size_t> open = {first};
     seen_[first] = mark;
-    std::int64_t n = 0;
+    const std::size_t own_end = kind ? static_cast<std::size_t>(s_.n_z) - 1 : 0;
+    Piece piece{.first = first};
     while (!open.empty()) {
       const std::size_t at = open.back();
       open.pop_back();
-      ++n;
+      ++piece.n;
       const auto visit = [&](bool is_there, std::size_t next) {
         if (!is_there || seen_[next] == mark || is_gel_[next] != kind) return;
         seen_[next] = mark;
@@ -71,9 +77,10 @@ class Voxels {
       visit(y + 1 < static_cast<std::size_t>(s_.n_y), at + n_x);
       visit(z > 0, at - plane_);
       visit(z + 1 < static_cast<std::size_t>(s_.n_z), at + plane_);
-      if (turns) is_gel_[at] = static_cast<char>(1 - kind);
+      piece.goes_on = piece.goes_on || z == own_end;
+      if (change) change(at);
     }
-    return n;
+    return piece;
   }
 
   const VoxelStack& s_;
