@@ -56,7 +56,7 @@ struct Range {
   double size() const { return high - low; }
 };
 
-struct Extent {
+struct BeadExtent {
   Range x, y;
   double apart_um = 0;  ///< n^(-1/3)
 };
@@ -72,11 +72,11 @@ void check_distinct(const std::vector<Vec3>& beads) {
                     "the place of bead " + std::to_string(std::min(twin[0], twin[1])));
 }
 
-Extent extent_of(const std::vector<Vec3>& beads) {
+BeadExtent extent_of(const std::vector<Vec3>& beads) {
   constexpr std::size_t kFewest = 30;
   if (beads.size() < kFewest)
     throw InvalidData("beads in the gel", "at least " + std::to_string(kFewest), std::to_string(beads.size()));
-  Extent extent;
+  BeadExtent extent;
   std::vector<double> z_um;
   for (std::size_t k = 0; k < beads.size(); ++k) {
     if (!is_finite(beads[k])) throw InvalidData("bead " + std::to_string(k), "finite numbers", "others");
@@ -275,7 +275,7 @@ HeightMap stitched(const std::vector<Outline>& outlines, const Range& x, double 
 HeightMap alpha_shape_surface(const std::vector<Vec3>& beads_um, const AlphaParameters& parameters, double spacing_um) {
   MBTFM_ASSERT(parameters.slice_um >= 0 && parameters.radius_um >= 0 && spacing_um > 0);
   const std::vector<Vec3> beads = turned(beads_um, parameters.along);
-  const Extent extent = extent_of(beads);
+  const BeadExtent extent = extent_of(beads);
   const double width = parameters.slice_um > 0 ? parameters.slice_um : 2 * extent.apart_um;
   const std::vector<Slice> slices = cut(beads, extent.x, width);
   const std::vector<Outline> outlines = outlines_of(slices, parameters.radius_um, extent.y);
