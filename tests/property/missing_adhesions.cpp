@@ -11,7 +11,7 @@ namespace {
 
 using test::TensionScene;
 
-constexpr Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
 constexpr Vec2 kPlaces[] = {{26, 33}, {35, 27}};  // away from all adhesions
 constexpr Vec2 kForce_nN{1.5, -1};
 

@@ -16,7 +16,7 @@ namespace {
 
 using test::TensionScene;
 
-constexpr Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
 
 /// A round cell with two fibres whose images lie off its beads.
 struct ShiftedCell {

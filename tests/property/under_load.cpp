@@ -14,7 +14,7 @@ namespace {
 
 using test::TensionScene;
 
-constexpr Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+const Gel kGel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
 constexpr double kSize_um = 1;    // of the adhesions
 constexpr double kNoise = 0.002;  // of the largest displacement, which a lone bead on an adhesion has
 
