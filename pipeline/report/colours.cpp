@@ -6,32 +6,11 @@
 #include <array>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/charts/colour_map.h"
 
 namespace mbtfm::report {
-namespace {
-
-/// Plasma (S. van der Walt & N. Smith, matplotlib) without its lightest fifth, which is lost on white paper.
-constexpr std::array<std::array<int, 3>, 8> kPlasma = {{{13, 8, 135},
-                                                        {70, 3, 159},
-                                                        {114, 1, 168},
-                                                        {156, 23, 158},
-                                                        {189, 55, 134},
-                                                        {216, 87, 107},
-                                                        {237, 121, 83},
-                                                        {251, 159, 58}}};
-
-}  // namespace
-
 std::string ColourScale::colour(double value) const {
-  const double share = high > low ? std::clamp((value - low) / (high - low), 0.0, 1.0) : 0.0;
-  const double at = share * (kPlasma.size() - 1);
-  const std::size_t i = std::min(kPlasma.size() - 2, static_cast<std::size_t>(at));
-  std::string text = "#";
-  for (int c = 0; c < 3; ++c) {
-    const double mixed = kPlasma[i][c] + (at - static_cast<double>(i)) * (kPlasma[i + 1][c] - kPlasma[i][c]);
-    text += fmt::format("{:02x}", static_cast<int>(mixed));
-  }
-  return text;
+  return charts::hex(charts::colour_at(charts::ColourMap::plasma, high > low ? (value - low) / (high - low) : 0));
 }
 
 double round_end(double value) {
@@ -43,8 +22,7 @@ double round_end(double value) {
 std::string colour_bar(const ColourScale& scale) {
   if (!(scale.high > scale.low)) return {};
   std::string stops, numbers;
-  for (std::size_t i = 0; i < kPlasma.size(); ++i) {
-    const double share = static_cast<double>(i) / (kPlasma.size() - 1);
+  for (const double share : charts::stops_of(charts::ColourMap::plasma)) {
     stops += "," + scale.colour(scale.low + share * (scale.high - scale.low));
   }
   for (const double tick : charts::ticks(scale.low, scale.high)) {
