@@ -17,30 +17,18 @@
 #include "pipeline/contract/numbers.h"
 #include "substrate/surface/alpha_slices.h"
 #include "substrate/surface/beads.h"
+#include "tests/support/beads_below.h"
 
 namespace mbtfm::surface {
 namespace {
 
+using test::beads_below;
 using Height = std::function<double(Vec2)>;
-constexpr double kHalf = 60, kBase = 60, kSigma = 0.3, kDensity = 0.0062;  // um
+constexpr double kHalf = test::kBeadField_um, kSigma = test::kBeadSigma_um, kDensity = 0.0062;
 
 double flat(Vec2) { return 0; }
 /// Crests along x.
 double wave(Vec2 p) { return -12 * std::cos(2 * std::numbers::pi * (p.y - 35) / 70); }
-
-std::vector<Vec3> beads_below(const Height& height, unsigned seed) {
-  std::mt19937_64 random(seed);
-  constexpr double kTop = -20;
-  std::uniform_real_distribution<double> across(-kHalf, kHalf), down(kTop, kBase);
-  std::normal_distribution<double> noise(0, kSigma);
-  const int n = std::poisson_distribution<int>(kDensity * 4 * kHalf * kHalf * (kBase - kTop))(random);
-  std::vector<Vec3> beads;
-  for (int k = 0; k < n; ++k) {
-    const Vec3 at = {across(random), across(random), down(random)};
-    if (at.z > height({at.x, at.y})) beads.push_back({at.x, at.y, at.z + noise(random)});
-  }
-  return beads;
-}
 
 struct Misfit {
   double mean_um = 0, rms_um = 0;
@@ -83,7 +71,7 @@ TEST(SurfaceFromAlphaSlices, errs_as_much_as_in_the_thesis_into_the_gel_and_more
   for (const auto& [name, height] : {std::pair<std::string, Height>{"flat", flat}, {"wave", wave}}) {
     Misfit alpha, likely;
     for (unsigned seed = 1; seed <= kSeeds; ++seed) {
-      const std::vector<Vec3> beads = beads_below(height, seed);
+      const std::vector<Vec3> beads = beads_below(height, kDensity, seed);
       const Misfit a = misfit_of(nearest_in(alpha_shape_surface(beads, {}, 0.5)), height);
       const SurfaceFit fit = fit_beads(beads, std::vector<double>(beads.size(), kSigma));
       const Misfit l = misfit_of([&](Vec2 at) { return fit.height_um(at); }, height);
@@ -103,7 +91,7 @@ TEST(SurfaceFromAlphaSlices, errs_as_much_as_in_the_thesis_into_the_gel_and_more
 
 TEST(SurfaceFromAlphaSlices, lies_nowhere_above_the_highest_bead_nor_below_the_lowest) {
   for (unsigned seed = 1; seed <= 3; ++seed) {
-    const std::vector<Vec3> beads = beads_below(wave, seed);
+    const std::vector<Vec3> beads = beads_below(wave, kDensity, seed);
     const auto [high, low] = std::ranges::minmax_element(beads, {}, &Vec3::z);
     for (const double radius : {0.0, 7.0, 12.0, 1000.0}) {
       for (const double z : alpha_shape_surface(beads, {.radius_um = radius}, 2).z_um) {
@@ -115,7 +103,7 @@ TEST(SurfaceFromAlphaSlices, lies_nowhere_above_the_highest_bead_nor_below_the_l
 }
 
 TEST(SurfaceFromAlphaSlices, rises_with_the_circle) {
-  const std::vector<Vec3> beads = beads_below(wave, 4);
+  const std::vector<Vec3> beads = beads_below(wave, kDensity, 4);
   const HeightMap narrow = alpha_shape_surface(beads, {.radius_um = 12}, 2);
   const HeightMap wide = alpha_shape_surface(beads, {.radius_um = 30}, 2);
   // both hold the outermost beads of each slice, so the lattices are the same
@@ -128,7 +116,7 @@ TEST(SurfaceFromAlphaSlices, is_the_upper_boundary_of_the_alpha_shape_of_cgal) {
   using Structure = CGAL::Triangulation_data_structure_2<CGAL::Alpha_shape_vertex_base_2<Kernel>,
                                                          CGAL::Alpha_shape_face_base_2<Kernel>>;
   using Alpha = CGAL::Alpha_shape_2<CGAL::Delaunay_triangulation_2<Kernel, Structure>>;
-  const std::vector<Vec3> beads = beads_below(wave, 5);
+  const std::vector<Vec3> beads = beads_below(wave, kDensity, 5);
   double low = beads[0].x, high = low;
   for (const Vec3& bead : beads) low = std::min(low, bead.x), high = std::max(high, bead.x);
   const double width = (high - low) / 12, radius = 12;
@@ -153,7 +141,7 @@ TEST(SurfaceFromAlphaSlices, is_the_upper_boundary_of_the_alpha_shape_of_cgal) {
 }
 
 TEST(SurfaceFromAlphaSlices, turns_with_the_beads_and_their_slices) {
-  std::vector<Vec3> beads = beads_below(wave, 6);
+  std::vector<Vec3> beads = beads_below(wave, kDensity, 6);
   const HeightMap map = alpha_shape_surface(beads, {}, 3);
   for (Vec3& bead : beads) std::swap(bead.x, bead.y);
   const HeightMap turned = alpha_shape_surface(beads, {.along = SlicesAlong::kY}, 3);
@@ -186,7 +174,7 @@ TEST(SurfaceFromAlphaSlices, beads_on_a_grid_are_borne) {
 }
 
 TEST(SurfaceFromAlphaSlices, refuses_by_place_what_has_no_shape) {
-  const std::vector<Vec3> good = beads_below(flat, 7);
+  const std::vector<Vec3> good = beads_below(flat, kDensity, 7);
   EXPECT_EQ(refusal(good), "");
   EXPECT_NE(refusal({good.begin(), good.begin() + 29}).find("at least 30"), std::string::npos);
   std::vector<Vec3> beads = good;

@@ -9,30 +9,19 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "substrate/surface/beads.h"
+#include "tests/support/beads_below.h"
 
 namespace mbtfm::surface {
 namespace {
 
+using test::beads_below;
+
 using Height = std::function<double(Vec2)>;
-constexpr double kHalf = 60, kBase = 60, kSigma = 0.3;  // um
+constexpr double kHalf = test::kBeadField_um, kSigma = test::kBeadSigma_um;
 
 double wave(Vec2 p) { return -12 * std::cos(2 * std::numbers::pi * (p.x - 35) / 70); }
 double turned_wave(Vec2 p) { return -10 * std::cos(2 * std::numbers::pi * (0.8 * p.x + 0.6 * p.y - 30) / 60); }
 double groove(Vec2 p) { return 10 * (std::tanh((p.x + 20) / 9) - std::tanh((p.x - 20) / 9)); }
-
-std::vector<Vec3> beads_below(const Height& height, double density_per_um3, unsigned seed) {
-  std::mt19937_64 random(seed);
-  constexpr double kTop = -20;
-  std::uniform_real_distribution<double> across(-kHalf, kHalf), down(kTop, kBase);
-  std::normal_distribution<double> noise(0, kSigma);
-  const int n = std::poisson_distribution<int>(density_per_um3 * 4 * kHalf * kHalf * (kBase - kTop))(random);
-  std::vector<Vec3> beads;
-  for (int k = 0; k < n; ++k) {
-    const Vec3 at = {across(random), across(random), down(random)};
-    if (at.z > height({at.x, at.y})) beads.push_back({at.x, at.y, at.z + noise(random)});
-  }
-  return beads;
-}
 
 SurfaceFit fitted(const std::vector<Vec3>& beads) {
   return fit_beads(beads, std::vector<double>(beads.size(), kSigma));
