@@ -8,6 +8,8 @@
 #include <optional>
 #include <string>
 
+#include "pipeline/contract/findings.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -295,10 +297,22 @@ double largest_traction_kPa(const Load& load) {
   return largest;
 }
 
+/// @throws InvalidData as check(gel)
+void notice_level(stage::StageContext& context, const Gel& gel) {
+  check(gel);
+  const auto [low, high] = std::ranges::minmax_element(gel.surface->z_um);
+  context.notice(noticed(FindingKind::surface_off_zero, std::max({0.0, *low, -*high}) / gel.thickness_um,
+                         "The surface lies from z = " + brief(*low) + " to " + brief(*high) +
+                             " um, so that the gel is " + brief(gel.thickness_um - *high) + " to " +
+                             brief(gel.thickness_um - *low) + " um thick."));
+}
+
 StageReport run(const Parameters& given, stage::StageContext& context) {
   Parameters parameters = given;
-  if (context.has_input("surface"))
+  if (context.has_input("surface")) {
     parameters.gel.surface = std::make_shared<const HeightMap>(files::read_surface(context.input("surface")));
+    notice_level(context, parameters.gel);
+  }
   Switch& vertical = parameters.substrate.effects.vertical_displacement;
   const Load load = read_load(context, parameters.gel);
   if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load, parameters.gel)))

@@ -99,6 +99,7 @@ struct Made {
   std::string from = {};          ///< "1200 beads, method likelihood"
   std::vector<Vec2> off_um = {};  ///< beads or points off the surface
   double share_off = 0, share_repaired = 0;
+  double apart_um = 0;  ///< distance of the beads; 0: made of none
   std::string repaired = {};
   Figures figures = {};
 };
@@ -230,7 +231,11 @@ Made from_height_map(const Path& file, const Parameters& p) {
     const std::string from = std::to_string(map.n_x) + " x " + std::to_string(map.n_y) + " heights of a table";
     return finished(std::move(map), p, "height_map", from);
   }
-  const images::Image image = images::read_image(file, {.prefix = "height_map", .may_lack_pixels = true});
+  const std::vector<images::Image> pages = images::read_slices(file, {.prefix = "height_map", .may_lack_pixels = true});
+  if (pages.size() != 1)
+    throw InputError(file.string(), "one page, its grey values the heights", std::to_string(pages.size()) + " pages",
+                     "masks, slice after slice, are read with --masks");
+  const images::Image& image = pages.front();
   const double pixel = pixel_of(image, p, "height_map"), unit = due(p.z_unit_um, "z_unit_um", "height_map");
   HeightMap map{.origin_um = {0.5 * pixel, 0.5 * pixel},
                 .spacing_um = {pixel, pixel},
@@ -312,7 +317,7 @@ Made from_mesh(const Path& file, const Parameters& p) {
 
 /// The gel's share of each voxel, slices in the order of z into the gel.
 VoxelStack read_masks(const Path& file, const Parameters& p) {
-  std::vector<images::Image> slices = images::read_slices(file);
+  std::vector<images::Image> slices = images::read_slices(file, {.prefix = "masks"});
   if (sign_of(p, "masks") < 0) std::ranges::reverse(slices);
   const images::Image& first = slices.front();
   VoxelStack stack{.n_x = first.width,
@@ -337,12 +342,10 @@ Made from_masks(const Path& file, const Parameters& p) {
   const double offset = sign_of(p, "masks") < 0 ? -stack.step_um * (stack.n_z - 1) : 0;
   const Rectangle within = rectangle_of(p);
   Places places;
-  for (std::size_t k = 0; k < found.points_um.size(); ++k) {
-    const Vec3& at = found.points_um[k];
-    if (!within.contains(at.x, at.y)) continue;
-    places.at_um.push_back(at + Vec3{0, 0, offset});
-    places.sigma_um.push_back(found.sigma_um[k]);
+  for (const Vec3& at : found.points_um) {
+    if (within.contains(at.x, at.y)) places.at_um.push_back(at + Vec3{0, 0, offset});
   }
+  places.sigma_um.assign(places.at_um.size(), found.sigma_um);
   const PointFit fit = fit_points(places.at_um, places.sigma_um);
   Made made{.map = heights_of(fit, p), .from = std::to_string(stack.n_z) + " masks"};
   made.figures = {{"n_voxels_left_out", found.n_voxels_left_out}};
@@ -364,6 +367,7 @@ Made from_beads(const Path& file, const Parameters& p) {
   made.figures = {{"n_beads", static_cast<std::int64_t>(places.at_um.size())},
                   {"beads_per_um3", fit.density_per_um3},
                   {"stiffness_along_crests", fit.smoothing.ratio}};
+  made.apart_um = 1 / std::cbrt(fit.density_per_um3);
   note_off(made, places, fit.above_surface);
   return made;
 }
@@ -428,6 +432,9 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   context.notice(
       noticed(FindingKind::off_the_surface, made.share_off,
               std::to_string(made.off_um.size()) + " beads or points lie off the surface and do not count."));
+  context.notice(
+      noticed(FindingKind::surface_level, made.apart_um == 0 ? 0 : made.apart_um / (*high - *low),
+              "The surface found is level to " + brief(*high - *low) + " um: it may be the end of the images."));
   context.notice(noticed(FindingKind::surface_repaired, made.share_repaired, made.repaired));
   return report;
 }

@@ -153,16 +153,24 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Report this with the cell: it should not happen."},
       {off_the_surface, "off-the-surface", "surface", caution,
        "share of the beads that lie above the gel's surface, or of the points that lie off it", 0.01,
-       "a few beads lie on every gel and in the cell; more of them are another surface, or an error of z that is "
-       "larger "
-       "than stated",
+       "a few beads lie on every gel and in the cell; more of them are another surface, or an error of z larger than "
+       "stated",
        "Look at the crosses in the picture beside surface.vtp. Take out beads that are not in the gel, or state a "
-       "larger "
-       "error of z."},
+       "larger error of z."},
       {surface_repaired, "surface-repaired", "surface", note,
        "share of the vertices in holes that were filled, and of triangles that were turned over", 0,
        "holes up to surface.largest_hole_um are filled by the plate that bends least",
        "Nothing where the holes are small beside the cell's adhesions. Else measure the surface again."},
+      {surface_level, "surface-level", "surface", caution,
+       "distance of the beads, n^(-1/3), over the difference between the surface's highest and lowest z", 4,
+       "below a quarter of the beads' distance, a flat gel and the end of the imaged volume look alike",
+       "Check that the stack begins above the gel, where there are no beads, and that z_points is right. A gel that is "
+       "flat needs no surface.vtp."},
+      {surface_off_zero, "surface-off-zero", "substrate", caution,
+       "distance from z = 0 to the nearest height of the surface, over the gel's thickness", 0.01,
+       "the thickness counts from z = 0, which should be a level of the surface: else the gel is thicker or thinner by "
+       "as much",
+       "Make surface.vtp with surface.zero_at = mean, or let gel.thickness_um be the z of the base in surface.vtp."},
       {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 where gel.youngs_modulus_sigma_kPa is not given",
        0, "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
@@ -224,7 +232,7 @@ std::string findings_page() {
       "- **caution**: the results may be off by more than their error bars say.\n"
       "- **bad**: do not use what the finding names.\n\n"
       "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
-  for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface"}) {
+  for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate"}) {
     bool has_title = false;
     for (const KindOfFinding& k : kinds_of_findings()) {
       if (std::string(stage) != k.stage) continue;

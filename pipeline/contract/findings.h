@@ -63,6 +63,8 @@ enum class FindingKind {
   // surface
   off_the_surface,
   surface_repaired,
+  surface_level,
+  surface_off_zero,
   // fit: the gel
   modulus_error_unknown
 };

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <vector>
 
 #include "pipeline/contract/geometry.h"
@@ -16,7 +17,12 @@ struct HeightMap {
   std::vector<double> z_um;      ///< by vertex, x fastest
   std::vector<double> sigma_um;  ///< standard error of each; empty: exact
 
-  Vec2 high_um() const { return origin_um + Vec2{(n_x - 1) * spacing_um.x, (n_y - 1) * spacing_um.y}; }
+  Vec2 place_um(double column, double row) const { return origin_um + Vec2{column * spacing_um.x, row * spacing_um.y}; }
+  Vec2 vertex_um(std::size_t k) const {
+    const auto n = static_cast<std::size_t>(n_x);
+    return place_um(static_cast<double>(k % n), static_cast<double>(k / n));
+  }
+  Vec2 high_um() const { return place_um(n_x - 1, n_y - 1); }
 };
 
 /// @throws InvalidData where the lattice has fewer than 4 x 4 vertices, sizes differ or a number is not finite

@@ -200,7 +200,7 @@ HeightMap read_surface(const Path& file) {
   map.origin_um = {x(0), y(0)};
   map.spacing_um = {(x(n - 1) - x(0)) / (map.n_x - 1), (y(n - 1) - y(0)) / (map.n_y - 1)};
   for (int k = 0; k < n; ++k) {
-    const Vec2 due = map.origin_um + Vec2{k % map.n_x * map.spacing_um.x, k / map.n_x * map.spacing_um.y};
+    const Vec2 due = map.vertex_um(static_cast<std::size_t>(k));
     constexpr double kRounding = 1e-5;  // of a spacing: single precision of a lattice of a hundred
     if (std::abs(x(k) - due.x) > kRounding * std::abs(map.spacing_um.x) * map.n_x ||
         std::abs(y(k) - due.y) > kRounding * std::abs(map.spacing_um.y) * map.n_y) {
@@ -224,9 +224,9 @@ void write_surface(const Path& file, const HeightMap& map) {
   check(map);
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();
-  for (int k = 0; k < map.n_x * map.n_y; ++k) {
-    points->InsertNextPoint(map.origin_um.x + k % map.n_x * map.spacing_um.x,
-                            map.origin_um.y + k / map.n_x * map.spacing_um.y, map.z_um[static_cast<std::size_t>(k)]);
+  for (std::size_t k = 0; k < map.z_um.size(); ++k) {
+    const Vec2 at = map.vertex_um(k);
+    points->InsertNextPoint(at.x, at.y, map.z_um[k]);
   }
   vtkNew<vtkCellArray> quads;
   for (int j = 0; j + 1 < map.n_y; ++j) {

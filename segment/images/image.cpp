@@ -125,9 +125,9 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");
 }
 
-std::vector<Image> read_slices(const std::filesystem::path& file) {
+std::vector<Image> read_slices(const std::filesystem::path& file, const PlaneChoice& choice) {
   if (!is_tiff(head_of(file))) throw InputError(file.string(), "a TIFF with a slice in each page", "another file");
-  return read_tiff_slices(file);
+  return read_tiff_slices(file, choice);
 }
 
 Image binned(Image image, int binning) {

@@ -47,9 +47,10 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice = 
 /// A page, from 0, as it lies in the file.
 inline Image read_image(const std::filesystem::path& file, int page) { return read_image(file, {.page = page + 1}); }
 
-/// All slices of a TIFF of one channel and frame, from the first on; all pages of a file that states no dimensions.
+/// All slices of a TIFF of one channel and frame, whatever the choice says of z, from the first on; all pages of a file
+/// that states no dimensions.
 /// @throws InputError as read_image, and where the file is no TIFF or its slices are not of one size
-std::vector<Image> read_slices(const std::filesystem::path& file);
+std::vector<Image> read_slices(const std::filesystem::path& file, const PlaneChoice& choice);
 
 // Of a side in one: beyond it no bead and no adhesion is left.
 inline constexpr int kLargestBinning = 16;

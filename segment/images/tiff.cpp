@@ -49,8 +49,8 @@ class TiffReader {
     return image;
   }
 
-  std::vector<Image> read_slices() {
-    const PlaneChoice all{.prefix = "masks"};
+  std::vector<Image> read_slices(PlaneChoice all) {
+    all.z = kProjection;
     std::vector<int> pages(static_cast<std::size_t>(n_pages()));
     std::iota(pages.begin(), pages.end(), 0);
     if (const auto stack = stack_of(of_first_page_.description, file_.filename().string()))
@@ -391,7 +391,9 @@ class TiffReader {
 
 }  // namespace
 
-std::vector<Image> read_tiff_slices(const std::filesystem::path& file) { return TiffReader(file).read_slices(); }
+std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice) {
+  return TiffReader(file).read_slices(choice);
+}
 
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return TiffReader(file).read(choice); }
 

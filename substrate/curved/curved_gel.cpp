@@ -167,9 +167,11 @@ class CurvedGel final : public substrate::Substrate {
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
     // refuses what is no load before anything is computed
-    for (const Target& t : targets_of(loads, 1)) check_known({t.low_um, t.high_um}, "a load");
+    for (const Target& t : targets_of(loads, 1)) {
+      for (const Vec2 corner : {t.low_um, t.high_um}) check_known(corner, "a load");
+    }
     const std::vector<Vec3> points = points_in_space(observations);
-    for (const Vec3& p : points) check_known({{p.x, p.y}}, "a point");
+    for (const Vec3& p : points) check_known({p.x, p.y}, "a point");
     if (std::holds_alternative<std::vector<Vec3>>(observations.points_um)) {
       for (const Vec3& p : points) check_inside(shape_, p);
     }
@@ -289,16 +291,13 @@ class CurvedGel final : public substrate::Substrate {
 
   /// Beyond its map the surface is made up: smooth enough for the gel far away, and not for a load.
   /// @throws InvalidData
-  void check_known(const std::vector<Vec2>& places_um, const std::string& what) const {
-    if (!height_) return;
-    for (const Vec2 p : places_um) {
-      if (height_->contains(p)) continue;
-      const Vec2 low = height_->low_um(), high = height_->high_um();
-      throw InvalidData(what + " at x, y = " + brief(p.x) + ", " + brief(p.y) + " um",
-                        "a place where the gel's surface is known: x " + brief(low.x) + " to " + brief(high.x) +
-                            ", y " + brief(low.y) + " to " + brief(high.y) + " um",
-                        "one outside");
-    }
+  void check_known(Vec2 at, const char* what) const {
+    if (!height_ || height_->contains(at)) return;
+    const Vec2 low = height_->low_um(), high = height_->high_um();
+    throw InvalidData(std::string(what) + " at x, y = " + brief(at.x) + ", " + brief(at.y) + " um",
+                      "a place where the gel's surface is known: x " + brief(low.x) + " to " + brief(high.x) + ", y " +
+                          brief(low.y) + " to " + brief(high.y) + " um",
+                      "one outside");
   }
 
   /// Tractions that a lattice resolves: waves eight of its faces long, in four directions, each along x, y and z in

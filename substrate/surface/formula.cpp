@@ -151,8 +151,7 @@ HeightMap sampled(const Function& height_um, Vec2 low_um, Vec2 high_um, double s
                 .sigma_um = {}};
   map.spacing_um = {size.x / (map.n_x - 1), size.y / (map.n_y - 1)};
   for (int j = 0; j < map.n_y; ++j) {
-    for (int i = 0; i < map.n_x; ++i)
-      map.z_um.push_back(height_um(low_um + Vec2{i * map.spacing_um.x, j * map.spacing_um.y}));
+    for (int i = 0; i < map.n_x; ++i) map.z_um.push_back(height_um(map.place_um(i, j)));
   }
   check(map);
   return map;

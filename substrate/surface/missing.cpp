@@ -51,7 +51,7 @@ Hole widest_hole(const HeightMap& map) {
         }
       }
       const double width = 2 * std::sqrt(nearest);
-      if (width > widest.width_um) widest = {map.origin_um + Vec2{i * map.spacing_um.x, j * map.spacing_um.y}, width};
+      if (width > widest.width_um) widest = {map.place_um(i, j), width};
     }
   }
   return widest;
@@ -118,7 +118,9 @@ FilledMap filled(HeightMap map, double widest_um) {
   const Hole hole = widest_hole(map);
   if (hole.width_um > widest_um) {
     throw InvalidData("height map near x, y = " + brief(hole.middle_um.x) + ", " + brief(hole.middle_um.y) + " um",
-                      "no hole wider than " + brief(widest_um) + " um (largest_hole_um)",
+                      "no hole wider than " + brief(widest_um) +
+                          " um (largest_hole_um): cut the map to where it is whole (low_x_um …), or allow "
+                          "wider ones",
                       "none within " + brief(hole.width_um / 2) + " um");
   }
   std::vector<Eigen::Triplet<double>> entries;

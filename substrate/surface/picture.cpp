@@ -2,40 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdio>
 
 #include "pipeline/charts/chart.h"
+#include "pipeline/charts/colour_map.h"
 
 namespace mbtfm::surface {
 namespace {
 
-using Colour = std::array<double, 3>;
-
-/// Source: matplotlib's viridis at even steps.
-Colour viridis(double share) {
-  static constexpr std::array<Colour, 9> kSteps = {{{68, 1, 84},
-                                                    {71, 44, 122},
-                                                    {59, 81, 139},
-                                                    {44, 113, 142},
-                                                    {33, 144, 141},
-                                                    {39, 173, 129},
-                                                    {92, 200, 99},
-                                                    {170, 220, 50},
-                                                    {253, 231, 37}}};
-  const double at = std::clamp(share, 0.0, 1.0) * (kSteps.size() - 1);
-  const auto low = std::min(static_cast<std::size_t>(at), kSteps.size() - 2);
-  const double rest = at - static_cast<double>(low);
-  Colour mixed;
-  for (int k = 0; k < 3; ++k) mixed[k] = (1 - rest) * kSteps[low][k] + rest * kSteps[low + 1][k];
-  return mixed;
-}
-
-std::string hex(const Colour& c) {
-  std::array<char, 8> text{};
-  std::snprintf(text.data(), text.size(), "#%02x%02x%02x", static_cast<int>(c[0]), static_cast<int>(c[1]),
-                static_cast<int>(c[2]));
-  return text.data();
-}
+constexpr charts::ColourMap kHeights = charts::ColourMap::viridis;
 
 struct HeightRange {
   double low, high;
@@ -49,9 +23,6 @@ HeightRange range_of(const HeightMap& map) {
 /// Lines of one height through the squares of the lattice (marching squares).
 std::vector<std::pair<Vec2, Vec2>> contour(const HeightMap& map, double z_um) {
   std::vector<std::pair<Vec2, Vec2>> pieces;
-  const auto place = [&](double i, double j) {
-    return map.origin_um + Vec2{i * map.spacing_um.x, j * map.spacing_um.y};
-  };
   for (int j = 0; j + 1 < map.n_y; ++j) {
     for (int i = 0; i + 1 < map.n_x; ++i) {
       constexpr std::array<std::array<int, 2>, 4> kRound = {{{0, 0}, {1, 0}, {1, 1}, {0, 1}}};
@@ -62,7 +33,7 @@ std::vector<std::pair<Vec2, Vec2>> contour(const HeightMap& map, double z_um) {
         const double from = map.z_um[i + a + map.n_x * (j + b)] - z_um, to = map.z_um[i + c + map.n_x * (j + d)] - z_um;
         if ((from < 0) == (to < 0)) continue;
         const double share = from / (from - to);
-        crossings.push_back(place(i + a + share * (c - a), j + b + share * (d - b)));
+        crossings.push_back(map.place_um(i + a + share * (c - a), j + b + share * (d - b)));
       }
       for (std::size_t k = 0; k + 1 < crossings.size(); k += 2) pieces.emplace_back(crossings[k], crossings[k + 1]);
     }
@@ -81,7 +52,7 @@ charts::Chart map_chart(const HeightMap& map, const std::string& image_address, 
     if (z <= range.low || z >= range.high) continue;
     const std::string name = "z = " + charts::readable(z) + " µm";
     chart.pieces(contour(map, z), "stroke:#ffffff;stroke-width:0.8;fill:none", name);
-    chart.key(name, hex(viridis(range.share(z))));
+    chart.key(name, charts::hex(charts::colour_at(kHeights, range.share(z))));
   }
   const double arm = 0.008 * norm(high - low);
   std::vector<std::pair<Vec2, Vec2>> crosses;
@@ -151,7 +122,8 @@ std::vector<std::uint8_t> colours_of(const HeightMap& map) {
   const HeightRange range = range_of(map);
   std::vector<std::uint8_t> rgb;
   for (const double z : map.z_um) {
-    for (const double c : viridis(range.share(z))) rgb.push_back(static_cast<std::uint8_t>(std::lround(c)));
+    for (const double c : charts::colour_at(kHeights, range.share(z)))
+      rgb.push_back(static_cast<std::uint8_t>(std::lround(c)));
   }
   return rgb;
 }

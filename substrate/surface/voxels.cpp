@@ -93,7 +93,8 @@ class Voxels {
 VoxelPoints points_of_masks(const VoxelStack& s) {
   MBTFM_ASSERT(s.share.size() == static_cast<std::size_t>(s.n_x) * s.n_y * s.n_z);
   Voxels voxels(s);
-  VoxelPoints found{.points_um = {}, .sigma_um = {}, .n_voxels_left_out = voxels.leave_out_pieces()};
+  VoxelPoints found{
+      .points_um = {}, .sigma_um = s.step_um / std::sqrt(12), .n_voxels_left_out = voxels.leave_out_pieces()};
   for (std::size_t column = 0; column < voxels.n_columns(); ++column) {
     const Vec2 at = {(static_cast<double>(column % s.n_x) + 0.5) * s.pixel_um,
                      (static_cast<double>(column / s.n_x) + 0.5) * s.pixel_um};
@@ -113,7 +114,6 @@ VoxelPoints points_of_masks(const VoxelStack& s) {
     const double above = share(first - 1), in = share(first);
     const double between = above < 0.5 && in > 0.5 ? (0.5 - above) / (in - above) : 0.5;
     found.points_um.push_back({at.x, at.y, (first - 1 + between) * s.step_um});
-    found.sigma_um.push_back(s.step_um / std::sqrt(12));
   }
   if (2 * found.points_um.size() < voxels.n_columns()) {
     throw InvalidData("masks", "slices from above the gel's surface to below it, the gel white",

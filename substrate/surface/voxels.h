@@ -17,7 +17,7 @@ struct VoxelStack {
 
 struct VoxelPoints {
   std::vector<Vec3> points_um;     ///< of the surface: one at the middle of each column in which the gel begins
-  std::vector<double> sigma_um;    ///< of z: half a slice to each side at most
+  double sigma_um = 0;             ///< of z: even, half a slice to each side at most
   std::int64_t n_voxels_left_out;  ///< of specks outside of the gel, and of bubbles in it
 };
 

@@ -1,5 +1,6 @@
 /// mbtfm-surface on files, and mbtfm-substrate on a gel with such a surface.
 #include <gtest/gtest.h>
+#include <tiffio.h>
 
 #include <cmath>
 #include <fstream>
@@ -38,7 +39,7 @@ class Surface : public testing::Test {
   double largest_error(const HeightMap& map, double rim_um = 0) const {
     double largest = 0;
     for (int k = 0; k < map.n_x * map.n_y; ++k) {
-      const Vec2 at = map.origin_um + Vec2{k % map.n_x * map.spacing_um.x, k / map.n_x * map.spacing_um.y};
+      const Vec2 at = map.vertex_um(static_cast<std::size_t>(k));
       if (std::max(std::abs(at.x), std::abs(at.y)) > 20 - rim_um) continue;
       largest = std::max(largest, std::abs(map.z_um[static_cast<std::size_t>(k)] - wave(at)));
     }
@@ -105,6 +106,61 @@ TEST_F(Surface, from_beads_knows_its_error_and_tells_beads_above_it) {
   EXPECT_LT(largest_error(map, 5), 1.9);  // half of the beads' distance, three standard errors
   ASSERT_EQ(run(beads + " --method alpha-shape").code, 0);
   EXPECT_TRUE(surface().sigma_um.empty());
+}
+
+TEST_F(Surface, that_beads_find_level_may_be_the_end_of_the_images) {
+  std::mt19937_64 random(2);
+  std::uniform_real_distribution<double> across(-20, 20), down(0, 40);
+  std::string text = "x_um,y_um,z_um\n";
+  for (int k = 0; k < 2000; ++k)
+    text += brief(across(random)) + "," + brief(across(random)) + "," + brief(down(random)) + "\n";
+  write("beads.csv", text);
+  const auto outcome = run("--z_points into-gel --sigma_z_um 0.1 --beads " + file("beads.csv"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("surface-level"), std::string::npos) << outcome.output;
+}
+
+/// A TIFF of masks of the gel below the wave, 40 pixels of a micrometre to each side, slices of half a micrometre.
+void write_masks(const std::string& file, bool is_upside_down) {
+  constexpr int kSide = 40, kSlices = 40;
+  TIFF* tiff = TIFFOpen(file.c_str(), "w");
+  for (int page = 0; page < kSlices; ++page) {
+    const double z = 0.5 * (is_upside_down ? kSlices - 1 - page : page) - 10;
+    TIFFSetField(tiff, TIFFTAG_IMAGEWIDTH, kSide);
+    TIFFSetField(tiff, TIFFTAG_IMAGELENGTH, kSide);
+    TIFFSetField(tiff, TIFFTAG_BITSPERSAMPLE, 8);
+    TIFFSetField(tiff, TIFFTAG_SAMPLESPERPIXEL, 1);
+    TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, PHOTOMETRIC_MINISBLACK);
+    std::vector<unsigned char> row;
+    for (int i = 0; i < kSide; ++i) row.push_back(z > wave({i + 0.5 - 20, 0}) ? 255 : 0);
+    for (std::uint32_t j = 0; j < kSide; ++j) TIFFWriteScanline(tiff, row.data(), j, 0);
+    TIFFWriteDirectory(tiff);
+  }
+  TIFFClose(tiff);
+}
+
+TEST_F(Surface, of_masks_lies_between_their_slices_whichever_comes_first) {
+  write_masks(file("down.tif"), false);
+  write_masks(file("up.tif"), true);
+  const std::string known = " --pixel_size_um 1 --z_step_um 0.5 --masks ";
+  const auto error_of = [&](double zero_um) {
+    const HeightMap map = surface();
+    double largest = 0;
+    for (std::size_t k = 0; k < map.z_um.size(); ++k) {
+      const Vec2 at = map.vertex_um(k) - Vec2{20, 20};
+      largest = std::max(largest, std::abs(map.z_um[k] - zero_um - wave(at)));
+    }
+    return largest;
+  };
+  ASSERT_EQ(run("--z_points into-gel" + known + file("down.tif")).code, 0);
+  EXPECT_LT(error_of(10), 0.5);  // a slice; the first is the file's z = 0, ten micrometres above that of the wave
+  ASSERT_EQ(run("--z_points out-of-gel" + known + file("up.tif")).code, 0);
+  EXPECT_LT(error_of(-9.5), 0.5);
+  const auto black = run("--z_points out-of-gel" + known + file("down.tif"));
+  EXPECT_EQ(black.code, 3) << black.output;  // gel above what is none
+  const auto heights = run("--z_points into-gel --z_unit_um 0.01 --pixel_size_um 1 --height_map " + file("down.tif"));
+  EXPECT_EQ(heights.code, 3);
+  EXPECT_NE(heights.output.find("40 pages"), std::string::npos) << heights.output;
 }
 
 TEST_F(Surface, asks_for_what_no_file_tells) {
@@ -200,6 +256,19 @@ TEST_F(Gel, carries_a_lattice_of_tractions_on_its_surface) {
   EXPECT_NE(files::read_text(file("u.vtu")).find("traction_kPa"), std::string::npos);
   const auto volume = test::run_program(gel + " --out " + file("volume.vtu"));
   EXPECT_EQ(volume.code, 2) << volume.output;
+}
+
+TEST_F(Gel, whose_surface_does_not_hold_the_level_from_which_its_thickness_counts_is_told) {
+  const std::string substrate = "mbtfm-substrate --gel " + file("gel.toml") + " --adhesions " + file("adhesions.csv") +
+                                " --forces " + file("forces.csv") + " --surface " + file("surface.vtp") + " --points " +
+                                file("points.csv") + " --displacement_tolerance 0.1 --out " + file("u.csv");
+  ASSERT_EQ(run("--formula 'flat z_um=4' --spacing_um 4" + kSquare).code, 0);
+  const auto told = test::run_program(substrate);
+  ASSERT_EQ(told.code, 0) << told.output;
+  EXPECT_NE(told.output.find("surface-off-zero"), std::string::npos) << told.output;
+  EXPECT_NE(told.output.find("26 um thick"), std::string::npos) << told.output;
+  ASSERT_EQ(run("--formula 'flat z_um=4' --zero_at mean --spacing_um 4" + kSquare).code, 0);
+  EXPECT_EQ(test::run_program(substrate).output.find("surface-off-zero"), std::string::npos);
 }
 
 TEST_F(Gel, is_known_no_further_than_its_surface) {

@@ -37,7 +37,7 @@ TEST(Masks, tell_the_surface_far_finer_than_their_slices) {
     const VoxelPoints found = points_of_masks(masks_of(height));
     EXPECT_EQ(found.n_voxels_left_out, 0);
     for (const Vec3& p : found.points_um) EXPECT_LE(std::abs(p.z - height({p.x, p.y})), 0.5 + 1e-9);  // half a slice
-    const PointFit fit = fit_points(found.points_um, found.sigma_um);
+    const PointFit fit = fit_points(found.points_um, std::vector(found.points_um.size(), found.sigma_um));
     double square = 0;
     int n = 0;
     for (double y = 2; y < 23; y += 0.9) {

@@ -97,7 +97,7 @@ TEST(Height, goes_on_beyond_its_rim_without_a_kink_and_ends_level_at_its_mean) {
 
 HeightMap with_holes(HeightMap map, const std::function<bool(Vec2)>& is_hole) {
   for (int k = 0; k < map.n_x * map.n_y; ++k) {
-    const Vec2 at = map.origin_um + Vec2{k % map.n_x * map.spacing_um.x, k / map.n_x * map.spacing_um.y};
+    const Vec2 at = map.vertex_um(static_cast<std::size_t>(k));
     if (is_hole(at)) map.z_um[static_cast<std::size_t>(k)] = kMissing;
   }
   return map;
