@@ -377,10 +377,8 @@ void beside_fttc(const Arguments& a) {
   TensionScene scene = test::scene_of(cell, test::thesis_tensions_nN(cell.fibres.size(), 1), 10000, 0.25, 1);
   const tensions::EnsembleFit fit = test::fit_own_network(scene);
   const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
-  const tractions::TractionInputs inputs{.beads = scene.beads,
-                                         .gel = gel,
-                                         .adhesions = cell.adhesions,
-                                         .outline_um = cell.outline_um};
+  const tractions::TractionInputs inputs{
+      .beads = scene.beads, .gel = gel, .adhesions = cell.adhesions, .outline_um = cell.outline_um};
   const tractions::TractionParameters p;
   const tractions::Reconstruction fttc = tractions::reconstruct_fttc(inputs, p, 2);
   Eigen::VectorXd by_fttc = Eigen::VectorXd::Zero(scene.forces_nN.size());
