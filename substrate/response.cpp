@@ -60,6 +60,9 @@ class Lazy final : public Response {
     return matrix().transpose() * displacements;
   }
   SharedResponse kept() const override { return answers_.kept ? answers_.kept() : dense_response(matrix()); }
+  Tangent about(const VectorXd& forces_nN) const override {
+    return answers_.about ? answers_.about(forces_nN) : Response::about(forces_nN);
+  }
 
  private:
   Answers answers_;

@@ -14,10 +14,19 @@ namespace mbtfm::substrate {
 class KeptResponse;
 using SharedResponse = std::shared_ptr<const KeptResponse>;
 
+class Response;
+using LazyResponse = std::shared_ptr<const Response>;
+
+/// About forces F₀: u(F) = displacement_um + response (F − F₀), to first order.
+struct Tangent {
+  Eigen::VectorXd displacement_um;
+  LazyResponse response;
+};
+
 /// u = G F, F the strengths of the loads by component, u the displacements (um) by component. For forces along the
 /// surface and points of it: rows 2i, 2i+1 are x, y of point i, columns 2j, 2j+1 a force along x, y on ellipse j (nN).
-/// Of a model that is not linear displace() alone is the answer, the others its derivative at rest.
-class Response {
+/// Of a model that is not linear displace() and about() alone are the answer, the others its derivative at rest.
+class Response : public std::enable_shared_from_this<Response> {
  public:
   virtual ~Response() = default;
   virtual Eigen::Index rows() const = 0;
@@ -30,14 +39,15 @@ class Response {
   virtual Eigen::MatrixXd matrix() const = 0;
   /// The same in memory, for many calls: as its matrix, or something that needs less room.
   virtual SharedResponse kept() const = 0;
+  /// Of a linear model: its displacement, and itself. @param forces_nN  one column of displace()
+  virtual Tangent about(const Eigen::VectorXd& forces_nN) const { return {displace(forces_nN), shared_from_this()}; }
 };
-using LazyResponse = std::shared_ptr<const Response>;
 
 /// A response in memory, which needs its model no more.
-class KeptResponse : public Response, public std::enable_shared_from_this<KeptResponse> {
+class KeptResponse : public Response {
  public:
   Eigen::MatrixXd matrix() const override;
-  SharedResponse kept() const override { return shared_from_this(); }
+  SharedResponse kept() const override { return std::static_pointer_cast<const KeptResponse>(shared_from_this()); }
   /// Gᵀ diag(weight) G, cols() square, on and above its diagonal; zero or rubbish below
   /// @param weight  by row, not negative
   virtual Eigen::MatrixXd upper_gram(const Eigen::VectorXd& weight) const = 0;
@@ -54,6 +64,7 @@ struct Answers {
   std::function<Eigen::MatrixXd()> matrix = {};
   std::function<Eigen::MatrixXd(const Eigen::MatrixXd& forces_nN)> displace = {};
   std::function<SharedResponse()> kept = {};
+  std::function<Tangent(const Eigen::VectorXd& forces_nN)> about = {};
 };
 LazyResponse lazy_response(Answers answers);
 

@@ -90,7 +90,8 @@ class Automatic final : public substrate::Substrate {
          .matrix = [=, this] { return timed([&] { return answer->matrix(); }); },
          .displace = [=,
                       this](const Eigen::MatrixXd& forces) { return timed([&] { return answer->displace(forces); }); },
-         .kept = [=, this] { return timed([&] { return answer->kept(); }); }});
+         .kept = [=, this] { return timed([&] { return answer->kept(); }); },
+         .about = [=, this](const Eigen::VectorXd& forces) { return timed([&] { return answer->about(forces); }); }});
   }
   substrate::VolumeField volume(const std::vector<substrate::Ellipse>& ellipses,
                                 const std::vector<Vec2>& forces_nN) const override {

@@ -48,18 +48,24 @@ struct Fineness {
   static constexpr double kFarStep = std::numbers::sqrt2;
 };
 
+/// Rows of a vector that hold a load's or a point's axes.
+struct Axes {
+  Index first = 0, n = 3;  ///< the first axis, and how many
+  Index row(std::size_t at, Index axis) const { return n * static_cast<Index>(at) + axis - first; }
+};
+
 /// A mesh with its factor, its loads and its points.
 struct System {
   Block block;
   Space space;
-  std::unique_ptr<const numerics::SparseCholesky> factor;  ///< of small strains; null where nobody asks for them
+  std::shared_ptr<const numerics::SparseCholesky> factor;  ///< of small strains; null where nobody asks for them
   std::vector<std::vector<boxes::NodeWeight>> loads, points;
 
   System(Block made, const Gel& gel, const substrate::Loads& of, const substrate::Observations& at, bool is_factorised,
          const numerics::FactorOptions& options)
       : block(std::move(made)), space(block.mesh(), options.threads), loads(load_weights(block, space, of)) {
     if (is_factorised) {
-      factor = std::make_unique<const numerics::SparseCholesky>(space.assemble(linear_stiffness_of(gel, block.mesh())),
+      factor = std::make_shared<const numerics::SparseCholesky>(space.assemble(linear_stiffness_of(gel, block.mesh())),
                                                                 options);
     }
     if (const auto* on_surface = std::get_if<std::vector<Vec2>>(&at.points_um)) {
@@ -72,15 +78,10 @@ struct System {
   }
 };
 
-/// Rows of a vector that hold a load's or a point's axes.
-struct Axes {
-  Index first = 0, n = 3;  ///< the first axis, and how many
-  Index row(std::size_t at, Index axis) const { return n * static_cast<Index>(at) + axis - first; }
-};
-
 /// K⁻¹ between two lists of weighted nodes: symmetric, so that exchanging them transposes it exactly.
-MatrixXd solve_between(const System& system, const std::vector<std::vector<boxes::NodeWeight>>& from, Axes from_axes,
-                       const MatrixXd& values, const std::vector<std::vector<boxes::NodeWeight>>& to, Axes to_axes) {
+MatrixXd solve_between(const numerics::SparseCholesky& factor, const std::vector<std::vector<boxes::NodeWeight>>& from,
+                       Axes from_axes, const MatrixXd& values, const std::vector<std::vector<boxes::NodeWeight>>& to,
+                       Axes to_axes) {
   std::vector<int> needed;
   for (const auto& weights : to) {
     for (const auto& w : weights) needed.push_back(w.node);
@@ -88,7 +89,7 @@ MatrixXd solve_between(const System& system, const std::vector<std::vector<boxes
   std::sort(needed.begin(), needed.end());
   needed.erase(std::unique(needed.begin(), needed.end()), needed.end());
   MatrixXd answers = MatrixXd::Zero(to_axes.n * static_cast<Index>(to.size()), values.cols());
-  system.factor->solve(
+  factor.solve(
       static_cast<int>(values.cols()), needed,
       [&](int column, const numerics::NodalColumn& b) {
         for (std::size_t j = 0; j < from.size(); ++j) {
@@ -110,6 +111,35 @@ MatrixXd solve_between(const System& system, const std::vector<std::vector<boxes
   return answers;
 }
 
+/// By the factor of a tangent, on a mesh.
+class FactoredResponse final : public substrate::Response {
+ public:
+  FactoredResponse(std::shared_ptr<const System> system, std::shared_ptr<const numerics::SparseCholesky> factor,
+                   Axes load_axes, Axes point_axes)
+      : system_(std::move(system)), factor_(std::move(factor)), load_axes_(load_axes), point_axes_(point_axes) {}
+
+  Index rows() const override { return point_axes_.n * std::ssize(system_->points); }
+  Index cols() const override { return load_axes_.n * std::ssize(system_->loads); }
+  MatrixXd displace(const MatrixXd& forces) const override {
+    return solve_between(*factor_, system_->loads, load_axes_, forces, system_->points, point_axes_);
+  }
+  MatrixXd pull_back(const MatrixXd& displacements) const override {
+    return solve_between(*factor_, system_->points, point_axes_, displacements, system_->loads, load_axes_);
+  }
+  MatrixXd matrix() const override {
+    if (cols() <= rows()) return displace(MatrixXd::Identity(cols(), cols()));
+    return pull_back(MatrixXd::Identity(rows(), rows())).transpose();
+  }
+  substrate::SharedResponse kept() const override {
+    return substrate::dense_response(matrix(), system_->space.threads());
+  }
+
+ private:
+  std::shared_ptr<const System> system_;
+  std::shared_ptr<const numerics::SparseCholesky> factor_;
+  Axes load_axes_, point_axes_;
+};
+
 class CurvedGel;
 
 class CurvedResponse final : public substrate::Response {
@@ -119,24 +149,14 @@ class CurvedResponse final : public substrate::Response {
 
   Index rows() const override { return observations_.n_components() * observations_.size(); }
   Index cols() const override { return loads_.n_components * loads_.size(); }
-  MatrixXd displace(const MatrixXd& forces) const override {
-    MBTFM_ASSERT(forces.rows() == cols());
-    if (is_empty()) return MatrixXd::Zero(rows(), forces.cols());
-    if (is_large()) return displace_far(forces);
-    const System& s = system();
-    return solve_between(s, s.loads, load_axes(), forces, s.points, point_axes());
-  }
+  MatrixXd displace(const MatrixXd& forces) const override;
   MatrixXd pull_back(const MatrixXd& displacements) const override {
     MBTFM_ASSERT(displacements.rows() == rows());
-    if (is_empty()) return MatrixXd::Zero(cols(), displacements.cols());
-    const System& s = system();
-    return solve_between(s, s.points, point_axes(), displacements, s.loads, load_axes());
+    return is_empty() ? MatrixXd::Zero(cols(), displacements.cols()) : at_rest().pull_back(displacements);
   }
-  MatrixXd matrix() const override {
-    if (cols() <= rows()) return displace(MatrixXd::Identity(cols(), cols()));
-    return pull_back(MatrixXd::Identity(rows(), rows())).transpose();
-  }
+  MatrixXd matrix() const override { return is_empty() ? MatrixXd::Zero(rows(), cols()) : at_rest().matrix(); }
   substrate::SharedResponse kept() const override;
+  substrate::Tangent about(const Eigen::VectorXd& forces) const override;
 
  private:
   bool is_empty() const { return rows() == 0 || cols() == 0; }
@@ -144,15 +164,18 @@ class CurvedResponse final : public substrate::Response {
   Axes point_axes() const {
     return {observations_.components == substrate::Components::normal ? 2 : 0, observations_.n_components()};
   }
-  const System& system() const;
-  bool is_large() const;
+  /// Of small strains.
+  const FactoredResponse& at_rest() const;
   MatrixXd displace_far(const MatrixXd& forces) const;
+  Vectors forces_on_nodes(const System& system, const Eigen::VectorXd& forces) const;
+  Eigen::VectorXd at_points(const System& system, const Vectors& free_um) const;
 
   const CurvedGel& gel_;
   substrate::Loads loads_;
   substrate::Observations observations_;
   mutable std::once_flag once_;
-  mutable std::unique_ptr<const System> system_;
+  mutable std::shared_ptr<const System> system_;
+  mutable std::shared_ptr<const FactoredResponse> at_rest_;
 };
 
 class CurvedGel final : public substrate::Substrate {
@@ -196,15 +219,18 @@ class CurvedGel final : public substrate::Substrate {
     }
     return effects.list();
   }
+  const Gel& gel() const { return gel_; }
   int threads() const { return threads_; }
+  numerics::FactorOptions factor_options() const {
+    return {.threads = threads_, .memory_limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB)};
+  }
   bool is_large() const { return parameters_.effects.large_strain == Switch::on; }
 
   /// Under forces on the free nodes.
   LargeSolution solve_large(const System& system, Vectors forces_nN) const {
     const auto start = std::chrono::steady_clock::now();
     LargeSolution solution =
-        solve_neo_hooke(gel_, system.space, {.at_nodes_nN = std::move(forces_nN)}, 1,
-                        {.threads = threads_, .memory_limit_GB = boxes::allowed_GB(parameters_.memory_limit_GB)});
+        solve_neo_hooke(gel_, system.space, {.at_nodes_nN = std::move(forces_nN)}, 1, factor_options());
     const std::lock_guard lock(mutex_);
     newton_figures_ = {
         {"substrate_load_steps", std::int64_t{solution.load_steps}},
@@ -222,7 +248,7 @@ class CurvedGel final : public substrate::Substrate {
     const double tolerance = parameters_.displacement_tolerance;
     const MatrixXd probes = probes_of(loads);
     const auto displaced = [&](const System& s) {
-      return solve_between(s, s.loads, load_axes, probes, s.points, point_axes);
+      return solve_between(*s.factor, s.loads, load_axes, probes, s.points, point_axes);
     };
     MatrixXd before;  // two factors at a time are too many: of the coarser mesh these are kept
     if (tolerance > 0) before = displaced(*make_system(fineness.coarser(), loads, observations));
@@ -364,8 +390,7 @@ class CurvedGel final : public substrate::Substrate {
       return box.low_um[2] == 0 && misfit_um(box) > fineness.misfit * (side + nearest);
     };
     return std::make_unique<System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), gel_, loads,
-                                    observations, is_factorised,
-                                    numerics::FactorOptions{.threads = threads_, .memory_limit_GB = limit_GB});
+                                    observations, is_factorised, factor_options());
   }
 
   double mean_depth_um(const substrate::Extent& scene) const {
@@ -430,34 +455,65 @@ class CurvedGel final : public substrate::Substrate {
   mutable Figures newton_figures_;
 };
 
-const System& CurvedResponse::system() const {
-  std::call_once(once_, [&] { system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes(), true); });
-  return *system_;
+const FactoredResponse& CurvedResponse::at_rest() const {
+  std::call_once(once_, [&] {
+    system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes(), true);
+    at_rest_ = std::make_shared<const FactoredResponse>(system_, system_->factor, load_axes(), point_axes());
+  });
+  return *at_rest_;
 }
 
-bool CurvedResponse::is_large() const { return gel_.is_large(); }
+MatrixXd CurvedResponse::displace(const MatrixXd& forces) const {
+  MBTFM_ASSERT(forces.rows() == cols());
+  if (is_empty()) return MatrixXd::Zero(rows(), forces.cols());
+  return gel_.is_large() ? displace_far(forces) : at_rest().displace(forces);
+}
 
-MatrixXd CurvedResponse::displace_far(const MatrixXd& forces) const {
-  const Axes from = load_axes(), to = point_axes();
-  const auto made = gel_.system_for(loads_, observations_, from, to, false);  // Newton's method needs the memory
-  const System& s = *made;
-  MatrixXd answers = MatrixXd::Zero(rows(), forces.cols());
-  for (Index column = 0; column < forces.cols(); ++column) {
-    Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());
-    for (std::size_t j = 0; j < s.loads.size(); ++j) {
-      for (Index axis = from.first; axis < from.first + from.n; ++axis) {
-        for (const auto& [node, weight] : s.loads[j])
-          at_nodes[node][axis] += weight * forces(from.row(j, axis), column);
-      }
-    }
-    const Vectors u = s.space.of_free_nodes(gel_.solve_large(s, std::move(at_nodes)).state.at_nodes_um);
-    for (std::size_t i = 0; i < s.points.size(); ++i) {
-      for (Index axis = to.first; axis < to.first + to.n; ++axis) {
-        for (const auto& [node, weight] : s.points[i]) answers(to.row(i, axis), column) += weight * u[node][axis];
-      }
+Vectors CurvedResponse::forces_on_nodes(const System& s, const Eigen::VectorXd& forces) const {
+  const Axes axes = load_axes();
+  Vectors at_nodes(s.space.nodes().size(), Eigen::Vector3d::Zero());
+  for (std::size_t j = 0; j < s.loads.size(); ++j) {
+    for (Index axis = axes.first; axis < axes.first + axes.n; ++axis) {
+      for (const auto& [node, weight] : s.loads[j]) at_nodes[node][axis] += weight * forces[axes.row(j, axis)];
     }
   }
+  return at_nodes;
+}
+
+Eigen::VectorXd CurvedResponse::at_points(const System& s, const Vectors& free_um) const {
+  const Axes axes = point_axes();
+  Eigen::VectorXd values = Eigen::VectorXd::Zero(rows());
+  for (std::size_t i = 0; i < s.points.size(); ++i) {
+    for (Index axis = axes.first; axis < axes.first + axes.n; ++axis) {
+      for (const auto& [node, weight] : s.points[i]) values[axes.row(i, axis)] += weight * free_um[node][axis];
+    }
+  }
+  return values;
+}
+
+MatrixXd CurvedResponse::displace_far(const MatrixXd& forces) const {
+  const auto made =
+      gel_.system_for(loads_, observations_, load_axes(), point_axes(), false);  // Newton's method needs the memory
+  const System& s = *made;
+  MatrixXd answers(rows(), forces.cols());
+  for (Index column = 0; column < forces.cols(); ++column) {
+    const LargeSolution solution = gel_.solve_large(s, forces_on_nodes(s, forces.col(column)));
+    answers.col(column) = at_points(s, s.space.of_free_nodes(solution.state.at_nodes_um));
+  }
   return answers;
+}
+
+substrate::Tangent CurvedResponse::about(const Eigen::VectorXd& forces) const {
+  MBTFM_ASSERT(forces.size() == cols());
+  if (!gel_.is_large() || is_empty()) return Response::about(forces);
+  at_rest();
+  if (forces.isZero(0)) return {.displacement_um = Eigen::VectorXd::Zero(rows()), .response = at_rest_};
+  const System& s = *system_;
+  const LargeSolution solution = gel_.solve_large(s, forces_on_nodes(s, forces));
+  auto tangent = std::make_shared<const numerics::SparseCholesky>(
+      s.space.assemble(large_stiffness_of(gel_.gel(), s.space, solution.state)), gel_.factor_options());
+  return {.displacement_um = at_points(s, s.space.of_free_nodes(solution.state.at_nodes_um)),
+          .response = std::make_shared<const FactoredResponse>(system_, std::move(tangent), load_axes(), point_axes())};
 }
 
 substrate::SharedResponse CurvedResponse::kept() const { return substrate::dense_response(matrix(), gel_.threads()); }

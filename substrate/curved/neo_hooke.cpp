@@ -297,6 +297,15 @@ LargeSolution solve_neo_hooke(const Gel& gel, const Space& space, const LargeLoa
                                    where + ": take smaller forces (are they in nN?), or larger areas for them"});
 }
 
+std::function<Eigen::MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space,
+                                                            const LargeState& state) {
+  return [law = NeoHooke(gel), &space, &state](int cell) {
+    return condensed(law, Element(space.mesh().positions_of(cell)), space.values_of(cell, state.at_nodes_um),
+                     state.pressure_kPa[cell], state.dilatation[cell], true)
+        .tangent;
+  };
+}
+
 StressLaw large_stress(const Gel& gel, const LargeState& state) {
   return {.at = [law = NeoHooke(gel)](const Eigen::Matrix3d& gradient, double pressure) -> Eigen::Matrix3d {
             const Eigen::Matrix3d F = Eigen::Matrix3d::Identity() + gradient;

@@ -61,6 +61,10 @@ LargeSolution solve_neo_hooke(const Gel& gel, const Space& space, const LargeLoa
 LargeSolution solve_neo_hooke_as_far(const Gel& gel, const Space& space, const LargeLoading& loading, int load_steps,
                                      const numerics::FactorOptions& options);
 
+/// By cell of the space's mesh: the tangent about a state. Both must outlive it.
+std::function<Eigen::MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space,
+                                                            const LargeState& state);
+
 /// Cauchy's, of a state.
 StressLaw large_stress(const Gel& gel, const LargeState& state);
 
