@@ -13,6 +13,8 @@ namespace mbtfm::substrate {
 void declare(stage::ParameterList& list, SubstrateParameters& p) {
   list.table("substrate");
   list.add("model", p.model, "elastic model of the gel; auto: the cheapest that has the effects that are on");
+  list.add("material", p.material,
+           "law of the gel: linear (small strains), or neo-hooke, where the tractions call for large ones");
   list.add("displacement_tolerance", p.displacement_tolerance, Range::between(0, 1),
            "refined, curved: relative L2 error of an adhesion's displacements, mean over adhesions, that the mesh is "
            "refined "

@@ -18,6 +18,7 @@
 #include "pipeline/stage/stage.h"
 #include "substrate/choice/decide.h"
 #include "substrate/choice/factory.h"
+#include "substrate/choice/large_strain.h"
 #include "substrate/gel_vtu.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
@@ -34,9 +35,6 @@ struct Parameters {
 void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.gel);
   declare(list, p.substrate);
-  list.add(
-      "material", p.substrate.material,
-      "law of the gel: linear (small strains), or neo-hooke, where the tractions call for large ones (model curved)");
   declare(list, p.substrate.effects,
           {"finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement", "large_strain",
            "effect_tolerance"});
@@ -282,19 +280,20 @@ void write_result(stage::StageContext& context, const substrate::Substrate& mode
   }
 }
 
-/// Along the surface and into the gel, over each patch.
-double largest_traction_kPa(const Load& load) {
+/// Along the surface and into the gel; of a lattice the largest.
+double traction_of(const Load& load) {
   double largest = 0;
   if (load.lattice) {
     for (Eigen::Index k = 0; k < load.lattice->traction_kPa.size(); k += 3)
       largest = std::max(largest, load.lattice->traction_kPa.segment<3>(k).norm());
+    return largest;
   }
+  Eigen::VectorXd forces_nN(2 * std::ssize(load.ellipses));
   for (std::size_t j = 0; j < load.ellipses.size(); ++j) {
     const double into = load.into_the_gel_nN.empty() ? 0 : load.into_the_gel_nN[j];
-    const double area = std::numbers::pi * load.ellipses[j].semi_major_um * load.ellipses[j].semi_minor_um;
-    largest = std::max(largest, std::hypot(norm(load.forces_nN[j]), into) / area);
+    forces_nN.segment<2>(2 * static_cast<Eigen::Index>(j)) << norm(load.forces_nN[j]), into;
   }
-  return largest;
+  return choice::mean_traction_kPa(load.ellipses, forces_nN);
 }
 
 /// @throws InvalidData as check(gel)
@@ -317,7 +316,7 @@ StageReport run(const Parameters& given, stage::StageContext& context) {
   const Load load = read_load(context, parameters.gel);
   if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load, parameters.gel)))
     vertical = Switch::on;  // what is written has three components
-  const Effect strain = choice::decide_large_strain(parameters.gel, parameters.substrate, largest_traction_kPa(load));
+  const Effect strain = choice::decide_large_strain(parameters.gel, parameters.substrate, traction_of(load));
   parameters.substrate.effects.large_strain = strain.is_on ? Switch::on : Switch::off;
   const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   context.progress(0.1, "solving for the substrate");

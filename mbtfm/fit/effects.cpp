@@ -125,6 +125,7 @@ const std::vector<EffectRow>& table_of_effects() {
       {depth_graded_gel, "depth_graded_gel", of_gel<depth_graded_gel>, bounded_by_number},
       {vertical_displacement, "vertical_displacement", of_gel<vertical_displacement>, nullptr,
        "would change no tension: nothing along the surface depends on it"},
+      {large_strain, "large_strain", on_the_way<&D::strain>, bounded_by_number},
       {uneven_surface, "", of_gel<uneven_surface>, bounded_by_number},
       {common_motion, "common_motion", of_common_motion, with_motion},
       {beads_under_load, "beads_under_load", on_the_way<&D::under_load>},

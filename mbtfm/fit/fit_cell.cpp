@@ -1,10 +1,12 @@
 #include "mbtfm/fit/fit_cell.h"
 
 #include "mbtfm/fit/effects.h"
+#include "mbtfm/fit/strained_gel.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/solved_misfit.h"
 #include "pipeline/contract/errors.h"
+#include "substrate/choice/large_strain.h"
 
 namespace mbtfm::fit {
 
@@ -26,8 +28,36 @@ struct ReadyAndFitted {
   EnsembleFit fit;
 };
 
+GelUnderCell under(const ReadyCell& cell, const Parameters& p, int threads) {
+  return {.gel = *cell.gel, .cell = cell.scene.cell, .parameters = p, .threads = threads};
+}
+
+/// With `auto`, the linear fit where there is none: its effect says why.
+EnsembleFit on_strained_gel(ReadyCell& ready, EnsembleFit fit, const Inputs& inputs, const Parameters& p,
+                            const Work& work) {
+  const stage::Stopwatch watch;
+  Effect& effect = ready.decisions.strain;
+  const GelUnderCell on = under(ready, p, work.threads);
+  effect = decide_strain(on, fit, !inputs.frames.empty());
+  if (!effect.is_on) return fit;
+  try {
+    fit = fit_on_strained_gel({on, ready.scene.beads, ready.decisions.under_load.is_on}, fit,
+                              [&](LinearData data, const Trial& start) {
+                                return fit_ensemble(ready.networks, std::move(data), adhesion_ids_of(on.cell), p.fit,
+                                                    work.threads, {}, {}, &start);
+                              },
+                              work);
+  } catch (const NotSolved& none) {
+    if (effect.setting == Switch::on) throw;
+    effect.is_on = false;
+    effect.why += "; but " + none.report.reason;
+  }
+  effect.seconds = watch.seconds();
+  return fit;
+}
+
 /// On elastic cables after all where the tensions that are found without call for them.
-ReadyAndFitted ready_and_fitted(const Inputs& inputs, const Parameters& p, const Work& work) {
+ReadyAndFitted on_cables(const Inputs& inputs, const Parameters& p, const Work& work) {
   auto [ready, data] = make_ready(inputs, p, work);
   const Work of_fit = work.part(0.4, inputs.frames.empty() ? 0.5 : 0.2);
   EnsembleFit fit = fit_networks(ready, std::move(data), p.fit, of_fit);
@@ -40,6 +70,18 @@ ReadyAndFitted ready_and_fitted(const Inputs& inputs, const Parameters& p, const
   return {std::move(ready), std::move(fit)};
 }
 
+ReadyAndFitted ready_and_fitted(const Inputs& inputs, const Parameters& p, const Work& work) {
+  auto [ready, fit] = on_cables(inputs, p, work);
+  fit = on_strained_gel(ready, std::move(fit), inputs, p, work.part(0.8, 0.1));
+  return {std::move(ready), std::move(fit)};
+}
+
+/// Of the linear model and of what large strains add to it.
+double substrate_error(const ReadyCell& cell) {
+  const Effect& strain = cell.decisions.strain;
+  return cell.gel->stated_error() + (strain.is_on ? choice::kStrainElementsError * strain.number.value_or(0) : 0);
+}
+
 ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Parameters& p, int threads) {
   return error_budget({.fit = fit,
                        .data = fit.data,
@@ -47,7 +89,7 @@ ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Param
                        .cell = cell.scene.cell,
                        .beads = cell.scene.beads,
                        .gel = p.gel,
-                       .substrate_error = cell.gel->stated_error(),
+                       .substrate_error = substrate_error(cell),
                        .lacks_base = !cell.gel->capabilities().base,
                        .segmentation = p.segmentation,
                        .n_of_place = cell.decisions.placement.is_on ? 3 : 0},
@@ -57,10 +99,17 @@ ErrorBudget budget_of(const ReadyCell& cell, const EnsembleFit& fit, const Param
 /// The fit of the cell with its candidates for adhesions at other places; beads, gel and cables as in the first.
 EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters& p, int threads) {
   if (!first.decisions.fibres.is_on) second.fibres.clear();
-  LinearData data =
-      data_of({.gel = *first.gel, .cell = second, .parameters = p, .threads = threads}, first.scene.beads);
-  return fit_ensemble(of_cables(span_ensemble(second, p, threads), first.networks.front().parameters()),
-                      std::move(data), adhesion_ids_of(second), p.fit, threads, {});
+  const GelUnderCell on{.gel = *first.gel, .cell = second, .parameters = p, .threads = threads};
+  const std::vector<cables::CableNetwork> networks =
+      of_cables(span_ensemble(second, p, threads), first.networks.front().parameters());
+  const auto fitted = [&](LinearData data, const Trial* start) {
+    return fit_ensemble(networks, std::move(data), adhesion_ids_of(second), p.fit, threads, {}, {}, start);
+  };
+  EnsembleFit fit = fitted(data_of(on, first.scene.beads), nullptr);
+  if (!first.decisions.strain.is_on) return fit;
+  return fit_on_strained_gel({on, first.scene.beads, first.decisions.under_load.is_on}, std::move(fit),
+                             [&](LinearData data, const Trial& start) { return fitted(std::move(data), &start); },
+                             Work{.threads = threads});
 }
 
 Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optional<Cell>& second, const Parameters& p,

@@ -18,6 +18,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
 
 Parameters as_switched(Parameters parameters) {
   parameters.substrate.effects = parameters.effects;
+  parameters.substrate.effects.large_strain = Switch::off;  // forces call for it: the fit adds it to a linear model
   parameters.fit.loss = tensions::loss_of_switch(parameters.effects.robust_loss, parameters.fit.robust_kind);
   return parameters;
 }

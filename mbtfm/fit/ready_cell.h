@@ -23,6 +23,7 @@ struct SeriesOnGel {
 /// What was decided on the way.
 struct Decisions {
   Effect fibres, under_load, placement, elasticity, time_coupling;
+  Effect strain = {};  ///< by the forces found
 };
 
 struct ReadyCell {

@@ -52,6 +52,14 @@ Noticed unexplained(const FitOutcome& o) {
                      " nm a component) would leave. The rest is an error of the model: mesh, segmentation or gel.");
 }
 
+Noticed strain_beyond_linear(const FitOutcome& o) {
+  if (o.strain.is_on) return {};
+  const double share = o.strain.number.value_or(0);
+  return noticed(FindingKind::strain_beyond_linear, share,
+                 "The forces strain the gel so far that small-strain elasticity is off by some " + brief(100 * share) +
+                     " % of the displacement.");
+}
+
 Noticed noise_unknown(const FitOutcome& o) {
   const bool is_known = o.summary.expected_relative_l2 > 0;
   return noticed(FindingKind::noise_unknown, is_known ? 0 : static_cast<double>(o.data.displacement_um.size() / 2),
@@ -285,7 +293,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
   std::vector<Finding> findings;
   for (Noticed found :
        {cell_cut(o), common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o),
-        missing_adhesions_noticed(o), explains_little(o), unexplained(o), beads_disagree(o), noise_unknown(o),
+        missing_adhesions_noticed(o), explains_little(o), unexplained(o), strain_beyond_linear(o), beads_disagree(o), noise_unknown(o),
         noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
         out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
         out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),

@@ -27,6 +27,7 @@ struct FitOutcome {
   const std::optional<CurvedMotion>& curved;
   const std::optional<FoundPlacement>& place;
   const std::optional<ForcesBeyond>& beyond;  ///< none: not allowed for
+  const Effect& strain;                       ///< large ones of the gel
 };
 
 /// In the order in which a user should read them.

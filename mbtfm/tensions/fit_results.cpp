@@ -141,8 +141,7 @@ Figures figures_of(const CutForce& cut, const EnsembleFit& fit, const std::vecto
 /// sigma √n / |u less the motion|: the relative L2 that noise alone would leave.
 double expected_relative_l2(const EnsembleFit& fit, double noise_um) {
   const LinearData& data = fit.data;
-  const Eigen::VectorXd model = data.response->displace(fit.forces_nN);
-  const double measured_um = (less_motion(data, data.displacement_um - model) + model).norm();
+  const double measured_um = (residual_um(data, fit.forces_nN) + moved_by(data, fit.forces_nN)).norm();
   return measured_um > 0 ? noise_um * std::sqrt(static_cast<double>(data.displacement_um.size())) / measured_um : 0;
 }
 
@@ -184,8 +183,10 @@ FitSummary summary_of(const EnsembleFit& fit, const CellOnBeads& scene, double s
 }
 
 DisplacementField field_of(const Eigen::VectorXd& forces_nN, const DisplacementField& beads, const LinearData& data) {
-  Eigen::VectorXd model = data.response->displace(forces_nN);
-  if (data.motions.cols() > 0) model += data.motions * motion_in(data, data.displacement_um - model);
+  Eigen::VectorXd model = moved_by(data, forces_nN);
+  if (data.motions.cols() > 0) {
+    model += data.motions * motion_in(data, data.displacement_um - data.response->displace(forces_nN));
+  }
   DisplacementField field = beads;
   for (std::size_t i = 0; i < field.size(); ++i) {
     const auto row = 2 * static_cast<Eigen::Index>(i);

@@ -213,6 +213,20 @@ LinearData unweighted(LinearData data) {
   return reweighted(std::move(data), Eigen::VectorXd::Ones(n_beads));
 }
 
+LinearData about_forces(LinearData data, substrate::SharedResponse response, const Eigen::VectorXd& measured_um,
+                        Eigen::VectorXd offset_um) {
+  data.response = std::move(response);
+  data.displacement_um = measured_um - offset_um;
+  data.offset_um = std::move(offset_um);
+  return unweighted(std::move(data));
+}
+
+Eigen::VectorXd moved_by(const LinearData& data, const Eigen::VectorXd& forces_nN) {
+  Eigen::VectorXd moved = data.response->displace(forces_nN);
+  if (data.offset_um.size() > 0) moved += data.offset_um;
+  return moved;
+}
+
 Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_nN, int threads) {
   if (!data.is_upper) return numerics::product(*data.compliance, forces_nN, threads);
   Eigen::MatrixXd displaced = forces_nN;
@@ -275,9 +289,8 @@ double noise_variance(const LinearData& data) {
 
 double relative_l2(const LinearData& data, const Eigen::VectorXd& forces_nN) {
   const Eigen::VectorXd is_used = data.weight_per_um.unaryExpr([](double w) { return w > 0 ? 1.0 : 0.0; });
-  const Eigen::VectorXd model = data.response->displace(forces_nN),
-                        residual = less_motion(data, data.displacement_um - model);
-  const double scale = is_used.cwiseProduct(model + residual).norm();  // u less the motion
+  const Eigen::VectorXd residual = residual_um(data, forces_nN);
+  const double scale = is_used.cwiseProduct(moved_by(data, forces_nN) + residual).norm();  // u less the motion
   const double misfit = is_used.cwiseProduct(residual).norm();
   return scale > 0 ? misfit / scale : misfit;
 }

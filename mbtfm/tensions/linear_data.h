@@ -30,7 +30,8 @@ Eigen::MatrixXd displace(const ReducedData& data, const Eigen::MatrixXd& forces_
 struct LinearData {
   std::vector<Vec2> position_um;       ///< of the beads
   substrate::SharedResponse response;  ///< G: 2·beads × 2·adhesions, rows 2i, 2i+1 of bead i
-  Eigen::VectorXd displacement_um;     ///< u: 2·beads, in the same order
+  Eigen::VectorXd displacement_um;     ///< u: 2·beads, in the same order, less the offset
+  Eigen::VectorXd offset_um;           ///< of a gel that is not linear: G F + offset moves its beads; empty: 0
   Eigen::VectorXd weight_per_um;       ///< W, diagonal, 2·beads: 1/sigma; 0 where the bead is not used
   Eigen::VectorXd bead_weight;         ///< by bead, 0 … 1: what a robust loss leaves of W²
   Eigen::MatrixXd motions;             ///< M: what the beads may do besides, found with the forces; 2·beads × some
@@ -66,6 +67,14 @@ LinearData with_more_motions(LinearData data, const Eigen::MatrixXd& motions);
 LinearData reweighted(LinearData data, const Eigen::VectorXd& bead_weight);
 /// Without what a robust loss has made of the weights.
 LinearData unweighted(LinearData data);
+
+/// Of a gel that is not linear: it moves the beads by response · F + offset_um near the forces that are found. Without
+/// what a robust loss has made of the weights.
+/// @param measured_um  of the beads, 2·beads
+LinearData about_forces(LinearData data, substrate::SharedResponse response, const Eigen::VectorXd& measured_um,
+                        Eigen::VectorXd offset_um);
+/// What forces make of the beads: G F and the offset; um, 2·beads.
+Eigen::VectorXd moved_by(const LinearData& data, const Eigen::VectorXd& forces_nN);
 
 /// How much of each motion explains these displacements (2·beads × some) best, as the beads are weighed and the motions
 /// expected: (MᵀW²M + Λ)⁻¹ MᵀW² D

@@ -100,6 +100,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "up to half of the noise's standard deviation, the model's own error adds less than an eighth to what is left",
        "Look at the map of what is left: arrows in a line want a fibre, arrows at one place an adhesion, arrows "
        "everywhere another gel or a common motion of the beads."},
+      {strain_beyond_linear, "strain-beyond-linear", "fit", caution,
+       "predicted part of the displacement that small-strain elasticity leaves out", 0.05,
+       "forces are then off by about as much, which is more than the error of a good fit",
+       "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\" in cell.toml. Check "
+       "the modulus of the gel and its unit, too."},
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
        "without the noise nobody can tell whether the model fits", "Give sigma_um in displacement.csv."},
       {noise_disagrees, "noise-disagrees", "fit", caution,

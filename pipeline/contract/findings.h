@@ -44,6 +44,7 @@ enum class FindingKind {
   channel_shift,
   explains_little,
   unexplained_displacement,
+  strain_beyond_linear,
   noise_unknown,
   noise_disagrees,
   beads_disagree_by_region,

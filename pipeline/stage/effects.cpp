@@ -12,7 +12,6 @@ struct Key {
   std::string name;
   Switch EffectSwitches::*member;
   std::string meaning;
-  bool is_of_cells = true;  ///< not of mbtfm-substrate alone
 };
 
 const std::vector<Key>& switches() {
@@ -25,8 +24,7 @@ const std::vector<Key>& switches() {
       {"vertical_displacement", &S::vertical_displacement,
        "displacement into the gel; auto: where a three-dimensional surface is written"},
       {"large_strain", &S::large_strain,
-       "strains that small-strain theory gets wrong; auto: where material = neo-hooke and the tractions call for it",
-       false},
+       "strains that small-strain theory gets wrong; auto: where material = neo-hooke and the tractions call for it"},
       {"drift_affine", &S::drift_affine,
        "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
       {"common_motion", &S::common_motion,
@@ -53,7 +51,7 @@ constexpr const char* kTolerance = "effect_tolerance";
 std::vector<std::string> effect_keys() {
   std::vector<std::string> keys;
   for (const Key& key : switches()) {
-    if (key.is_of_cells) keys.push_back(key.name);
+    keys.push_back(key.name);
   }
   keys.emplace_back(kTolerance);
   return keys;

@@ -115,27 +115,6 @@ Effect decide_strain(const substrate::SubstrateParameters& p) {
 
 }  // namespace
 
-Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& p, double largest_traction_kPa) {
-  substrate::check_data(p);
-  const double number = 0.055 * largest_traction_kPa / substrate::shear_modulus_kPa(gel);
-  Effect effect = stage::decided(EffectKind::large_strain, p.effects.large_strain, number, p.effects.effect_tolerance,
-                                 "at the largest traction small-strain theory is off by some");
-  const bool has_model =
-      p.model == substrate::ModelKind::automatic || std::ranges::any_of(models(), [&](const substrate::Model& model) {
-        return model.kind == p.model && model.can.large_strain;
-      });
-  if (effect.is_on && p.material == substrate::MaterialLaw::neo_hooke && !has_model) {
-    throw UsageError("substrate.material = neo-hooke: the forces call for large strains, which the model '" +
-                     std::string(name_of(p.model)) +
-                     "' has not: take the model curved or auto, or switch effects.large_strain off");
-  }
-  if (p.material == substrate::MaterialLaw::linear) {
-    if (effect.is_on) effect.why += "; but the material is linear: take substrate.material = neo-hooke";
-    effect.is_on = false;
-  }
-  return effect;
-}
-
 substrate::GelEffects decide(const Gel& gel, const substrate::SubstrateParameters& p, const SceneSize& scene) {
   substrate::check_data(p);
   substrate::GelEffects effects{decide_thickness(gel, p, scene.width_um),

@@ -26,15 +26,8 @@ struct SceneSize {
 ///   over the mean surface adds the couple eta F, as two vertical forces would: on a half-space its field along the
 ///   surface is (1-2 nu)/(2-2 nu) eta/r of the force's own (Boussinesq), so by the same norm at most eta/a. No model
 ///   has it: never on, but its number says whether that matters.
-/// - large strain: where no force is known yet, only where its switch is on; else see decide_large_strain.
+/// - large strain: where no force is known yet, only where its switch is on; else see large_strain.h.
 /// @throws UsageError where a switch is on that the gel has no datum for, or the switches contradict each other
 substrate::GelEffects decide(const Gel& gel, const substrate::SubstrateParameters& parameters, const SceneSize& scene);
-
-/// Whether forces call for it: linear theory's relative L2 error of the displacement is 0.055, within a factor
-/// of two, of the largest traction over the shear modulus (docs/accuracy.md). Never
-/// on where the material is linear, but its number says whether that matters.
-/// @throws UsageError as decide
-Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& parameters,
-                           double largest_traction_kPa);
 
 }  // namespace mbtfm::choice

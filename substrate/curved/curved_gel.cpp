@@ -164,8 +164,8 @@ class CurvedResponse final : public substrate::Response {
   Axes point_axes() const {
     return {observations_.components == substrate::Components::normal ? 2 : 0, observations_.n_components()};
   }
-  /// Of small strains.
   const FactoredResponse& at_rest() const;
+  std::shared_ptr<const FactoredResponse> tangent_at(const LargeState& state) const;
   MatrixXd displace_far(const MatrixXd& forces) const;
   Vectors forces_on_nodes(const System& system, const Eigen::VectorXd& forces) const;
   Eigen::VectorXd at_points(const System& system, const Vectors& free_um) const;
@@ -457,8 +457,10 @@ class CurvedGel final : public substrate::Substrate {
 
 const FactoredResponse& CurvedResponse::at_rest() const {
   std::call_once(once_, [&] {
-    system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes(), true);
-    at_rest_ = std::make_shared<const FactoredResponse>(system_, system_->factor, load_axes(), point_axes());
+    system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes(), !gel_.is_large());
+    at_rest_ = gel_.is_large() ? tangent_at(state_at_rest(system_->space))
+                               : std::make_shared<const FactoredResponse>(system_, system_->factor, load_axes(),
+                                                                          point_axes());
   });
   return *at_rest_;
 }
@@ -503,6 +505,14 @@ MatrixXd CurvedResponse::displace_far(const MatrixXd& forces) const {
   return answers;
 }
 
+/// On a coarse mesh the linear elements differ from these, which project what is left of div u, too: the derivative at
+/// rest is by the same elements as the others.
+std::shared_ptr<const FactoredResponse> CurvedResponse::tangent_at(const LargeState& state) const {
+  auto tangent = std::make_shared<const numerics::SparseCholesky>(
+      system_->space.assemble(large_stiffness_of(gel_.gel(), system_->space, state)), gel_.factor_options());
+  return std::make_shared<const FactoredResponse>(system_, std::move(tangent), load_axes(), point_axes());
+}
+
 substrate::Tangent CurvedResponse::about(const Eigen::VectorXd& forces) const {
   MBTFM_ASSERT(forces.size() == cols());
   if (!gel_.is_large() || is_empty()) return Response::about(forces);
@@ -510,10 +520,8 @@ substrate::Tangent CurvedResponse::about(const Eigen::VectorXd& forces) const {
   if (forces.isZero(0)) return {.displacement_um = Eigen::VectorXd::Zero(rows()), .response = at_rest_};
   const System& s = *system_;
   const LargeSolution solution = gel_.solve_large(s, forces_on_nodes(s, forces));
-  auto tangent = std::make_shared<const numerics::SparseCholesky>(
-      s.space.assemble(large_stiffness_of(gel_.gel(), s.space, solution.state)), gel_.factor_options());
   return {.displacement_um = at_points(s, s.space.of_free_nodes(solution.state.at_nodes_um)),
-          .response = std::make_shared<const FactoredResponse>(system_, std::move(tangent), load_axes(), point_axes())};
+          .response = tangent_at(solution.state)};
 }
 
 substrate::SharedResponse CurvedResponse::kept() const { return substrate::dense_response(matrix(), gel_.threads()); }

@@ -101,8 +101,7 @@ class Solver {
       for (std::size_t k = 0; k < forces_.size(); ++k) forces_[k] += by_volume[k];
     }
     for (std::size_t k = 0; k < loading.at_nodes_nN.size(); ++k) forces_[k] += loading.at_nodes_nN[k];
-    state_ = {Vectors(space.mesh().position_um.size(), kNull), std::vector<Eigen::Vector4d>(n_cells, {0, 0, 0, 0}),
-              std::vector<Eigen::Vector4d>(n_cells, {1, 0, 0, 0})};
+    state_ = state_at_rest(space);
   }
 
   LargeSolution solve(int load_steps) {
@@ -277,6 +276,12 @@ Eigen::Matrix3d NeoHooke::stress_change_kPa(const Eigen::Matrix3d& F, double p_k
   const double d_log_J = g.cwiseProduct(dF).sum();
   return a * (dF - 2.0 / 3 * F.cwiseProduct(dF).sum() * g - trace / 3 * dg) -
          2.0 / 3 * d_log_J * a * (F - trace / 3 * g) + p_kPa * J * (d_log_J * g + dg);
+}
+
+LargeState state_at_rest(const Space& space) {
+  const auto n_cells = static_cast<std::size_t>(space.mesh().n_cells());
+  return {Vectors(space.mesh().position_um.size(), Eigen::Vector3d::Zero()),
+          std::vector<Eigen::Vector4d>(n_cells, {0, 0, 0, 0}), std::vector<Eigen::Vector4d>(n_cells, {1, 0, 0, 0})};
 }
 
 LargeSolution solve_neo_hooke_as_far(const Gel& gel, const Space& space, const LargeLoading& loading, int load_steps,

@@ -34,6 +34,9 @@ struct LargeState {
   std::vector<Eigen::Vector4d> pressure_kPa, dilatation;
 };
 
+/// While nothing acts.
+LargeState state_at_rest(const Space& space);
+
 /// What acts, per area and volume of the gel at rest, and keeps its direction.
 struct LargeLoading {
   OfSurface traction_kPa = {};

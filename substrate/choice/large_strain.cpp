@@ -1,0 +1,125 @@
+#include "substrate/choice/large_strain.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <utility>
+
+#include "pipeline/contract/errors.h"
+#include "substrate/choice/factory.h"
+#include "substrate/effects.h"
+#include "substrate/material.h"
+
+namespace mbtfm::choice {
+namespace {
+
+std::unique_ptr<substrate::Substrate> neo_hookean(const Gel& gel, int threads) {
+  substrate::SubstrateParameters p;
+  p.model = substrate::ModelKind::curved;
+  p.material = substrate::MaterialLaw::neo_hooke;
+  p.effects.large_strain = Switch::on;
+  p.displacement_tolerance = 0;  // the first mesh
+  p.elements_across_adhesion = 1;
+  p.growth = 8;
+  p.margin_thicknesses = 1;  // far away strains are small
+  return make_substrate(gel, p, threads);
+}
+
+double traction_kPa(const substrate::Ellipse& e, double force_nN) {
+  return force_nN / (std::numbers::pi * e.semi_major_um * e.semi_minor_um);
+}
+
+/// Magnitude of the force on an ellipse.
+double force_on(Eigen::Index j, const Eigen::VectorXd& forces_nN) { return forces_nN.segment<2>(2 * j).norm(); }
+
+/// Those that matter: what one strains the gel by makes a displacement as its force times its traction.
+std::vector<Eigen::Index> straining(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN) {
+  constexpr double kLeftOut = 1e-3;  // of the sum of squares: 3 % of the change
+  std::vector<std::pair<double, Eigen::Index>> squares;
+  double left = 0;
+  for (Eigen::Index j = 0; j < std::ssize(ellipses); ++j) {
+    const double force = force_on(j, forces_nN);
+    squares.emplace_back(std::pow(force * traction_kPa(ellipses[static_cast<std::size_t>(j)], force), 2), j);
+    left += squares.back().first;
+  }
+  std::ranges::sort(squares, std::greater());
+  const double most = kLeftOut * left;
+  std::vector<Eigen::Index> taken;
+  for (const auto& [square, j] : squares) {
+    if (left <= most) break;
+    taken.push_back(j);
+    left -= square;
+  }
+  std::ranges::sort(taken);
+  return taken;
+}
+
+std::vector<substrate::Ellipse> chosen(const std::vector<substrate::Ellipse>& all,
+                                       const std::vector<Eigen::Index>& taken) {
+  std::vector<substrate::Ellipse> some;
+  for (const Eigen::Index j : taken) some.push_back(all[static_cast<std::size_t>(j)]);
+  return some;
+}
+
+}  // namespace
+
+LargeStrain::LargeStrain(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
+                         const std::vector<Vec2>& points_um, const Eigen::VectorXd& near_nN, int threads)
+    : taken_(straining(ellipses, near_nN)),
+      elements_(neo_hookean(gel, threads)),
+      response_(elements_->response({chosen(ellipses, taken_)}, {points_um})) {}
+
+substrate::Tangent LargeStrain::about(const Eigen::VectorXd& forces_nN) const {
+  Eigen::VectorXd forces(response_->cols());
+  for (std::size_t k = 0; k < taken_.size(); ++k)
+    forces.segment<2>(2 * static_cast<Eigen::Index>(k)) = forces_nN.segment<2>(2 * taken_[k]);
+  const auto rest = response_->about(Eigen::VectorXd::Zero(forces.size())).response;
+  const substrate::Tangent there = response_->about(forces);
+  return {.displacement_um = there.displacement_um - rest->displace(forces),
+          .response = substrate::lazy_response(
+              {.rows = response_->rows(),
+               .cols = forces_nN.size(),
+               .matrix = [taken = taken_, n = forces_nN.size(), there = there.response, rest] {
+                 const Eigen::MatrixXd a = there->matrix(), b = rest->matrix();
+                 Eigen::MatrixXd change = Eigen::MatrixXd::Zero(a.rows(), n);
+                 for (std::size_t k = 0; k < taken.size(); ++k) {
+                   const auto from = 2 * static_cast<Eigen::Index>(k);
+                   change.middleCols<2>(2 * taken[k]) = a.middleCols<2>(from) - b.middleCols<2>(from);
+                 }
+                 return change;
+               }})};
+}
+
+double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN) {
+  double squares = 0, weight = 0;
+  for (std::size_t j = 0; j < ellipses.size(); ++j) {
+    const double force = force_on(static_cast<Eigen::Index>(j), forces_nN);
+    squares += std::pow(force * traction_kPa(ellipses[j], force), 2);
+    weight += force * force;
+  }
+  return weight > 0 ? std::sqrt(squares / weight) : 0;
+}
+
+Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& p, double traction) {
+  substrate::check_data(p);
+  const double number = 0.055 * traction / substrate::shear_modulus_kPa(gel);
+  Effect effect = stage::decided(EffectKind::large_strain, p.effects.large_strain, number, p.effects.effect_tolerance,
+                                 "under these tractions small-strain theory is off by some");
+  const bool has_model =
+      p.model == substrate::ModelKind::automatic || std::ranges::any_of(models(), [&](const substrate::Model& model) {
+        return model.kind == p.model && model.can.large_strain;
+      });
+  if (effect.is_on && p.material == substrate::MaterialLaw::neo_hooke && !has_model) {
+    throw UsageError("substrate.material = neo-hooke: the forces call for large strains, which the model '" +
+                     std::string(name_of(p.model)) +
+                     "' has not: take the model curved or auto, or switch effects.large_strain off");
+  }
+  if (p.material == substrate::MaterialLaw::linear) {
+    if (effect.is_on) effect.why += "; but the material is linear: take substrate.material = neo-hooke";
+    effect.is_on = false;
+  }
+  return effect;
+}
+
+}  // namespace mbtfm::choice

@@ -1,0 +1,48 @@
+/// What large strains change of a gel's displacement: a Neo-Hookean gel less a linear one, both on the same elements,
+/// whose own errors are the same in both. Added to a linear model that is exact, or has other effects, it needs far
+/// coarser elements than a field would.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "substrate/compliance.h"
+#include "substrate/loads.h"
+#include "substrate/response.h"
+
+namespace mbtfm::choice {
+
+class LargeStrain {
+ public:
+  /// @param gel  of one modulus
+  /// @param near_nN  forces like those to come: ellipses that they hardly load stay out of it, as they strain nothing
+  /// @throws as Substrate::response
+  LargeStrain(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec2>& points_um,
+              const Eigen::VectorXd& near_nN, int threads);
+  /// By how much the points move otherwise than by G F, to first order about these forces; 2·points, and
+  /// 2·points × 2·ellipses.
+  /// @throws NotSolved where the gel finds no state under them
+  substrate::Tangent about(const Eigen::VectorXd& forces_nN) const;
+  /// Of the elements, and of the last solution.
+  Figures figures() const { return elements_->figures(); }
+
+ private:
+  std::vector<Eigen::Index> taken_;  ///< of the ellipses, ascending
+  std::unique_ptr<substrate::Substrate> elements_;
+  substrate::LazyResponse response_;  ///< of those taken
+};
+
+/// Largest part of the change that the elements leave out or add: measured (docs/accuracy.md).
+constexpr double kStrainElementsError = 0.15;
+
+/// Of forces spread over ellipses: the root mean square of the tractions, by the squares of the forces, as these make
+/// the squares of the displacement.
+double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN);
+
+/// Whether tractions call for large strains: linear theory's relative L2 error of the displacement is 0.055, within a
+/// factor of two, of the traction over the shear modulus (docs/accuracy.md). Never on where the material is linear, but
+/// its number says whether that matters.
+/// @throws UsageError as decide
+Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& parameters, double traction_kPa);
+
+}  // namespace mbtfm::choice
