@@ -47,13 +47,6 @@ enum class FiniteElement {
 };
 constexpr auto words(FiniteElement) { return std::array{"q2-p1disc", "q1-p0"}; }
 
-/// What relates stress to strain.
-enum class MaterialLaw {
-  linear,    ///< small strains
-  neo_hooke  ///< large ones, too, where a load calls for it
-};
-constexpr auto words(MaterialLaw) { return std::array{"linear", "neo-hooke"}; }
-
 struct SubstrateParameters {
   ModelKind model = ModelKind::automatic;  ///< how, not what
   double displacement_tolerance = 0.02;    ///< a third of the beads' noise in good experiments

@@ -316,7 +316,8 @@ StageReport run(const Parameters& given, stage::StageContext& context) {
   const Load load = read_load(context, parameters.gel);
   if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load, parameters.gel)))
     vertical = Switch::on;  // what is written has three components
-  const Effect strain = choice::decide_large_strain(parameters.gel, parameters.substrate, traction_of(load));
+  const Effect strain = choice::decide_large_strain(
+      parameters.substrate, choice::left_out_in_gel(parameters.gel, traction_of(load)));
   parameters.substrate.effects.large_strain = strain.is_on ? Switch::on : Switch::off;
   const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   context.progress(0.1, "solving for the substrate");

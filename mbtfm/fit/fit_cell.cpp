@@ -41,12 +41,13 @@ EnsembleFit on_strained_gel(ReadyCell& ready, EnsembleFit fit, const Inputs& inp
   effect = decide_strain(on, fit, !inputs.frames.empty());
   if (!effect.is_on) return fit;
   try {
-    fit = fit_on_strained_gel({on, ready.scene.beads, ready.decisions.under_load.is_on}, fit,
-                              [&](LinearData data, const Trial& start) {
-                                return fit_ensemble(ready.networks, std::move(data), adhesion_ids_of(on.cell), p.fit,
-                                                    work.threads, {}, {}, &start);
-                              },
-                              work);
+    fit = fit_on_strained_gel(
+        {on, ready.scene.beads, ready.decisions.under_load.is_on}, fit,
+        [&](LinearData data, const Trial& start) {
+          return fit_ensemble(ready.networks, std::move(data), adhesion_ids_of(on.cell), p.fit, work.threads, {}, {},
+                              &start);
+        },
+        work);
   } catch (const NotSolved& none) {
     if (effect.setting == Switch::on) throw;
     effect.is_on = false;
@@ -107,9 +108,9 @@ EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters&
   };
   EnsembleFit fit = fitted(data_of(on, first.scene.beads), nullptr);
   if (!first.decisions.strain.is_on) return fit;
-  return fit_on_strained_gel({on, first.scene.beads, first.decisions.under_load.is_on}, std::move(fit),
-                             [&](LinearData data, const Trial& start) { return fitted(std::move(data), &start); },
-                             Work{.threads = threads});
+  return fit_on_strained_gel(
+      {on, first.scene.beads, first.decisions.under_load.is_on}, std::move(fit),
+      [&](LinearData data, const Trial& start) { return fitted(std::move(data), &start); }, Work{.threads = threads});
 }
 
 Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optional<Cell>& second, const Parameters& p,

@@ -37,9 +37,10 @@ std::string summary_line(const FittedCell& cell) {
 }
 
 std::vector<Finding> all_findings(const FittedCell& c) {
-  std::vector<Finding> findings = findings_of({c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions,
-                                               c.checks.missing_fibres, c.checks.missing_adhesions, c.motions.common,
-                                               c.motions.curved, c.motions.placement, c.ready.beyond, c.ready.decisions.strain});
+  std::vector<Finding> findings =
+      findings_of({c.fit, c.fit.data, c.seen, c.found.summary, c.found.tensions, c.checks.missing_fibres,
+                   c.checks.missing_adhesions, c.motions.common, c.motions.curved, c.motions.placement, c.ready.beyond,
+                   c.ready.decisions.strain});
   const bool has_error = c.parameters.gel.youngs_modulus_sigma_kPa.has_value();
   if (const auto unknown =
           noticed(FindingKind::modulus_error_unknown, has_error ? 0 : 1,

@@ -89,8 +89,8 @@ Effect decide_strain(const GelUnderCell& on, const EnsembleFit& fit, bool is_ser
   substrate::SubstrateParameters asked;  // whatever the linear model is: the change is added to it
   asked.material = p.substrate.material;
   asked.effects = p.effects;
-  Effect effect = choice::decide_large_strain(
-      p.gel, asked, choice::mean_traction_kPa(ellipses_of(on.cell), adhesion_forces_nN(fit)));
+  const double traction_kPa = choice::mean_traction_kPa(ellipses_of(on.cell), adhesion_forces_nN(fit));
+  Effect effect = choice::decide_large_strain(asked, choice::left_out_at_beads(p.gel, traction_kPa));
   if (!effect.is_on) return effect;
   const std::vector<Effect> of_gel = on.gel.effects();
   const auto graded = std::ranges::find(of_gel, EffectKind::depth_graded_gel, &Effect::kind);

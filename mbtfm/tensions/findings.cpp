@@ -291,13 +291,26 @@ Imbalance imbalance_of(const EnsembleFit& fit) {
 std::vector<Finding> findings_of(const FitOutcome& o) {
   const Imbalance imbalance = imbalance_of(o.fit);
   std::vector<Finding> findings;
-  for (Noticed found :
-       {cell_cut(o), common_motion(o), curved_motion(o), channel_shift(o), missing_fibres_noticed(o),
-        missing_adhesions_noticed(o), explains_little(o), unexplained(o), strain_beyond_linear(o), beads_disagree(o), noise_unknown(o),
-        noise_disagrees(o), not_identifiable(o), network_not_identifiable(o), fibres_without_tension(o), single_mesh(o),
-        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
-        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"), wide_intervals(o),
-        tensions_at_zero(o)}) {
+  for (Noticed found : {cell_cut(o),
+                        common_motion(o),
+                        curved_motion(o),
+                        channel_shift(o),
+                        missing_fibres_noticed(o),
+                        missing_adhesions_noticed(o),
+                        explains_little(o),
+                        unexplained(o),
+                        strain_beyond_linear(o),
+                        beads_disagree(o),
+                        noise_unknown(o),
+                        noise_disagrees(o),
+                        not_identifiable(o),
+                        network_not_identifiable(o),
+                        fibres_without_tension(o),
+                        single_mesh(o),
+                        out_of_balance(FindingKind::forces_out_of_balance, imbalance.force, "forces"),
+                        out_of_balance(FindingKind::torques_out_of_balance, imbalance.torque, "torques"),
+                        wide_intervals(o),
+                        tensions_at_zero(o)}) {
     if (found) findings.push_back(std::move(*found));
   }
   return findings;

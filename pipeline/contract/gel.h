@@ -22,6 +22,13 @@ struct Gel {
 enum class GelModel { layer, half_space };
 constexpr auto words(GelModel) { return std::array{"layer", "half-space"}; }
 
+/// What relates stress to strain.
+enum class MaterialLaw {
+  linear,    ///< small strains
+  neo_hooke  ///< large ones, too, where a load calls for it
+};
+constexpr auto words(MaterialLaw) { return std::array{"linear", "neo-hooke"}; }
+
 /// State what must hold of a value. @throws InvalidData naming the element and the finding.
 void check(const Gel& gel);
 

@@ -170,6 +170,8 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("simulation_edge_length_um", p.mechanics.simulation_edge_length_um, Range::mesh_um(),
            "mean cable length of the simulation's network (um)");
   list.add("simulation_substrate", p.mechanics.simulation_substrate, "model of the gel in the simulation");
+  list.add("simulation_material", p.mechanics.simulation_material,
+           "law of the gel in the simulation: linear, or neo-hooke, whatever the strains are");
   declare_microscope(list, p.microscope);
 }
 

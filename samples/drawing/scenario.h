@@ -100,6 +100,7 @@ struct TensionParameters {
 struct MechanicsParameters {
   double simulation_edge_length_um = 0.9;           ///< of its network: well below the 1.5 um of a reconstruction
   GelModel simulation_substrate = GelModel::layer;  ///< the Green's function of the finite layer: exact
+  MaterialLaw simulation_material = MaterialLaw::linear;
 };
 
 enum class ImageQuality { good, ordinary, poor };

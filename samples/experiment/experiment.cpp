@@ -10,8 +10,10 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/memory.h"
 #include "samples/drawing/random.h"
+#include "substrate/choice/large_strain.h"
 #include "substrate/compliance.h"
 #include "substrate/greens/models.h"
+#include "substrate/models.h"
 
 namespace mbtfm::experiment {
 
@@ -95,7 +97,14 @@ DisplacementField displacement_of(const Experiment& e, const drawing::ScenarioPa
     forces.push_back(e.forces[i].force_nN);
   }
   const std::vector<Vec2> beads = place_beads(p);
-  const std::vector<Vec2> displacements = gel->displacements_um(beads, ellipses, forces);
+  std::vector<Vec2> displacements = gel->displacements_um(beads, ellipses, forces);
+  if (p.mechanics.simulation_material == MaterialLaw::neo_hooke) {
+    constexpr double kElementsAcross = 2;  // finer than a fit's, as the network is
+    const Eigen::VectorXd at_adhesions = substrate::column_of(forces);
+    const choice::LargeStrain large(p.gel, ellipses, beads, at_adhesions, threads, kElementsAcross);
+    const std::vector<Vec2> change = substrate::vectors_of(large.about(at_adhesions).displacement_um);
+    for (std::size_t i = 0; i < beads.size(); ++i) displacements[i] += change[i];
+  }
   DisplacementField field;
   for (std::size_t i = 0; i < beads.size(); ++i) {
     field.push_back({.position_um = beads[i], .displacement_um = displacements[i], .sigma_um = 0, .flag = {}});

@@ -14,13 +14,13 @@
 namespace mbtfm::choice {
 namespace {
 
-std::unique_ptr<substrate::Substrate> neo_hookean(const Gel& gel, int threads) {
+std::unique_ptr<substrate::Substrate> neo_hookean(const Gel& gel, double elements_across, int threads) {
   substrate::SubstrateParameters p;
   p.model = substrate::ModelKind::curved;
-  p.material = substrate::MaterialLaw::neo_hooke;
+  p.material = MaterialLaw::neo_hooke;
   p.effects.large_strain = Switch::on;
   p.displacement_tolerance = 0;  // the first mesh
-  p.elements_across_adhesion = 1;
+  p.elements_across_adhesion = elements_across;
   p.growth = 8;
   p.margin_thicknesses = 1;  // far away strains are small
   return make_substrate(gel, p, threads);
@@ -35,7 +35,7 @@ double force_on(Eigen::Index j, const Eigen::VectorXd& forces_nN) { return force
 
 /// Those that matter: what one strains the gel by makes a displacement as its force times its traction.
 std::vector<Eigen::Index> straining(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN) {
-  constexpr double kLeftOut = 1e-3;  // of the sum of squares: 3 % of the change
+  constexpr double kLeftOut = 1e-2;  // of the sum of squares: a tenth of the change, which is some per cent
   std::vector<std::pair<double, Eigen::Index>> squares;
   double left = 0;
   for (Eigen::Index j = 0; j < std::ssize(ellipses); ++j) {
@@ -65,9 +65,10 @@ std::vector<substrate::Ellipse> chosen(const std::vector<substrate::Ellipse>& al
 }  // namespace
 
 LargeStrain::LargeStrain(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses,
-                         const std::vector<Vec2>& points_um, const Eigen::VectorXd& near_nN, int threads)
+                         const std::vector<Vec2>& points_um, const Eigen::VectorXd& near_nN, int threads,
+                         double elements_across)
     : taken_(straining(ellipses, near_nN)),
-      elements_(neo_hookean(gel, threads)),
+      elements_(neo_hookean(gel, elements_across, threads)),
       response_(elements_->response({chosen(ellipses, taken_)}, {points_um})) {}
 
 substrate::Tangent LargeStrain::about(const Eigen::VectorXd& forces_nN) const {
@@ -77,18 +78,19 @@ substrate::Tangent LargeStrain::about(const Eigen::VectorXd& forces_nN) const {
   const auto rest = response_->about(Eigen::VectorXd::Zero(forces.size())).response;
   const substrate::Tangent there = response_->about(forces);
   return {.displacement_um = there.displacement_um - rest->displace(forces),
-          .response = substrate::lazy_response(
-              {.rows = response_->rows(),
-               .cols = forces_nN.size(),
-               .matrix = [taken = taken_, n = forces_nN.size(), there = there.response, rest] {
-                 const Eigen::MatrixXd a = there->matrix(), b = rest->matrix();
-                 Eigen::MatrixXd change = Eigen::MatrixXd::Zero(a.rows(), n);
-                 for (std::size_t k = 0; k < taken.size(); ++k) {
-                   const auto from = 2 * static_cast<Eigen::Index>(k);
-                   change.middleCols<2>(2 * taken[k]) = a.middleCols<2>(from) - b.middleCols<2>(from);
-                 }
-                 return change;
-               }})};
+          .response =
+              substrate::lazy_response({.rows = response_->rows(),
+                                        .cols = forces_nN.size(),
+                                        .matrix = [taken = taken_, n = forces_nN.size(), there = there.response, rest] {
+                                          const Eigen::MatrixXd a = there->matrix(), b = rest->matrix();
+                                          Eigen::MatrixXd change = Eigen::MatrixXd::Zero(a.rows(), n);
+                                          for (std::size_t k = 0; k < taken.size(); ++k) {
+                                            const auto from = 2 * static_cast<Eigen::Index>(k);
+                                            change.middleCols<2>(2 * taken[k]) =
+                                                a.middleCols<2>(from) - b.middleCols<2>(from);
+                                          }
+                                          return change;
+                                        }})};
 }
 
 double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN) {
@@ -101,21 +103,25 @@ double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const 
   return weight > 0 ? std::sqrt(squares / weight) : 0;
 }
 
-Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& p, double traction) {
+double left_out_in_gel(const Gel& gel, double traction) { return 0.055 * traction / substrate::shear_modulus_kPa(gel); }
+double left_out_at_beads(const Gel& gel, double traction) {
+  return 0.015 * traction / substrate::shear_modulus_kPa(gel);
+}
+
+Effect decide_large_strain(const substrate::SubstrateParameters& p, double left_out) {
   substrate::check_data(p);
-  const double number = 0.055 * traction / substrate::shear_modulus_kPa(gel);
-  Effect effect = stage::decided(EffectKind::large_strain, p.effects.large_strain, number, p.effects.effect_tolerance,
+  Effect effect = stage::decided(EffectKind::large_strain, p.effects.large_strain, left_out, p.effects.effect_tolerance,
                                  "under these tractions small-strain theory is off by some");
   const bool has_model =
       p.model == substrate::ModelKind::automatic || std::ranges::any_of(models(), [&](const substrate::Model& model) {
         return model.kind == p.model && model.can.large_strain;
       });
-  if (effect.is_on && p.material == substrate::MaterialLaw::neo_hooke && !has_model) {
+  if (effect.is_on && p.material == MaterialLaw::neo_hooke && !has_model) {
     throw UsageError("substrate.material = neo-hooke: the forces call for large strains, which the model '" +
                      std::string(name_of(p.model)) +
                      "' has not: take the model curved or auto, or switch effects.large_strain off");
   }
-  if (p.material == substrate::MaterialLaw::linear) {
+  if (p.material == MaterialLaw::linear) {
     if (effect.is_on) effect.why += "; but the material is linear: take substrate.material = neo-hooke";
     effect.is_on = false;
   }

@@ -16,9 +16,10 @@ class LargeStrain {
  public:
   /// @param gel  of one modulus
   /// @param near_nN  forces like those to come: ellipses that they hardly load stay out of it, as they strain nothing
+  /// @param elements_across  the square root of an ellipse's area over the side of the elements that carry it
   /// @throws as Substrate::response
   LargeStrain(const Gel& gel, const std::vector<substrate::Ellipse>& ellipses, const std::vector<Vec2>& points_um,
-              const Eigen::VectorXd& near_nN, int threads);
+              const Eigen::VectorXd& near_nN, int threads, double elements_across = 1);
   /// By how much the points move otherwise than by G F, to first order about these forces; 2·points, and
   /// 2·points × 2·ellipses.
   /// @throws NotSolved where the gel finds no state under them
@@ -39,10 +40,14 @@ constexpr double kStrainElementsError = 0.15;
 /// the squares of the displacement.
 double mean_traction_kPa(const std::vector<substrate::Ellipse>& ellipses, const Eigen::VectorXd& forces_nN);
 
-/// Whether tractions call for large strains: linear theory's relative L2 error of the displacement is 0.055, within a
-/// factor of two, of the traction over the shear modulus (docs/accuracy.md). Never on where the material is linear, but
-/// its number says whether that matters.
-/// @throws UsageError as decide
-Effect decide_large_strain(const Gel& gel, const substrate::SubstrateParameters& parameters, double traction_kPa);
+/// What linear theory leaves out of the displacement, as a share of its L2 norm, within a factor of two: everywhere in
+/// the gel, or at beads all over its surface, most of them far from the adhesions, which are small. Measured
+/// (docs/accuracy.md).
+double left_out_in_gel(const Gel& gel, double traction_kPa);
+double left_out_at_beads(const Gel& gel, double traction_kPa);
+
+/// Whether that calls for large strains. Never on where the material is linear, but its number says whether that
+/// matters. @throws UsageError as decide
+Effect decide_large_strain(const substrate::SubstrateParameters& parameters, double left_out);
 
 }  // namespace mbtfm::choice

@@ -458,9 +458,9 @@ class CurvedGel final : public substrate::Substrate {
 const FactoredResponse& CurvedResponse::at_rest() const {
   std::call_once(once_, [&] {
     system_ = gel_.system_for(loads_, observations_, load_axes(), point_axes(), !gel_.is_large());
-    at_rest_ = gel_.is_large() ? tangent_at(state_at_rest(system_->space))
-                               : std::make_shared<const FactoredResponse>(system_, system_->factor, load_axes(),
-                                                                          point_axes());
+    at_rest_ = gel_.is_large()
+                   ? tangent_at(state_at_rest(system_->space))
+                   : std::make_shared<const FactoredResponse>(system_, system_->factor, load_axes(), point_axes());
   });
   return *at_rest_;
 }

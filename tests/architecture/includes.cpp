@@ -63,7 +63,7 @@ const Graph kMayInclude = {
     {"samples/drawing", {"pipeline/contract", "pipeline/numerics", "pipeline/stage", "segment/images"}},
     {"samples/experiment",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "samples/drawing", "network/mesh", "network/cables",
-      "substrate", "substrate/greens"}},
+      "substrate", "substrate/choice", "substrate/greens"}},
 };
 
 /// Third-party headers and the nodes that may see them, by the beginning of the include.
