@@ -1,0 +1,97 @@
+/// A cell that strains its gel beyond linear elasticity, simulated and fitted.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/contract/results.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Outcome;
+using test::run_program;
+
+class LargeStrains : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    // its elements are finer than the fit's, and noise of two thousandths lets the gel's law be seen
+    const Outcome made = run_program(
+        "mbtfm-simulate --quiet --scenario two-adhesions --seed 3 --beads 6000 "
+        "--youngs_modulus_kPa 11 --noise 0.002 --simulation_material neo-hooke --out " +
+        cell().string());
+    ASSERT_EQ(made.code, 0) << made.output;
+    toml_ = files::read_text(cell() / "cell.toml");
+  }
+  fs::path cell() const { return folder_ / "cell"; }
+
+  Outcome run(const std::string& settings) {
+    files::write_text(cell() / "cell.toml", toml_ + settings);
+    return run_program("mbtfm run " + cell().string());
+  }
+  /// Of the forces found, |F − true| / |true|.
+  double error() const {
+    const auto truth = files::read_adhesion_forces(cell() / "truth/adhesion_forces.csv"),
+               found = files::read_adhesion_forces(cell() / "4_fit/adhesion_forces.csv");
+    double off = 0, size = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      off += std::pow(norm(found.at(i).force_nN - truth[i].force_nN), 2);
+      size += std::pow(norm(truth[i].force_nN), 2);
+    }
+    return std::sqrt(off / size);
+  }
+
+ private:
+  test::TemporaryFolder folder_;
+  std::string toml_;
+};
+
+TEST_F(LargeStrains, a_fit_that_has_them_comes_nearer_to_the_truth_than_one_that_has_not) {
+  const Outcome linear = run("");
+  ASSERT_EQ(linear.code, 0) << linear.output;
+  EXPECT_NE(linear.output.find("large strain: off (auto)"), std::string::npos) << linear.output;
+  const double error_of_linear = error();
+  const Outcome large = run("\n[substrate]\nmaterial = 'neo-hooke'\n");
+  ASSERT_EQ(large.code, 0) << large.output;
+  EXPECT_NE(large.output.find("large strain: on (auto)"), std::string::npos) << large.output;
+  RecordProperty("errors", std::to_string(error_of_linear) + " " + std::to_string(error()));
+  EXPECT_LT(error(), 0.6 * error_of_linear);
+}
+
+TEST_F(LargeStrains, switched_off_they_change_nothing) {
+  ASSERT_EQ(run("").code, 0);
+  const std::string forces = files::read_text(cell() / "4_fit/adhesion_forces.csv");
+  ASSERT_EQ(run("\n[substrate]\nmaterial = 'neo-hooke'\n[effects]\nlarge_strain = 'off'\n").code, 0);
+  EXPECT_EQ(files::read_text(cell() / "4_fit/adhesion_forces.csv"), forces);
+}
+
+TEST_F(LargeStrains, what_has_no_model_of_them_is_refused_or_said) {
+  const std::string kGraded = "\n[substrate]\nmaterial = 'neo-hooke'\nmodulus_profile = '0:11, 60:33'\n";
+  const Outcome asked = run(kGraded + "[effects]\nlarge_strain = 'on'\n");
+  EXPECT_EQ(asked.code, 2) << asked.output;
+  EXPECT_NE(asked.output.find("one modulus alone"), std::string::npos) << asked.output;
+  const Outcome left_to_it = run(kGraded);
+  EXPECT_EQ(left_to_it.code, 0) << left_to_it.output;
+  EXPECT_NE(left_to_it.output.find("one modulus alone"), std::string::npos) << left_to_it.output;
+}
+
+TEST_F(LargeStrains, a_gel_too_soft_for_its_forces_is_fitted_linearly_and_told) {
+  // the same displacement on a gel of another modulus: tractions over the modulus stay, so the forces are raised
+  DisplacementField beads = files::read_displacement(cell() / "2_track/displacement.csv");
+  for (Bead& b : beads) {
+    b.displacement_um = 6 * b.displacement_um;
+    b.sigma_um *= 6;
+  }
+  files::write_displacement(cell() / "2_track/displacement.csv", beads);
+  const Outcome outcome = run("\n[substrate]\nmaterial = 'neo-hooke'\n");
+  EXPECT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("large strain: off (auto)"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("found no state at rest"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("strain-beyond-linear"), std::string::npos) << outcome.output;
+}
+
+}  // namespace
+}  // namespace mbtfm
