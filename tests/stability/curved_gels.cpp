@@ -1,0 +1,234 @@
+/// Hard cases of gels that are not flat and not linear: their surfaces, as users have them, and their mechanics.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <random>
+
+#include "pipeline/contract/errors.h"
+#include "substrate/choice/factory.h"
+#include "substrate/choice/large_strain.h"
+#include "substrate/response.h"
+#include "substrate/surface/beads.h"
+#include "substrate/surface/formula.h"
+#include "substrate/surface/mesh.h"
+#include "substrate/surface/missing.h"
+#include "tests/support/beads_below.h"
+#include "tests/support/hard_case.h"
+
+namespace mbtfm {
+namespace {
+
+using Eigen::Index;
+using Eigen::VectorXd;
+using std::numbers::pi;
+using substrate::Ellipse;
+using test::came_out;
+using test::hard_case;
+using test::two_digits;
+
+/// What a call refuses; empty where it does not.
+template <class Call>
+std::string refusal_of(const Call& call) {
+  try {
+    call();
+  } catch (const InvalidData& refused) {
+    return refused.what();
+  } catch (const NotSolved& refused) {
+    return refused.what();
+  }
+  return {};
+}
+
+double off(const VectorXd& a, const VectorXd& b) { return (a - b).norm() / b.norm(); }
+
+/// Two adhesions that pull at each other across a surface, and points of it.
+struct Pair {
+  Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 40};
+  std::vector<Ellipse> ellipses = {{{-8, 1}, 2, 1.5, 0.3}, {{8, -1}, 2, 1.5, -0.3}};
+  std::vector<Vec2> points;
+
+  explicit Pair(const std::string& formula) {
+    gel.surface =
+        std::make_shared<const HeightMap>(surface::sampled(surface::formula_of(formula), {-40, -40}, {40, 40}, 0.2));
+    for (double y = -12; y <= 12; y += 4) {
+      for (double x = -14; x <= 14; x += 3.5) points.push_back({x, y});
+    }
+  }
+  VectorXd displaced(double elements_across) const {
+    substrate::SubstrateParameters p;
+    p.model = substrate::ModelKind::curved;
+    p.displacement_tolerance = 0;
+    p.elements_across_adhesion = elements_across;
+    const auto model = choice::make_substrate(gel, p, 2);
+    return model->response({ellipses}, {points})->displace(Eigen::Vector4d(3, 1, -3, -1));
+  }
+};
+
+TEST(CurvedGel, bears_a_slope_of_sixty_degrees) {
+  hard_case("adhesions on the slopes of a wave, 60 degrees steep", "coarse and fine elements within 5 %");
+  const Pair steep("wave amplitude_um=8.27 period_um=30 phase_um=7.5");  // 2 pi A / L = tan 60
+  const double difference = off(steep.displaced(2), steep.displaced(4));
+  came_out("differ by " + two_digits(100 * difference) + " %");
+  EXPECT_LE(difference, 0.05);
+}
+
+TEST(CurvedGel, bears_a_wall_of_eighty_degrees_or_refuses_it_by_place) {
+  hard_case("adhesions beside walls of a groove, 70, 80 and 89 degrees steep",
+            "coarse and fine elements within 10 %, or refused by place");
+  std::string measured;
+  // depth / (2 wall) is the tangent
+  for (const auto& [degrees, wall_um] : {std::pair{"70", "0.91"}, std::pair{"80", "0.44"}, std::pair{"89", "0.044"}}) {
+    const std::string refused = refusal_of([&, wall = wall_um] {
+      const Pair groove(std::string("groove depth_um=5 width_um=6 wall_um=") + wall);
+      const double difference = off(groove.displaced(2), groove.displaced(4));
+      EXPECT_LE(difference, 0.1);
+      measured += two_digits(100 * difference) + " %; ";
+    });
+    if (refused.empty()) continue;
+    EXPECT_NE(refused.find("surface at ("), std::string::npos) << refused;
+    measured += std::string(degrees) + " refused; ";
+  }
+  came_out(measured.substr(0, measured.size() - 2));
+}
+
+TEST(CurvedGel, hardly_cares_how_incompressible_it_is) {
+  hard_case("a wave, nu = 0.4999", "within 2 % of nu = 0.499");
+  Pair wave("wave amplitude_um=4 period_um=30");
+  wave.gel.poisson_ratio = 0.499;
+  const VectorXd before = wave.displaced(2);
+  wave.gel.poisson_ratio = 0.4999;
+  const double change = off(wave.displaced(2), before);
+  came_out("changed by " + two_digits(100 * change) + " %");
+  EXPECT_LE(change, 0.02);
+}
+
+TEST(CurvedGel, says_where_a_load_turns_it_inside_out) {
+  hard_case("tractions of twenty shear moduli on a Neo-Hookean gel",
+            "refused, with the share of the load that was reached");
+  Gel gel{.youngs_modulus_kPa = 3, .poisson_ratio = 0.49, .thickness_um = 40};
+  const std::vector<Ellipse> ellipses = {{{-8, 0}, 2, 1.5, 0}, {{8, 0}, 2, 1.5, 0}};
+  const Eigen::Vector4d forces = 190 * Eigen::Vector4d(1, 0, -1, 0);
+  const std::string refused = refusal_of([&] {
+    choice::LargeStrain(gel, ellipses, {{0, 0}}, forces, 2).about(forces);
+  });
+  came_out(refused.substr(0, refused.find(':')));
+  EXPECT_NE(refused.find("% of this load"), std::string::npos) << refused;
+}
+
+double wave(Vec2 p) { return -12 * std::cos(2 * pi * (p.x - 35) / 70); }
+
+surface::SurfaceFit fitted(const std::vector<Vec3>& beads) {
+  return surface::fit_beads(beads, std::vector<double>(beads.size(), test::kBeadSigma_um));
+}
+
+TEST(SurfaceOfBeads, of_a_few_beads_has_honest_errors_or_is_refused) {
+  hard_case("910 and 27 beads below a wave of 120 x 120 um", "the height within four standard errors, or refused");
+  std::string measured;
+  for (const double density : {1e-3, 2.5e-5}) {
+    const std::vector<Vec3> beads = test::beads_below(wave, density, 4);
+    double worst = 0;
+    const std::string refused = refusal_of([&] {
+      const surface::SurfaceFit fit = fitted(beads);
+      for (const Vec2 at : {Vec2{0, 0}, {20, 10}, {-35, -20}, {30, 40}})
+        worst = std::max(worst, std::abs(fit.height_um(at) - wave(at)) / fit.sigma_um(at));
+    });
+    EXPECT_LE(worst, 4) << density;
+    measured += (measured.empty() ? "" : "; ") + std::to_string(beads.size()) +
+                " beads: " + (refused.empty() ? two_digits(worst) + " standard errors" : "refused");
+  }
+  came_out(measured);
+}
+
+TEST(SurfaceOfBeads, is_not_lifted_by_beads_above_it) {
+  hard_case("eight stray beads up to 15 um above the surface", "named, the height as without them");
+  std::vector<Vec3> beads = test::beads_below(wave, 0.0062, 2);
+  const surface::SurfaceFit without = fitted(beads);
+  const std::size_t n = beads.size();
+  std::vector<Vec2> below;
+  for (int k = 0; k < 8; ++k) {
+    below.push_back({-40.0 + 10 * k, 35.0 - 9 * k});
+    beads.push_back({below.back().x, below.back().y, wave(below.back()) - 8 - k});
+  }
+  const surface::SurfaceFit with = fitted(beads);
+  std::size_t named = 0;
+  for (const int k : with.above_surface) named += static_cast<std::size_t>(k) >= n;
+  double lifted = 0;
+  for (const Vec2 at : below) lifted = std::max(lifted, std::abs(with.height_um(at) - without.height_um(at)));
+  came_out(std::to_string(named) + " named, lifted by " + two_digits(lifted) + " um");
+  EXPECT_EQ(named, 8u);
+  EXPECT_LE(lifted, 1);
+}
+
+TEST(SurfaceOfBeads, that_lie_in_two_sheets_is_refused) {
+  hard_case("6 000 beads in two sheets, 30 um apart", "refused: beads lie on both faces of a thin gel");
+  std::vector<Vec3> sheets;
+  std::mt19937_64 random(3);
+  std::uniform_real_distribution<double> across(-60, 60), thick(0, 1);
+  for (int k = 0; k < 6000; ++k) sheets.push_back({across(random), across(random), thick(random) + 30 * (k % 2)});
+  const std::string refused = refusal_of([&] { fitted(sheets); });
+  came_out(refused.empty() ? "not refused" : "refused");
+  EXPECT_NE(refused.find("sheets"), std::string::npos) << refused;
+}
+
+TEST(SurfaceOfAMap, has_small_holes_filled_and_wide_ones_refused) {
+  hard_case("a height map with NaN in a disc of 4 um and in one of 20 um",
+            "the small one filled within 0.1 um, the wide one refused by place");
+  const auto holed = [](double radius_um) {
+    HeightMap map = surface::sampled(wave, {-30, -30}, {30, 30}, 0.5);
+    for (std::size_t k = 0; k < map.z_um.size(); ++k) {
+      if (norm(map.vertex_um(k)) < radius_um) map.z_um[k] = std::numeric_limits<double>::quiet_NaN();
+    }
+    return map;
+  };
+  const HeightMap filled = surface::filled(holed(2), 5).map;
+  double worst = 0;
+  for (std::size_t k = 0; k < filled.z_um.size(); ++k)
+    worst = std::max(worst, std::abs(filled.z_um[k] - wave(filled.vertex_um(k))));
+  const std::string refused = refusal_of([&] { surface::filled(holed(10), 5); });
+  came_out("filled within " + two_digits(worst) + " um; " + (refused.empty() ? "not refused" : "refused"));
+  EXPECT_LE(worst, 0.1);
+  EXPECT_NE(refused.find("x, y = "), std::string::npos) << refused;
+}
+
+/// Two triangles for each square of 2 um, some of them the other way round, some missing.
+TriangleMesh mesh_of(bool has_flipped, double hole_um) {
+  constexpr int kSide = 21;
+  TriangleMesh mesh;
+  for (int j = 0; j < kSide; ++j) {
+    for (int i = 0; i < kSide; ++i) {
+      const Vec2 p = {2.0 * i - 20, 2.0 * j - 20};
+      mesh.points_um.push_back({p.x, p.y, wave(p)});
+    }
+  }
+  for (int j = 0; j + 1 < kSide; ++j) {
+    for (int i = 0; i + 1 < kSide; ++i) {
+      if (std::hypot(2.0 * i - 19, 2.0 * j - 19) < hole_um) continue;
+      const int a = kSide * j + i, b = a + 1, c = a + kSide, d = c + 1;
+      const bool flips = has_flipped && (i + j) % 7 == 0;
+      mesh.triangles.push_back(flips ? std::array{a, c, b} : std::array{a, b, c});
+      mesh.triangles.push_back(flips ? std::array{b, c, d} : std::array{b, d, c});
+    }
+  }
+  return mesh;
+}
+
+TEST(SurfaceOfAMesh, bears_flipped_normals_and_small_holes_and_refuses_wide_ones) {
+  hard_case("a triangle mesh with a seventh of its normals flipped and a hole of 4 um; a hole of 20 um",
+            "flipped ones counted, the height within 0.3 um (half of what edges of 2 um miss); refused by place");
+  const surface::MeshSurface flipped = surface::sample_mesh(mesh_of(true, 2), 1);
+  const HeightMap map = surface::filled(flipped.map, 6).map;
+  double worst = 0;
+  for (std::size_t k = 0; k < map.z_um.size(); ++k)
+    worst = std::max(worst, std::abs(map.z_um[k] - wave(map.vertex_um(k))));
+  const std::string refused = refusal_of([] { surface::filled(surface::sample_mesh(mesh_of(false, 10), 1).map, 6); });
+  came_out(std::to_string(flipped.n_flipped) + " flipped, within " + two_digits(worst) + " um; " +
+           (refused.empty() ? "not refused" : "refused"));
+  EXPECT_GT(flipped.n_flipped, 0);
+  EXPECT_LE(worst, 0.3);
+  EXPECT_NE(refused.find("x, y = "), std::string::npos) << refused;
+}
+
+}  // namespace
+}  // namespace mbtfm
