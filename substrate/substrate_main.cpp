@@ -212,17 +212,18 @@ void write_in_space(stage::StageContext& context, const substrate::Substrate& mo
   if (!has_depth) observed.points_um = files::read_points(file);  // on the surface, to the last digit
   const auto [loads, amounts] = in_space(load);
   const Eigen::VectorXd u = model.response(loads, observed)->displace(amounts).col(0);
-  files::CsvText csv({"x_um", "y_um", "z_um", "ux_um", "uy_um", "uz_um", "sigma_um", "sigma_z_um", "flag"});
+  std::vector<BeadInSpace> field;
   double largest_um = 0;
   for (std::size_t i = 0; i < points.size(); ++i) {
     const Eigen::Vector3d at_point = u.segment<3>(3 * static_cast<Eigen::Index>(i));
-    csv.add(points[i].x).add(points[i].y).add(points[i].z);
-    for (const double component : at_point) csv.add(component);
-    csv.add(0.0).add(0.0).add("");
-    csv.end_row();
+    field.push_back({.position_um = points[i],
+                     .displacement_um = {at_point.x(), at_point.y(), at_point.z()},
+                     .sigma_um = 0,
+                     .sigma_z_um = 0,
+                     .flag = {}});
     largest_um = std::max(largest_um, at_point.norm());
   }
-  files::write_text(context.output("out"), csv.str());
+  files::write_displacement_in_space(context.output("out"), field);
   figures.emplace_back("n_points", static_cast<std::int64_t>(points.size()));
   figures.emplace_back("largest_displacement_um", largest_um);
 }
@@ -316,8 +317,8 @@ StageReport run(const Parameters& given, stage::StageContext& context) {
   const Load load = read_load(context, parameters.gel);
   if (vertical == Switch::automatic && (!context.has_input("points") || is_in_space(context, load, parameters.gel)))
     vertical = Switch::on;  // what is written has three components
-  const Effect strain = choice::decide_large_strain(
-      parameters.substrate, choice::left_out_in_gel(parameters.gel, traction_of(load)));
+  const Effect strain =
+      choice::decide_large_strain(parameters.substrate, choice::left_out_in_gel(parameters.gel, traction_of(load)));
   parameters.substrate.effects.large_strain = strain.is_on ? Switch::on : Switch::off;
   const auto model = choice::make_substrate(parameters.gel, parameters.substrate, context.threads);
   context.progress(0.1, "solving for the substrate");

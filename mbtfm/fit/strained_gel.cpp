@@ -72,7 +72,8 @@ Effect decide_strain(const GelUnderCell& on, const EnsembleFit& fit, bool is_ser
   const Parameters& p = on.parameters;
   substrate::SubstrateParameters asked;  // whatever the linear model is: the change is added to it
   asked.material = p.substrate.material;
-  asked.effects = p.effects;
+  asked.effects.large_strain = p.effects.large_strain;
+  asked.effects.effect_tolerance = p.effects.effect_tolerance;
   const double traction_kPa = choice::mean_traction_kPa(ellipses_of(on.cell), adhesion_forces_nN(fit));
   Effect effect = choice::decide_large_strain(asked, choice::left_out_at_beads(p.gel, traction_kPa));
   if (!effect.is_on) return effect;

@@ -136,6 +136,15 @@ void write_displacement(const Path& file, const DisplacementField& field) {
   write(file, displacement_table(), field);
 }
 
+std::vector<BeadInSpace> read_displacement_in_space(const Path& file) {
+  return read(file, displacement_in_space_table());
+}
+
+void write_displacement_in_space(const Path& file, const std::vector<BeadInSpace>& beads) {
+  check(beads);
+  write(file, displacement_in_space_table(), beads);
+}
+
 std::string displacement_of_frame(int frame) {
   char name[32];
   std::snprintf(name, sizeof name, "displacement_%04d.csv", frame);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
@@ -33,6 +34,8 @@ Cell read_cell(const Path& folder);
 
 DisplacementField read_displacement(const Path& file);
 void write_displacement(const Path& file, const DisplacementField& field);
+std::vector<BeadInSpace> read_displacement_in_space(const Path& file);
+void write_displacement_in_space(const Path& file, const std::vector<BeadInSpace>& beads);
 /// displacement_0001.csv of a time series.
 std::string displacement_of_frame(int frame);
 

@@ -114,6 +114,24 @@ const Table<Bead>& displacement_table() {
   return table;
 }
 
+const Table<BeadInSpace>& displacement_in_space_table() {
+  using B = BeadInSpace;
+  constexpr ColumnOptions kError{.range = {.low = 0}, .may_lack = true};
+  static const Table<B> table{
+      .file = "displacement_3d.csv",
+      .row = "each bead or point in the volume of a gel",
+      .columns = {{"x_um", "its place in the relaxed state", x_of(&B::position_um)},
+                  {"y_um", "its place in the relaxed state", y_of(&B::position_um)},
+                  {"z_um", "its place, into the gel; a flat surface lies at 0", z_of(&B::position_um)},
+                  {"ux_um", "its displacement: stressed less relaxed", x_of(&B::displacement_um)},
+                  {"uy_um", "its displacement: stressed less relaxed", y_of(&B::displacement_um)},
+                  {"uz_um", "its displacement into the gel", z_of(&B::displacement_um)},
+                  {"sigma_um", "standard error along x and along y", &B::sigma_um, kError},
+                  {"sigma_z_um", "standard error along z", &B::sigma_z_um, kError},
+                  {"flag", "why it must not be used; empty: good", &B::flag, kMayLack}}};
+  return table;
+}
+
 std::vector<FibreTension> with_types(const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres) {
   std::map<int, std::optional<FibreType>> type_of;
   for (const Fibre& f : fibres) type_of[f.fibre_id] = f.type;
@@ -250,7 +268,8 @@ std::string pages_of_cell_tables() {
   return page_of(adhesion_table()) + page_of(fibre_table()) + page_of(fibre_point_table()) + page_of(outline_table()) +
          page_of(image_place_table()) + page_of(displacement_table()) + page_of(frame_table()) +
          page_of(tension_table()) + page_of(adhesion_force_table()) + page_of(missing_fibre_table()) +
-         page_of(missing_adhesion_table()) + page_of(point_table()) + page_of(reaction_table());
+         page_of(missing_adhesion_table()) + page_of(point_table()) + page_of(displacement_in_space_table()) +
+         page_of(reaction_table());
 }
 
 }  // namespace mbtfm::files

@@ -6,13 +6,14 @@
 #include <vector>
 
 #include "pipeline/contract/beads.h"
+#include "pipeline/contract/beads_in_space.h"
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/results.h"
 #include "pipeline/files/columns.h"
 
 namespace mbtfm::files {
 
-/// For columns: the components of a member of the row that is a Vec2.
+/// For columns: the components of a member of the row that is a Vec2 or a Vec3.
 template <class Access>
 auto x_of(Access access) {
   return [access](auto& row) -> auto& { return std::invoke(access, row).x; };
@@ -20,6 +21,10 @@ auto x_of(Access access) {
 template <class Access>
 auto y_of(Access access) {
   return [access](auto& row) -> auto& { return std::invoke(access, row).y; };
+}
+template <class Access>
+auto z_of(Access access) {
+  return [access](auto& row) -> auto& { return std::invoke(access, row).z; };
 }
 
 const Table<Adhesion>& adhesion_table();
@@ -40,6 +45,7 @@ const Table<OutlinePoint>& outline_table();
 
 const Table<Vec2>& point_table();
 const Table<Bead>& displacement_table();
+const Table<BeadInSpace>& displacement_in_space_table();
 
 struct FibreTension {
   Tension tension;

@@ -68,8 +68,8 @@ const std::vector<Stage>& stages() {
        .series = {"4_fit/frames.csv", "4_fit/tracks.csv"},
        .tables = {"", "gel", "network", "cables", "substrate", "fit", "checks"},
        .effects = {"stress_fibres", "finite_thickness", "finite_sides", "depth_graded_gel", "vertical_displacement",
-                   "common_motion", "beads_under_load", "channel_shift", "beyond_cut", "cable_elasticity",
-                   "robust_loss", "time_coupling", "effect_tolerance"},
+                   "large_strain", "common_motion", "beads_under_load", "channel_shift", "beyond_cut",
+                   "cable_elasticity", "robust_loss", "time_coupling", "effect_tolerance"},
        .explains = true},
   };
   return list;

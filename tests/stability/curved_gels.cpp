@@ -25,7 +25,6 @@ using Eigen::VectorXd;
 using std::numbers::pi;
 using substrate::Ellipse;
 using test::came_out;
-using test::hard_case;
 using test::two_digits;
 
 /// What a call refuses; empty where it does not.
@@ -67,7 +66,7 @@ struct Pair {
 };
 
 TEST(CurvedGel, bears_a_slope_of_sixty_degrees) {
-  hard_case("adhesions on the slopes of a wave, 60 degrees steep", "coarse and fine elements within 5 %");
+  test::hard_case("adhesions on the slopes of a wave, 60 degrees steep", "coarse and fine elements within 5 %");
   const Pair steep("wave amplitude_um=8.27 period_um=30 phase_um=7.5");  // 2 pi A / L = tan 60
   const double difference = off(steep.displaced(2), steep.displaced(4));
   came_out("differ by " + two_digits(100 * difference) + " %");
@@ -75,8 +74,8 @@ TEST(CurvedGel, bears_a_slope_of_sixty_degrees) {
 }
 
 TEST(CurvedGel, bears_a_wall_of_eighty_degrees_or_refuses_it_by_place) {
-  hard_case("adhesions beside walls of a groove, 70, 80 and 89 degrees steep",
-            "coarse and fine elements within 10 %, or refused by place");
+  test::hard_case("adhesions beside walls of a groove, 70, 80 and 89 degrees steep",
+                  "coarse and fine elements within 10 %, or refused by place");
   std::string measured;
   // depth / (2 wall) is the tangent
   for (const auto& [degrees, wall_um] : {std::pair{"70", "0.91"}, std::pair{"80", "0.44"}, std::pair{"89", "0.044"}}) {
@@ -94,7 +93,7 @@ TEST(CurvedGel, bears_a_wall_of_eighty_degrees_or_refuses_it_by_place) {
 }
 
 TEST(CurvedGel, hardly_cares_how_incompressible_it_is) {
-  hard_case("a wave, nu = 0.4999", "within 2 % of nu = 0.499");
+  test::hard_case("a wave, nu = 0.4999", "within 2 % of nu = 0.499");
   Pair wave("wave amplitude_um=4 period_um=30");
   wave.gel.poisson_ratio = 0.499;
   const VectorXd before = wave.displaced(2);
@@ -105,8 +104,8 @@ TEST(CurvedGel, hardly_cares_how_incompressible_it_is) {
 }
 
 TEST(CurvedGel, says_where_a_load_turns_it_inside_out) {
-  hard_case("tractions of twenty shear moduli on a Neo-Hookean gel",
-            "refused, with the share of the load that was reached");
+  test::hard_case("tractions of twenty shear moduli on a Neo-Hookean gel",
+                  "refused, with the share of the load that was reached");
   Gel gel{.youngs_modulus_kPa = 3, .poisson_ratio = 0.49, .thickness_um = 40};
   const std::vector<Ellipse> ellipses = {{{-8, 0}, 2, 1.5, 0}, {{8, 0}, 2, 1.5, 0}};
   const Eigen::Vector4d forces = 190 * Eigen::Vector4d(1, 0, -1, 0);
@@ -124,7 +123,8 @@ surface::SurfaceFit fitted(const std::vector<Vec3>& beads) {
 }
 
 TEST(SurfaceOfBeads, of_a_few_beads_has_honest_errors_or_is_refused) {
-  hard_case("910 and 27 beads below a wave of 120 x 120 um", "the height within four standard errors, or refused");
+  test::hard_case("910 and 27 beads below a wave of 120 x 120 um",
+                  "the height within four standard errors, or refused");
   std::string measured;
   for (const double density : {1e-3, 2.5e-5}) {
     const std::vector<Vec3> beads = test::beads_below(wave, density, 4);
@@ -142,7 +142,7 @@ TEST(SurfaceOfBeads, of_a_few_beads_has_honest_errors_or_is_refused) {
 }
 
 TEST(SurfaceOfBeads, is_not_lifted_by_beads_above_it) {
-  hard_case("eight stray beads up to 15 um above the surface", "named, the height as without them");
+  test::hard_case("eight stray beads up to 15 um above the surface", "named, the height as without them");
   std::vector<Vec3> beads = test::beads_below(wave, 0.0062, 2);
   const surface::SurfaceFit without = fitted(beads);
   const std::size_t n = beads.size();
@@ -162,7 +162,7 @@ TEST(SurfaceOfBeads, is_not_lifted_by_beads_above_it) {
 }
 
 TEST(SurfaceOfBeads, that_lie_in_two_sheets_is_refused) {
-  hard_case("6 000 beads in two sheets, 30 um apart", "refused: beads lie on both faces of a thin gel");
+  test::hard_case("6 000 beads in two sheets, 30 um apart", "refused: beads lie on both faces of a thin gel");
   std::vector<Vec3> sheets;
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> across(-60, 60), thick(0, 1);
@@ -173,8 +173,8 @@ TEST(SurfaceOfBeads, that_lie_in_two_sheets_is_refused) {
 }
 
 TEST(SurfaceOfAMap, has_small_holes_filled_and_wide_ones_refused) {
-  hard_case("a height map with NaN in a disc of 4 um and in one of 20 um",
-            "the small one filled within 0.1 um, the wide one refused by place");
+  test::hard_case("a height map with NaN in a disc of 4 um and in one of 20 um",
+                  "the small one filled within 0.1 um, the wide one refused by place");
   const auto holed = [](double radius_um) {
     HeightMap map = surface::sampled(wave, {-30, -30}, {30, 30}, 0.5);
     for (std::size_t k = 0; k < map.z_um.size(); ++k) {
@@ -215,8 +215,8 @@ TriangleMesh mesh_of(bool has_flipped, double hole_um) {
 }
 
 TEST(SurfaceOfAMesh, bears_flipped_normals_and_small_holes_and_refuses_wide_ones) {
-  hard_case("a triangle mesh with a seventh of its normals flipped and a hole of 4 um; a hole of 20 um",
-            "flipped ones counted, the height within 0.3 um (half of what edges of 2 um miss); refused by place");
+  test::hard_case("a triangle mesh with a seventh of its normals flipped and a hole of 4 um; a hole of 20 um",
+                  "flipped ones counted, the height within 0.3 um (half of what edges of 2 um miss); refused by place");
   const surface::MeshSurface flipped = surface::sample_mesh(mesh_of(true, 2), 1);
   const HeightMap map = surface::filled(flipped.map, 6).map;
   double worst = 0;

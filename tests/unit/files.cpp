@@ -257,6 +257,24 @@ TEST(Columns, a_table_of_an_older_version_is_read_and_its_later_columns_are_unse
   EXPECT_FALSE(force.low_nN.has_value());
 }
 
+TEST(Files, displacements_in_space_come_back_and_are_checked) {
+  const TemporaryFolder folder;
+  const std::vector<BeadInSpace> beads = {{{1, 2, 3.25}, {0.1, -0.2, 1.0 / 3}, 0.01, 0.03, ""},
+                                          {{4, 5, 6}, {}, 0, 0, "defocused"}};
+  files::write_displacement_in_space(folder / "d.csv", beads);
+  const std::vector<BeadInSpace> read = files::read_displacement_in_space(folder / "d.csv");
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_EQ(read[0].position_um, beads[0].position_um);
+  EXPECT_EQ(read[0].displacement_um, beads[0].displacement_um);
+  EXPECT_EQ(read[0].sigma_z_um, 0.03);
+  EXPECT_EQ(read[1].flag, "defocused");
+  EXPECT_THROW(check(std::vector<BeadInSpace>{{{0, 0, 0}, {}, 0, -1, ""}}), InvalidData);
+  files::write_text(folder / "bare.csv", "x_um,y_um,z_um,ux_um,uy_um,uz_um\n1,2,3,0,0,0.5\n");
+  EXPECT_EQ(files::read_displacement_in_space(folder / "bare.csv").front().displacement_um.z, 0.5);
+  files::write_text(folder / "flat.csv", "x_um,y_um,ux_um,uy_um\n1,2,0,0\n");
+  EXPECT_THROW(files::read_displacement_in_space(folder / "flat.csv"), InputError);
+}
+
 /// What a later stage computes with comes back as it was; a result has the digits that mean something.
 TEST(Columns, results_have_six_digits_and_what_is_computed_with_has_all) {
   const TemporaryFolder folder;
