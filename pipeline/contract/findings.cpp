@@ -103,7 +103,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {strain_beyond_linear, "strain-beyond-linear", "fit", caution,
        "predicted part of the displacement that small-strain elasticity leaves out", 0.05,
        "forces are then off by about as much, which is more than the error of a good fit",
-       "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\" in cell.toml. Check "
+       "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\" in cell.toml. "
+       "Check "
        "the modulus of the gel and its unit, too."},
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
        "without the noise nobody can tell whether the model fits", "Give sigma_um in displacement.csv."},
