@@ -185,7 +185,9 @@ class CurvedGel final : public substrate::Substrate {
         gel_(gel),
         height_(gel.surface ? std::make_shared<const surface::Height>(*gel.surface) : nullptr),
         shape_(shape_of(gel, height_)),
-        threads_(threads) {}
+        threads_(threads) {
+    if (height_) check_walls(*gel.surface, *height_);
+  }
 
   substrate::LazyResponse response(const substrate::Loads& loads,
                                    const substrate::Observations& observations) const override {
@@ -315,6 +317,22 @@ class CurvedGel final : public substrate::Substrate {
     return {[height](Vec2 at) { return (*height)(at); }, gel.thickness_um};
   }
 
+  /// However small, an element below a wall is as slanted as the wall.
+  /// @throws InvalidData by place
+  static void check_walls(const HeightMap& map, const surface::Height& height) {
+    const double steepest = std::sqrt(1 / (kLeastScaledJacobian * kLeastScaledJacobian) - 1);
+    for (int row = 0; row < 2 * map.n_y - 1; ++row) {
+      for (int column = 0; column < 2 * map.n_x - 1; ++column) {
+        const Vec2 at = map.place_um(0.5 * column, 0.5 * row);
+        const double slope = norm(height.slope(at));
+        if (slope <= steepest) continue;
+        const auto degrees = [](double tangent) { return brief(std::atan(tangent) * 180 / std::numbers::pi); };
+        throw InvalidData("the gel's surface at (" + brief(at.x) + ", " + brief(at.y) + ") um",
+                          "no wall steeper than " + degrees(steepest) + " degrees", "one of " + degrees(slope));
+      }
+    }
+  }
+
   /// Beyond its map the surface is made up: smooth enough for the gel far away, and not for a load.
   /// @throws InvalidData
   void check_known(Vec2 at, const char* what) const {
@@ -387,7 +405,11 @@ class CurvedGel final : public substrate::Substrate {
         nearest = std::min(nearest, away);
         if (side > target.side_um * (1 + 1e-9) && side > fineness.growth * away) return true;
       }
-      return box.low_um[2] == 0 && misfit_um(box) > fineness.misfit * (side + nearest);
+      const double misfit = misfit_um(box) * (1 - box.low_um[2] / depth);  // what is pulled follows the surface less
+      // smaller neighbours bring their nodes onto this box, and must not be crushed by that
+      constexpr double kMostMoved = 0.2;
+      if (misfit > kMostMoved * std::min({box.size_um[0], box.size_um[1], box.size_um[2]})) return true;
+      return box.low_um[2] == 0 && misfit > fineness.misfit * (side + nearest);
     };
     return std::make_unique<System>(Block(shape_, lines, is_too_large, Sides::free, most, threads_), gel_, loads,
                                     observations, is_factorised, factor_options());

@@ -10,8 +10,6 @@
 namespace mbtfm::curved {
 namespace {
 
-constexpr double kLeastScaledJacobian = 0.1;
-
 std::string shown(const Eigen::Vector3d& p) {
   return "(" + brief(p.x()) + ", " + brief(p.y()) + ", " + brief(p.z()) + ") um";
 }

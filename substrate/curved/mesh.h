@@ -28,6 +28,9 @@ struct Mesh {
   NodePositions positions_of(int cell) const;
 };
 
+/// Of an element, at its worst corner: 1 of a box, the cosine of the angle by which a slanted one leans.
+constexpr double kLeastScaledJacobian = 0.1;
+
 /// A gel on a plane base, z = base_um, under its surface z = height_um(x, y); z points into the gel.
 struct Shape {
   std::function<double(Vec2)> height_um;

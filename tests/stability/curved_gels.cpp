@@ -81,7 +81,7 @@ TEST(CurvedGel, bears_a_wall_of_eighty_degrees_or_refuses_it_by_place) {
   for (const auto& [degrees, wall_um] : {std::pair{"70", "0.91"}, std::pair{"80", "0.44"}, std::pair{"89", "0.044"}}) {
     const std::string refused = refusal_of([&, wall = wall_um] {
       const Pair groove(std::string("groove depth_um=5 width_um=6 wall_um=") + wall);
-      const double difference = off(groove.displaced(2), groove.displaced(4));
+      const double difference = off(groove.displaced(1), groove.displaced(2));
       EXPECT_LE(difference, 0.1);
       measured += two_digits(100 * difference) + " %; ";
     });
