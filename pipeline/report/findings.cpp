@@ -63,20 +63,25 @@ std::string of_candidates(const Cell& cell) {
              : " Forces act on the candidates, too, where nobody saw an adhesion.";
 }
 
+/// Where the beads do not tell the network's tension, its part of the force may come out at any size.
+std::string parts_of_total(const CellResults& results) {
+  const auto network = results.tensions.find(0);
+  if (network != results.tensions.end() && !network->second.identifiable)
+    return ". What part of it the actin network brings, the beads do not tell.";
+  return fmt::format(": {} nN by the fibres, {} nN by the actin network.", charts::readable(results.fit.fibre_force_nN),
+                     charts::readable(results.fit.network_force_nN));
+}
+
 std::string what(const CellResults& results) {
   int n_by_type[std::size(kFibreTypes)] = {};
   for (const Fibre& fibre : results.cell.fibres) ++n_by_type[static_cast<int>(fibre.type)];
   const int n_edge = n_by_type[static_cast<int>(FibreType::edge)];
   return fmt::format(
-             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} nN in total, summed over its adhesions: "
-             "{} "
-             "nN by "
-             "the fibres, {} nN by the actin network.",
+             "{} ({} dorsal, {}, {} ventral{}) and {}. The cell pulls with {} nN in total, summed over its adhesions{}",
              counted(results.cell.fibres.size(), "stress fibre", "stress fibres"), n_by_type[0],
              counted(n_by_type[1], "transverse arc", "transverse arcs"), n_by_type[2],
              n_edge > 0 ? fmt::format(", {} edge", n_edge) : "", adhesions_in_words(results.cell),
-             charts::readable(results.fit.total_force_nN), charts::readable(results.fit.fibre_force_nN),
-             charts::readable(results.fit.network_force_nN)) +
+             charts::readable(results.fit.total_force_nN), parts_of_total(results)) +
          of_candidates(results.cell) + of_cut(results.fit);
 }
 

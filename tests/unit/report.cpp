@@ -164,6 +164,16 @@ TEST(Report, tells_the_noise_from_the_models_error) {
   EXPECT_NE(text_of(results).find("All that the model leaves"), std::string::npos);
 }
 
+TEST(Report, names_no_part_of_the_network_that_beads_do_not_tell) {
+  const FakeCell cell;
+  CellResults results = read_results(cell.folder.path());
+  results.tensions.at(0).identifiable = true;
+  EXPECT_NE(text_of(results).find("nN by the actin network"), std::string::npos);
+  results.tensions.at(0).identifiable = false;
+  EXPECT_EQ(text_of(results).find("nN by the actin network"), std::string::npos);
+  EXPECT_NE(text_of(results).find("the beads do not tell"), std::string::npos);
+}
+
 TEST(Report, shows_no_more_digits_of_a_tension_than_its_interval_warrants) {
   const FakeCell cell;
   CellResults results = read_results(cell.folder.path());
