@@ -5,7 +5,6 @@
 
 #include "mbtfm/tensions/fit_results.h"
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/numbers.h"
 #include "substrate/choice/large_strain.h"
 
 namespace mbtfm::fit {
@@ -23,14 +22,13 @@ struct AtRest {
 AtRest as_seen(const StrainedScene& scene) { return {ellipses_of(scene.on.cell), points_of(scene.beads)}; }
 
 /// @param by_um  of the adhesions' centres, 2·adhesions
-AtRest led_back(const StrainedScene& scene, const Eigen::VectorXd& by_um) {
-  AtRest rest = as_seen(scene);
-  for (std::size_t j = 0; j < rest.ellipses.size(); ++j) {
+AtRest led_back(AtRest scene, const DisplacementField& beads, const Eigen::VectorXd& by_um) {
+  for (std::size_t j = 0; j < scene.ellipses.size(); ++j) {
     const auto row = 2 * static_cast<Eigen::Index>(j);
-    rest.ellipses[j].centre_um += Vec2{-by_um[row], -by_um[row + 1]};
+    scene.ellipses[j].centre_um += Vec2{-by_um[row], -by_um[row + 1]};
   }
-  for (std::size_t i = 0; i < rest.beads_um.size(); ++i) rest.beads_um[i] += -1 * scene.beads[i].displacement_um;
-  return rest;
+  for (std::size_t i = 0; i < beads.size(); ++i) scene.beads_um[i] += -1 * beads[i].displacement_um;
+  return scene;
 }
 
 /// Of the ellipses' centres by these forces on them, 2·ellipses.
@@ -45,8 +43,9 @@ Eigen::VectorXd displaced_um(const substrate::Substrate& gel, const std::vector<
 class GelAtRest {
  public:
   /// @param near_nN  forces like those to come
-  GelAtRest(const StrainedScene& scene, const AtRest& rest, const Eigen::VectorXd& near_nN)
-      : linear_(scene.on.gel.response({rest.ellipses}, {rest.beads_um})->kept()),
+  GelAtRest(const StrainedScene& scene, const AtRest& rest, substrate::SharedResponse linear,
+            const Eigen::VectorXd& near_nN)
+      : linear_(std::move(linear)),
         large_(scene.on.parameters.gel, rest.ellipses, rest.beads_um, near_nN, scene.on.threads) {}
 
   substrate::Tangent about(const Eigen::VectorXd& forces_nN) const {
@@ -61,10 +60,6 @@ class GelAtRest {
   substrate::SharedResponse linear_;
   choice::LargeStrain large_;
 };
-
-Eigen::VectorXd measured_um(const LinearData& data) {
-  return data.offset_um.size() > 0 ? data.displacement_um + data.offset_um : data.displacement_um;
-}
 
 }  // namespace
 
@@ -94,15 +89,19 @@ EnsembleFit fit_on_strained_gel(const StrainedScene& scene, EnsembleFit fit, con
   constexpr int kMostFits = 6;
   constexpr double kSettled = 0.01;  // of what matters at all
   const Parameters& p = scene.on.parameters;
-  const Eigen::VectorXd measured = measured_um(fit.data);
+  const Eigen::VectorXd measured = fit.data.displacement_um;
   const std::vector<substrate::Ellipse> ellipses = ellipses_of(scene.on.cell);
   const auto left_out = [&](const Eigen::VectorXd& forces) {
     return choice::left_out_at_beads(p.gel, choice::mean_traction_kPa(ellipses, forces));
   };
   Eigen::VectorXd forces = adhesion_forces_nN(fit);
-  const GelAtRest gel(
-      scene, scene.is_under_load ? led_back(scene, displaced_um(scene.on.gel, ellipses, forces)) : as_seen(scene),
-      forces);
+  AtRest rest = as_seen(scene);
+  substrate::SharedResponse linear = fit.data.response;
+  if (scene.is_under_load) {
+    rest = led_back(std::move(rest), scene.beads, displaced_um(scene.on.gel, ellipses, forces));
+    linear = scene.on.gel.response({rest.ellipses}, {rest.beads_um})->kept();
+  }
+  const GelAtRest gel(scene, rest, std::move(linear), forces);
   for (int step = 0; step < kMostFits; ++step) {
     work.tell(static_cast<double>(step) / kMostFits, "large strains of the gel");
     const substrate::Tangent tangent = gel.about(forces);

@@ -105,7 +105,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "forces are then off by about as much, which is more than the error of a good fit",
        "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\" in cell.toml. "
        "Check "
-       "the modulus of the gel and its unit, too."},
+       "the pixel size, and that no adhesion is drawn too small: the strain does not depend on the modulus."},
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
        "without the noise nobody can tell whether the model fits", "Give sigma_um in displacement.csv."},
       {noise_disagrees, "noise-disagrees", "fit", caution,

@@ -67,7 +67,7 @@ std::string of_candidates(const Cell& cell) {
 std::string parts_of_total(const CellResults& results) {
   const auto network = results.tensions.find(0);
   if (network != results.tensions.end() && !network->second.identifiable)
-    return ". What part of it the actin network brings, the beads do not tell.";
+    return ". How much of it comes from the actin network, the beads do not tell.";
   return fmt::format(": {} nN by the fibres, {} nN by the actin network.", charts::readable(results.fit.fibre_force_nN),
                      charts::readable(results.fit.network_force_nN));
 }

@@ -24,8 +24,6 @@ class LargeStrain {
   /// 2·points × 2·ellipses.
   /// @throws NotSolved where the gel finds no state under them
   substrate::Tangent about(const Eigen::VectorXd& forces_nN) const;
-  /// Of the elements, and of the last solution.
-  Figures figures() const { return elements_->figures(); }
 
  private:
   std::vector<Eigen::Index> taken_;  ///< of the ellipses, ascending

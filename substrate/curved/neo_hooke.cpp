@@ -299,7 +299,7 @@ LargeSolution solve_neo_hooke(const Gel& gel, const Space& space, const LargeLoa
             ", " + brief(at->z()) + " um";
   }
   throw NotSolved(Report{.reason = "found no state at rest beyond " + brief(100 * solution.share) + " % of this load" +
-                                   where + ": take smaller forces (are they in nN?), or larger areas for them"});
+                                   where + ": are units right, and areas of adhesions not too small?"});
 }
 
 std::function<Eigen::MatrixXd(int cell)> large_stiffness_of(const Gel& gel, const Space& space,
