@@ -61,6 +61,38 @@ TEST_F(LargeStrains, a_fit_that_has_them_comes_nearer_to_the_truth_than_one_that
   EXPECT_LT(error(), 0.6 * error_of_linear);
 }
 
+/// The images of a real cell show its adhesions under their own pull; the simulator draws them at rest.
+TEST_F(LargeStrains, a_cell_seen_under_load_is_led_back_to_the_gel_at_rest) {
+  const std::string kNeoHooke = "\n[substrate]\nmaterial = 'neo-hooke'\n";
+  ASSERT_EQ(run(kNeoHooke).code, 0);
+  const double error_at_rest = error();
+  std::vector<Adhesion> adhesions = files::read_adhesions(cell() / "1_segment/adhesions.csv");
+  std::string centres = "x_um,y_um\n";
+  for (const Adhesion& a : adhesions)
+    centres += std::to_string(a.position_um.x) + "," + std::to_string(a.position_um.y) + "\n";
+  files::write_text(cell() / "centres.csv", centres);
+  const std::string truth = (cell() / "truth").string();
+  const Outcome moved = run_program(
+      "mbtfm-substrate --quiet --youngs_modulus_kPa 11 --material neo-hooke --large_strain on --displacement_tolerance "
+      "0 "
+      "--elements_across_adhesion 2 --growth 8 --adhesions " +
+      truth + "/adhesions.csv --forces " + truth + "/adhesion_forces.csv --points " +
+      (cell() / "centres.csv").string() + " --out " + (cell() / "moved.csv").string());
+  ASSERT_EQ(moved.code, 0) << moved.output;
+  const DisplacementField by = files::read_displacement(cell() / "moved.csv");
+  for (std::size_t a = 0; a < adhesions.size(); ++a) {
+    EXPECT_GT(norm(by.at(a).displacement_um), 0.5);  // half an adhesion
+    adhesions[a].position_um += by[a].displacement_um;
+  }
+  files::write_adhesions(cell() / "1_segment/adhesions.csv", adhesions);
+  const Outcome outcome = run(kNeoHooke);
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("beads under load: on (auto)"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("large strain: on (auto)"), std::string::npos) << outcome.output;
+  RecordProperty("errors", std::to_string(error_at_rest) + " " + std::to_string(error()));
+  EXPECT_NEAR(error(), error_at_rest, 0.002);
+}
+
 TEST_F(LargeStrains, switched_off_they_change_nothing) {
   ASSERT_EQ(run("").code, 0);
   const std::string forces = files::read_text(cell() / "4_fit/adhesion_forces.csv");
