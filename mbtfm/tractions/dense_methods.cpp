@@ -57,7 +57,7 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
                   double length_at_unit_density_um, Reconstruction& r) {
   const auto n = 2 * static_cast<Index>(model.n_loads), n_true = 2 * static_cast<Index>(model.n_adhesions);
   const DenseProblem problem(inputs.beads, model.compliance, n, model.truth, n_true);
-  if (problem.data_squared() == 0) {
+  if (problem.spectrum().data_squared() == 0) {
     r.remark = "no bead has moved: there is no traction";
     return {Eigen::VectorXd::Zero(n), Eigen::MatrixXd::Zero(n, n), Eigen::MatrixXd::Zero(n, n_true)};
   }
@@ -66,9 +66,9 @@ Loads regularised(const TractionInputs& inputs, const TractionParameters& parame
   r.lambda = parameters.lambda_um_per_kPa ? *parameters.lambda_um_per_kPa * inputs.gel.youngs_modulus_kPa / length_um
                                           : chosen_lambda(*r.scan, parameters.lambda_by);
   r.length_um = *r.lambda * length_um;
-  const Eigen::VectorXd loads = problem.solve(*r.lambda);
-  r.relative_l2 = problem.relative_l2(*r.lambda);
-  return {loads, problem.covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
+  const Eigen::VectorXd loads = problem.spectrum().solve(*r.lambda);
+  r.relative_l2 = problem.spectrum().relative_l2(*r.lambda);
+  return {loads, problem.spectrum().covariance(*r.lambda, r.scan->variance), problem.response_to_truth(*r.lambda)};
 }
 
 /// Standard errors of the forces' magnitudes, which are `sums` (rows 2a, 2a+1 for adhesion a) of the loads: by the

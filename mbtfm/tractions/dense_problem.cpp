@@ -1,6 +1,5 @@
 #include "mbtfm/tractions/dense_problem.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -61,6 +60,7 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
   for (double& w : weights_) w /= mean;
   if (states_errors) stated_variance_ = 1 / mean;
 
+  double data_squared = 0;
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n_loads, n_loads);
   Eigen::VectorXd pulled = Eigen::VectorXd::Zero(n_loads);
   Eigen::MatrixXd pulled_by_truth = Eigen::MatrixXd::Zero(n_loads, n_true);
@@ -68,65 +68,15 @@ DenseProblem::DenseProblem(const DisplacementField& beads, Compliance compliance
     numerics::add_upper_gram(G, normal);
     pulled += G.transpose() * u;
     if (n_true > 0) pulled_by_truth += G.transpose() * weighted(truth, range);
-    data_squared_ += u.squaredNorm();
+    data_squared += u.squaredNorm();
   });
-  numerics::mirror_upper(normal);
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(normal);
-  eigenvalues_ = eigen.eigenvalues().cwiseMax(0);
-  eigenvectors_ = eigen.eigenvectors();
-  projected_ = eigenvectors_.transpose() * pulled;
-  projected_truth_ = eigenvectors_.transpose() * pulled_by_truth;
-}
-
-LambdaScan DenseProblem::scan() const {
-  const double largest = std::sqrt(eigenvalues_.maxCoeff());
-  // At a tenth of the smallest singular value nothing is smoothed any more; below a millionth of the largest, rounding
-  // of the normal matrix is all there is.
-  const double smallest = std::max(0.1 * std::sqrt(eigenvalues_.minCoeff()), 1e-6 * largest);
-  std::vector<ScanPoint> points;
-  const auto n_data = static_cast<double>(2 * beads_.size());
-  const Eigen::Array<bool, Eigen::Dynamic, 1> is_felt = eigenvalues_.array() > 1e-12 * largest * largest;
-  const auto point_at = [&](double lambda) -> ScanPoint {
-    const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
-    return {.lambda = lambda,
-            .misfit = misfit(lambda),
-            .norm = shares.square().sum(),
-            .degrees = (eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda)).sum(),
-            .removable_misfit = is_felt.select(shares.square() / eigenvalues_.array(), 0).sum() * std::pow(lambda, 4)};
-  };
-  for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
-  // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
-  // for tractions that follow all but a few, would call most of it signal.)
-  return judge(std::move(points), n_data, static_cast<double>(is_felt.count()), stated_variance_, [&](double lambda) {
-    const ScanPoint p = point_at(lambda);
-    return p.misfit / (n_data - p.degrees);
-  });
-}
-
-Eigen::VectorXd DenseProblem::solve(double lambda) const {
-  return eigenvectors_ * (projected_.array() / (eigenvalues_.array() + lambda * lambda)).matrix();
-}
-
-Eigen::MatrixXd DenseProblem::covariance(double lambda, double variance) const {
-  const Eigen::ArrayXd shares = eigenvalues_.array() / (eigenvalues_.array() + lambda * lambda).square();
-  Eigen::MatrixXd covariance = Eigen::MatrixXd::Zero(eigenvectors_.rows(), eigenvectors_.rows());
-  numerics::add_upper_outer(eigenvectors_ * (variance * shares).sqrt().matrix().asDiagonal(), covariance);
-  numerics::mirror_upper(covariance);
-  return covariance;
+  spectrum_.emplace(std::move(normal), std::move(pulled), data_squared, static_cast<double>(2 * beads.size()));
+  projected_truth_ = spectrum_->vectors().transpose() * pulled_by_truth;
 }
 
 Eigen::MatrixXd DenseProblem::response_to_truth(double lambda) const {
-  const Eigen::VectorXd shares = (eigenvalues_.array() + lambda * lambda).inverse().matrix();
-  return eigenvectors_ * (shares.asDiagonal() * projected_truth_);
-}
-
-double DenseProblem::misfit(double lambda) const {
-  const Eigen::ArrayXd shares = projected_.array() / (eigenvalues_.array() + lambda * lambda);
-  return data_squared_ - 2 * (shares * projected_.array()).sum() + (eigenvalues_.array() * shares.square()).sum();
-}
-
-double DenseProblem::relative_l2(double lambda) const {
-  return data_squared_ > 0 ? std::sqrt(std::max(0.0, misfit(lambda)) / data_squared_) : 0;
+  const Eigen::VectorXd shares = (spectrum_->values() + lambda * lambda).inverse().matrix();
+  return spectrum_->vectors() * (shares.asDiagonal() * projected_truth_);
 }
 
 }  // namespace mbtfm::tractions

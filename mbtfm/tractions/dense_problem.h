@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "mbtfm/tractions/regularisation.h"
+#include "mbtfm/tractions/spectrum.h"
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/range.h"
@@ -23,29 +24,22 @@ class DenseProblem {
   DenseProblem(const DisplacementField& beads, Compliance compliance, Eigen::Index n_loads, const Compliance& truth,
                Eigen::Index n_true);
 
-  LambdaScan scan() const;
-  Eigen::VectorXd solve(double lambda) const;
-  /// Of solve(lambda), by the noise alone. @param variance  of one component of unit weight
-  Eigen::MatrixXd covariance(double lambda, double variance) const;
+  LambdaScan scan() const { return spectrum_->scan(stated_variance_); }
+  const Spectrum& spectrum() const { return *spectrum_; }
   /// What solve(lambda) makes of each true load of one, without noise.
   Eigen::MatrixXd response_to_truth(double lambda) const;
-  double relative_l2(double lambda) const;  ///< |u − G f| / |u| of solve(lambda), weighted
-  double data_squared() const { return data_squared_; }
 
  private:
   template <class Use>
   void for_blocks(const Use& use) const;  ///< use(range of beads, weighted block of G, weighted u of the same rows)
   struct Range;
-  double misfit(double lambda) const;  ///< |G f − u|² of solve(lambda)
   Eigen::MatrixXd weighted(const Compliance& compliance, const Range& range) const;
   const DisplacementField& beads_;
   Compliance compliance_;
   std::vector<double> weights_;
   std::optional<double> stated_variance_;
-  double data_squared_ = 0;
-  Eigen::VectorXd eigenvalues_, projected_;  ///< of GᵀG; its eigenvectors' share in Gᵀ u
-  Eigen::MatrixXd eigenvectors_;
-  Eigen::MatrixXd projected_truth_;  ///< of the truth's answers
+  std::optional<Spectrum> spectrum_;
+  Eigen::MatrixXd projected_truth_;  ///< of the truth's answers, in the spectrum's frame
 };
 
 }  // namespace mbtfm::tractions

@@ -17,6 +17,8 @@ void dtrsm_(const char* side, const char* triangle, const char* transpose, const
             const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
 void dtrmm_(const char* side, const char* triangle, const char* transpose, const char* diagonal, const int* m,
             const int* n, const double* alpha, const double* a, const int* lda, double* b, const int* ldb);
+void dsyevd_(const char* vectors, const char* triangle, const int* n, double* a, const int* lda, double* values,
+             double* work, const int* n_work, int* integers, const int* n_integers, int* info);
 void dpotrf_(const char* triangle, const int* n, double* a, const int* lda, int* info);
 }
 
@@ -162,5 +164,21 @@ bool downdate_upper(Eigen::MatrixXd& U, Eigen::MatrixXd B) {
 void multiply_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrmm_, 'N', U, B, threads); }
 void solve_upper(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrsm_, 'N', U, B, threads); }
 void solve_upper_transposed(const MatrixXd& U, MatrixXd& B, int threads) { with_triangle(dtrsm_, 'T', U, B, threads); }
+
+SymmetricEigen symmetric_eigen(MatrixXd A) {
+  const int n = static_cast<int>(A.rows());
+  SymmetricEigen eigen{Eigen::VectorXd(n), {}};
+  int info = 0, n_integers = -1, n_work = -1, integers_wanted = 0;
+  double work_wanted = 0;
+  dsyevd_("V", "U", &n, A.data(), &n, eigen.values.data(), &work_wanted, &n_work, &integers_wanted, &n_integers, &info);
+  n_work = static_cast<int>(work_wanted);
+  n_integers = integers_wanted;
+  std::vector<double> work(static_cast<std::size_t>(n_work));
+  std::vector<int> integers(static_cast<std::size_t>(n_integers));
+  dsyevd_("V", "U", &n, A.data(), &n, eigen.values.data(), work.data(), &n_work, integers.data(), &n_integers, &info);
+  MBTFM_ASSERT(info == 0);
+  eigen.vectors = std::move(A);
+  return eigen;
+}
 
 }  // namespace mbtfm::numerics

@@ -41,4 +41,12 @@ void multiply_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 
 void solve_upper(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
 void solve_upper_transposed(const Eigen::MatrixXd& U, Eigen::MatrixXd& B, int threads = 1);
 
+/// A = V diag(values) Vᵀ of a symmetric A, by LAPACK's divide and conquer.
+struct SymmetricEigen {
+  Eigen::VectorXd values;   ///< rising
+  Eigen::MatrixXd vectors;  ///< by column
+};
+/// @param A  what is below the diagonal does not count
+SymmetricEigen symmetric_eigen(Eigen::MatrixXd A);
+
 }  // namespace mbtfm::numerics

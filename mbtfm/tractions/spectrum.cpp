@@ -1,0 +1,78 @@
+#include "mbtfm/tractions/spectrum.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/numerics/dense.h"
+
+namespace mbtfm::tractions {
+
+using Eigen::ArrayXd;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double n_data)
+    : data_squared_(data_squared), n_data_(n_data) {
+  auto [values, vectors] = numerics::symmetric_eigen(std::move(normal));
+  values_ = values.array().max(0);
+  vectors_ = std::move(vectors);
+  projected_ = vectors_.transpose() * pulled;
+}
+
+LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
+  const double largest = std::sqrt(values_.maxCoeff());
+  // At a tenth of the smallest singular value nothing is smoothed any more; below a millionth of the largest, rounding
+  // of the normal matrix is all there is.
+  const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), 1e-6 * largest);
+  std::vector<ScanPoint> points;
+  const Eigen::Array<bool, Eigen::Dynamic, 1> is_felt = values_ > 1e-12 * largest * largest;
+  for (const double lambda : lambdas_between(largest, smallest)) {
+    const ArrayXd shares = projected_ / (values_ + lambda * lambda);
+    points.push_back(
+        {.lambda = lambda,
+         .misfit = misfit(lambda),
+         .norm = shares.square().sum(),
+         .degrees = degrees(lambda),
+         .removable_misfit = is_felt.select(shares.square() / values_, 0).sum() * std::pow(lambda, 4)});
+  }
+  // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
+  // for tractions that follow all but a few, would call most of it signal.)
+  return judge(std::move(points), n_data_, static_cast<double>(is_felt.count()), stated_variance,
+               [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
+}
+
+VectorXd Spectrum::solve(double lambda) const {
+  return vectors_ * (projected_ / (values_ + lambda * lambda)).matrix();
+}
+
+MatrixXd Spectrum::outer(const ArrayXd& shares) const {
+  MatrixXd sum = MatrixXd::Zero(vectors_.rows(), vectors_.rows());
+  numerics::add_upper_outer(vectors_ * shares.sqrt().matrix().asDiagonal(), sum);
+  numerics::mirror_upper(sum);
+  return sum;
+}
+
+MatrixXd Spectrum::covariance(double lambda, double variance) const {
+  return outer(variance * values_ / (values_ + lambda * lambda).square());
+}
+
+MatrixXd Spectrum::posterior(double lambda, double variance) const {
+  return outer(variance / (values_ + lambda * lambda));
+}
+
+VectorXd Spectrum::resolved(double lambda) const {
+  return vectors_.array().square().matrix() * (values_ / (values_ + lambda * lambda)).matrix();
+}
+
+double Spectrum::misfit(double lambda) const {
+  const ArrayXd shares = projected_ / (values_ + lambda * lambda);
+  return data_squared_ - 2 * (shares * projected_).sum() + (values_ * shares.square()).sum();
+}
+
+double Spectrum::degrees(double lambda) const { return (values_ / (values_ + lambda * lambda)).sum(); }
+
+double Spectrum::relative_l2(double lambda) const {
+  return data_squared_ > 0 ? std::sqrt(std::max(0.0, misfit(lambda)) / data_squared_) : 0;
+}
+
+}  // namespace mbtfm::tractions

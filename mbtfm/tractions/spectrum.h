@@ -1,0 +1,43 @@
+/// A linear problem in the frame of its own directions: every lambda at once.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+
+#include "mbtfm/tractions/regularisation.h"
+
+namespace mbtfm::tractions {
+
+/// |A s − u|² + lambda² |s|², from AᵀA and Aᵀu.
+class Spectrum {
+ public:
+  /// @param normal  AᵀA; what is below its diagonal does not count
+  /// @param pulled  Aᵀu
+  Spectrum(Eigen::MatrixXd normal, Eigen::VectorXd pulled, double data_squared, double n_data);
+
+  /// @param stated_variance  of one datum
+  LambdaScan scan(std::optional<double> stated_variance) const;
+  Eigen::VectorXd solve(double lambda) const;
+  /// Of solve(lambda), by the noise alone. @param variance  of one datum
+  Eigen::MatrixXd covariance(double lambda, double variance) const;
+  /// Of s itself, where nothing but its size was known before: noise and what the penalty takes away.
+  Eigen::MatrixXd posterior(double lambda, double variance) const;
+  /// By unknown: how much of a change of it solve(lambda) shows, 0 … 1.
+  Eigen::VectorXd resolved(double lambda) const;
+  double misfit(double lambda) const;       ///< |u − A s|² of solve(lambda)
+  double degrees(double lambda) const;      ///< trace of the matrix that takes u to A s
+  double relative_l2(double lambda) const;  ///< |u − A s| / |u|
+  double data_squared() const { return data_squared_; }
+
+  /// V with AᵀA = V diag Vᵀ
+  const Eigen::MatrixXd& vectors() const { return vectors_; }
+  const Eigen::ArrayXd& values() const { return values_; }
+
+ private:
+  Eigen::MatrixXd outer(const Eigen::ArrayXd& shares) const;
+  double data_squared_, n_data_;
+  Eigen::ArrayXd values_, projected_;
+  Eigen::MatrixXd vectors_;
+};
+
+}  // namespace mbtfm::tractions
