@@ -25,7 +25,7 @@ for build in old new; do
       exit 1
     fi
   done
-  find "$scratch/$build" -name record.json -exec sed -i -E '/"(seconds|peak_memory_MB|version|error_budget_s)":/d' {} +
+  find "$scratch/$build" -name record.json -exec sed -i -E '/"(seconds|peak_memory_MB|version|started|ended|processor|error_budget_s)":/d' {} +
 done
 differ=$(cd "$scratch" && diff -rq old new | grep -vE '(run\.json|report\.html|run\.log|batch\.csv|\.mbtfm\.hashes|profile\.html) ' || true)
 files=$(find "$scratch/old" -type f | wc -l)

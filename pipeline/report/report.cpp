@@ -158,6 +158,10 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
                            stage.peak_memory_MB, charts::html_escaped(stage.version)});
   }
   std::string html = html_of(stages);
+  if (!provenance.started.empty())
+    html += fmt::format("<p class=\"sub\">Run by mbtfm {} from {} to {} on {}.</p>\n",
+                        charts::html_escaped(provenance.version), charts::html_escaped(provenance.started),
+                        charts::html_escaped(provenance.ended), charts::html_escaped(provenance.processor));
   if (!provenance.preset.empty())
     html += fmt::format("<p class=\"sub\">Preset: {}, where cell.toml says nothing.</p>\n",
                         charts::html_escaped(provenance.preset));

@@ -9,6 +9,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
@@ -302,6 +303,7 @@ CellOutcome CellRun::run() {
   const bool is_whole = options_.only.empty();  // and no other run is in the cell
   if (is_whole) remove_partial_files(cell_);
   CellOutcome outcome = look();
+  outcome.started = numerics::utc_now();
   const bool has_work = std::any_of(outcome.stages.begin(), outcome.stages.end(), [](const StageOutcome& stage) {
     return stage.status.state == StageState::must_run;
   });
@@ -310,6 +312,7 @@ CellOutcome CellRun::run() {
     if (has_work) write_run_record(cell_, options_, outcome);  // unfinished: what a kill leaves
     run_chains(outcome);
   } catch (const std::exception&) {
+    outcome.ended = numerics::utc_now();
     try {
       write_run_record(cell_, options_, outcome);
     } catch (const std::exception&) {
@@ -320,6 +323,7 @@ CellOutcome CellRun::run() {
   // A report of what is no more must not outlive a kill between here and the next one.
   std::error_code is_folder;  // then writing the report tells
   if (has_work) fs::remove(cell_ / "report.html", is_folder);
+  outcome.ended = numerics::utc_now();
   write_run_record(cell_, options_, outcome);
   hashes_.save();
   return outcome;

@@ -46,6 +46,7 @@ struct StageOutcome {
 };
 
 struct CellOutcome {
+  std::string started, ended;  ///< UTC, ISO 8601; empty: not run, or not ended yet
   std::vector<StageOutcome> stages;
   bool converged() const;
   /// "fit, network"; empty where all did

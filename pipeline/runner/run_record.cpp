@@ -9,6 +9,7 @@
 #include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
+#include "pipeline/numerics/machine.h"
 #include "pipeline/runner/lock.h"
 
 namespace mbtfm::runner {
@@ -137,6 +138,9 @@ void write_run_record(const fs::path& cell, const RunOptions& options, const Cel
   run["version"] = options.version;
   run["cell"] = fs::weakly_canonical(cell).filename().string();
   run["outcome"] = name_of(outcome_of(entries));
+  run["started"] = outcome.started;
+  if (!outcome.ended.empty()) run["ended"] = outcome.ended;
+  run["processor"] = numerics::processor_name();
   run["threads"] = options.threads;
   if (!options.preset.empty()) run["preset"] = options.preset;
   run["converged"] =

@@ -16,9 +16,11 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/numerics/blas.h"
+#include "pipeline/numerics/machine.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/manual.h"
 
 namespace mbtfm::stage {
 
@@ -31,7 +33,7 @@ using namespace exit_code;
 /// What the command line says, before any of it is believed.
 struct CommandLine {
   std::map<std::string, std::string> files, values;
-  std::string config, record;
+  std::string config, record, manuals;
   int threads = numerics::available_threads();
   bool is_quiet = false, only_check = false, only_parameters = false, only_version = false;
 };
@@ -61,6 +63,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
   app.add_flag("--check", line.only_check, "read the parameters, run nothing");
   app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
   app.add_flag("--version", line.only_version, "print the version");
+  app.add_option("--manuals", line.manuals, "write manual page and completions below this folder")->group("");
   for (const Parameter& p : list.all()) {
     std::string meaning = p.meaning + words_in(p);
     if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
@@ -71,6 +74,14 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
       app.add_option("--" + p.name, line.values[p.name], meaning)->type_name("")->group(group);
     }
   }
+}
+
+WordsOfFlags words_of_flags(const ParameterList& list) {
+  WordsOfFlags words;
+  for (const Parameter& p : list.all()) {
+    if (const auto* choice = std::get_if<Choice>(&p.member)) words["--" + p.name] = choice->words;
+  }
+  return words;
 }
 
 void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
@@ -150,8 +161,13 @@ double peak_memory_MB() {
   return static_cast<double>(usage.ru_maxrss) / 1024;
 }
 
+struct Took {
+  std::string started;  ///< as utc_now tells
+  double seconds = 0;
+};
+
 void write_record(const fs::path& file, const StageDescription& description, const ParameterList& list,
-                  StageContext& context, const StageReport& report, double seconds) {
+                  StageContext& context, const StageReport& report, const Took& took) {
   const fs::path folder = fs::absolute(file).parent_path();
   std::vector<HashedFile> inputs, outputs;
   for (const fs::path& read : context.read_) inputs.push_back({.at = read, .name = read});
@@ -167,8 +183,11 @@ void write_record(const fs::path& file, const StageDescription& description, con
                                          {"parameters", parameters_of(list)},
                                          {"inputs", hashes_of(inputs, folder)},
                                          {"outputs", hashes_of(outputs, folder)},
+                                         {"started", took.started},
+                                         {"ended", numerics::utc_now()},
+                                         {"processor", numerics::processor_name()},
                                          {"threads", context.threads},
-                                         {"seconds", seconds},
+                                         {"seconds", took.seconds},
                                          {"peak_memory_MB", peak_memory_MB()},
                                          {"converged", report.converged},
                                          {"summary", report.summary},
@@ -216,6 +235,7 @@ void add_findings(StageReport& report, const StageContext& context) {
 int run(const StageDescription& description, ParameterList& list, const CommandLine& line, StageContext context,
         const std::function<StageReport(StageContext&)>& body) {
   const auto begin = std::chrono::steady_clock::now();
+  const std::string started = numerics::utc_now();
   set_files(context, description, line);
   context.threads = line.threads;
   context.progress = terminal_progress(description.name, line.is_quiet);
@@ -225,7 +245,7 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     expect_all_written(context);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;
     // The record takes its place last: where it is, all that it speaks of is.
-    if (!line.record.empty()) write_record(line.record, description, list, context, report, seconds.count());
+    if (!line.record.empty()) write_record(line.record, description, list, context, report, {started, seconds.count()});
     commit(context);
     if (!report.converged) {
       std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", description.name.c_str(), report.summary.c_str());
@@ -342,6 +362,10 @@ int run_stage(const StageDescription& description, int argc, char** argv,
     }
     if (line.only_version || line.only_parameters) {
       print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));
+      return kDone;
+    }
+    if (!line.manuals.empty()) {
+      write_manuals(app, words_of_flags(list), line.manuals);
       return kDone;
     }
     set_parameters(list, line, app);
