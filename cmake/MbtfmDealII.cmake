@@ -11,10 +11,3 @@ add_library(mbtfm_dealii INTERFACE)
 target_include_directories(mbtfm_dealii SYSTEM INTERFACE ${DEAL_II_INCLUDE_DIRS})
 target_compile_definitions(mbtfm_dealii INTERFACE ${DEAL_II_USER_DEFINITIONS} OMPI_SKIP_MPICXX)
 target_link_libraries(mbtfm_dealii INTERFACE ${dealii_library} TBB::tbb ${TEUCHOS_CORE} ${TEUCHOS_COMM} ${DEALII_MPI})
-
-# CHOLMOD and METIS have no CMake configuration in Debian.
-find_library(CHOLMOD_LIBRARY cholmod REQUIRED)
-find_path(CHOLMOD_INCLUDE cholmod.h PATH_SUFFIXES suitesparse REQUIRED)
-add_library(mbtfm_cholmod INTERFACE)
-target_include_directories(mbtfm_cholmod SYSTEM INTERFACE ${CHOLMOD_INCLUDE})
-target_link_libraries(mbtfm_cholmod INTERFACE ${CHOLMOD_LIBRARY})

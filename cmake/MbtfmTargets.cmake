@@ -2,9 +2,11 @@
 # a target with the project's include root and warnings.
 
 add_library(mbtfm_options INTERFACE)
-target_include_directories(mbtfm_options INTERFACE ${CMAKE_SOURCE_DIR})
+target_include_directories(mbtfm_options INTERFACE
+  $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:include/mbtfm>)
 # -Wno-restrict: GCC 12 sees overlapping copies in std::string concatenation that are not there (GCC PR 105651)
-target_compile_options(mbtfm_options INTERFACE -Wall -Wextra -Wshadow $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<BOOL:${MBTFM_STRICT}>:-Werror>)
+target_compile_options(mbtfm_options INTERFACE
+  "$<BUILD_INTERFACE:-Wall;-Wextra;-Wshadow;$<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>;$<$<BOOL:${MBTFM_STRICT}>:-Werror>>")
 
 function(mbtfm_library name)
   cmake_parse_arguments(PARSE_ARGV 1 arg "" "" "PUBLIC;PRIVATE")
@@ -25,4 +27,6 @@ function(mbtfm_executable name)
   add_executable(${name} ${arg_UNPARSED_ARGUMENTS})
   target_link_libraries(${name} PRIVATE mbtfm_options ${arg_PRIVATE})
   add_dependencies(executables ${name})
+  set_property(GLOBAL APPEND PROPERTY MBTFM_PROGRAMS ${name})
+  install(TARGETS ${name} RUNTIME)
 endfunction()

@@ -28,8 +28,10 @@
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/run_cell.h"
+#include "pipeline/runner/stages.h"
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/console.h"
+#include "pipeline/stage/manual.h"
 
 namespace {
 
@@ -233,13 +235,15 @@ int compare(const CommandLine& line) {
 
 struct FolderArgument {
   const char *name, *meaning;
+  bool is_required = true;
 };
-constexpr FolderArgument kCell = {"CELL", "a cell folder"}, kFolder = {"FOLDER", "a folder of cell folders"};
+constexpr FolderArgument kCell = {"CELL", "a cell folder"}, kFolder = {"FOLDER", "a folder of cell folders"},
+                         kDemo = {"CELL", "the cell folder to make; default: mbtfm-demo", false};
 
 CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name, const std::string& purpose,
                       const FolderArgument& folder) {
   CLI::App* command = app.add_subcommand(name, purpose);
-  command->add_option(folder.name, line.folder, folder.meaning)->required();
+  command->add_option(folder.name, line.folder, folder.meaning)->required(folder.is_required);
   command->add_option("--threads", line.threads, "processors to use")
       ->check(CLI::Range(1, 1024))
       ->capture_default_str();
@@ -276,16 +280,46 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
       ->check(CLI::PositiveNumber);
 }
 
+/// A simulated cell, images and all, every stage on it, and its tensions beside the truth.
+int demo(CommandLine line) {
+  if (line.folder.empty()) line.folder = "mbtfm-demo";
+  if (!line.is_quiet) say("simulating a cell in " + line.folder.string());
+  std::vector<std::string> command = {(line.stage_folder / "mbtfm-simulate").string(),
+                                      "--scenario",
+                                      "u2os",
+                                      "--seed",
+                                      "1",
+                                      "--noise",
+                                      "0.07",
+                                      "--beads",
+                                      "10000",
+                                      "--images",
+                                      "--out",
+                                      line.folder.string(),
+                                      "--threads",
+                                      std::to_string(line.threads)};
+  if (line.is_quiet) command.emplace_back("--quiet");
+  const runner::ProcessResult simulated = runner::run_process(command);
+  if (const int code = runner::exit_code_of(simulated); code != kDone) return code;
+  const int code = run(line);
+  if (code == kDone) compare(line);
+  return code;
+}
+
+stage::WordsOfFlags words_of_flags() {
+  std::vector<std::string> presets, stages;
+  for (const cost::Preset& preset : cost::presets()) presets.push_back(preset.name);
+  for (const runner::Stage& stage : runner::stages()) stages.push_back(stage.name);
+  return {{"--preset", presets}, {"--only", stages}, {"--redo", stages}};
+}
+
 int start(int argc, char** argv) {
   CommandLine line;
   CLI::App app("model-based traction force microscopy: from images to stress-fibre tensions", "mbtfm");
   app.set_version_flag("--version", std::string("mbtfm ") + kVersion);
-  app.require_subcommand(1);
-  app.footer(
-      "Exit codes: 0 done, 1 some cells failed, 2 wrong flag, 3 bad input, 4 not converged (outputs are there, "
-      "marked), "
-      "5 cannot write, 6 out of memory or time, 7 no answer (nothing written), 70 our bug, 75 cell is busy, "
-      "130 interrupted, 128 + n killed by signal n.");
+  app.footer("Exit codes: " + stage::exit_codes());
+  CLI::App* demo_command = add_command(
+      app, line, "demo", "simulate a cell, run every stage on it, show its tensions beside the truth", kDemo);
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
@@ -323,6 +357,9 @@ int start(int argc, char** argv) {
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
   cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
       ->capture_default_str();
+  fs::path manuals;
+  app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
+  app.require_subcommand(0, 1);
   add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", kCell);
   try {
     app.parse(argc, argv);
@@ -332,6 +369,15 @@ int start(int argc, char** argv) {
     stage::print(help.str());
     return code == 0 ? kDone : kUsage;
   }
+  if (!manuals.empty()) {
+    stage::write_manuals(app, words_of_flags(), manuals);
+    return kDone;
+  }
+  if (app.get_subcommands().empty()) {
+    stage::print(app.help());
+    return kDone;
+  }
+  if (demo_command->parsed()) return demo(line);
   if (run_command->parsed()) return run(line);
   if (batch_command->parsed()) return batch(line);
   if (cost_command->parsed()) return cost_study(line);

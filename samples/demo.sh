@@ -8,8 +8,4 @@ mv build-configure.log build/configure.log
 echo "mbtfm: building (a few minutes the first time)"
 cmake --build build --target executables >build/build.log 2>&1 || { tail -n 40 build/build.log >&2; exit 1; }
 
-cell=build/demo/u2os
-echo "mbtfm: simulating the demo cell in $cell"
-./build/bin/mbtfm-simulate --scenario u2os --seed 1 --noise 0.07 --beads 10000 --images --out "$cell"
-./build/bin/mbtfm run "$cell"
-./build/bin/mbtfm compare "$cell"
+exec ./build/bin/mbtfm demo build/demo/u2os

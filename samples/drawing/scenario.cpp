@@ -119,27 +119,16 @@ void declare_microscope(stage::ParameterList& list, MicroscopeParameters& p) {
            "standard deviation of the camera's own noise (counts)");
 }
 
-/// Where scenarios may lie: the source tree this was built from, or beside the executable.
-std::vector<fs::path> scenario_folders() {
-  std::vector<fs::path> folders{MBTFM_SCENARIO_FOLDER};
-  std::error_code error;
-  const fs::path executable = fs::read_symlink("/proc/self/exe", error);
-  if (!error) {
-    const fs::path bin = executable.parent_path();
-    folders.push_back(bin.parent_path().parent_path() / "samples" / "scenarios");
-    folders.push_back(bin.parent_path() / "share" / "mbtfm" / "scenarios");
-  }
-  return folders;
+/// Beside the folder of the program, in an installation as in a build.
+fs::path scenario_folder() {
+  return fs::read_symlink("/proc/self/exe").parent_path().parent_path() / "share/mbtfm/scenarios";
 }
 
 std::string known_scenarios() {
   std::vector<std::string> names;
-  for (const fs::path& folder : scenario_folders()) {
-    std::error_code error;
-    for (const auto& entry : fs::directory_iterator(folder, error)) {
-      if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
-    }
-    if (!names.empty()) break;
+  std::error_code is_missing;
+  for (const auto& entry : fs::directory_iterator(scenario_folder(), is_missing)) {
+    if (entry.path().extension() == ".toml") names.push_back(entry.path().stem().string());
   }
   std::ranges::sort(names);
   return listed(names);
@@ -180,10 +169,7 @@ fs::path scenario_file(const std::string& name) {
     if (!fs::is_regular_file(name)) throw UsageError("--scenario: there is no file " + name);
     return name;
   }
-  for (const fs::path& folder : scenario_folders()) {
-    const fs::path file = folder / (name + ".toml");
-    if (fs::is_regular_file(file)) return file;
-  }
+  if (const fs::path file = scenario_folder() / (name + ".toml"); fs::is_regular_file(file)) return file;
   throw UsageError("--scenario: '" + name + "' is unknown; there are " + known_scenarios() +
                    ", or give the path of a scenario file");
 }

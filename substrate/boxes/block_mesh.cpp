@@ -19,7 +19,14 @@ namespace {
 /// with the program. The path is told by the program's, as sanitizers hide the run path from dlopen.
 MakeMesh* load_mesh_maker() {
   const std::filesystem::path program = std::filesystem::read_symlink("/proc/self/exe");
-  const std::filesystem::path file = program.parent_path().parent_path() / "lib" / kMeshMakerFile;
+  const std::filesystem::path file = program.parent_path().parent_path() / "lib/mbtfm" / kMeshMakerFile;
+  if (!std::filesystem::exists(file)) {
+    throw UsageError(
+        "this installation has no finite elements: the substrate models 'split', 'refined' and 'curved', and the "
+        "effects that need them, are missing. Take 'half-space' or 'layer', install Debian's package mbtfm-mesh, or "
+        "build with MBTFM_WITH_DEALII=ON (expected " +
+        file.string() + ")");
+  }
   std::fenv_t environment;
   std::feholdexcept(&environment);  // the libraries' own initialisation is not ours to trap
   void* library = dlopen(file.c_str(), RTLD_NOW | RTLD_LOCAL);
@@ -32,8 +39,9 @@ MakeMesh* load_mesh_maker() {
     throw OutOfMemory("there is no room to load the library that makes finite element meshes (" + why +
                       "): allow more memory, or take the model 'layer'");
   }
-  throw InputError(file.string(), "the library that makes finite element meshes", why,
-                   "build anew, and keep lib/ beside bin/; the models 'half-space' and 'layer' do without it");
+  throw InputError(
+      file.string(), "the library that makes finite element meshes", why,
+      "install the program again, with lib/ beside bin/; the models 'half-space' and 'layer' do without it");
 }
 
 /// Index of the interval of `line` that holds x; the last one holds its upper end.

@@ -1,0 +1,66 @@
+# What an installation has beside the programs, each of which installs itself (mbtfm_executable). Nothing in it looks into the
+# source tree, and all is found relative to bin/: an installation may be moved.
+#
+#   bin/  lib/mbtfm/ (what deal.II is seen by)  share/mbtfm/ (scenarios, Snakefile, profiles)  share/doc/mbtfm/
+#   share/man/man1/  share/bash-completion/  share/zsh/  share/fish/
+#   and for programs that use the libraries: LIBDIR/mbtfm/*.a  LIBDIR/cmake/mbtfm/  LIBDIR/pkgconfig/mbtfm.pc  include/mbtfm/
+
+# Manual pages and completions are what the programs say of themselves.
+get_property(programs GLOBAL PROPERTY MBTFM_PROGRAMS)
+set(share ${CMAKE_BINARY_DIR}/share)
+set(commands "")
+foreach(program ${programs})
+  list(APPEND commands COMMAND ${program} --manuals ${share})
+endforeach()
+add_custom_command(OUTPUT ${share}/manuals.stamp ${commands} COMMAND ${CMAKE_COMMAND} -E touch ${share}/manuals.stamp
+  DEPENDS ${programs} COMMENT "manual pages and completions" VERBATIM)
+add_custom_target(manuals ALL DEPENDS ${share}/manuals.stamp)
+install(DIRECTORY ${share}/man ${share}/bash-completion ${share}/zsh ${share}/fish DESTINATION ${CMAKE_INSTALL_DATADIR})
+
+install(DIRECTORY samples/scenarios pipeline/profiles DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
+install(FILES pipeline/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
+install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
+install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs FILES_MATCHING
+  PATTERN *.md PATTERN *.json PATTERN *.svg PATTERN *.png PATTERN *.csv PATTERN developers EXCLUDE)
+
+# The libraries that are interfaces: the contract and its files, gels, cables; and what these are made of.
+set(interfaces
+  substrate_choice substrate_curved substrate_boxes substrate_surface substrate_greens substrate
+  network_cables network_mesh network
+  pipeline_charts pipeline_stage pipeline_numerics pipeline_files pipeline_contract)
+set(archives ${CMAKE_INSTALL_LIBDIR}/mbtfm)
+install(TARGETS mbtfm_options ${interfaces} EXPORT mbtfm ARCHIVE DESTINATION ${archives} COMPONENT Development)
+install(EXPORT mbtfm NAMESPACE mbtfm:: DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/mbtfm FILE mbtfm-targets.cmake
+  COMPONENT Development)
+include(CMakePackageConfigHelpers)
+configure_package_config_file(cmake/mbtfm-config.cmake.in ${CMAKE_BINARY_DIR}/generated/mbtfm-config.cmake
+  INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/mbtfm NO_SET_AND_CHECK_MACRO NO_CHECK_REQUIRED_COMPONENTS_MACRO)
+write_basic_package_version_file(${CMAKE_BINARY_DIR}/generated/mbtfm-config-version.cmake COMPATIBILITY SameMinorVersion)
+install(FILES ${CMAKE_BINARY_DIR}/generated/mbtfm-config.cmake ${CMAKE_BINARY_DIR}/generated/mbtfm-config-version.cmake
+  DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/mbtfm COMPONENT Development)
+
+set(MBTFM_PC_LIBRARIES "")
+foreach(library ${interfaces})
+  get_target_property(type ${library} TYPE)
+  if(type STREQUAL STATIC_LIBRARY)
+    string(APPEND MBTFM_PC_LIBRARIES " -l${library}")
+  endif()
+  string(REPLACE _ / folder ${library})
+  install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbtfm/${folder} COMPONENT Development
+    FILES_MATCHING PATTERN *.h PATTERN */* EXCLUDE)
+endforeach()
+foreach(library CommonCore CommonDataModel IOCore IOXML CommonMisc CommonSystem CommonTransforms CommonMath CommonExecutionModel IOXMLParser sys)
+  if(TARGET VTK::${library})
+    get_target_property(name VTK::${library} IMPORTED_LOCATION_RELEASE)
+    if(NOT name)
+      get_target_property(name VTK::${library} IMPORTED_LOCATION_NONE)
+    endif()
+    if(name)
+      get_filename_component(name ${name} NAME)
+      string(REGEX REPLACE "^lib(.*)\\.so.*" "-l\\1" name ${name})
+      string(APPEND MBTFM_PC_THIRD_PARTY " ${name}")
+    endif()
+  endif()
+endforeach()
+configure_file(cmake/mbtfm.pc.in ${CMAKE_BINARY_DIR}/generated/mbtfm.pc @ONLY)
+install(FILES ${CMAKE_BINARY_DIR}/generated/mbtfm.pc DESTINATION ${CMAKE_INSTALL_LIBDIR}/pkgconfig COMPONENT Development)

@@ -1,0 +1,132 @@
+"""All cells below a folder as one tidy frame."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+from pathlib import Path
+from typing import Any, Dict, Iterable, Iterator, List, Optional
+
+import pandas as pd
+
+from .cell import PathLike, read_table
+
+#: Tables that `study` knows by a short name.
+TABLES = {
+    "tensions": "4_fit/tensions.csv",
+    "adhesion_forces": "4_fit/adhesion_forces.csv",
+    "adhesions": "1_segment/adhesions.csv",
+    "fibres": "1_segment/fibres.csv",
+    "displacement": "2_track/displacement.csv",
+}
+
+
+def cells_below(folder: PathLike) -> List[Path]:
+    """The cell folders at or below a folder, sorted: those that `mbtfm batch` would run."""
+    return sorted(_walk(Path(folder)))
+
+
+def _walk(folder: Path) -> Iterator[Path]:
+    with os.scandir(folder) as entries:
+        names = list(entries)
+    if any(entry.name == "cell.toml" for entry in names):
+        yield folder
+        return
+    for entry in names:
+        if entry.is_dir(follow_symlinks=False) and not entry.name.startswith("."):
+            yield from _walk(Path(entry.path))
+
+
+def study(folder: PathLike, table: str = "tensions", conditions: Optional[PathLike] = None) -> pd.DataFrame:
+    """One table of all cells below a folder, with the cell's path (relative to the folder) in the column `cell`.
+
+    table:       ``tensions`` (a row for each fibre and network), ``adhesion_forces``, ``adhesions``, ``fibres``,
+                 ``displacement``; ``cells`` (a row for each cell: the numbers of fit.json); or a path in the cell folder.
+    conditions:  a CSV file with a column `cell` and others, such as `condition` and `replicate`, which are joined.
+
+    Cells without that table (not run, or failed) are left out; their paths are in ``frame.attrs["left_out"]``.
+    Cells whose fit did not converge are in the frame, with `converged` false.
+    """
+    root = Path(folder)
+    cells = cells_below(root)
+    if not cells:
+        raise FileNotFoundError(f"{root}: no folder with a cell.toml is in it or below it")
+    left_out: List[str] = []
+    frame = _summaries(root, cells, left_out) if table == "cells" else _rows(root, cells, TABLES.get(table, table), left_out)
+    if frame is None:
+        raise FileNotFoundError(f"{root}: none of its {len(cells)} cells has {TABLES.get(table, table)}: run mbtfm batch")
+    if conditions is not None:
+        frame = _joined(frame, conditions)
+    frame.attrs["left_out"] = left_out
+    return frame
+
+
+def _name(root: Path, cell: Path) -> str:
+    return cell.relative_to(root).as_posix() if cell != root else root.resolve().name
+
+
+def _fit(cell: Path) -> Dict[str, Any]:
+    try:
+        content = json.loads((cell / "4_fit/fit.json").read_bytes())
+    except FileNotFoundError:
+        return {}
+    return content if isinstance(content, dict) else {}
+
+
+def _rows(root: Path, cells: Iterable[Path], file: str, left_out: List[str]) -> Optional[pd.DataFrame]:
+    """The tables are put together as text, by their first lines, and parsed at once: a study has thousands of small files."""
+    texts: Dict[str, List[str]] = {}
+    names: Dict[str, List[str]] = {}
+    converged: Dict[str, List[bool]] = {}
+    for cell in cells:
+        try:
+            head, _, rows = (cell / file).read_text(encoding="utf-8").partition("\n")
+        except FileNotFoundError:
+            left_out.append(_name(root, cell))
+            continue
+        if rows and not rows.endswith("\n"):
+            rows += "\n"
+        is_converged = bool(_fit(cell).get("converged", True)) if file.startswith("4_fit/") else True
+        # a line break within quotes is no row: count as the parser does
+        n_rows = rows.count("\n") if '"' not in rows else len(pd.read_csv(io.StringIO(f"{head}\n{rows}")))
+        texts.setdefault(head, []).append(rows)
+        names.setdefault(head, []).extend([_name(root, cell)] * n_rows)
+        converged.setdefault(head, []).extend([is_converged] * n_rows)
+    frames = []
+    for head, parts in texts.items():
+        frame = read_table(io.StringIO(head + "\n" + "".join(parts)))
+        frame.insert(0, "cell", names[head])
+        if file.startswith("4_fit/"):
+            frame["converged"] = converged[head]
+        frames.append(frame)
+    if not frames:
+        return None
+    whole = pd.concat(frames, ignore_index=True) if len(frames) > 1 else frames[0]
+    return whole.sort_values("cell", kind="stable", ignore_index=True)
+
+
+def _summaries(root: Path, cells: Iterable[Path], left_out: List[str]) -> Optional[pd.DataFrame]:
+    rows = []
+    for cell in cells:
+        fit = _fit(cell)
+        if not fit:
+            left_out.append(_name(root, cell))
+            continue
+        numbers = {key: value for key, value in fit.items() if not isinstance(value, (dict, list))}
+        rows.append({"cell": _name(root, cell), **numbers})
+    return pd.DataFrame(rows) if rows else None
+
+
+def _joined(frame: pd.DataFrame, conditions: PathLike) -> pd.DataFrame:
+    table = pd.read_csv(conditions, dtype={"cell": str})
+    if "cell" not in table:
+        raise ValueError(f"{conditions}: expected a column 'cell', found {', '.join(map(str, table.columns))}")
+    if table["cell"].duplicated().any():
+        twice = table["cell"][table["cell"].duplicated()].iloc[0]
+        raise ValueError(f"{conditions}: cell {twice} has several rows")
+    table["cell"] = table["cell"].str.rstrip("/")
+    missing = sorted(set(frame["cell"]) - set(table["cell"]))
+    if missing:
+        raise ValueError(f"{conditions}: no row for {missing[0]}" + (f" and {len(missing) - 1} others" if missing[1:] else ""))
+    return frame.merge(table, on="cell", how="left", validate="many_to_one")
