@@ -1,6 +1,7 @@
 #include "pipeline/files/csv.h"
 
 #include <algorithm>
+#include <cctype>
 #include <charconv>
 #include <cmath>
 #include <limits>
@@ -84,6 +85,12 @@ CsvTable::CsvTable(std::string_view text, std::string name) : name_(std::move(na
   if (text.empty()) throw InputError(name_ + ":1", "a header line", "an empty file");
   Splitter splitter(text, name_);
   header_ = splitter.record();
+  if (header_.size() == 1 && header_.front().find_first_of(";\t") != std::string::npos) {
+    throw InputError(name_ + ":1", "columns with commas between them",
+                     header_.front().find(';') != std::string::npos ? "semicolons" : "tabs",
+                     "save it as CSV with commas, and with points in the numbers: Excel does so with English number "
+                     "formats, R with write.csv(), pandas with to_csv()");
+  }
   std::unordered_set<std::string> seen;
   for (const std::string& column : header_) {
     if (!seen.insert(column).second) throw InputError(name_ + ":1", "each column once", "'" + column + "' twice");
@@ -109,7 +116,13 @@ void CsvTable::require(const std::vector<std::string>& columns) const {
 int CsvTable::index_of(const std::string& column) const {
   const auto at = std::find(header_.begin(), header_.end(), column);
   if (at != header_.end()) return static_cast<int>(at - header_.begin());
-  throw InputError(name_ + ":1", "a column '" + column + "'", "the columns " + listed(header_));
+  const auto lower = [](std::string text) {
+    std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+    return text;
+  };
+  const auto alike = std::ranges::find(header_, lower(column), lower);
+  throw InputError(name_ + ":1", "a column '" + column + "'", "the columns " + listed(header_),
+                   alike == header_.end() ? "" : "write '" + *alike + "' as '" + column + "': capitals count");
 }
 
 void CsvTable::label_rows_by(const std::string& column, const std::string& kind) {

@@ -48,6 +48,21 @@ void expect_shallow_keys(std::string_view text, const std::string& name) {
   }
 }
 
+/// What a line was probably meant to say; empty: no idea.
+std::string advice_on(std::string_view text, std::size_t line) {
+  for (std::size_t i = 1; i < line && text.find('\n') != text.npos; ++i) text.remove_prefix(text.find('\n') + 1);
+  const std::string_view here = text.substr(0, text.find('\n'));
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  if (const auto comma = here.find(','); comma != here.npos && comma > 0 && comma + 1 < here.size() &&
+                                         is_digit(here[comma - 1]) && is_digit(here[comma + 1]))
+    return "decimals follow a point: 8.4";
+  if (here.find('\\') != here.npos)
+    return "write folders with /, as in \"D:/images/cell 1\", or the text in single quotes";
+  if (here.find('=') != here.npos && here.find('"') == here.npos && here.find('\'') == here.npos)
+    return "a text stands in quotes: actin = \"actin.tif\"";
+  return {};
+}
+
 }  // namespace
 
 toml::table parse_toml(std::string_view text, const std::string& name) {
@@ -56,7 +71,8 @@ toml::table parse_toml(std::string_view text, const std::string& name) {
   try {
     return toml::parse(text, name);
   } catch (const toml::parse_error& error) {
-    throw InputError(name + ":" + std::to_string(error.source().begin.line), "TOML", std::string(error.description()));
+    throw InputError(name + ":" + std::to_string(error.source().begin.line), "TOML", std::string(error.description()),
+                     advice_on(text, error.source().begin.line));
   } catch (const ImpossibleToml&) {
     throw InputError(name, "TOML", "brackets, quotes or keys that make none");
   }

@@ -3,6 +3,7 @@
 #include <fnmatch.h>
 
 #include <algorithm>
+#include <cctype>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/names.h"
@@ -83,12 +84,45 @@ ImageMatch match_image(const fs::path& folder, const std::string& name_or_glob) 
   return match;
 }
 
+namespace {
+
+std::string lower(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return std::tolower(c); });
+  return text;
+}
+
+/// Where there is no such file: one that was probably meant; else what can be done.
+std::string advice_on_missing(const fs::path& folder, const std::string& name, const std::string& key) {
+  const std::string place = "'" + key + "' in [images] of cell.toml";
+  if (name.find('\\') != name.npos) return "write folders with / in " + place;
+  std::vector<fs::path> there;
+  std::error_code error;
+  for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error))
+    there.push_back(entry->path().filename());
+  std::ranges::sort(there);
+  for (const fs::path& file : there) {
+    if (lower(file.string()) == lower(name)) return "there is '" + file.string() + "': capitals count";
+  }
+  for (const fs::path& file : there) {
+    const std::string type = lower(file.extension().string());
+    if (type == ".nd2" || type == ".czi" || type == ".lif" || type == ".oib" || type == ".oif")
+      return "there is '" + file.string() + "', a file of a microscope: save it as TIFF in Fiji (File > Import > " +
+             "Bio-Formats, then File > Save As > Tiff), or: bfconvert '" + file.string() + "' '" +
+             file.stem().string() + ".ome.tif'; then name it as " + place;
+    if (lower(file.stem().string()) == lower(fs::path(name).stem().string()))
+      return "there is '" + file.string() + "': name it as " + place;
+  }
+  return "put it there, or name the file or a glob as " + place;
+}
+
+}  // namespace
+
 fs::path resolve_image(const fs::path& folder, const ImageNames& names, const std::string& key) {
   const ImageMatch match = match_image(folder, name_of_image(names, key));
   if (match.files.size() == 1) return match.files.front();
   if (match.files.empty()) {
     throw InputError(folder.string(), "a file '" + match.pattern + "'", "none",
-                     "put it there, or name the file or a glob as '" + key + "' in [images] of cell.toml");
+                     advice_on_missing(folder, match.pattern, key));
   }
   std::string list;
   for (const fs::path& file : match.files) list += (list.empty() ? "" : ", ") + file.filename().string();

@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <map>
-#include <numeric>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
@@ -14,6 +13,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/files/toml.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/suggest.h"
 
 namespace mbtfm::stage {
 
@@ -31,29 +31,6 @@ struct Overloaded : F... {
 };
 template <class... F>
 Overloaded(F...) -> Overloaded<F...>;
-
-int edit_distance(std::string_view a, std::string_view b) {
-  std::vector<int> row(b.size() + 1);
-  std::iota(row.begin(), row.end(), 0);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    int diagonal = std::exchange(row[0], static_cast<int>(i) + 1);
-    for (std::size_t j = 0; j < b.size(); ++j) {
-      const int replaced = diagonal + (a[i] != b[j]);
-      diagonal = row[j + 1];
-      row[j + 1] = std::min({replaced, row[j] + 1, diagonal + 1});
-    }
-  }
-  return row.back();
-}
-
-std::string nearest(const std::vector<std::string>& known, std::string_view name) {
-  const auto closest = std::min_element(known.begin(), known.end(), [&](const auto& a, const auto& b) {
-    return edit_distance(a, name) < edit_distance(b, name);
-  });
-  return closest == known.end() ? std::string() : *closest;
-}
-
-std::string did_you_mean(const std::string& word) { return "did you mean '" + word + "'?"; }
 
 std::string in_table(const Parameter& p) { return (p.table.empty() ? "" : "[" + p.table + "] ") + p.name; }
 
@@ -117,11 +94,13 @@ bool try_set(Parameter& p, const std::string& text) {
 std::string likely_slip(const Parameter& p, const std::string& text) {
   if (const auto* choice = std::get_if<Choice>(&p.member)) {
     const std::string word = nearest(choice->words, text);
-    const bool is_alike = 2 * edit_distance(word, text) < static_cast<int>(word.size());
-    return is_alike ? did_you_mean(word) : "";
+    return is_alike(word, text) ? did_you_mean(word) : "";
   }
   double value = 0;
-  return read_number(text, value) ? unit_slip(p.name, value, p.range) : "";
+  if (read_number(text, value)) return unit_slip(p.name, value, p.range);
+  std::string with_point = text;
+  std::ranges::replace(with_point, ',', '.');
+  return with_point != text && read_number(with_point, value) ? "decimals follow a point: " + with_point : "";
 }
 
 std::string advice_on(const Parameter& p, const std::string& text) {

@@ -18,18 +18,25 @@ constexpr const char* kExpected = "a TIFF, PNG or JPEG image";
 struct Signature {
   std::string_view bytes;
   std::string_view name;
+  bool is_microscopes = false;  ///< which Bio-Formats reads
 };
 using namespace std::string_view_literals;
 constexpr Signature kForeignFormats[] = {{"GIF8"sv, "a GIF image"},
                                          {"BM"sv, "a BMP image"},
                                          {"PK\x03\x04"sv, "a zip archive"},
-                                         {"ZISRAWFILE"sv, "a Zeiss CZI file"},
-                                         {"\x70\x00\x00\x00"sv, "a Leica LIF file"},
-                                         {"\xDA\xCE\xBE\x0A"sv, "a Nikon ND2 file"},
+                                         {"ZISRAWFILE"sv, "a Zeiss CZI file", true},
+                                         {"\x70\x00\x00\x00"sv, "a Leica LIF file", true},
+                                         {"\xDA\xCE\xBE\x0A"sv, "a Nikon ND2 file", true},
                                          {"\x00\x00\x00\x0CjP  "sv, "a JPEG 2000 image"},
                                          {"\x89HDF"sv, "an HDF5 file"},
                                          {"\x1F\x8B"sv, "a gzip archive"},
-                                         {"\xD0\xCF\x11\xE0"sv, "an Olympus OIB or Microsoft file"}};
+                                         {"\xD0\xCF\x11\xE0"sv, "an Olympus OIB or Microsoft file", true}};
+
+std::string microscopes_hint(const std::filesystem::path& file) {
+  const std::string name = file.filename().string();
+  return "in Fiji: File > Import > Bio-Formats, then File > Save As > Tiff; or on the command line: bfconvert '" +
+         name + "' '" + file.stem().string() + ".ome.tif'";
+}
 
 bool is_tiff(std::string_view head) {
   return head.starts_with("II\x2A\x00"sv) || head.starts_with("MM\x00\x2A"sv) || head.starts_with("II\x2B\x00"sv) ||
@@ -119,7 +126,8 @@ Image read_image(const std::filesystem::path& file, const PlaneChoice& choice) {
   }
   for (const Signature& format : kForeignFormats) {
     if (head.starts_with(format.bytes)) {
-      throw InputError(file.string(), kExpected, std::string(format.name), "export it as 8- or 16-bit TIFF");
+      throw InputError(file.string(), kExpected, std::string(format.name),
+                       format.is_microscopes ? microscopes_hint(file) : "export it as 8- or 16-bit TIFF");
     }
   }
   throw InputError(file.string(), kExpected, head.empty() ? "an empty file" : "bytes of neither");

@@ -164,6 +164,20 @@ TEST(Files, missing_columns_extra_fields_open_quotes_and_early_ends_are_refused)
   EXPECT_THROW(files::CsvTable("a\n1\n", "t").require({"b"}), InputError);
 }
 
+TEST(Files, semicolons_and_capitals_in_a_table_are_answered_with_how_to_write_it) {
+  const auto error_of = [](const std::string& text) {
+    try {
+      files::CsvTable(text, "points.csv").require({"x_um"});
+    } catch (const InputError& error) {
+      return error.found + " | " + error.hint;
+    }
+    return std::string("read");
+  };
+  EXPECT_NE(error_of("x_um;y_um\n1,5;2,5\n").find("semicolons | save it as CSV with commas"), std::string::npos);
+  EXPECT_NE(error_of("x_um\ty_um\n1\t2\n").find("tabs | "), std::string::npos);
+  EXPECT_NE(error_of("X_um,y_um\n1,2\n").find("write 'X_um' as 'x_um'"), std::string::npos);
+}
+
 TEST(Files, quoted_fields_and_carriage_returns_are_read) {
   const files::CsvTable table(
       "\xEF\xBB\xBF"

@@ -184,5 +184,21 @@ TEST(Parameters, a_gel_needs_its_modulus_and_a_poisson_ratio_below_one_half) {
   EXPECT_NO_THROW(stage::check_complete(list));
 }
 
+TEST(Parameters, what_other_programs_and_countries_write_is_answered_with_how_to_write_it) {
+  const auto hint = [](const std::string& text) {
+    stage::ParameterList list;
+    try {
+      stage::read_toml(list, text, "cell.toml");
+    } catch (const InputError& error) {
+      return error.hint;
+    }
+    return std::string("read");
+  };
+  EXPECT_EQ(hint("[gel]\nthickness_um = 8,4\n"), "decimals follow a point: 8.4");
+  EXPECT_NE(hint("[images]\nactin = \"D:\\images\\cell 1\\actin.tif\"\n").find("write folders with /"),
+            std::string::npos);
+  EXPECT_NE(hint("[images]\nactin = actin.tif\n").find("in quotes"), std::string::npos);
+}
+
 }  // namespace
 }  // namespace mbtfm
