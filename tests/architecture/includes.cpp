@@ -40,6 +40,7 @@ const Graph kMayInclude = {
     {"segment/rois", {"pipeline/contract"}},
     {"segment/cells", {"pipeline/contract", "pipeline/numerics", "pipeline/stage", "segment/images", "segment/rois"}},
     {"segment/beads", {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "segment/images"}},
+    {"segment/survey", {"pipeline/contract", "pipeline/stage", "segment/images", "segment/beads", "segment/cells"}},
     {"network/mesh", {"pipeline/contract", "pipeline/numerics", "pipeline/stage"}},
     {"network", {"pipeline/contract"}},
     {"network/cables", {"pipeline/contract", "pipeline/numerics", "pipeline/stage", "network"}},

@@ -1,0 +1,124 @@
+/// mbtfm-check: what the images below a folder are good for, cell by cell, before a batch is run.
+#include <algorithm>
+#include <filesystem>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/runner/batch.h"
+#include "pipeline/runner/run_cell.h"
+#include "pipeline/stage/console.h"
+#include "pipeline/stage/stage.h"
+#include "segment/beads/track.h"
+#include "segment/cells/segment_cell.h"
+#include "segment/survey/survey.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace mbtfm;
+
+struct CheckParameters {};
+void declare(stage::ParameterList&, CheckParameters&) {}
+
+/// Which planes cell.toml chooses, as the stages will read them. @throws InputError where a key or value is wrong
+struct Chosen {
+  cells::SegmentParameters segment;
+  beads::TrackParameters track;
+};
+
+Chosen chosen_in(const fs::path& toml) {
+  Chosen chosen;
+  stage::ParameterList of_segment, of_track;
+  declare(of_segment, chosen.segment);
+  stage::read_toml(of_segment, toml);
+  declare(of_track, chosen.track);
+  int binning = 1;  // of the stage: images are looked at as they are
+  of_track.table("track");
+  of_track.add("binning", binning, Range::between(1, images::kLargestBinning), "pixels of a side in one");
+  stage::read_toml(of_track, toml);
+  return chosen;
+}
+
+std::optional<images::Channel> channel(const fs::path& file, const images::PlaneChoice& choice) {
+  return images::Channel{.name = file.filename().string(), .image = images::read_image(file, choice)};
+}
+
+survey::CellImages images_of(const fs::path& cell) {
+  const runner::ImageNames names = runner::read_image_names(cell);
+  const Chosen chosen = chosen_in(cell / "cell.toml");
+  survey::CellImages images;
+  images.given_pixel_size_um = chosen.segment.pixel_size_um;
+  if (const auto file = runner::resolve_optional_image(cell, names, "adhesion"))
+    images.adhesion = channel(*file, chosen.segment.adhesion_plane);
+  images.actin = channel(runner::resolve_image(cell, names, "actin"), chosen.segment.actin_plane);
+  if (!runner::name_of_image(names, "displacement").empty()) return images;  // of another program
+  images.beads_stressed = channel(runner::resolve_image(cell, names, "beads_stressed"), chosen.track.stressed_plane);
+  images.beads_relaxed = channel(runner::resolve_image(cell, names, "beads_relaxed"), chosen.track.relaxed_plane);
+  return images;
+}
+
+struct Seen {
+  std::string text;
+  bool is_fine = true;
+};
+
+Seen look_at(const fs::path& cell, const std::string& name) {
+  try {
+    const survey::Survey survey = survey::survey(images_of(cell), 1);
+    std::string text = name + ": " + survey.facts + (survey.doubts.empty() ? "; fine" : "");
+    for (const std::string& doubt : survey.doubts) text += "\n" + stage::warning("  caution: " + doubt);
+    return {.text = text + "\n", .is_fine = survey.doubts.empty()};
+  } catch (const InputError& error) {
+    std::string text = name + ": " + stage::warning(std::string("error: ") + error.what()) + "\n";
+    if (!error.hint.empty()) text += "  hint: " + error.hint + "\n";
+    return {.text = text, .is_fine = false};
+  } catch (const std::exception& error) {
+    return {.text = name + ": " + stage::warning(std::string("error: ") + error.what()) + "\n", .is_fine = false};
+  }
+}
+
+// What a run writes beside each image: its picture, its field, its networks; measured on the demo cell and doubled.
+constexpr double kBytesPerCell = 40e6;
+
+std::string disk_doubt(const fs::path& folder, std::size_t n_cells) {
+  std::error_code error;
+  const double free = static_cast<double>(fs::space(folder, error).available),
+               needed = kBytesPerCell * static_cast<double>(n_cells);
+  if (error || free > needed) return {};
+  return "  caution: " + brief(free / 1e9) + " GB of the disk are free; the results of " + std::to_string(n_cells) +
+         " cells may take " + brief(needed / 1e9) + " GB.\n";
+}
+
+StageReport check(const fs::path& folder, int threads, bool& is_fine) {
+  const runner::FoundCells found = runner::find_cells(folder);
+  std::vector<Seen> seen(found.cells.size());
+  numerics::parallel_for(static_cast<int>(seen.size()), threads, [&](int i) {
+    const fs::path name = found.cells[i].lexically_relative(folder);
+    seen[i] = look_at(found.cells[i], name == "." ? fs::weakly_canonical(folder).filename().string() : name.string());
+  });
+  for (const Seen& cell : seen) stage::print(cell.text);
+  stage::print(disk_doubt(folder, seen.size()));
+  const auto n_fine = std::ranges::count_if(seen, &Seen::is_fine);
+  is_fine = n_fine == static_cast<std::ptrdiff_t>(seen.size());
+  StageReport report;
+  report.summary = std::to_string(n_fine) + " of " + std::to_string(seen.size()) + " cells are fine";
+  report.figures = {{"n_cells", static_cast<std::int64_t>(seen.size())}, {"n_fine", static_cast<std::int64_t>(n_fine)}};
+  return report;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  bool is_fine = true;
+  const int code = stage::run_stage<CheckParameters>(
+      {.name = "check",
+       .purpose =
+           "what the images below a folder are good for, before a batch is run: calibration, sizes, saturation, focus, "
+           "beads, margin, pictures that are the same, disk",
+       .files = {{"cells", stage::FileArgument::Kind::input, "a cell folder, or a folder of cell folders"}}},
+      argc, argv, [&](const CheckParameters&, stage::StageContext& context) {
+        return check(context.input("cells", {}), context.threads, is_fine);
+      });
+  return code == exit_code::kDone && !is_fine ? exit_code::kFailed : code;
+}

@@ -1,0 +1,133 @@
+/// mbtfm-init: a cell.toml from what the files of a folder say, with notes on what is to be completed.
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+#include <optional>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/listed.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/text.h"
+#include "pipeline/stage/stage.h"
+#include "segment/images/image.h"
+#include "segment/survey/roles.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace mbtfm;
+
+struct InitParameters {};
+void declare(stage::ParameterList&, InitParameters&) {}
+
+bool is_image(const fs::path& file) {
+  std::string type = file.extension().string();
+  std::ranges::transform(type, type.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return type == ".tif" || type == ".tiff" || type == ".png" || type == ".jpg" || type == ".jpeg";
+}
+
+std::vector<std::string> images_in(const fs::path& folder) {
+  std::vector<std::string> names;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.is_regular_file() && is_image(entry.path())) names.push_back(entry.path().filename().string());
+  std::ranges::sort(names);
+  return names;
+}
+
+/// What an image file says of itself, as a comment; its calibration.
+struct Says {
+  std::string note;
+  std::optional<double> pixel_size_um;
+};
+
+Says says_of(const fs::path& file) {
+  try {
+    const images::Image image = images::read_image(file);
+    return {.note = std::to_string(image.width) + " x " + std::to_string(image.height) + " pixels",
+            .pixel_size_um = image.pixel_size_um};
+  } catch (const InputError& error) {
+    return {
+        .note = "expected " + error.expected + ", found " + error.found + (error.hint.empty() ? "" : ": " + error.hint),
+        .pixel_size_um = {}};
+  }
+}
+
+std::string quoted(const std::string& name) {
+  std::string text = "\"";
+  for (const char c : name) text += c == '"' || c == '\\' ? std::string("\\") + c : std::string(1, c);
+  return text + "\"";
+}
+
+struct Written {
+  std::string text, open;  ///< of cell.toml; what is to be completed
+};
+
+Written cell_toml(const fs::path& folder) {
+  const std::vector<std::string> names = images_in(folder);
+  const survey::Roles roles = survey::roles_of(names);
+  std::string images;
+  std::vector<std::string> open;
+  std::optional<double> pixel_size_um;
+  std::string calibrated;
+  for (const char* key : {"adhesion", "actin", "beads_stressed", "beads_relaxed"}) {
+    const auto file = roles.files.find(key);
+    if (file == roles.files.end()) {
+      images += "# " + std::string(key) + " = \"\"    # which file? no name tells\n";
+      open.push_back(std::string(key) + " in [images]");
+      continue;
+    }
+    const Says says = says_of(folder / file->second);
+    images += std::string(key) + " = " + quoted(file->second) + "    # " + says.note + "\n";
+    if (!pixel_size_um && says.pixel_size_um) {
+      pixel_size_um = says.pixel_size_um;
+      calibrated = file->second;
+    }
+  }
+  if (!roles.unknown.empty()) images += "# other images here: " + listed(roles.unknown) + "\n";
+  std::string text =
+      "# Written by mbtfm init from the files of this folder. What is behind a # is a note or not used.\n\n";
+  if (pixel_size_um) {
+    text += "# The calibration of " + calibrated + " is " + shortest(*pixel_size_um) +
+            " um: each image's own is used. To overrule it:\n" + "# pixel_size_um = " + shortest(*pixel_size_um) + "\n";
+  } else {
+    text += "# pixel_size_um = 0.1    # needed, as no image has a calibration: side of a pixel on the specimen\n";
+    open.emplace_back("pixel_size_um");
+  }
+  text +=
+      "\n[gel]\n# youngs_modulus_kPa = 8.4    # needed: as measured; all forces are proportional to it\n"
+      "# poisson_ratio = 0.49    # of the gel; 0.49 if not given\n# thickness_um = 60    # of the gel; 60 if not "
+      "given\n"
+      "\n[images]\n" +
+      images;
+  open.insert(open.begin(), "youngs_modulus_kPa in [gel]");
+  return {.text = text, .open = listed(open)};
+}
+
+StageReport init(stage::StageContext& context) {
+  const fs::path folder = context.input("cell", {});
+  if (!fs::is_directory(folder)) throw InputError(folder.string(), "a folder with the images of a cell", "none");
+  if (fs::exists(folder / "cell.toml"))
+    throw InputError((folder / "cell.toml").string(), "no cell.toml yet", "one",
+                     "it is yours: edit it, or rename it first");
+  if (images_in(folder).empty())
+    throw InputError(
+        folder.string(), "images of a cell: TIFF, PNG or JPEG", "none",
+        "files of a microscope (nd2, czi, lif): in Fiji, File > Import > Bio-Formats, then File > Save As > Tiff; "
+        "or bfconvert IN OUT.ome.tif");
+  const Written written = cell_toml(folder);
+  files::write_text(context.output("out"), written.text);
+  StageReport report;
+  report.summary = "cell.toml is written; complete in it: " + written.open;
+  return report;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return mbtfm::stage::run_stage<InitParameters>(
+      {.name = "init",
+       .purpose = "write a cell.toml from what the images of a folder say",
+       .files = {{"cell", stage::FileArgument::Kind::input, "folder with the images of a cell"},
+                 {"out", stage::FileArgument::Kind::output, "the cell.toml"}}},
+      argc, argv, [](const InitParameters&, stage::StageContext& context) { return init(context); });
+}

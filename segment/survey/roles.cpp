@@ -1,0 +1,54 @@
+#include "segment/survey/roles.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <string_view>
+
+namespace mbtfm::survey {
+
+namespace {
+
+constexpr std::array kBeads = {"bead", "fluosphere", "tfm", "gel"};
+constexpr std::array kRelaxed = {"relax", "ref",    "after",   "null", "tryps",   "sds",
+                                 "post",  "nocell", "no_cell", "zero", "undeform"};
+constexpr std::array kStressed = {"stress", "before", "pre", "load", "deform", "withcell", "with_cell", "force"};
+constexpr std::array kAdhesion = {"pax", "vinc", "zyx", "adhes", "fak", "talin", "integrin", "_fa", "fa_"};
+constexpr std::array kActin = {"actin", "phall", "_act", "act_", "fiber", "fibre", "utroph", "ftract"};
+
+template <class Words>
+bool has_any(std::string_view name, const Words& words) {
+  return std::ranges::any_of(words, [&](std::string_view word) { return name.find(word) != name.npos; });
+}
+
+/// Empty where the name tells nothing.
+std::string key_of(std::string name) {
+  std::ranges::transform(name, name.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  const bool is_adhesion = has_any(name, kAdhesion), is_actin = has_any(name, kActin);
+  if (!has_any(name, kBeads)) {
+    if (is_adhesion && is_actin) return "";
+    if (is_adhesion) return "adhesion";
+    if (is_actin) return "actin";
+  }
+  if (has_any(name, kRelaxed)) return "beads_relaxed";  // "undeformed", too, which has "deform" in it
+  return has_any(name, kStressed) ? "beads_stressed" : "";
+}
+
+}  // namespace
+
+Roles roles_of(const std::vector<std::string>& names) {
+  std::map<std::string, std::vector<std::string>> by_key;
+  Roles roles;
+  for (const std::string& name : names) by_key[key_of(name)].push_back(name);
+  for (const auto& [key, files] : by_key) {
+    if (!key.empty() && files.size() == 1) {
+      roles.files[key] = files.front();
+    } else {
+      roles.unknown.insert(roles.unknown.end(), files.begin(), files.end());
+    }
+  }
+  std::ranges::sort(roles.unknown);
+  return roles;
+}
+
+}  // namespace mbtfm::survey

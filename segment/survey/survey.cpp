@@ -1,0 +1,136 @@
+#include "segment/survey/survey.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/findings.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/stage/plausible.h"
+#include "segment/beads/plane.h"
+#include "segment/beads/track.h"
+#include "segment/cells/outline.h"
+
+namespace mbtfm::survey {
+
+namespace {
+
+using images::Channel;
+
+// Fewer than these three by three beads under a fibre of 10 um and its surroundings leave its tension to its
+// neighbours.
+constexpr double kWidestSpacing_um = 3;
+// Beads of unlike focus: as the tracker's finding `defocused` has it.
+constexpr double kUnlikeSizes = 1.1;
+// A force's displacement falls to a tenth of its peak some five adhesions' lengths away; the drift is measured beyond.
+constexpr double kLeastMargin_um = 5;
+
+std::vector<const Channel*> all_of(const CellImages& cell) {
+  std::vector<const Channel*> all;
+  for (const auto* image : {&cell.adhesion, &cell.actin, &cell.beads_stressed, &cell.beads_relaxed})
+    if (*image) all.push_back(&**image);
+  return all;
+}
+
+double pixel_size_um(const CellImages& cell) {
+  std::optional<double> size = cell.given_pixel_size_um;
+  const std::vector<const Channel*> all = all_of(cell);
+  for (std::size_t i = 0; i < all.size(); ++i) size = images::common_pixel_size_um(*all[0], *all[i], size);
+  return size.value_or(0);
+}
+
+void look_at_each(const CellImages& cell, Survey& survey) {
+  for (const Channel* image : all_of(cell)) {
+    for (const auto& finding : {images::noticed_saturation(*image), images::noticed_loss(*image)})
+      if (finding) survey.doubts.push_back(finding->text + " " + finding->remedy);
+  }
+}
+
+void look_for_twins(const CellImages& cell, Survey& survey) {
+  const std::vector<const Channel*> all = all_of(cell);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j) {
+      if (all[i]->image.pixels == all[j]->image.pixels)
+        survey.doubts.push_back(all[j]->name + " and " + all[i]->name +
+                                " are the same picture. Name the right files in [images] of cell.toml.");
+    }
+  }
+}
+
+/// Gaussian size (px) of the beads in an image; 0: none are seen.
+double bead_size_px(const images::Image& image) {
+  constexpr double kWide_px = 8;  // wider than any bead, for a first look
+  return beads::bead_sigma_of(beads::without_background(image, kWide_px));
+}
+
+void look_at_beads(const CellImages& cell, double pixel_um, int threads, Survey& survey) {
+  if (!cell.beads_stressed || !cell.beads_relaxed) return;
+  const images::Image& relaxed = cell.beads_relaxed->image;
+  const double size_relaxed = bead_size_px(relaxed), size_stressed = bead_size_px(cell.beads_stressed->image);
+  for (const Channel* channel : {&*cell.beads_relaxed, &*cell.beads_stressed}) {
+    if ((channel == &*cell.beads_relaxed ? size_relaxed : size_stressed) == 0)
+      survey.doubts.push_back(channel->name + " shows no beads, only noise. Check the channel and the focus.");
+  }
+  if (size_relaxed == 0 || size_stressed == 0) return;
+  const double ratio = size_stressed / size_relaxed, unlike = std::max(ratio, 1 / ratio);
+  if (unlike > kUnlikeSizes)
+    survey.doubts.push_back("The beads of " + (ratio > 1 ? cell.beads_stressed : cell.beads_relaxed)->name +
+                            " are wider by a factor of " + brief(unlike) + " (limit " + brief(kUnlikeSizes) +
+                            "). Focus both images on the same beads, or take the slice that is as sharp.");
+  const std::size_t n_beads = beads::detect_beads(relaxed, beads::TrackParameters{}.detection_snr, threads).size();
+  const double field_um2 = relaxed.width * pixel_um * relaxed.height * pixel_um;
+  const double spacing_um = std::sqrt(field_um2 / static_cast<double>(std::max<std::size_t>(1, n_beads)));
+  survey.facts += "; " + std::to_string(n_beads) + " beads, " + brief(spacing_um) + " um apart";
+  if (spacing_um > kWidestSpacing_um)
+    survey.doubts.push_back("The beads are " + brief(spacing_um) + " um apart (limit " + brief(kWidestSpacing_um) +
+                            " um): single fibres will not be told apart. Use more beads, or two colours of them.");
+}
+
+/// From the cell to the nearest side of the image; none where no cell is found.
+std::optional<double> margin_um(const images::Image& image, double pixel_um) {
+  const auto cells = cells::find_cells(image, {}, pixel_um, cells::OutlineParameters{});
+  if (cells.empty()) return std::nullopt;
+  double margin = std::min(image.width, image.height) * pixel_um;
+  for (const Vec2 p : cells.front().outer_um)
+    margin = std::min({margin, p.x, p.y, image.width * pixel_um - p.x, image.height * pixel_um - p.y});
+  return std::max(0.0, margin);
+}
+
+void look_at_cell(const CellImages& cell, double pixel_um, Survey& survey) {
+  if (!cell.actin) return;
+  constexpr int kCoarse = 4;  // px: the outline to half a micrometre is enough here
+  const int binning = std::min({kCoarse, cell.actin->image.width, cell.actin->image.height});
+  const std::optional<double> margin = margin_um(images::binned(cell.actin->image, binning), pixel_um * binning);
+  if (!margin) {
+    survey.doubts.push_back(cell.actin->name + " shows no cell. Check the channel.");
+    return;
+  }
+  survey.facts += "; margin " + brief(*margin) + " um";
+  if (*margin < kLeastMargin_um)
+    survey.doubts.push_back(
+        "The cell comes within " + brief(*margin) + " um of the image's border (limit " + brief(kLeastMargin_um) +
+        " um): forces beyond the image are then unknown. Take a larger field, or a cell in its middle.");
+}
+
+}  // namespace
+
+Survey survey(const CellImages& cell, int threads) {
+  Survey survey;
+  const std::vector<const Channel*> all = all_of(cell);
+  if (all.empty()) return {.facts = "no images", .doubts = {}};
+  if (cell.adhesion && cell.actin) images::require_equal_sizes(*cell.adhesion, *cell.actin);
+  if (cell.beads_stressed && cell.beads_relaxed) images::require_equal_sizes(*cell.beads_stressed, *cell.beads_relaxed);
+  const double pixel_um = pixel_size_um(cell);
+  survey.facts = std::to_string(all[0]->image.width) + " x " + std::to_string(all[0]->image.height) + " pixels of " +
+                 images::in_um(pixel_um);
+  for (const Channel* image : all) {
+    if (const auto doubt = images::doubt_about_calibration(*image, cell.given_pixel_size_um))
+      survey.doubts.push_back(image->name + ": " + stage::sentence_of(*doubt) + ". " + doubt->remedy);
+  }
+  look_at_each(cell, survey);
+  look_for_twins(cell, survey);
+  look_at_beads(cell, pixel_um, threads, survey);
+  look_at_cell(cell, pixel_um, survey);
+  return survey;
+}
+
+}  // namespace mbtfm::survey
