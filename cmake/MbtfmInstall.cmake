@@ -17,11 +17,11 @@ add_custom_command(OUTPUT ${share}/manuals.stamp ${commands} COMMAND ${CMAKE_COM
 add_custom_target(manuals ALL DEPENDS ${share}/manuals.stamp)
 install(DIRECTORY ${share}/man ${share}/bash-completion ${share}/zsh ${share}/fish DESTINATION ${CMAKE_INSTALL_DATADIR})
 
-install(DIRECTORY samples/scenarios pipeline/profiles DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
+install(DIRECTORY samples/scenarios pipeline/profiles pipeline/fiji DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
 install(FILES pipeline/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs FILES_MATCHING
-  PATTERN *.md PATTERN *.json PATTERN *.svg PATTERN *.png PATTERN *.csv PATTERN developers EXCLUDE)
+  PATTERN *.md PATTERN *.R PATTERN *.json PATTERN *.svg PATTERN *.png PATTERN *.csv PATTERN developers EXCLUDE)
 
 # The libraries that are interfaces: the contract and its files, gels, cables; and what these are made of.
 set(interfaces

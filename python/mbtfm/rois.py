@@ -49,7 +49,7 @@ def encode(roi: Roi) -> bytes:
     struct.pack_into(">h", header, 34, round(roi.stroke_width_px))
     struct.pack_into(">h", header, 50, _SUB_PIXEL)
     whole = np.floor(points).astype(int) - low
-    coordinates = whole.T.astype(">u2").tobytes() + points.T.astype(">f4").tobytes()
+    coordinates = bytes(whole.T.astype(">u2").tobytes() + points.T.astype(">f4").tobytes())
     struct.pack_into(">i", header, 60, _HEADER + len(coordinates))
     name = roi.name.encode("utf-16-be")
     header2 = bytearray(_HEADER2)
@@ -60,25 +60,27 @@ def encode(roi: Roi) -> bytes:
 
 def decode(data: bytes, where: str = "ROI") -> Roi:
     """A polygon or a line; other shapes are ValueErrors."""
+    if data[:4] != b"Iout":
+        raise ValueError(f"{where}: expected an ImageJ ROI")
     try:
-        if data[:4] != b"Iout":
-            raise ValueError(f"{where}: expected an ImageJ ROI")
-        if data[6] not in (_POLYGON, _POLYLINE):
-            raise ValueError(f"{where}: expected a polygon or a line of straight pieces, found the ImageJ shape {data[6]}")
+        shape = data[6]
         top, left, _, _, n = struct.unpack_from(">4hH", data, 8)
         has_fractions = struct.unpack_from(">h", data, 50)[0] & _SUB_PIXEL
-        if has_fractions:
-            points = np.frombuffer(data, ">f4", 2 * n, _HEADER + 4 * n).astype(float)
-        else:
-            points = np.frombuffer(data, ">u2", 2 * n, _HEADER).astype(float)
-            points += np.repeat([left, top], n)
+        kind, at_points = (">f4", _HEADER + 4 * n) if has_fractions else (">u2", _HEADER)
+        points = np.frombuffer(data, kind, 2 * n, at_points).astype(float).reshape(2, n).T.copy()
         (header2,) = struct.unpack_from(">i", data, 60)
         at, length = struct.unpack_from(">2i", data, header2 + 16)
         (width,) = struct.unpack_from(">f", data, header2 + 36)
-        name = data[at : at + 2 * length].decode("utf-16-be", errors="replace")
-    except (struct.error, IndexError) as error:
+        name = data[at : at + 2 * length].decode("utf-16-be")
+        if len(name.encode("utf-16-be")) != 2 * length:
+            raise ValueError("its name is cut")
+    except (struct.error, IndexError, ValueError) as error:
         raise ValueError(f"{where}: the file is truncated or damaged: {error}") from error
-    return Roi(name, points.reshape(2, n).T.copy(), data[6] == _POLYGON, float(width))
+    if shape not in (_POLYGON, _POLYLINE):
+        raise ValueError(f"{where}: expected a polygon or a line of straight pieces, found the ImageJ shape {shape}")
+    if not has_fractions:
+        points += [left, top]
+    return Roi(name, points, shape == _POLYGON, float(width))
 
 
 def write_rois(file: PathLike, rois: Sequence[Roi]) -> None:
