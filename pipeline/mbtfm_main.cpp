@@ -22,7 +22,9 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/report/compare.h"
 #include "pipeline/report/report.h"
+#include "pipeline/report/result_line.h"
 #include "pipeline/runner/batch.h"
+#include "pipeline/runner/batch_progress.h"
 #include "pipeline/runner/batch_table.h"
 #include "pipeline/runner/image_sets.h"
 #include "pipeline/runner/lock.h"
@@ -32,6 +34,7 @@
 #include "pipeline/runner/verify.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/manual.h"
+#include "pipeline/stage/suggest.h"
 
 namespace {
 
@@ -45,7 +48,8 @@ struct CommandLine {
   fs::path stage_folder = runner::executable_folder();
   int threads = numerics::available_threads();
   int jobs = 1;
-  bool is_quiet = false, only_list = false, only_table = false, is_checked = false, explain = false;
+  bool is_quiet = false, is_verbose = false, is_json = false, only_list = false, only_table = false, is_checked = false,
+       explain = false;
   std::vector<std::string> only, redo, patterns;
   std::vector<fs::path> more_cells;
   fs::path template_toml, out, inputs;
@@ -59,11 +63,30 @@ struct CommandLine {
 
 bool is_terminal() { return isatty(STDERR_FILENO) != 0; }
 
+/// Of `mbtfm run --json`: what a stage prints of its progress is an event; all else goes where messages go.
+runner::Sink event_sink() {
+  return [begun = std::string()](std::string_view text) mutable {
+    begun += text;
+    for (std::size_t end = begun.find('\n'); end != begun.npos; end = begun.find('\n')) {
+      const std::string line = begun.substr(0, end + 1);
+      begun.erase(0, end + 1);
+      line.starts_with("{\"event\":") ? stage::print(line) : runner::print_on(line);
+    }
+  };
+}
+
 // What stands on the line of a terminal before gives way.
 void say(const std::string& line) {
   std::fprintf(stderr, "%smbtfm: %s\n", is_terminal() ? "\r\033[K" : "", line.c_str());
 }
 void show(const std::string& line) { std::fprintf(stderr, "\r\033[K%s", line.c_str()); }
+
+std::function<void(const runner::StageTold&)> teller(const CommandLine& line) {
+  if (line.is_json) return [](const runner::StageTold& told) { stage::print(events_of(told)); };
+  if (line.is_quiet) return nullptr;
+  const auto detail = line.is_verbose ? runner::Detail::all : runner::Detail::brief;
+  return [detail](const runner::StageTold& told) { say(text_of(told, detail)); };
+}
 
 runner::RunOptions run_options(const CommandLine& line) {
   return {.stage_folder = line.stage_folder,
@@ -77,7 +100,8 @@ runner::RunOptions run_options(const CommandLine& line) {
           .preset = line.preset,
           .beneath = line.preset.empty() ? std::vector<runner::Setting>() : cost::preset_named(line.preset).settings,
           .version = kVersion,
-          .say = line.is_quiet ? nullptr : say,
+          .say = teller(line),
+          .sink = line.is_json ? event_sink : std::function<runner::Sink()>(),
           .finish = nullptr};
 }
 
@@ -105,15 +129,26 @@ runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions 
   return runner::run_cell(line.folder, options);
 }
 
+/// The stages leave it to us to tell of them.
+void speak_for_stages(const CommandLine& line) { setenv(stage::kRunnerVariable, line.is_json ? "json" : "text", 1); }
+
 int run(const CommandLine& line) {
+  speak_for_stages(line);
   runner::RunOptions options = run_options(line);
   options.finish = [&] {
     if (!files::is_own_file(line.folder / "4_fit/fit.json")) return;
     report::update_report(line.folder);
-    if (!line.is_quiet) say("report " + (line.folder / "report.html").string());
+    const fs::path page = line.folder / "report.html";
+    if (line.is_json) return stage::print(report::result_event(line.folder, page));
+    if (!line.is_quiet) say(report::result_line(line.folder) + "; " + page.string());
   };
-  const runner::CellOutcome outcome =
-      line.accuracy.empty() ? runner::run_cell(line.folder, options) : run_to_accuracy(line, options);
+  runner::CellOutcome outcome;
+  try {
+    outcome = line.accuracy.empty() ? runner::run_cell(line.folder, options) : run_to_accuracy(line, options);
+  } catch (const runner::StageFailed& error) {
+    if (line.is_json) stage::print(runner::event_of_error(error.failure.message, error.failure.exit_code));
+    throw;
+  }
   if (outcome.converged()) return kDone;
   std::fprintf(stderr, "mbtfm: error: not converged: %s; the outputs are marked\n", outcome.not_converged().c_str());
   return kNotSolved;
@@ -142,6 +177,8 @@ std::vector<std::string> arguments_of_cell(const CommandLine& line) {
   return arguments;
 }
 
+void tell_of_cell(const runner::BatchCell& cell) { stage::print(event_of(cell)); }
+
 int batch(const CommandLine& line) {
   const std::vector<fs::path> cells = cells_of(line);
   if (line.only_list) {
@@ -155,7 +192,8 @@ int batch(const CommandLine& line) {
                                                         .jobs = line.jobs,
                                                         .threads = line.threads,
                                                         .run = run_options(line),
-                                                        .say = line.is_quiet ? nullptr : say,
+                                                        .say = line.is_quiet || line.is_json ? nullptr : say,
+                                                        .ended = line.is_json ? tell_of_cell : nullptr,
                                                         .show = line.is_quiet || !is_terminal() ? nullptr : show});
   const auto n_failed =
       std::count_if(outcomes.begin(), outcomes.end(), [](const auto& cell) { return cell.exit_code != 0; });
@@ -177,21 +215,27 @@ int tell(const runner::Verification& found, const std::string& what) {
 int verify(const CommandLine& line) { return tell(runner::verify_cell(line.folder), line.folder.string()); }
 
 int repeat(const CommandLine& line) {
+  speak_for_stages(line);
   const fs::path run_json = files::is_file(line.folder) ? line.folder : line.folder / "run.json";
   const fs::path inputs = line.inputs.empty() ? run_json.parent_path() : line.inputs;
   return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
 }
 
-/// Become mbtfm-stats.
-int stats(const CommandLine& line, const std::vector<std::string>& further) {
-  const std::string program = (runner::executable_folder() / "mbtfm-stats").string();
-  std::vector<std::string> arguments = {program,
-                                        "--cells",
-                                        line.folder.string(),
-                                        "--out",
-                                        files::inside(line.folder, "statistics", line.folder.string()).string(),
-                                        "--threads",
-                                        std::to_string(line.threads)};
+/// Become another program of ours.
+[[noreturn]] void become(const std::string& name, std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), (runner::executable_folder() / name).string());
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  execv(pointers[0], pointers.data());
+  throw OutputError("cannot start " + arguments[0]);
+}
+
+[[noreturn]] void stats(const CommandLine& line, const std::vector<std::string>& further) {
+  std::vector<std::string> arguments = {
+      "--cells",   line.folder.string(),
+      "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
+      "--threads", std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
   for (const std::string& argument : further) {
     // the one flag that people write with a dash
@@ -199,11 +243,15 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
     const bool is_dashed = argument.starts_with(kDashed);
     arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
   }
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  pointers.push_back(nullptr);
-  execv(pointers[0], pointers.data());
-  throw OutputError("cannot start " + program);
+  become("mbtfm-stats", std::move(arguments));
+}
+
+[[noreturn]] void check(const CommandLine& line) {
+  become("mbtfm-check", {"--cells", line.folder.string(), "--threads", std::to_string(line.threads)});
+}
+
+[[noreturn]] void init(const CommandLine& line) {
+  become("mbtfm-init", {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()});
 }
 
 int cost_study(const CommandLine& line) {
@@ -320,11 +368,20 @@ int start(int argc, char** argv) {
   app.footer("Exit codes: " + stage::exit_codes());
   CLI::App* demo_command = add_command(
       app, line, "demo", "simulate a cell, run every stage on it, show its tensions beside the truth", kDemo);
+  CLI::App* init_command =
+      add_command(app, line, "init", "write a cell.toml from what the images of a folder say", kCell);
+  CLI::App* check_command = add_command(
+      app, line, "check", "what the images below a folder are good for: a second a cell, before a batch", kFolder);
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
   run_command->add_flag("--explain", line.explain, "fit anew and say what each effect that is off would change");
+  for (CLI::App* command : {run_command, demo_command}) {
+    command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
+  }
   CLI::App* batch_command = add_command(app, line, "batch", "run every cell below a folder", kFolder);
+  for (CLI::App* command : {run_command, batch_command})
+    command->add_flag("--json", line.is_json, "print events as JSON, one object a line (docs/formats.md)");
   add_stage_options(batch_command, line);
   batch_command->add_option("--jobs", line.jobs, "cells at a time")->check(CLI::Range(1, 1024))->capture_default_str();
   batch_command
@@ -364,8 +421,11 @@ int start(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    std::ostringstream help;
-    const int code = app.exit(error, help, std::cerr);
+    std::ostringstream help, message;
+    const int code = app.exit(error, help, message);
+    std::cerr << message.str();
+    if (const std::string meant = stage::suggestion(app, error.what()); code != 0 && !meant.empty())
+      std::cerr << "mbtfm: " << meant.substr(2) << "\n";
     stage::print(help.str());
     return code == 0 ? kDone : kUsage;
   }
@@ -383,7 +443,9 @@ int start(int argc, char** argv) {
   if (cost_command->parsed()) return cost_study(line);
   if (verify_command->parsed()) return verify(line);
   if (repeat_command->parsed()) return repeat(line);
-  if (stats_command->parsed()) return stats(line, stats_command->remaining());
+  if (stats_command->parsed()) stats(line, stats_command->remaining());
+  if (check_command->parsed()) check(line);
+  if (init_command->parsed()) init(line);
   return compare(line);
 }
 

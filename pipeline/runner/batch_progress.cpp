@@ -1,24 +1,19 @@
 #include "pipeline/runner/batch_progress.h"
 
-#include <cmath>
 #include <iomanip>
 #include <sstream>
 
+#include "pipeline/files/json.h"
 #include "pipeline/runner/batch_table.h"
+#include "pipeline/stage/console.h"
 
 namespace mbtfm::runner {
 
-std::string readable_duration(double seconds) {
-  constexpr double kMinute = 60, kHour = 3600;
-  std::ostringstream text;
-  if (seconds < 1.5 * kMinute) {
-    text << std::lround(seconds) << " s";
-  } else if (seconds < 1.5 * kHour) {
-    text << std::lround(seconds / kMinute) << " min";
-  } else {
-    text << std::fixed << std::setprecision(1) << seconds / kHour << " h";
-  }
-  return text.str();
+std::string event_of(const BatchCell& cell) {
+  const nlohmann::ordered_json event = {
+      {"event", "cell"},         {"cell", cell.cell.string()},        {"exit_code", cell.exit_code},
+      {"seconds", cell.seconds}, {"failed_stage", cell.failed_stage}, {"message", cell.message}};
+  return files::json_text(event) + "\n";
 }
 
 void BatchProgress::starts(const std::filesystem::path& cell) {
@@ -37,6 +32,7 @@ void BatchProgress::ended(const BatchCell& cell) {
   running_.erase(cell.cell.filename().string());
   ++n_done_;
   if (cell.exit_code != 0) ++n_failed_;
+  if (options_.ended) options_.ended(cell);
   if (options_.say) {
     std::ostringstream line;
     line << '[' << n_done_ << '/' << n_to_run_ << "] " << cell.cell.string() << ": " << std::fixed
@@ -56,7 +52,7 @@ void BatchProgress::ended(const BatchCell& cell) {
 std::string BatchProgress::time_left() const {
   if (n_done_ == 0 || n_done_ >= n_to_run_) return {};
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
-  return "; about " + readable_duration(seconds / n_done_ * (n_to_run_ - n_done_)) + " left";
+  return "; about " + stage::readable_duration(seconds / n_done_ * (n_to_run_ - n_done_)) + " left";
 }
 
 void BatchProgress::show() const {

@@ -11,8 +11,8 @@
 
 namespace mbtfm::runner {
 
-/// "40 s", "3 min", "2.5 h"
-std::string readable_duration(double seconds);
+/// What became of a cell as a JSON object on a line (docs/formats.md, "Events").
+std::string event_of(const BatchCell& cell);
 
 /// Threads may share one.
 class BatchProgress {

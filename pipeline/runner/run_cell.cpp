@@ -13,6 +13,7 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_record.h"
+#include "pipeline/stage/stage.h"
 
 namespace mbtfm::runner {
 namespace fs = std::filesystem;
@@ -130,7 +131,7 @@ class CellRun {
   void bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome);
   void start(const Stage& stage, const Present& now, int threads, StageOutcome& outcome);
   Hashes outputs_of(const Stage& stage, const Present& before);
-  void say(const Stage& stage, const std::string& what) const;
+  void say(const StageTold& told);
 
   fs::path cell_;
   const RunOptions& options_;
@@ -138,6 +139,7 @@ class CellRun {
   std::vector<Setting> beneath_;
   Settings settings_;
   HashCache hashes_;
+  std::mutex saying_;
 };
 
 CellRun::Present CellRun::present(const Stage& stage) {
@@ -190,11 +192,19 @@ void CellRun::check_before_start(CellOutcome& now) const {
   }
 }
 
-void CellRun::say(const Stage& stage, const std::string& what) const {
+void CellRun::say(const StageTold& told) {
   if (!options_.say) return;
-  std::ostringstream line;
-  line << std::left << std::setw(9) << stage.name << what;
-  options_.say(line.str());
+  const std::lock_guard guard(saying_);
+  options_.say(told);
+}
+
+/// None where the record of a stage that has just run is not as ours are.
+std::optional<StageReport> report_in(const fs::path& record_file) {
+  try {
+    return stage::read_report(record_file);
+  } catch (const InputError&) {
+    return std::nullopt;
+  }
 }
 
 void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& outcome) {
@@ -203,7 +213,7 @@ void CellRun::bring_up_to_date(const Stage& stage, int threads, StageOutcome& ou
     outcome.status = now.status;
     if (now.status.state == StageState::must_run) return start(stage, now, threads, outcome);
     outcome.converged = now.status.state != StageState::up_to_date || !now.record || now.record->converged;
-    say(stage, name_of(now.status.state) + std::string(": ") + now.status.why);
+    say({.stage = stage.name, .status = now.status, .converged = outcome.converged, .report = {}});
   });
 }
 
@@ -245,7 +255,7 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
     command.push_back((cell_ / stage.folder).string());
   }
   write_begun(record_file, stage, before.status.keeps_frames ? record_before : "");
-  const ProcessResult result = run_process(command, options_.limits);
+  const ProcessResult result = run_process(command, options_.limits, options_.sink ? options_.sink() : Sink(print_on));
   // A stage that did not converge and yet wrote its outputs has written a record, too.
   outcome.converged = result.exit_code != exit_code::kNotSolved;
   outcome.seconds = result.seconds;
@@ -267,11 +277,13 @@ void CellRun::start(const Stage& stage, const Present& before, int threads, Stag
        .outputs = outputs},
       {.command = command_to_tell(command, cell_), .seconds = result.seconds, .peak_memory_MB = result.peak_memory_MB});
   outcome.was_run = true;
-  std::ostringstream line;
-  line << std::fixed << std::setprecision(1) << result.seconds << " s, " << std::setprecision(0)
-       << result.peak_memory_MB << " MB" << (outcome.converged ? "" : ", NOT CONVERGED") << " (" << outcome.status.why
-       << ")";
-  say(stage, line.str());
+  say({.stage = stage.name,
+       .status = outcome.status,
+       .was_run = true,
+       .converged = outcome.converged,
+       .seconds = result.seconds,
+       .peak_memory_MB = result.peak_memory_MB,
+       .report = report_in(record_file)});
 }
 
 /// Tracking needs nothing of the cell: it runs beside segmentation and network. The fit needs both.
@@ -364,7 +376,18 @@ void check_parameters(const Stage& stage, const fs::path& toml_file, const RunOp
   throw StageFailed(stage.name, std::move(failure));
 }
 
+namespace {
+
+std::string parent_of(const fs::path& file) {
+  const fs::path folder = file.parent_path();
+  return folder.empty() ? "." : folder.string();
+}
+
+}  // namespace
+
 ImageNames read_image_names(const fs::path& cell) {
+  if (files::is_file(cell))
+    throw InputError(cell.string(), "a cell folder", "a file", "give the folder that it is in: " + parent_of(cell));
   if (!files::is_folder(cell)) throw InputError(cell.string(), "a cell folder", "none");
   if (!files::is_file(cell / "cell.toml")) {
     throw InputError(cell.string(), "a cell folder with cell.toml", "no cell.toml",

@@ -9,6 +9,7 @@
 #include "pipeline/runner/process.h"
 #include "pipeline/runner/record.h"
 #include "pipeline/runner/settings.h"
+#include "pipeline/runner/told.h"
 
 namespace mbtfm::runner {
 
@@ -24,8 +25,9 @@ struct RunOptions {
   std::string preset = {};            ///< name of what `beneath` comes from; empty: none
   std::vector<Setting> beneath = {};  ///< in place of defaults, where cell.toml says nothing
   std::string version;
-  std::function<void(const std::string&)> say;  ///< one line for each stage
-  std::function<void()> finish;                 ///< called when the stages are done, the cell still being ours
+  std::function<void(const StageTold&)> say;  ///< what became of each stage
+  std::function<Sink()> sink = {};            ///< makes one for what a stage prints; empty: our standard error
+  std::function<void()> finish;               ///< called when the stages are done, the cell still being ours
 };
 
 /// How a stage that ended with an error did so.

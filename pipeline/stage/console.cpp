@@ -4,9 +4,12 @@
 
 #include <atomic>
 #include <cerrno>
+#include <cmath>
 #include <csignal>
+#include <cstdlib>
 #include <cstring>
-#include <string>
+#include <iomanip>
+#include <sstream>
 
 #include "pipeline/contract/errors.h"
 
@@ -38,6 +41,37 @@ void print(std::string_view text) {
     if (n <= 0) throw OutputError(std::string("cannot write to standard output: ") + std::strerror(errno));
     text.remove_prefix(static_cast<std::size_t>(n));
   }
+}
+
+bool is_terminal() { return isatty(STDERR_FILENO) != 0 || std::getenv("MBTFM_TERMINAL") != nullptr; }
+
+std::string warning(const std::string& text) {
+  const char* no_color = std::getenv("NO_COLOR");
+  const char* terminal = std::getenv("TERM");
+  const bool is_plain = !is_terminal() || (no_color != nullptr && *no_color != '\0') ||
+                        (terminal != nullptr && std::string_view(terminal) == "dumb");
+  return is_plain ? text : "\033[33m" + text + "\033[0m";
+}
+
+std::string readable_duration(double seconds) {
+  constexpr double kMinute = 60, kHour = 3600;
+  std::ostringstream text;
+  if (seconds < 1.5 * kMinute) {
+    text << std::lround(seconds) << " s";
+  } else if (seconds < 1.5 * kHour) {
+    text << std::lround(seconds / kMinute) << " min";
+  } else {
+    text << std::fixed << std::setprecision(1) << seconds / kHour << " h";
+  }
+  return text.str();
+}
+
+Reader reader(bool is_quiet, bool is_json) {
+  if (is_json) return Reader::program;
+  if (is_quiet) return Reader::nobody;
+  const char* runner = std::getenv(kRunnerVariable);
+  if (runner == nullptr) return Reader::person;
+  return std::string_view(runner) == "json" ? Reader::json_runner : Reader::runner;
 }
 
 void watch_signals(SecondSignal second) {

@@ -1,7 +1,6 @@
 #include "pipeline/stage/stage.h"
 
 #include <sys/resource.h>
-#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -20,7 +19,9 @@
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/effects.h"
+#include "pipeline/stage/events.h"
 #include "pipeline/stage/manual.h"
+#include "pipeline/stage/suggest.h"
 
 namespace mbtfm::stage {
 
@@ -35,7 +36,7 @@ struct CommandLine {
   std::map<std::string, std::string> files, values;
   std::string config, record, manuals;
   int threads = numerics::available_threads();
-  bool is_quiet = false, only_check = false, only_parameters = false, only_version = false;
+  bool is_quiet = false, is_json = false, only_check = false, only_parameters = false, only_version = false;
 };
 
 /// " (one of a, b, c)"; empty where the parameter is no choice.
@@ -60,6 +61,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
       ->group("Outputs");
   app.add_option("--threads", line.threads, "processors to use")->check(CLI::Range(1, 1024))->capture_default_str();
   app.add_flag("--quiet", line.is_quiet, "print errors only");
+  app.add_flag("--json", line.is_json, "print progress, findings and effects as JSON, one object a line");
   app.add_flag("--check", line.only_check, "read the parameters, run nothing");
   app.add_flag("--parameters", line.only_parameters, "print the table of parameters (Markdown)");
   app.add_flag("--version", line.only_version, "print the version");
@@ -105,18 +107,62 @@ void set_files(StageContext& context, const StageDescription& description, const
   }
 }
 
-/// A line that is overwritten as the work goes on, on a terminal only.
-Progress terminal_progress(const std::string& stage, bool is_quiet) {
-  // mbtfm passes on what a stage prints; where it prints on a terminal, it says so
-  const bool is_shown = !is_quiet && (isatty(STDERR_FILENO) || std::getenv("MBTFM_TERMINAL") != nullptr);
-  return [stage, is_shown, last = -1](double fraction, std::string_view what) mutable {
+/// " 35 % meshes, about 40 s left": the time at the rate so far, where that is long enough to be asked.
+std::string progress_line(int percent, std::string_view what, std::optional<double> left_s) {
+  std::string line = (percent < 10 ? "   " : percent < 100 ? "  " : " ") + std::to_string(percent) + " % ";
+  line += what;
+  if (left_s) line += ", about " + readable_duration(*left_s) + " left";
+  return line;
+}
+
+void write_event(const nlohmann::ordered_json& event, Reader reader) {
+  const std::string line = files::json_text(event) + "\n";
+  if (reader == Reader::program) return print(line);
+  std::fputs(line.c_str(), stderr);
+}
+
+/// A line that is overwritten as the work goes on, on a terminal only; or an event for each percent.
+Progress progress_for(const std::string& stage, Reader reader) {
+  const bool is_event = reader == Reader::program || reader == Reader::json_runner;
+  const bool is_shown = is_event || (reader != Reader::nobody && is_terminal());
+  return [=, watch = Stopwatch(), last = -1](double fraction, std::string_view what) mutable {
     if (is_stop_asked()) throw Interrupted("interrupted; nothing was written");
     const int percent = static_cast<int>(100 * fraction);
     if (!is_shown || percent == last) return;
     last = percent;
-    std::fprintf(stderr, "\r\033[K%s %3d %% %.*s", stage.c_str(), percent, static_cast<int>(what.size()), what.data());
+    constexpr double kLong_s = 5, kLittle = 0.02;  // shorter work ends before one asks; too little tells no rate
+    const double gone_s = watch.seconds();
+    std::optional<double> left_s;
+    if (gone_s > kLong_s && fraction > kLittle) left_s = gone_s * (1 - fraction) / fraction;
+    if (is_event) {
+      nlohmann::ordered_json event = {{"event", "progress"}, {"stage", stage}, {"fraction", fraction}, {"what", what}};
+      if (left_s) event["left_s"] = *left_s;
+      return write_event(event, reader);
+    }
+    std::fprintf(stderr, "\r\033[K%s%s", stage.c_str(), progress_line(percent, what, left_s).c_str());
     if (percent >= 100) std::fprintf(stderr, "\r\033[K");
   };
+}
+
+/// The last lines of a program that was started by hand.
+void tell(const std::string& stage, const StageReport& report, double seconds, Reader reader) {
+  if (reader == Reader::program) {
+    write_event({{"event", "stage"},
+                 {"stage", stage},
+                 {"converged", report.converged},
+                 {"seconds", seconds},
+                 {"summary", report.summary},
+                 {"figures", files::json_of(report.figures)}},
+                reader);
+    print(events_of(stage, report));
+  }
+  if (reader != Reader::person || !report.converged) return;
+  std::fprintf(stderr, "mbtfm-%s: %s\n", stage.c_str(), report.summary.c_str());
+  for (const Effect& e : report.effects) std::fprintf(stderr, "  %s\n", line_of(e).c_str());
+  for (const Finding& f : report.findings) {
+    const std::string line = line_of(f);
+    std::fprintf(stderr, "  %s\n", (is_open(f) ? warning(line) : line).c_str());
+  }
 }
 
 /// Content hashes of files that lie at `at` now and are called `name` when all is in place.
@@ -238,7 +284,8 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
   const std::string started = numerics::utc_now();
   set_files(context, description, line);
   context.threads = line.threads;
-  context.progress = terminal_progress(description.name, line.is_quiet);
+  const Reader whose = reader(line.is_quiet, line.is_json);
+  context.progress = progress_for(description.name, whose);
   try {
     StageReport report = body(context);
     add_findings(report, context);
@@ -247,14 +294,10 @@ int run(const StageDescription& description, ParameterList& list, const CommandL
     // The record takes its place last: where it is, all that it speaks of is.
     if (!line.record.empty()) write_record(line.record, description, list, context, report, {started, seconds.count()});
     commit(context);
+    tell(description.name, report, seconds.count(), whose);
     if (!report.converged) {
       std::fprintf(stderr, "mbtfm-%s: error: not converged: %s\n", description.name.c_str(), report.summary.c_str());
       return kNotSolved;
-    }
-    if (!line.is_quiet) {
-      std::fprintf(stderr, "mbtfm-%s: %s\n", description.name.c_str(), report.summary.c_str());
-      for (const Effect& e : report.effects) std::fprintf(stderr, "  %s\n", line_of(e).c_str());
-      for (const Finding& f : report.findings) std::fprintf(stderr, "  %s\n", line_of(f).c_str());
     }
     return kDone;
   } catch (...) {
@@ -358,7 +401,7 @@ int run_stage(const StageDescription& description, int argc, char** argv,
       print(app.help());
       return kDone;
     } catch (const CLI::ParseError& error) {
-      throw UsageError(std::string(error.what()) + " (see mbtfm-" + stage + " --help)");
+      throw UsageError(error.what() + suggestion(app, error.what()) + " (see mbtfm-" + stage + " --help)");
     }
     if (line.only_version || line.only_parameters) {
       print(line.only_version ? "mbtfm-" + stage + " " + kVersion + "\n" : to_markdown(list));

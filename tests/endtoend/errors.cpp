@@ -1,9 +1,9 @@
 /// Bad input: an error that names file, place, expectation and finding; a non-zero exit code; nothing half-written.
 #include <gtest/gtest.h>
 
-#include <random>
-
+#include <algorithm>
 #include <fstream>
+#include <random>
 
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
@@ -18,7 +18,7 @@ using test::Outcome;
 using test::run_program;
 using test::TemporaryFolder;
 
-constexpr int kUsage = 2, kInput = 3, kOutput = 5;
+constexpr int kFailed = 1, kUsage = 2, kInput = 3, kOutput = 5;
 
 class Errors : public ::testing::Test {
  protected:
@@ -165,6 +165,61 @@ TEST_F(Errors, a_wrong_flag_names_it) {
   const Outcome outcome = run_program("mbtfm-network --sed 3");
   EXPECT_EQ(outcome.code, kUsage);
   EXPECT_NE(outcome.output.find("--sed"), std::string::npos) << outcome.output;
+}
+
+TEST_F(Errors, what_was_probably_meant_is_named) {
+  const auto said = [](const std::string& command, int code) {
+    const Outcome outcome = run_program(command);
+    EXPECT_EQ(outcome.code, code) << outcome.output;
+    return outcome.output;
+  };
+  EXPECT_NE(said("mbtfm run --thread 2 " + cell_.string(), kUsage).find("did you mean '--threads'?"),
+            std::string::npos);
+  EXPECT_NE(said("mbtfm bacth " + cell_.string(), kUsage).find("did you mean 'batch'?"), std::string::npos);
+  EXPECT_NE(said("mbtfm-segment --fibre_contrst 2", kUsage).find("did you mean"), std::string::npos);
+  EXPECT_NE(said("mbtfm run " + (cell_ / "actin.tif").string(), kInput)
+                .find("give the folder that it is in: " + cell_.string()),
+            std::string::npos);
+  EXPECT_NE(said("mbtfm", 0).find("check"), std::string::npos) << "alone it prints its help";
+}
+
+TEST_F(Errors, files_of_a_microscope_are_answered_with_how_to_convert_them) {
+  files::write_text(cell_ / "actin.tif", std::string("ZISRAWFILE\0\0\0\0\0\0", 16));
+  expect_error(kInput, {"a Zeiss CZI file", "Bio-Formats", "bfconvert 'actin.tif' 'actin.ome.tif'"}, "1_segment");
+}
+
+TEST_F(Errors, check_finds_what_would_spoil_a_batch_and_nothing_in_a_good_cell) {
+  const Outcome good = run_program("mbtfm check " + cell_.string());
+  EXPECT_NE(good.output.find(" beads, "), std::string::npos) << good.output;
+  fs::copy_file(cell_ / "beads_stressed.tif", cell_ / "beads_relaxed.tif", fs::copy_options::overwrite_existing);
+  const Outcome twice = run_program("mbtfm check " + cell_.string());
+  EXPECT_EQ(twice.code, kFailed);
+  EXPECT_NE(twice.output.find("beads_stressed.tif and beads_relaxed.tif are the same picture"), std::string::npos)
+      << twice.output;
+  images::Image actin = images::read_image(cell_ / "actin.tif");
+  for (float& value : actin.pixels) value = std::min(value, 0.3F * *std::ranges::max_element(actin.pixels));
+  images::write_tiff(cell_ / "actin.tif", actin);
+  EXPECT_NE(run_program("mbtfm check " + cell_.string()).output.find("actin.tif is saturated"), std::string::npos);
+  fs::remove(cell_ / "actin.tif");
+  const Outcome missing = run_program("mbtfm check " + cell_.parent_path().string());
+  EXPECT_EQ(missing.code, kFailed);
+  EXPECT_NE(missing.output.find("expected a file 'actin.tif', found none"), std::string::npos) << missing.output;
+}
+
+TEST_F(Errors, a_cell_toml_that_init_wrote_runs_once_the_modulus_is_in_it) {
+  fs::remove(cell_ / "cell.toml");
+  fs::rename(cell_ / "paxillin.tif", cell_ / "day1_Paxillin.tif");
+  fs::rename(cell_ / "beads_relaxed.tif", cell_ / "beads_after_trypsin.tif");
+  fs::rename(cell_ / "beads_stressed.tif", cell_ / "beads_with_cell.tif");
+  const Outcome made = run_program("mbtfm init " + cell_.string());
+  EXPECT_EQ(made.code, 0) << made.output;
+  EXPECT_NE(made.output.find("complete in it: youngs_modulus_kPa in [gel]"), std::string::npos) << made.output;
+  EXPECT_EQ(run_program("mbtfm init " + cell_.string()).code, kInput) << "a cell.toml that is there stays";
+  expect_error(kUsage, {"youngs_modulus_kPa"}, "4_fit");
+  replace_in_toml("# youngs_modulus_kPa", "youngs_modulus_kPa = 8.4");
+  const Outcome run = run_program("mbtfm run --preset fast " + cell_.string());
+  EXPECT_EQ(run.code, 0) << run.output;
+  EXPECT_NE(run.output.find("total force "), std::string::npos) << run.output;
 }
 
 }  // namespace

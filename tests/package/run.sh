@@ -19,7 +19,7 @@ if ! ls "$folder"/mbtfm_"${version}"_*.deb >/dev/null 2>&1; then
   say "building in $folder/mbtfm-$version"
   rm -rf "$folder/mbtfm-$version"
   mkdir "$folder/mbtfm-$version"
-  git ls-files -z | xargs -0 cp --parents -t "$folder/mbtfm-$version"
+  git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$folder/mbtfm-$version"
   (cd "$folder/mbtfm-$version" && dpkg-buildpackage --build=full --no-sign --jobs=2) >"$folder/build.log" 2>&1 ||
     { tail -n 30 "$folder/build.log" >&2; fail "dpkg-buildpackage ($folder/build.log)"; }
 fi
@@ -28,9 +28,11 @@ say "lintian"
 lintian --fail-on error,warning "$folder"/mbtfm_"${version}"_*.changes || fail "lintian has complaints"
 
 root=$(mktemp -d "${TMPDIR:-/tmp}/mbtfm-root.XXXXXX")
-trap 'rm -rf --one-file-system "$root"' EXIT
+leave() { if mountpoint -q "$root/proc"; then umount "$root/proc" || return; fi; rm -rf --one-file-system "$root"; }
+trap leave EXIT
 say "a bare Debian 12"
 mmdebstrap --quiet --variant=minbase bookworm "$root"
+mount -t proc proc "$root/proc"
 inside() { DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"; }
 listing() { (cd "$root" && find . -path ./proc -prune -o -path ./var/lib -prune -o -path ./var/log -prune -o -path ./var/cache -prune -o -path ./tmp -prune -o -print | sort); }
 dpkg-query --admindir="$root/var/lib/dpkg" -W -f '${Package}\n' | sort >"$folder/packages-before.txt"

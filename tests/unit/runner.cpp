@@ -14,6 +14,7 @@
 #include "pipeline/runner/lock.h"
 #include "pipeline/runner/run_cell.h"
 #include "pipeline/runner/stages.h"
+#include "pipeline/runner/told.h"
 #include "pipeline/stage/effects.h"
 #include "tests/support/temporary_folder.h"
 
@@ -568,6 +569,65 @@ TEST(Batch, a_failed_cell_does_not_stop_the_others) {
 TEST(Batch, a_folder_without_cells_is_an_error) {
   const TemporaryFolder folder;
   EXPECT_THROW(find_cells(folder.path()), InputError);
+}
+
+TEST(Told, is_one_line_for_the_stage_and_names_effects_that_are_on_unasked) {
+  StageTold told{.stage = "fit",
+                 .status = {StageState::must_run, "not run yet"},
+                 .was_run = true,
+                 .seconds = 2.34,
+                 .report = StageReport{}};
+  told.report->summary = "20 tensions";
+  const auto effect = [](EffectKind kind, Switch setting, bool is_on) {
+    return Effect{.kind = kind, .setting = setting, .is_on = is_on, .why = "because"};
+  };
+  told.report->effects = {effect(EffectKind::finite_thickness, Switch::automatic, true),
+                          effect(EffectKind::robust_loss, Switch::on, true),
+                          effect(EffectKind::large_strain, Switch::automatic, false)};
+  EXPECT_EQ(text_of(told, Detail::brief),
+            "fit      20 tensions (2.3 s)\n  on as your data call for it: finite thickness");
+  const std::string all = text_of(told, Detail::all);
+  for (const char* name : {"finite thickness", "robust loss", "large strain"})
+    EXPECT_NE(all.find(name), all.npos) << all;
+  told.report->effects.clear();
+  told.status.why = "its parameters have changed";
+  EXPECT_EQ(text_of(told, Detail::brief), "fit      20 tensions (2.3 s; its parameters have changed)");
+}
+
+TEST(Told, events_are_json_objects_a_line) {
+  StageTold told{
+      .stage = "track", .status = {StageState::must_run, "not run yet"}, .was_run = true, .report = StageReport{}};
+  told.report->summary = "two\nlines and \"quotes\"";
+  told.report->findings = {*noticed(FindingKind::nothing_moves, 1, "Nothing moves.")};
+  std::istringstream lines(events_of(told));
+  std::vector<nlohmann::json> events;
+  for (std::string line; std::getline(lines, line);) events.push_back(nlohmann::json::parse(line));
+  ASSERT_EQ(events.size(), 2u);
+  EXPECT_EQ(events[0]["event"], "stage");
+  EXPECT_EQ(events[0]["summary"], told.report->summary);
+  EXPECT_EQ(events[1]["event"], "finding");
+  EXPECT_EQ(events[1]["stage"], "track");
+}
+
+TEST_F(Runner, an_image_that_is_missing_is_answered_with_the_one_that_was_probably_meant) {
+  const auto hint = [&](const std::string& there) {
+    const fs::path folder = cell_ / "images";
+    fs::remove_all(folder);
+    fs::create_directory(folder);
+    files::write_text(folder / there, "x");
+    ImageNames names;
+    try {
+      resolve_image(folder, names, "actin");
+    } catch (const InputError& error) {
+      return error.hint;
+    }
+    return std::string("found");
+  };
+  EXPECT_EQ(hint("actin.tif"), "found");
+  EXPECT_NE(hint("Actin.TIF").find("there is 'Actin.TIF': capitals count"), std::string::npos);
+  EXPECT_NE(hint("actin.png").find("there is 'actin.png': name it as"), std::string::npos);
+  EXPECT_NE(hint("day1.nd2").find("bfconvert 'day1.nd2' 'day1.ome.tif'"), std::string::npos);
+  EXPECT_NE(hint("notes.txt").find("put it there"), std::string::npos);
 }
 
 }  // namespace

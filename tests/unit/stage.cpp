@@ -2,11 +2,19 @@
 
 #include <gtest/gtest.h>
 
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdlib>
 #include <new>
 #include <stdexcept>
 #include <system_error>
 
 #include "pipeline/files/text.h"
+#include "pipeline/stage/console.h"
+#include "pipeline/stage/manual.h"
+#include "pipeline/stage/suggest.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm {
@@ -165,6 +173,62 @@ TEST_F(Stage, wrong_flags_and_values_are_usage_errors_and_a_wrong_file_an_input_
   files::write_text(folder_ / "bad.toml", "[network]\nlength = 3\n");
   EXPECT_EQ(run(files_and({"--check", "--config", (folder_ / "bad.toml").string()}), write_two), 3);
   EXPECT_FALSE(fs::exists(folder_ / "out")) << "--check runs nothing";
+}
+
+TEST(Suggestion, names_the_flag_or_command_that_was_meant_and_nothing_where_none_is_alike) {
+  CLI::App app("what it does", "mbtfm");
+  app.add_subcommand("batch", "")->add_option("--threads", "");
+  app.add_subcommand("verify", "");
+  const auto after = [&](std::vector<std::string> arguments) {
+    std::ranges::reverse(arguments);
+    try {
+      app.parse(arguments);
+    } catch (const CLI::ParseError& error) {
+      return stage::suggestion(app, error.what());
+    }
+    return std::string("parsed");
+  };
+  EXPECT_EQ(after({"batch", "--thread=2"}), "; did you mean '--threads'?");
+  EXPECT_EQ(after({"bacth"}), "; did you mean 'batch'?");
+  EXPECT_EQ(after({"verfy", "CELL"}), "; did you mean 'verify'?");
+  EXPECT_EQ(after({"batch", "--xyz"}), "");
+}
+
+TEST(Manual, has_every_option_and_hides_what_help_hides) {
+  CLI::App app("what it does: 'all', and more", "mbtfm-example");
+  app.add_option("--length_um", "length (um); a line\n.that begins with a point")->type_name("FILE");
+  bool is_secret = false;
+  app.add_flag("--secret", is_secret, "nobody's")->group("");
+  const std::string page = stage::manual_page(app);
+  EXPECT_NE(page.find("\\-\\-length_um"), std::string::npos) << page;
+  EXPECT_NE(page.find("\n\\&.that begins"), std::string::npos) << "troff takes a leading point for a command: " << page;
+  for (const std::string& text :
+       {page, stage::bash_completion(app, {}), stage::zsh_completion(app, {}), stage::fish_completion(app, {})})
+    EXPECT_EQ(text.find("secret"), std::string::npos) << text;
+}
+
+TEST(Completion, offers_the_words_of_a_choice) {
+  CLI::App app("what it does", "mbtfm-example");
+  app.add_option("--model", "which");
+  const stage::WordsOfFlags words = {{"--model", {"layer", "half-space"}}};
+  EXPECT_NE(stage::bash_completion(app, words).find("--model) COMPREPLY=($(compgen -W 'layer half-space'"),
+            std::string::npos);
+  EXPECT_NE(stage::zsh_completion(app, words).find(":(layer half-space)"), std::string::npos);
+  EXPECT_NE(stage::fish_completion(app, words).find("-l model -d 'which' -x -a 'layer half-space'"), std::string::npos);
+}
+
+TEST(Console, colours_warnings_on_a_terminal_alone_and_never_against_no_color) {
+  setenv("MBTFM_TERMINAL", "1", 1);
+  setenv("TERM", "xterm", 1);
+  unsetenv("NO_COLOR");
+  EXPECT_EQ(stage::warning("x"), "\033[33mx\033[0m");
+  setenv("NO_COLOR", "1", 1);
+  EXPECT_EQ(stage::warning("x"), "x");
+  unsetenv("NO_COLOR");
+  unsetenv("MBTFM_TERMINAL");
+  if (isatty(STDERR_FILENO) == 0) {
+    EXPECT_EQ(stage::warning("x"), "x");
+  }
 }
 
 }  // namespace

@@ -1,0 +1,75 @@
+#include "pipeline/report/result_line.h"
+
+#include <cmath>
+#include <map>
+
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/json.h"
+#include "pipeline/report/numbers.h"
+
+namespace mbtfm::report {
+
+namespace {
+
+struct OfType {
+  int n = 0;
+  double mean_nN = 0;
+};
+
+struct Result {
+  FitSummary fit;
+  std::optional<double> total_error_nN;  ///< of the whole error budget
+  std::map<FibreType, OfType> types;
+  int n_fibres = 0, n_uncertain = 0;
+};
+
+Result result_of(const Path& cell) {
+  Result result{.fit = files::read_fit_summary(cell / "4_fit/fit.json"), .total_error_nN = {}, .types = {}};
+  if (result.fit.error_budget) result.total_error_nN = total(result.fit.error_budget->total_force_parts_nN);
+  std::map<int, FibreType> types;
+  for (const Fibre& fibre : files::read_fibres(cell / "1_segment/fibres.csv", cell / "1_segment/fibre_points.csv"))
+    types[fibre.fibre_id] = fibre.type;
+  for (const Tension& tension : files::read_tensions(cell / "4_fit/tensions.csv")) {
+    const auto type = types.find(tension.fibre_id);
+    if (type == types.end()) continue;  // the network
+    OfType& of = result.types[type->second];
+    of.mean_nN += (tension.tension_nN - of.mean_nN) / ++of.n;
+    ++result.n_fibres;
+    result.n_uncertain += !tension.identifiable;
+  }
+  return result;
+}
+
+}  // namespace
+
+std::string result_line(const Path& cell) {
+  const Result result = result_of(cell);
+  std::string line = "total force " + readable(result.fit.total_force_nN);
+  if (result.total_error_nN) line += " ± " + readable(*result.total_error_nN);
+  line += " nN";
+  std::string tensions;
+  for (const auto& [type, of] : result.types)
+    tensions += (tensions.empty() ? "; mean tension: " : ", ") + std::string(name_of(type)) + " " +
+                readable(of.mean_nN) + " nN (" + std::to_string(of.n) + ")";
+  line += tensions;
+  if (result.n_fibres > 0)
+    line += "; " + std::to_string(result.n_uncertain) + " of " + std::to_string(result.n_fibres) + " uncertain";
+  return line;
+}
+
+std::string result_event(const Path& cell, const Path& report) {
+  const Result result = result_of(cell);
+  nlohmann::ordered_json event = {{"event", "result"},
+                                  {"total_force_nN", result.fit.total_force_nN},
+                                  {"total_force_error_nN", nullptr},
+                                  {"mean_tension_nN", nlohmann::ordered_json::object()},
+                                  {"fibres", result.n_fibres},
+                                  {"uncertain", result.n_uncertain},
+                                  {"report", report.string()}};
+  if (result.total_error_nN) event["total_force_error_nN"] = *result.total_error_nN;
+  for (const auto& [type, of] : result.types) event["mean_tension_nN"][name_of(type)] = of.mean_nN;
+  return files::json_text(event) + "\n";
+}
+
+}  // namespace mbtfm::report

@@ -1,0 +1,34 @@
+/// What became of a stage, for people and for programs.
+#pragma once
+
+#include <optional>
+#include <string>
+
+#include "pipeline/contract/report.h"
+#include "pipeline/runner/record.h"
+
+namespace mbtfm::runner {
+
+struct StageTold {
+  std::string stage;
+  StageStatus status;  ///< before the run
+  bool was_run = false;
+  bool converged = true;
+  double seconds = 0, peak_memory_MB = 0;
+  std::optional<StageReport> report;  ///< of a stage that was run
+};
+
+enum class Detail {
+  brief,  ///< effects by name alone, and only those that are on and nobody asked for
+  all     ///< every effect with its number, memory, and why the stage was run
+};
+
+/// One line for the stage; below it, indented, its findings and effects.
+std::string text_of(const StageTold& told, Detail detail);
+
+/// JSON objects, one a line: the stage, its findings, its effects (docs/formats.md, "Events").
+std::string events_of(const StageTold& told);
+/// What ended a run.
+std::string event_of_error(const std::string& message, int exit_code);
+
+}  // namespace mbtfm::runner

@@ -1,0 +1,13 @@
+/// What a stage found as JSON objects, one a line (docs/formats.md, "Events").
+#pragma once
+
+#include <string>
+
+#include "pipeline/contract/report.h"
+
+namespace mbtfm::stage {
+
+/// Of its findings, then of its effects.
+std::string events_of(const std::string& stage, const StageReport& report);
+
+}  // namespace mbtfm::stage
