@@ -51,14 +51,13 @@ Largest top_of(const std::array<Largest, 3>& p) {
   return {at, p[0].value + (at - p[0].at) * (left + bend * (at - p[1].at))};
 }
 
-/// The largest value of a function along the lines of a row of elements, from a place on. A parabola finds what lies
-/// between the places that are looked at.
+/// The largest value of a function along the lines of a row of elements. A parabola finds what lies between the
+/// places that are looked at.
 template <class F>
-Largest largest_along(const std::vector<double>& lines, double from, const F& value) {
+Largest largest_along(const std::vector<double>& lines, const F& value) {
   constexpr int kLooks = 8;  // an element: more than its polynomial has tops
   std::vector<Largest> looked;
   for (std::size_t k = 1; k < lines.size(); ++k) {
-    if (lines[k] <= from) continue;
     for (int look = looked.empty() ? 0 : 1; look <= kLooks; ++look) {
       const double at = lines[k - 1] + (lines[k] - lines[k - 1]) * look / kLooks;
       looked.push_back({at, value(at)});
@@ -76,12 +75,11 @@ Reading read(const Deformed& deformed, const SectionMesh& mesh, const std::vecto
   for (double& line : r_lines) line *= mesh.slab.radius_um;
   const auto down = [&](double r, double depth) { return deformed.displacement_um_at(mesh.in_gel(r, depth)).y; };
   for (const double depth : depths_um) {
-    const Largest deepest = largest_along(r_lines, 0, [&](double r) { return down(r, depth); });
+    const Largest deepest = largest_along(r_lines, [&](double r) { return down(r, depth); });
     reading.depth_um.push_back(deepest.value);
     reading.deepest_at_um.push_back(deepest.at);
   }
-  reading.lift_um = std::max(
-      0.0, largest_along(r_lines, mesh.contact_radius_um * (1 + 1e-9), [&](double r) { return -down(r, 0); }).value);
+  reading.lift_um = std::max(0.0, largest_along(r_lines, [&](double r) { return -down(r, 0); }).value);
   for (int e = 0; e < mesh.mesh->n_elements(); ++e) {
     for (int k = 0; k < mesh.mesh->square.n_nodes(); ++k) {
       const double size = norm(deformed.displacement_um[mesh.mesh->nodes_of(e)[k]]);

@@ -30,7 +30,7 @@ files::Table<Indentation> table_of_cases(const std::vector<double>& depths_um) {
       [](const Indentation& i) { return i.error_um; });
   add("contact_radius_um", "radius of the contact", [](const Indentation& i) { return i.contact_radius_um; });
   add("contact_area_um2", "area of the contact", [](const Indentation& i) { return i.contact_area_um2; });
-  add("lift_um", "largest displacement of the surface around the cell, out of the gel",
+  add("lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
       [](const Indentation& i) { return i.reading.lift_um; });
   add("largest_u_gel_um", "largest displacement in the gel",
       [](const Indentation& i) { return i.reading.largest_u_gel_um; });
