@@ -18,6 +18,7 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "pipeline/stage/stage.h"
+#include "segment/images/image.h"
 
 namespace mbtfm::mean {
 namespace {
@@ -27,12 +28,18 @@ namespace fs = std::filesystem;
 enum class Others { refused, left_out };
 constexpr auto words(Others) { return std::array{"refused", "left-out"}; }
 
+/// What cells are laid onto each other by.
+enum class By { outlines, images };
+constexpr auto words(By) { return std::array{"outlines", "images"}; }
+
 enum class LambdaFor { all, each };
 constexpr auto words(LambdaFor) { return std::array{"all", "each"}; }
 
 struct Parameters {
   Gel gel;
   std::string reference = {};
+  By register_by = By::outlines;
+  std::string image = "phase.tif";
   std::string symmetry = "C1";
   Switch mirror = Switch::automatic;
   double largest_misfit = Alignment{}.largest_misfit;
@@ -52,6 +59,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
   list.table("mean");
   list.add("reference", p.reference,
            "name of the cell whose outline is the reference; empty: the pattern, or the most typical outline");
+  list.add("register_by", p.register_by, "what cells are laid onto each other by: their outlines, or images of them");
+  list.add("image", p.image, "name of the image in each cell's folder, with register_by = images");
   list.add(
       "symmetry", p.symmetry,
       "motions that leave the shape as it is: C1 none, C4 turns by a quarter, C4v with mirrors, Cinfv a circle; the "
@@ -107,7 +116,16 @@ Gel gel_of(const Path& cell, const Gel& otherwise) {
   return gel;
 }
 
-std::vector<Cell> read_cells(stage::StageContext& context, const Gel& otherwise) {
+/// @throws InputError where the image has no calibration: that of beads and outline is not known here
+Brightness read_brightness(const Path& file) {
+  images::Image image = images::read_image(file);
+  if (!image.pixel_size_um)
+    throw InputError(file.string(), "an image with its pixel size", "none in the file",
+                     "set its scale in ImageJ (Image > Properties) and save it as TIFF");
+  return {image.width, image.height, *image.pixel_size_um, std::move(image.pixels)};
+}
+
+std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) {
   const Path top = context.input("cells", {});
   std::vector<std::string> read;
   std::vector<Cell> cells;
@@ -117,7 +135,7 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Gel& otherwise)
               .outline_file = folder / outline_in(folder),
               .outline_um = {},
               .beads = {},
-              .gel = gel_of(folder, otherwise)};
+              .gel = gel_of(folder, p.gel)};
     cell.outline_um = files::read_outline(cell.outline_file).front();
     cell.beads = files::read_displacement(folder / displacement_in(folder));
     std::erase_if(cell.beads, [](const Bead& bead) { return !bead.flag.empty(); });
@@ -125,6 +143,10 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Gel& otherwise)
     if (!(cell.gel.youngs_modulus_kPa > 0))
       throw InputError((folder / "cell.toml").string(), "[gel] youngs_modulus_kPa", "none",
                        "give it there, or for all cells in --config or as --youngs_modulus_kPa");
+    if (p.register_by == By::images) {
+      cell.image = read_brightness(folder / p.image);
+      read.push_back((name / p.image).generic_string());
+    }
     read.push_back((name / outline_in(folder)).generic_string());
     read.push_back((name / displacement_in(folder)).generic_string());
     cells.push_back(std::move(cell));
@@ -138,28 +160,38 @@ std::vector<Cell> read_cells(stage::StageContext& context, const Gel& otherwise)
   return cells;
 }
 
-Polygon reference_of(stage::StageContext& context, const Parameters& p, const std::vector<Cell>& cells) {
+/// An outline, and the cell that it is of; none: that of a pattern.
+struct Reference {
+  Polygon outline_um;
+  const Cell* cell = nullptr;
+};
+Reference reference_of(stage::StageContext& context, const Parameters& p, const std::vector<Cell>& cells) {
   if (context.has_input("pattern")) {
     if (!p.reference.empty()) throw UsageError("expected --pattern or --reference, found both");
-    return files::read_outline(context.input("pattern")).front();
+    if (p.register_by == By::images)
+      throw UsageError("expected --reference with register_by = images: a pattern has no image");
+    return {files::read_outline(context.input("pattern")).front()};
   }
   if (!p.reference.empty()) {
     const auto named = std::ranges::find(cells, p.reference, &Cell::name);
     if (named == cells.end())
       throw UsageError("--reference: expected one of the cells, found '" + p.reference + "' (the first is '" +
                        cells.front().name + "')");
-    return named->outline_um;
+    return {named->outline_um, &*named};
   }
   std::vector<Polygon> outlines;
   for (const Cell& cell : cells) outlines.push_back(cell.outline_um);
   const Mirrors mirrors = p.mirror == Switch::on ? Mirrors::tried : Mirrors::not_tried;
-  return cells[most_typical(outlines, mirrors, context.threads)].outline_um;
+  const Cell& typical = cells[most_typical(outlines, mirrors, context.threads)];
+  return {typical.outline_um, &typical};
 }
 
 /// @throws InputError at the first cell of another shape, where those are refused
 std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, const std::vector<Cell>& cells,
-                             const Alignment& alignment) {
-  std::vector<CellRow> rows = aligned(cells, alignment, context.threads);
+                             const Reference& reference, const Alignment& alignment) {
+  std::vector<CellRow> rows = p.register_by == By::images
+                                  ? aligned_by_images(cells, reference.cell->image, alignment, context.threads)
+                                  : aligned(cells, alignment, context.threads);
   int n_left_out = 0, n_ambiguous = 0;
   for (std::size_t k = 0; k < rows.size(); ++k) {
     n_ambiguous += rows[k].is_kept && rows[k].is_ambiguous && !symmetry_of(p.symmetry).is_circle ? 1 : 0;
@@ -322,15 +354,15 @@ Figures figures_of(const Parameters& p, const std::vector<CellRow>& rows, const 
 }
 
 StageReport run(const Parameters& p, stage::StageContext& context) {
-  const std::vector<Cell> cells = read_cells(context, p.gel);
+  const std::vector<Cell> cells = read_cells(context, p);
   context.progress(0.1, "laying outlines onto the reference");
-  Alignment alignment{
-      .reference_um = reference_of(context, p, cells), .motions = {}, .largest_misfit = p.largest_misfit};
+  const Reference reference = reference_of(context, p, cells);
+  Alignment alignment{.reference_um = reference.outline_um, .motions = {}, .largest_misfit = p.largest_misfit};
   const Symmetry symmetry = symmetry_of(p.symmetry);
   alignment.motions = motions_of(symmetry, alignment.reference_um);
   expect_symmetric(alignment, p.symmetry);
   alignment.mirrors = mirrors_for(p.mirror, alignment.reference_um);
-  std::vector<CellRow> rows = rows_of(context, p, cells, alignment);
+  std::vector<CellRow> rows = rows_of(context, p, cells, reference, alignment);
   std::vector<Registered> kept;
   std::vector<Polygon> outlines;
   for (std::size_t k = 0; k < rows.size(); ++k) {

@@ -46,26 +46,56 @@ void expect_symmetric(const Alignment& alignment, const std::string& symmetry) {
                      " um: give its own symmetry, or a pattern that has this one");
 }
 
+namespace {
+
+/// Marks a cell whose outline does not fit.
+void judge(CellRow& row, const Alignment& alignment) {
+  const double allowed = alignment.largest_misfit * size_um(alignment.reference_um);
+  if (row.way.misfit_um <= allowed) return;
+  row.is_kept = false;
+  row.reason = "its outline lies " + brief(row.way.misfit_um) +
+               " um from the reference (root mean square), more than " + brief(allowed) + " um";
+}
+
+CellRow row_of(const Cell& cell, const Way& way) {
+  return {.cell = cell.name, .way = way, .n_beads = static_cast<int>(cell.beads.size())};
+}
+
+}  // namespace
+
 std::vector<CellRow> aligned(const std::vector<Cell>& cells, const Alignment& alignment, int threads) {
-  const double size = size_um(alignment.reference_um);
   std::vector<CellRow> rows(cells.size());
   numerics::parallel_for(static_cast<int>(cells.size()), threads, [&](int k) {
     const std::vector<Way> ways = ways_onto(cells[k].outline_um, alignment.reference_um, alignment.mirrors);
-    CellRow& row = rows[k];
-    row = {
-        .cell = cells[k].name, .reason = {}, .way = ways.front(), .n_beads = static_cast<int>(cells[k].beads.size())};
+    CellRow& row = rows[k] = row_of(cells[k], ways.front());
     const auto second = std::ranges::find_if(
         ways, [&](const Way& way) { return !are_equivalent(way, ways.front(), alignment.motions); });
     if (second != ways.end()) {
       row.second_misfit_um = second->misfit_um;
-      row.is_ambiguous = fit_equally(ways.front(), *second, size);
+      row.is_ambiguous = fit_equally(ways.front(), *second, size_um(alignment.reference_um));
     }
-    if (row.way.misfit_um > alignment.largest_misfit * size) {
-      row.is_kept = false;
-      row.reason = "its outline lies " + brief(row.way.misfit_um) +
-                   " um from the reference (root mean square), more than " + brief(alignment.largest_misfit * size) +
-                   " um";
+    judge(row, alignment);
+  });
+  return rows;
+}
+
+std::vector<CellRow> aligned_by_images(const std::vector<Cell>& cells, const Brightness& reference,
+                                       const Alignment& alignment, int threads) {
+  std::vector<CellRow> rows(cells.size());
+  numerics::parallel_for(static_cast<int>(cells.size()), threads, [&](int k) {
+    const std::vector<ImageWay> found = ways_by_images(cells[k].image, reference, alignment.mirrors);
+    std::vector<Way> ways;
+    for (const ImageWay& way : found)
+      ways.push_back({way.motion, misfit_um(moved(cells[k].outline_um, way.motion), alignment.reference_um),
+                      way.shift_error_um, way.angle_error_rad});
+    CellRow& row = rows[k] = row_of(cells[k], ways.front());
+    for (std::size_t second = 1; second < ways.size(); ++second) {
+      if (are_equivalent(ways[second], ways.front(), alignment.motions)) continue;
+      row.second_misfit_um = ways[second].misfit_um;
+      row.is_ambiguous = correlate_equally(found.front(), found[second]);
+      break;
     }
+    judge(row, alignment);
   });
   return rows;
 }

@@ -4,6 +4,7 @@
 #include <string>
 #include <vector>
 
+#include "continuum/mean/images.h"
 #include "continuum/mean/outputs.h"
 #include "continuum/mean/symmetry.h"
 #include "pipeline/contract/words.h"
@@ -17,6 +18,7 @@ struct Cell {
   Polygon outline_um;
   DisplacementField beads;
   Gel gel;
+  Brightness image = {};  ///< where it is registered by images
 };
 
 struct Alignment {
@@ -37,5 +39,8 @@ void expect_symmetric(const Alignment& alignment, const std::string& symmetry);
 
 /// Each cell's best way onto the reference; those that do not fit are marked, with the reason.
 std::vector<CellRow> aligned(const std::vector<Cell>& cells, const Alignment& alignment, int threads);
+/// The same by images; the outlines then tell how well they fit, and which cells have another shape.
+std::vector<CellRow> aligned_by_images(const std::vector<Cell>& cells, const Brightness& reference,
+                                       const Alignment& alignment, int threads);
 
 }  // namespace mbtfm::mean

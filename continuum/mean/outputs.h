@@ -15,9 +15,9 @@ namespace mbtfm::mean {
 struct CellRow {
   std::string cell;
   bool is_kept = true;
-  std::string reason;  ///< why not
-  Way way;
-  std::optional<double> second_misfit_um;  ///< of the best way that is no other view of the same
+  std::string reason = {};  ///< why not
+  Way way = {};
+  std::optional<double> second_misfit_um = {};  ///< of the best way that is no other view of the same
   bool is_ambiguous = false;
   int n_beads = 0;
   double lambda_um_per_kPa = 0;

@@ -54,6 +54,7 @@ charts::Chart map_chart(const Setting& setting, const Depths& depths, const std:
   charts::Chart chart("Depth " + read_at_text(setting, read_at),
                       {.label = "height of the cell (µm)", .low = heights.front(), .high = heights.back()}, rows);
   const double largest = largest_of(depths);
+  chart.subtitle("0 (dark) to " + charts::readable(largest) + " µm (yellow)", "#444444");
   constexpr int kStripes = 60;  // along a row: finer than the eye tells colours apart
   row = 0;
   for (const auto& [ratio, by_height] : depths) {

@@ -72,7 +72,7 @@ const Graph kMayInclude = {
 
 /// Third-party headers and the nodes that may see them, by the beginning of the include.
 const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
-    {"opencv2/", {"segment/cells", "segment/beads", kPrograms}},
+    {"opencv2/", {"segment/cells", "segment/beads", "continuum/mean", kPrograms}},
     {"tiff", {"segment/images"}},
     {"png", {"segment/images"}},
     {"jpeglib", {"segment/images"}},

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "continuum/mean/align.h"
+#include "continuum/mean/images.h"
 #include "pipeline/contract/errors.h"
 #include "substrate/greens/half_space.h"
 
@@ -66,6 +67,46 @@ TEST(Mean, registration_finds_a_known_shift_turn_and_mirror) {
 TEST(Mean, a_shape_that_is_its_own_mirror_image_is_not_mirrored) {
   EXPECT_EQ(mirrors_for(Switch::automatic, spiked(40, 15, 6, 360)), Mirrors::not_tried);
   EXPECT_EQ(mirrors_for(Switch::automatic, leaning(spiked(40, 15, 6, 360))), Mirrors::tried);
+}
+
+/// Smooth blobs of light in places of their own, seen in the frame of a motion's cell.
+Brightness blobs(const Motion& motion, double noise, std::uint64_t seed) {
+  Brightness image{.width = 260, .height = 240, .pixel_size_um = 0.5, .values = {}};
+  std::mt19937_64 places(4), random(seed);
+  std::uniform_real_distribution<double> across(25, 95), height(0.4, 1);
+  std::normal_distribution<double> normal(0, noise);
+  struct Blob {
+    Vec2 at;
+    double height;
+  };
+  std::vector<Blob> all;
+  for (int k = 0; k < 30; ++k) {
+    const double x = across(places), y = across(places);
+    all.push_back({{x, y}, height(places)});
+  }
+  for (int j = 0; j < image.height; ++j) {
+    for (int i = 0; i < image.width; ++i) {
+      const Vec2 at = motion.place_um({0.5 * (i + 0.5), 0.5 * (j + 0.5)});
+      double value = 5 + normal(random);
+      for (const Blob& blob : all) value += blob.height * std::exp(-dot(at - blob.at, at - blob.at) / 18);
+      image.values.push_back(static_cast<float>(value));
+    }
+  }
+  return image;
+}
+
+TEST(Mean, images_tell_a_known_shift_and_turn) {
+  const Brightness reference = blobs({}, 0.05, 1);
+  for (const double angle : {12.3, -140.0}) {
+    const Motion truth{{62, 60}, {64.3, 58.1}, angle * kDegree, false};
+    const auto ways = ways_by_images(blobs(truth, 0.05, 2), reference, Mirrors::tried);
+    const Motion& found = ways.front().motion;
+    EXPECT_FALSE(found.is_mirrored);
+    EXPECT_NEAR(std::remainder(found.angle_rad - truth.angle_rad, 2 * std::numbers::pi), 0, 0.1 * kDegree);
+    EXPECT_LT(norm(found.place_um({62, 60}) - truth.place_um({62, 60})), 0.1 * 0.5);  // a tenth of a pixel
+    EXPECT_FALSE(correlate_equally(ways[0], ways[1]));
+    EXPECT_LT(ways.front().shift_error_um, 0.05);
+  }
 }
 
 Cell cell_of(const Polygon& outline) {
