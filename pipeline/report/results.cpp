@@ -91,14 +91,22 @@ std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell) {
   return by_id;
 }
 
+std::optional<double> figure_of(const FitSummary& fit, std::string_view name) {
+  for (const auto& [known, value] : fit.more) {
+    if (known != name) continue;
+    if (const auto* number = std::get_if<double>(&value)) return *number;
+    if (const auto* count = std::get_if<std::int64_t>(&value)) return static_cast<double>(*count);
+  }
+  return {};
+}
+
 std::optional<CutForce> cut_force_of(const FitSummary& fit) {
   std::optional<CutForce> cut;
   const auto read = [&](const char* name, double CutForce::*member) {
-    for (const auto& [known, value] : fit.more) {
-      if (known != name || !std::holds_alternative<double>(value)) continue;
-      if (!cut) cut.emplace();
-      (*cut).*member = std::get<double>(value);
-    }
+    const auto value = figure_of(fit, name);
+    if (!value) return;
+    if (!cut) cut.emplace();
+    (*cut).*member = *value;
   };
   read("cut_force_x_nN", &CutForce::x_nN);
   read("cut_force_x_sigma_nN", &CutForce::x_sigma_nN);

@@ -57,6 +57,9 @@ struct Balance {
 };
 Balance balance_of(const CellResults& results);
 
+/// A number of fit.json; none where it is not there or is no number.
+std::optional<double> figure_of(const FitSummary& fit, std::string_view name);
+
 /// What passes through the image's cut, of fit.json.
 struct CutForce {
   double x_nN = 0, x_sigma_nN = 0, y_nN = 0, y_sigma_nN = 0, force_nN = 0, sigma_nN = 0, torque_nN_um = 0;
