@@ -136,7 +136,8 @@ std::string quality(const FitSummary& fit) {
 }
 
 std::string with_error(double value, double sigma, const char* unit) {
-  return fmt::format("{} ± {} {}", charts::readable(value), charts::readable(sigma), unit);
+  const auto decimals = sigma > 0 ? std::optional(decimals_for(sigma)) : std::nullopt;
+  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(sigma, decimals), unit);
 }
 
 /// Empty for results of a version that did not compute them.

@@ -56,6 +56,7 @@ std::string map_section(const CellResults& results) {
       "<p class=\"sub screen\">The mouse tells what it rests on. Ctrl and wheel, or the buttons, zoom; dragging moves; "
       "a double click shows all again.</p><div class=\"grid\">\n" +
       html_of(segmentation_map(results)) + html_of(adhesion_map(results));
+  if (results.bead_images) html += html_of(bead_map(results));
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
   html += html_of(network_map(results, NetworkForm::contracted));
   return section("Maps", html +

@@ -39,7 +39,8 @@ struct CellResults {
   FitSummary fit;
   std::optional<Residual> residual;
   std::optional<Comparison> comparison;  ///< of a simulated cell
-  std::optional<Images> images;
+  std::optional<Images> images;          ///< of the cell
+  std::optional<Images> bead_images;     ///< both on each other
   std::vector<MissingFibre> missing_fibres;
   std::vector<MissingAdhesion> missing_adhesions;
 };
