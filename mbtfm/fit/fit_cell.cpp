@@ -1,8 +1,8 @@
 #include "mbtfm/fit/fit_cell.h"
 
 #include "mbtfm/fit/effects.h"
-#include "mbtfm/fit/energy.h"
 #include "mbtfm/fit/strained_gel.h"
+#include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/solved_misfit.h"

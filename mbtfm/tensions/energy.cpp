@@ -1,15 +1,15 @@
-#include "mbtfm/fit/energy.h"
+#include "mbtfm/tensions/energy.h"
 
 #include <Eigen/Eigenvalues>
 #include <cmath>
 #include <numbers>
 
 #include "mbtfm/tensions/fit_results.h"
-#include "substrate/choice/factory.h"
+#include "substrate/greens/models.h"
 #include "substrate/loads.h"
 #include "substrate/response.h"
 
-namespace mbtfm::fit {
+namespace mbtfm::tensions {
 
 using Eigen::Index;
 using Eigen::VectorXd;
@@ -43,7 +43,7 @@ VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, c
     for (const auto& [at, weight] : rule)
       points_um.push_back(e.centre_um + at.x * e.semi_major_um * along + at.y * e.semi_minor_um * across);
   }
-  const auto layer = choice::make_substrate(gel, {.model = substrate::ModelKind::layer}, threads);
+  const auto layer = greens::make_greens(gel, {.model = substrate::ModelKind::layer}, threads);
   const VectorXd at_points = layer->response({ellipses}, {points_um})->displace(forces_nN);
   VectorXd mean = VectorXd::Zero(forces_nN.size());
   for (Index a = 0; a < std::ssize(ellipses); ++a) {
@@ -54,11 +54,10 @@ VectorXd mean_displacement_um(const std::vector<substrate::Ellipse>& ellipses, c
 }
 
 /// Of a number that changes by `gradient` with the forces.
-double standard_error(const tensions::EnsembleFit& fit, const VectorXd& gradient) {
-  const Eigen::MatrixXd network = tensions::by_network_force(fit, gradient);
-  const double variance =
-      tensions::covariance_of_estimates(fit, Eigen::MatrixXd::Zero(1, 1), network.transpose())(0, 0);
-  return std::sqrt(variance + tensions::own_variances(fit, gradient)[0]);
+double standard_error(const EnsembleFit& fit, const VectorXd& gradient) {
+  const Eigen::MatrixXd network = by_network_force(fit, gradient);
+  const double variance = covariance_of_estimates(fit, Eigen::MatrixXd::Zero(1, 1), network.transpose())(0, 0);
+  return std::sqrt(variance + own_variances(fit, gradient)[0]);
 }
 
 Vec2 centre_of(const std::vector<substrate::Ellipse>& ellipses) {
@@ -67,8 +66,7 @@ Vec2 centre_of(const std::vector<substrate::Ellipse>& ellipses) {
   return 1.0 / static_cast<double>(ellipses.size()) * sum;
 }
 
-Figures moments_of(const tensions::EnsembleFit& fit, const std::vector<substrate::Ellipse>& ellipses,
-                   const VectorXd& forces_nN) {
+Figures moments_of(const EnsembleFit& fit, const std::vector<substrate::Ellipse>& ellipses, const VectorXd& forces_nN) {
   const Vec2 centre = centre_of(ellipses);
   Eigen::Matrix2d moment = Eigen::Matrix2d::Zero();
   VectorXd of_trace(forces_nN.size());
@@ -90,10 +88,9 @@ Figures moments_of(const tensions::EnsembleFit& fit, const std::vector<substrate
 
 }  // namespace
 
-Figures energy_and_moments(const tensions::EnsembleFit& fit, const Cell& cell, const Gel& gel, bool is_even_gel,
-                           int threads) {
-  const std::vector<substrate::Ellipse> ellipses = tensions::ellipses_of(cell);
-  const VectorXd forces_nN = tensions::adhesion_forces_nN(fit);
+Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& gel, bool is_even_gel, int threads) {
+  const std::vector<substrate::Ellipse> ellipses = ellipses_of(cell);
+  const VectorXd forces_nN = adhesion_forces_nN(fit);
   Figures figures;
   if (is_even_gel) {
     const VectorXd displacement_um = mean_displacement_um(ellipses, forces_nN, gel, threads);
@@ -107,4 +104,4 @@ Figures energy_and_moments(const tensions::EnsembleFit& fit, const Cell& cell, c
   return figures;
 }
 
-}  // namespace mbtfm::fit
+}  // namespace mbtfm::tensions

@@ -4,7 +4,7 @@
 #include "mbtfm/tensions/ensemble.h"
 #include "pipeline/contract/gel.h"
 
-namespace mbtfm::fit {
+namespace mbtfm::tensions {
 
 /// Figures of fit.json, each with its standard error:
 ///
@@ -15,7 +15,6 @@ namespace mbtfm::fit {
 /// The energy is that of the exact layer of the gel's thickness and modulus; without it where the modulus changes with
 /// depth. No moments where the image cuts the cell: the forces beyond the cut are part of them.
 /// Source: Butler, Tolić-Nørrelykke, Fabry, Fredberg, Am. J. Physiol. Cell Physiol. 282 (2002) C595, eqs. 17 to 20.
-Figures energy_and_moments(const tensions::EnsembleFit& fit, const Cell& cell, const Gel& gel, bool is_even_gel,
-                           int threads);
+Figures energy_and_moments(const EnsembleFit& fit, const Cell& cell, const Gel& gel, bool is_even_gel, int threads);
 
-}  // namespace mbtfm::fit
+}  // namespace mbtfm::tensions
