@@ -279,6 +279,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
 
 std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   std::vector<Figure> figures;
+  if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
   if (analysis.tensions.sample.values.empty()) {
     figures.push_back({.name = "tensions_by_type",
                        .title = "Tension of each fibre",

@@ -42,11 +42,12 @@ report::Table types_table(const Study& study, const Analysis& analysis) {
                        {"mean, mixed model (nN)", true},
                        {"95 %", true},
                        {"plain mean (nN)", true},
-                       {"95 %, cells drawn anew", true},
+                       {"95 %, cells resampled", true},
                        {"median (nN)", true},
                        {"SD (nN)", true},
                        {"SD without error (nN)", true}},
-                      {}};
+                      {},
+                      "Tension by fibre type"};
   for (const Summary& s : analysis.tensions.summaries) {
     table.rows.push_back(
         {charts::html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
@@ -77,7 +78,8 @@ report::Table tests_table(const Measure& m) {
                        {"effect", true},
                        {"95 %"},
                        {"effect is"}},
-                      {}};
+                      {},
+                      "Tests of the " + m.sample.name};
   for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
     table.rows.push_back({charts::html_escaped(t.within), name_of(t.test), name_of(t.unit),
@@ -103,7 +105,8 @@ report::Table cells_table(const Study& study) {
                        {"relative L2", true},
                        {"expected", true},
                        {"enters"}},
-                      {}};
+                      {},
+                      "Cells"};
   for (const StudyCell& c : study.cells) {
     table.rows.push_back(
         {charts::html_escaped(c.name), charts::html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
@@ -129,7 +132,7 @@ std::string first_of(const std::vector<std::string>& names) {
 
 /// Open findings, each with the cells that have it.
 report::Table findings_table(const Study& study) {
-  report::Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}};
+  report::Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}, "Open findings"};
   std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
@@ -179,6 +182,33 @@ std::string overview(const Study& study, const Analysis& analysis) {
   return html;
 }
 
+/// What the study was made for, before anything else.
+std::string primary_section(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures) {
+  const Primary& primary = analysis.primary;
+  std::string html;
+  if (study.conditions.size() < 2) {
+    html =
+        "<p>The study has one condition: there is nothing to compare. Give each cell a condition: a column "
+        "<code>condition</code> in <code>--table</code>, or <code>--condition-from folder</code>.</p>\n";
+  } else if (primary.differences.empty()) {
+    html = "<p>The " + html_escaped(primary.measure) + " cannot be compared: " + html_escaped(primary.obstacle) +
+           ".</p>\n";
+  }
+  for (const PrimaryDifference& d : primary.differences) {
+    std::string text = sentence_of(primary, d);
+    text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+    html += "<p class=\"what\"><b>" + html_escaped(text) + ".</b></p>\n";
+  }
+  for (const Figure& figure : figures) {
+    if (figure.name == "primary") html += embedded(figure);
+  }
+  if (!primary.differences.empty())
+    html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
+            ", two-sided; p by Holm over the conditions. It was chosen by the parameters <code>primary</code> and "
+            "<code>primary_type</code>, not by its result. All other tests of this page are exploratory.</p>\n";
+  return html;
+}
+
 constexpr const char* kHowToRead =
     "<p class=\"sub\">Two-sided. The fibres of a cell are not independent: tests whose unit is the observation "
     "overstate the evidence; those with the unit cell do not (clustered rank sum: Datta &amp; Satten 2005; mixed "
@@ -207,7 +237,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
                        const StudyParameters& parameters) {
   const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
                                        study.cells.size(), kVersion);
-  std::string body = report::section("In short", overview(study, analysis));
+  std::string body = report::section("Primary comparison", primary_section(study, analysis, figures)) +
+                     report::section("In short", overview(study, analysis));
   std::string found;
   for (const Findings& f : findings_of(analysis, parameters)) {
     if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
@@ -215,9 +246,11 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
     found += fmt::format("<details><summary>{} pairs that do not demonstrably differ</summary>\n{}</details>\n",
                          f.unclear.size(), list_of(f.unclear));
   }
-  body += report::section("What was found", found);
+  body += report::section("What was found, exploratory", found);
   std::string pictures;
-  for (const Figure& figure : figures) pictures += embedded(figure);
+  for (const Figure& figure : figures) {
+    if (figure.name != "primary") pictures += embedded(figure);
+  }
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const report::Table& table, const std::string& name) {
     const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
@@ -234,7 +267,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
       tests += report::folded("Tests of the " + m->sample.name + " of " + name_of(m->sample.each),
                               report::html_of(tests_table(*m)));
   }
-  body += report::section("Tests", tests + kHowToRead);
+  body += report::section("Exploratory tests", tests + kHowToRead);
   body += report::section("Cells", with_file(cells_table(study), "cells.csv"));
   return report::page("Stress-fibre tensions – mbtfm", head, body);
 }

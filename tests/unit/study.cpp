@@ -107,7 +107,7 @@ TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   EXPECT_THROW(fake.read({.condition_from = "drug"}, table("cell,dose\ncell_1,2\n")), InputError);
   EXPECT_THROW(fake.read({}, table("cell\ncell_77\n")), InputError);
   EXPECT_THROW(fake.read({}, table("cell\ncell_1\ncontrol/cell_1\n")), InputError);
-  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", table("cell\nx\n")), InputError);
+  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", "", table("cell\nx\n")), InputError);
 }
 
 TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
