@@ -76,8 +76,10 @@ charts::Chart super_plot(const Study& study, const Measure& m, int kind, const P
     if (o.kind == kind) largest = std::max(largest, o.value);
   }
   const std::size_t n_keys = replicates.size() > 1 ? replicates.size() : 0;
-  charts::Chart chart(primary.measure, condition_axis(sample),
-                      charts::Axis{.label = primary.unit, .low = 0, .high = end_below_keys(largest, n_keys)});
+  charts::Chart chart(
+      primary.measure, condition_axis(sample),
+      charts::Axis{
+          .label = sample.name + " (" + primary.unit + ")", .low = 0, .high = end_below_keys(largest, n_keys)});
   for (int c = 0; c < sample.n_conditions(); ++c) draw_column(chart, study, sample, c, kind, replicates);
   for (const Summary& s : m.summaries) {
     if (s.kind != sample.kinds[static_cast<std::size_t>(kind)] || !s.model) continue;

@@ -4,6 +4,9 @@
 #include <map>
 
 #include "pipeline/contract/version.h"
+#include "pipeline/files/base64.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/page.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -24,14 +27,18 @@ std::string interval_text(const std::optional<Interval>& interval) {
 
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
 
-/// The one place where a figure enters the page.
+/// The charts and what they show, without the title.
+std::string charts_of(const Figure& figure) {
+  std::string html = "<div class=\"grid\">\n";
+  for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
+  return html + "</div>\n<p class=\"sub\">" + charts::html_escaped(figure.caption) + "</p>\n";
+}
+
 std::string embedded(const Figure& figure) {
   if (figure.charts.empty())
     return "<h3>" + charts::html_escaped(figure.title) +
            "</h3>\n<p class=\"sub\">Not drawn: " + charts::html_escaped(figure.caption) + "</p>\n";
-  std::string html = "<h3>" + charts::html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
-  for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
-  return html + "</div>\n<p class=\"sub\">" + charts::html_escaped(figure.caption) + "</p>\n";
+  return "<h3>" + charts::html_escaped(figure.title) + "</h3>\n" + charts_of(figure);
 }
 
 report::Table types_table(const Study& study, const Analysis& analysis) {
@@ -160,6 +167,28 @@ std::string findings_text(const Study& study, const std::string& table_html) {
          table_html;
 }
 
+/// Every cell that enters, as its segmentation looks, linked to its page where the study lies beside the cells.
+std::string gallery(const Study& study, const Path& page_folder) {
+  std::string html = "<div class=\"cells\">\n";
+  for (const StudyCell& c : study.cells) {
+    const Path folder = study.folder / c.name, picture = folder / "1_segment/thumbnail.jpg";
+    const std::string link = (folder / "report.html").lexically_relative(page_folder).generic_string();
+    const std::string& condition = study.conditions[static_cast<std::size_t>(c.condition)];
+    const std::string text =
+        fmt::format("{}{}{}: {} nN", c.name, condition.empty() ? "" : ", ", condition, readable(c.fit.total_force_nN));
+    html += fmt::format("<a href=\"{}\">{}<span>{}{}</span></a>\n", html_escaped(link),
+                        files::is_own_file(picture) ? fmt::format("<img alt=\"\" src=\"data:image/jpeg;base64,{}\">",
+                                                                  files::base64(files::read_text(picture)))
+                                                    : "",
+                        html_escaped(text), has_open(c.findings) ? " <b>!</b>" : "");
+  }
+  return html +
+         "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
+         "leave cells out by a rule: <code>--exclude-findings</code>; one by one: a column <code>exclude</code> with "
+         "the "
+         "reason in <code>--table</code>.</p>\n";
+}
+
 std::string list_of(const std::vector<std::string>& sentences) {
   std::string html = "<ul>\n";
   for (const std::string& s : sentences) html += "<li>" + charts::html_escaped(s) + "</li>\n";
@@ -200,7 +229,7 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
     html += "<p class=\"what\"><b>" + html_escaped(text) + ".</b></p>\n";
   }
   for (const Figure& figure : figures) {
-    if (figure.name == "primary") html += embedded(figure);
+    if (figure.name == "primary") html += charts_of(figure);
   }
   if (!primary.differences.empty())
     html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
@@ -234,7 +263,7 @@ std::string on_edge_fibres(const Study& study) {
 }  // namespace
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
-                       const StudyParameters& parameters) {
+                       const StudyParameters& parameters, const Path& page_folder) {
   const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
                                        study.cells.size(), kVersion);
   std::string body = report::section("Primary comparison", primary_section(study, analysis, figures)) +
@@ -268,7 +297,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
                               report::html_of(tests_table(*m)));
   }
   body += report::section("Exploratory tests", tests + kHowToRead);
-  body += report::section("Cells", with_file(cells_table(study), "cells.csv"));
+  body += report::section("Cells", gallery(study, page_folder) + with_file(cells_table(study), "cells.csv"));
   return report::page("Stress-fibre tensions – mbtfm", head, body);
 }
 

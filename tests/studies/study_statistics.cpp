@@ -159,7 +159,7 @@ void study_time() {
     const statistics::Analysis analysis = statistics::analyse(study, parameters);
     const auto analysed = std::chrono::steady_clock::now();
     const auto figures = statistics::figures_of(study, analysis, parameters);
-    const std::string html = statistics::study_html(study, analysis, figures, parameters);
+    const std::string html = statistics::study_html(study, analysis, figures, parameters, "statistics");
     const std::chrono::duration<double> first = analysed - start, second = std::chrono::steady_clock::now() - analysed;
     std::printf("%d cells, %zu fibres, %zu adhesions: analysis %.1f s, figures and page %.1f s (%zu kB)\n", n_cells,
                 analysis.tensions.sample.values.size(), analysis.adhesion_forces.sample.values.size(), first.count(),

@@ -10,7 +10,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
 #include "pipeline/statistics/conditions.h"
-#include "pipeline/statistics/png.h"
+#include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/relations.h"
 #include "pipeline/statistics/study_files.h"
 #include "pipeline/statistics/summaries.h"
@@ -146,7 +146,8 @@ TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
     EXPECT_EQ(cells.integer(0, "n_edge", 0), 1);
     const StudyParameters parameters{.fibre_types = n_types};
     const Analysis analysis = analyse(study, parameters);
-    const std::string page = study_html(study, analysis, figures_of(study, analysis, parameters), parameters);
+    const std::string page =
+        study_html(study, analysis, figures_of(study, analysis, parameters), parameters, "statistics");
     EXPECT_NE(page.find("1 edge fibre runs along"), std::string::npos);
   }
 }
@@ -360,7 +361,7 @@ void expect_whole(const Study& study) {
     if (figure.charts.empty()) continue;
     EXPECT_EQ(svg_of(figure).find("nan"), std::string::npos) << figure.name;
   }
-  const std::string html = study_html(study, analysis, figures, parameters);
+  const std::string html = study_html(study, analysis, figures, parameters, "statistics");
   EXPECT_EQ(html.find("nan "), html.npos);
 }
 
@@ -400,15 +401,23 @@ TEST(Figures, are_drawn_into_pixels) {
   const Study study = test::simulated_study({.n_cells = 6});
   const StudyParameters parameters{.bootstrap_draws = 100};
   const Figure figure = figures_of(study, analyse(study, parameters), parameters).front();
-  write_png(folder / "figure.png", svg_of(figure), 2);
+  write_png(folder / "figure.png", svg_of(figure), 85, 300);
   const std::string bytes = files::read_text(folder / "figure.png");
   EXPECT_EQ(bytes.substr(1, 3), "PNG");
   const auto big_endian = [&](std::size_t at) {
     return (static_cast<unsigned char>(bytes[at + 2]) << 8) + static_cast<unsigned char>(bytes[at + 3]);
   };
-  EXPECT_EQ(big_endian(16), 2 * static_cast<int>(charts::Chart::kWidth_px));
+  EXPECT_EQ(big_endian(16), std::lround(85 / 25.4 * 300));
+  const std::size_t at = bytes.find("pHYs");
+  ASSERT_NE(at, bytes.npos);
+  EXPECT_EQ(big_endian(at + 4), std::lround(300 / 0.0254)) << "pixels in a metre";
   EXPECT_GT(bytes.size(), 10000u);  // an empty page of this size has some 4 kB
-  EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 2), OutputError);
+  EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 85, 300), OutputError);
+  write_pdf(folder / "figure.pdf", svg_of(figure), 85);
+  write_pdf(folder / "again.pdf", svg_of(figure), 85);
+  const std::string pdf = files::read_text(folder / "figure.pdf");
+  EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
+  EXPECT_EQ(pdf, files::read_text(folder / "again.pdf"));
 }
 
 }  // namespace
