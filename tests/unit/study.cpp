@@ -96,6 +96,33 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
   EXPECT_EQ(reason_of(by_table, "treated/cell_4"), "not in the table");
 }
 
+TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
+  const FakeStudy fake;
+  files::write_text(
+      fake.folder / "study.csv",
+      "cell,condition,day\ncell_1,untreated,mon\ncell_2,drug,mon\ncell_3,untreated,tue\ncell_4,drug,tue\n");
+  const Study study = fake.read({}, fake.folder / "study.csv");
+  EXPECT_EQ(study.conditions, (std::vector<std::string>{"drug", "untreated"}));
+  EXPECT_EQ(study.cells[0].replicate, "mon");
+  EXPECT_EQ(study.cells[1].replicate, "tue");
+  const Study ordered = fake.read({.conditions = "untreated , drug"}, fake.folder / "study.csv");
+  EXPECT_EQ(ordered.conditions, (std::vector<std::string>{"untreated", "drug"}));
+  EXPECT_EQ(ordered.cells[0].condition, 0);
+  EXPECT_THROW(fake.read({.conditions = "control"}, fake.folder / "study.csv"), UsageError);
+}
+
+TEST(Study, cells_with_a_finding_that_excludes_are_left_out_with_it_as_the_reason) {
+  const FakeStudy fake;
+  files::write_text(fake.folder / "control/cell_1/run.json",
+                    R"({"findings":[{"id":"cell-cut","severity":"caution","text":"cut"},)"
+                    R"({"id":"saturated","severity":"note","text":"a little"}]})");
+  EXPECT_EQ(fake.read({.exclude_findings = "saturated"}).cells.size(), 4u) << "a note is not open";
+  const Study study = fake.read({.exclude_findings = "explains-little, cell-cut"});
+  EXPECT_EQ(study.cells.size(), 3u);
+  EXPECT_EQ(reason_of(study, "control/cell_1"), "the finding cell-cut is open (stats.exclude_findings)");
+  EXPECT_THROW(fake.read({.exclude_findings = "cell-cutt"}), UsageError);
+}
+
 TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   const FakeStudy fake;
   EXPECT_THROW(fake.read({.condition_from = "drug"}), UsageError);
@@ -394,6 +421,54 @@ TEST(Analysis, a_single_cell_of_a_condition_is_warned_of) {
   for (StudyCell& c : study.cells) c.condition = &c == &study.cells[0] ? 0 : 1;
   const auto warnings = analyse(study, {.bootstrap_draws = 100}).warnings;
   EXPECT_EQ(warnings.front().substr(0, 16), "a: a single cell");
+}
+
+TEST(Primary, compares_each_condition_with_the_reference_by_the_test_that_was_named) {
+  const Study study = test::simulated_study({.n_cells = 24, .n_conditions = 3, .condition_effect_nN = 3, .seed = 4});
+  StudyParameters parameters{.bootstrap_draws = 100};
+  const Analysis analysis = analyse(study, parameters);
+  const Primary& primary = analysis.primary;
+  ASSERT_EQ(primary.differences.size(), 2u);
+  EXPECT_EQ(primary.reference, "a");
+  EXPECT_EQ(primary.differences[1].condition, "c");
+  EXPECT_GT(primary.differences[0].difference.low, 0);
+  EXPECT_NEAR(primary.differences[1].difference.estimate, 6, 3 * primary.differences[1].difference.standard_error);
+  // the same numbers as among all tests, but for the sign
+  for (const Comparison& c : analysis.tensions.comparisons) {
+    if (c.test != statistics::Test::mixed_model || c.within != "ventral" || c.group_a != "a" || c.group_b != "b")
+      continue;
+    EXPECT_NEAR(primary.differences[0].difference.estimate, -c.effect, 1e-12);
+    EXPECT_NEAR(primary.differences[0].difference.low, -c.interval->high, 1e-9);
+    EXPECT_NEAR(primary.differences[0].difference.p_value, c.p_value, 1e-9);
+  }
+  parameters.primary = PrimaryMeasure::total_force;
+  EXPECT_EQ(analyse(study, parameters).primary.measure, "total force of cells");
+}
+
+TEST(Primary, with_replicates_compares_their_means_in_pairs) {
+  Study study = test::simulated_study({.n_cells = 12, .n_conditions = 2, .seed = 9});
+  for (std::size_t i = 0; i < study.cells.size(); ++i) study.cells[i].replicate = std::string(1, "xyz"[i % 3]);
+  const Analysis analysis = analyse(study, {.bootstrap_draws = 100});
+  ASSERT_EQ(analysis.primary.differences.size(), 1u);
+  const PrimaryDifference& d = analysis.primary.differences[0];
+  EXPECT_EQ(d.replicates, 3);
+  EXPECT_EQ(d.difference.degrees, 2);
+  // by hand: means of cells, of replicates, of their differences
+  const Sample& sample = analysis.tensions.sample;
+  std::map<std::pair<int, std::string>, std::vector<double>> cells_of;
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    std::vector<double> own;
+    for (const Observation& o : sample.values) {
+      if (o.cell == static_cast<int>(i) && o.kind == 2) own.push_back(o.value);
+    }
+    if (!own.empty()) cells_of[{study.cells[i].condition, study.cells[i].replicate}].push_back(describe(own).mean);
+  }
+  double sum = 0;
+  for (const char* replicate : {"x", "y", "z"})
+    sum += describe(cells_of.at({1, replicate})).mean - describe(cells_of.at({0, replicate})).mean;
+  EXPECT_NEAR(d.difference.estimate, sum / 3, 1e-12);
+  for (StudyCell& cell : study.cells) cell.replicate = "one day";
+  EXPECT_FALSE(analyse(study, {.bootstrap_draws = 100}).primary.obstacle.empty());
 }
 
 TEST(Figures, are_drawn_into_pixels) {
