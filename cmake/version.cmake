@@ -8,7 +8,7 @@
 # Named is the last commit that changed what the programs are made of: one that changes docs or tests alone leaves the version,
 # and with it each cell's results, as they are.
 cmake_minimum_required(VERSION 3.25)
-set(code pipeline segment network substrate mbtfm samples cmake CMakeLists.txt)
+set(code pipeline segment network substrate mbtfm continuum samples cmake CMakeLists.txt)
 
 function(git out)
   execute_process(COMMAND git --no-optional-locks -C ${SOURCE} ${ARGN}
