@@ -177,7 +177,8 @@ class Sampler {
   std::pair<double, double> across(const Corners& t, double y) const {
     std::pair span(std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity());
     for (int k = 0; k < 3; ++k) {
-      const auto [low, high] = std::minmax(t[k], t[(k + 1) % 3], [](Vec3 a, Vec3 b) { return a.y < b.y; });
+      const bool rises = t[k].y <= t[(k + 1) % 3].y;
+      const Vec3 low = t[rises ? k : (k + 1) % 3], high = t[rises ? (k + 1) % 3 : k];
       if (high.y < y - reach_um_ || low.y > y + reach_um_) continue;
       const double slope = high.y > low.y ? (high.x - low.x) / (high.y - low.y) : 0;
       const auto x_at = [&](double at) {
