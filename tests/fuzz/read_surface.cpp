@@ -75,7 +75,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   }
   fuzz::answer([&] {
     const HeightMap map = files::read_surface(fuzz::folder() / "input.vtp");
-    surface::Height(map)(map.origin_um);
+    const surface::Height height(map);
+    height(map.origin_um);
   });
   return 0;
 }
