@@ -16,6 +16,7 @@ Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
 
 /// All its slices. @throws InputError
 std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice);
+int n_tiff_slices(const std::filesystem::path& file);
 
 /// Read a file that begins as a PNG; of RGB the mean where no channel is chosen. @throws InputError
 Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);
@@ -45,6 +46,9 @@ struct TiffCalibration {
 /// The pixel size: OME-XML's PhysicalSizeX, ImageJ's unit with XResolution, Volocity's XCalibrationMicrons; nothing
 /// where none of them speaks (a resolution without a unit of ImageJ is a printer's) or where pixels are not square.
 std::optional<double> pixel_size_um(const TiffCalibration& calibration);
+
+/// The distance of slices: OME-XML's PhysicalSizeZ, ImageJ's spacing in its unit, Volocity's ZCalibrationMicrons.
+std::optional<double> z_step_um(const TiffCalibration& calibration);
 
 /// The value of `key=value` at the start of a line; lines end as Unix, DOS or the old Macintosh (Volocity) ends them.
 std::optional<std::string_view> line_value(std::string_view text, std::string_view key);

@@ -55,15 +55,22 @@ class TiffReader {
     std::iota(pages.begin(), pages.end(), 0);
     if (const auto stack = stack_of(of_first_page_.description, file_.filename().string()))
       pages = chosen_pages(*stack, all, file_.string());
+    const std::optional<double> z_step = z_step_um(of_first_page_);
     std::vector<Image> slices;
     for (const int page : pages) {
       slices.push_back(read_page(page, all));
       const Image& first = slices.front();
       if (slices.size() == 1) require_plausible_bytes(file_, pages.size() * first.pixels.size());
+      slices.back().z_step_um = z_step;
       if (slices.back().width != first.width || slices.back().height != first.height)
         refuse("slices of one size", "slices of different sizes");
     }
     return slices;
+  }
+
+  int n_slices() const {
+    const auto stack = stack_of(of_first_page_.description, file_.filename().string());
+    return stack ? stack->n_slices : 1;
   }
 
  private:
@@ -393,6 +400,14 @@ class TiffReader {
 
 std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice) {
   return TiffReader(file).read_slices(choice);
+}
+
+int n_tiff_slices(const std::filesystem::path& file) {
+  try {
+    return TiffReader(file).n_slices();
+  } catch (const InvalidData&) {
+    return 1;  // what contradicts itself is told of where it is read
+  }
 }
 
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return TiffReader(file).read(choice); }
