@@ -15,6 +15,7 @@
 #include "segment/beads/given_field.h"
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
+#include "segment/stacks/run.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -355,6 +356,8 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
 
 struct TrackStageParameters {
   TrackParameters track;
+  stacks::StackParameters stacks;
+  images::PlaneChoice surface_plane;
   int binning = 1;  ///< to be quick: beads closer than a few pixels of the reduced images are lost
   stage::EffectSwitches effects;
 };
@@ -364,6 +367,8 @@ void declare(stage::ParameterList& list, TrackStageParameters& p) {
   list.table("track");
   list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
            "the images are reduced first: means of blocks of so many pixels a side");
+  declare(list, p.stacks);
+  declare(list, p.surface_plane, "surface", "the stack of beads on the surface");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});
 }
 
@@ -396,6 +401,8 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
       throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
     }
   }
+  if (stacks::are_in_space(context.inputs_.at("relaxed"), context.inputs_.at("stressed"), parameters, given.stacks))
+    return stacks::run(parameters, given.surface_plane, given.stacks, context);
   return track(parameters, given.binning, context);
 }
 
@@ -410,11 +417,14 @@ int main(int argc, char** argv) {
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
        .files =
            {{"stressed", Kind::optional_input,
-             "beads while the cell pulls (TIFF, PNG or JPEG); a folder of them: a time series"},
+             "beads while the cell pulls (TIFF, PNG or JPEG; a stack: in space); a folder of them: a time series"},
             {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)"},
+            {"surface_beads", Kind::optional_input,
+             "of stacks: beads of another colour on the gel's surface, relaxed; their places are for mbtfm-surface"},
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
-            {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
+            {"out", Kind::output_folder,
+             "folder for displacement.csv, displacement.vtp; of stacks for displacement_3d.csv, displacement_3d.vtp"}}},
       argc, argv, mbtfm::beads::run);
 }

@@ -103,8 +103,7 @@ bool is_peak(const Block& block, int i, int j, int k) {
 
 }  // namespace
 
-std::vector<Peak> peaks_of(const Volume& volume, Widths w, const std::vector<double>& noise, double detection_snr,
-                           int threads) {
+std::vector<Peak> peaks_of(const Volume& volume, Widths w, const Noise& noise, double detection_snr, int threads) {
   if (volume.depth < 3) return {};
   const Widths narrow_widths{0.8 * w.xy, 0.8 * w.z}, wide_widths{1.6 * w.xy, 1.6 * w.z};
   const Average narrow(narrow_widths), wide(wide_widths);
@@ -126,11 +125,11 @@ std::vector<Peak> peaks_of(const Volume& volume, Widths w, const std::vector<dou
         for (int i = 0; i < block.nx; ++i) to[i] = from[mirrored(left - margin + i, volume.width)];
       }
     }
-    Block answers = averaged(block, narrow);
-    const Block wider = averaged(block, wide);
-    for (std::size_t v = 0; v < answers.values.size(); ++v) answers.values[v] -= wider.values[v];
+    const Block light = averaged(block, narrow);
+    Block answers = averaged(block, wide);
+    for (std::size_t v = 0; v < answers.values.size(); ++v) answers.values[v] = light.values[v] - answers.values[v];
     for (int k = 1; k + 1 < volume.depth; ++k) {
-      const auto least = static_cast<float>(detection_snr * gain * noise[static_cast<std::size_t>(k)]);
+      const auto least = static_cast<float>(detection_snr * gain * std::sqrt(noise.variance(k, 0)));
       for (int y = std::max(1, top); y < std::min(bottom, volume.height - 1); ++y) {
         const int j = y - top + margin;
         const float* row = answers.row(j, k);
@@ -138,6 +137,7 @@ std::vector<Peak> peaks_of(const Volume& volume, Widths w, const std::vector<dou
           const int i = x - left + margin;
           if (!(row[i] > least) || !is_peak(answers, i, j, k)) continue;
           const float here = row[i];
+          if (here < detection_snr * gain * std::sqrt(noise.variance(k, light.row(j, k)[i]))) continue;
           found[static_cast<std::size_t>(number)].push_back(
               {{x + beads::parabola_vertex(row[i - 1], here, row[i + 1]),
                 y + beads::parabola_vertex(answers.row(j - 1, k)[i], here, answers.row(j + 1, k)[i]),

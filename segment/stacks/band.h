@@ -15,9 +15,8 @@ struct Peak {
 };
 
 /// Maxima of the difference of two Gaussian averages, of 0.8 and 1.6 widths along each axis, where they stand out of
-/// the noise by `detection_snr`: the first average keeps touching beads apart, the second takes away what is wider than
-/// a bead. The volume is filtered in columns, so that little memory is taken.
-std::vector<Peak> peaks_of(const Volume& volume, Widths widths, const std::vector<double>& noise_by_slice,
-                           double detection_snr, int threads);
+/// the noise, that of the light there included, by `detection_snr`: the first average keeps touching beads apart, the
+/// second takes away what is wider than a bead. The volume is filtered in columns, so that little memory is taken.
+std::vector<Peak> peaks_of(const Volume& volume, Widths widths, const Noise& noise, double detection_snr, int threads);
 
 }  // namespace mbtfm::stacks

@@ -2,7 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <numbers>
 #include <string>
 
 #include "pipeline/numerics/order_statistics.h"
@@ -62,26 +62,58 @@ Noise flatten(Volume& volume, double width, int threads) {
   return noise;
 }
 
-/// For Gaussian pictures of width s along z the autocorrelation is exp(-l²/4s²): s² = 3 / (4 ln(C1/C2)), lags in slices.
+/// The variance in proportion to light, roughly: what Immerkaer's mask answers where there is some light. It answers to
+/// the curvature of a bead's picture, too, but as the square of the light, so that the dim voxels decide.
+double light_variance_of(const Volume& volume, const Noise& noise) {
+  constexpr int kBins = 12;
+  std::vector<std::vector<float>> answers(kBins), lights(kBins);
+  for (const int k : some_slices(volume.depth)) {
+    const double dark = noise.dark[static_cast<std::size_t>(k)];
+    for (int j = 1; j + 1 < volume.height; ++j) {
+      const float *above = volume.row(j - 1, k), *here = volume.row(j, k), *below = volume.row(j + 1, k);
+      for (int i = 1; i + 1 < volume.width; ++i) {
+        const float corners = above[i - 1] + above[i + 1] + below[i - 1] + below[i + 1];
+        const float sides = above[i] + below[i] + here[i - 1] + here[i + 1];
+        const float mean = (corners + sides + here[i]) / 9;
+        if (!(mean > dark)) continue;
+        const auto bin = static_cast<std::size_t>(std::min(kBins - 1.0, std::floor(2 * std::log2(mean / dark))));
+        answers[bin].push_back(std::abs(corners - 2 * sides + 4 * here[i]) / 6);
+        lights[bin].push_back(mean);
+      }
+    }
+  }
+  std::vector<double> variances;
+  const double dark = numerics::median(noise.dark);
+  constexpr std::size_t kFewest = 300, kDimmest = 3;  // of a bin; bins
+  for (int bin = 0; bin < kBins && variances.size() < kDimmest; ++bin) {
+    auto& of_bin = answers[static_cast<std::size_t>(bin)];
+    if (of_bin.size() < kFewest) continue;
+    const double sd = numerics::median_in(of_bin) / 0.6745;
+    variances.push_back((sd * sd - dark * dark) / numerics::median_in(lights[static_cast<std::size_t>(bin)]));
+  }
+  return variances.empty() ? 0 : std::max(0.0, numerics::median(variances));
+}
+
+/// For Gaussian pictures of width s along z the autocorrelation is exp(-l²/4s²): s² = 3 / (4 ln(C1/C2)), lags in
+/// slices.
 double width_along_z(const Volume& volume) {
-  double c[3] = {0, 0, 0};
+  double near = 0, far = 0;
   const std::size_t in_slice = static_cast<std::size_t>(volume.width) * volume.height;
   for (int k = 0; k + 2 < volume.depth; ++k) {
     const float* here = volume.row(0, k);
     for (std::size_t v = 0; v < in_slice; v += 3) {
-      c[0] += here[v] * here[v];
-      c[1] += here[v] * here[v + in_slice];
-      c[2] += here[v] * here[v + 2 * in_slice];
+      near += here[v] * here[v + in_slice];
+      far += here[v] * here[v + 2 * in_slice];
     }
   }
   constexpr double kNarrowest = 0.5, kWidest = 20;
-  if (!(c[1] > 0)) return kNarrowest;
-  if (!(c[2] > 0.02 * c[1])) return kNarrowest;
-  if (c[2] >= c[1]) return kWidest;
-  return std::clamp(std::sqrt(3 / (4 * std::log(c[1] / c[2]))), kNarrowest, kWidest);
+  if (!(near > 0) || !(far > 0.02 * near)) return kNarrowest;
+  if (far >= near) return kWidest;
+  return std::clamp(std::sqrt(3 / (4 * std::log(near / far))), kNarrowest, kWidest);
 }
 
-/// Heights of a tenth of a bright bead's of the same depth are spurious more often than not: halos, bleed-through, dust.
+/// Heights of a tenth of a bright bead's of the same depth are spurious more often than not: halos, bleed-through,
+/// dust.
 void drop_dimmest(std::vector<Peak>& peaks, int depth) {
   constexpr int kLayers = 8;
   std::vector<std::vector<double>> heights(kLayers);
@@ -94,6 +126,16 @@ void drop_dimmest(std::vector<Peak>& peaks, int depth) {
   std::erase_if(peaks, [&](const Peak& p) { return p.height < least[layer_of(p)]; });
 }
 
+/// No more than can be told apart: one in a ball of three widths.
+void keep_highest(std::vector<Peak>& peaks, const Volume& volume, Widths w) {
+  constexpr double kBall = 4.0 / 3 * std::numbers::pi * 27;
+  const double room = static_cast<double>(volume.values.size()) / (kBall * w.xy * w.xy * w.z);
+  const auto most = static_cast<std::size_t>(std::max(100.0, room));
+  if (peaks.size() <= most) return;
+  std::ranges::stable_sort(peaks, [](const Peak& a, const Peak& b) { return a.height > b.height; });
+  peaks.resize(most);
+}
+
 std::vector<Spot> spots_of(const std::vector<Peak>& peaks) {
   std::vector<Spot> spots;
   for (const Peak& p : peaks) spots.push_back({.place = p.place, .height = p.height});
@@ -104,7 +146,7 @@ std::vector<Spot> spots_of(const std::vector<Peak>& peaks) {
 std::vector<Peak> hidden(const SpotFit& fit, double detection_snr, int threads) {
   const Volume& rest = fit.rest();
   const Widths w = fit.shape().at({0.5 * rest.width, 0.5 * rest.height, 0.5 * rest.depth});
-  std::vector<Peak> peaks = peaks_of(rest, w, fit.noise().dark, detection_snr, threads);
+  std::vector<Peak> peaks = peaks_of(rest, w, fit.noise(), detection_snr, threads);
   drop_dimmest(peaks, rest.depth);
   std::vector<Vec3> places;
   const double stretch = w.xy / w.z;
@@ -127,10 +169,12 @@ Detection detect(std::vector<images::Image> slices, double detection_snr, const 
   const std::string name = std::string("the ") + which + " stack";
   const double across = width_across(volume);
   if (!(across > 0)) throw beads::NotFollowed(name, "bright beads", "nothing but noise");
-  const Noise noise = flatten(volume, across, threads);
+  Noise noise = flatten(volume, across, threads);
+  noise.light_variance = light_variance_of(volume, noise);
   const Widths first{across, width_along_z(volume)};
-  std::vector<Peak> peaks = peaks_of(volume, first, noise.dark, detection_snr, threads);
+  std::vector<Peak> peaks = peaks_of(volume, first, noise, detection_snr, threads);
   drop_dimmest(peaks, volume.depth);
+  keep_highest(peaks, volume, first);
   SpotFit fit(volume, SpotShape(first), noise, threads);
   fit.add(spots_of(peaks));
   constexpr int kFirstRounds = 3, kRounds = 6;

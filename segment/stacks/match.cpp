@@ -58,8 +58,7 @@ Cloud cloud_of(const std::vector<PlacedBead>& beads) {
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   const Vec3 size = high - low;
-  const double spacing =
-      std::cbrt(std::max(1e-9, size.x * size.y * size.z) / static_cast<double>(beads.size()));
+  const double spacing = std::cbrt(std::max(1e-9, size.x * size.y * size.z) / static_cast<double>(beads.size()));
   return {beads, Near(points, spacing), spacing};
 }
 
@@ -110,7 +109,7 @@ double similarity_of(const Eigen::Vector3f* a, int n_a, const Eigen::Vector3f* b
 struct LocalMotion {
   Eigen::Vector3d at_place = Eigen::Vector3d::Zero();
   Eigen::Matrix3d gradient = Eigen::Matrix3d::Zero();
-  double variance = 0, variance_z = 0;  ///< of at_place, by the standard errors
+  double variance = 0, variance_z = 0;      ///< of at_place, by the standard errors
   double scatter_um = 0, scatter_z_um = 0;  ///< of the beads about it, robust standard deviations
   bool is_sound = false;
 };
@@ -452,11 +451,19 @@ class Matcher {
 
   void drop_contradicting() {
     std::vector<char> is_bad(result_.matches.size());
+    std::vector<double> across(good_.size()), along(good_.size());
     for_each(good_.size(), threads_, [&](std::size_t k) {
       const auto bead = static_cast<std::size_t>(good_[k]);
       const LocalMotion around = motion_around(bead, kAround);
       is_bad[bead] = !around.is_sound || contradiction(bead, around) > limit();
+      const Eigen::Vector3d off = as_eigen(displacement(bead)) - around.at_place;
+      across[k] = std::hypot(off[0], off[1]), along[k] = std::abs(off[2]);
     });
+    // places may be less exact than they claim, or claim nothing
+    if (!across.empty()) {
+      sigma_um_ = std::max(sigma_um_, 1.5 * numerics::median(across));
+      sigma_z_um_ = std::max(sigma_z_um_, 3 * numerics::median(along));
+    }
     for (std::size_t bead = 0; bead < is_bad.size(); ++bead) {
       if (is_bad[bead]) result_.matches[bead].flag = TrackFlag::neighbours_disagree;
     }
@@ -525,9 +532,7 @@ class Matcher {
 
 }  // namespace
 
-Vec3 RigidMotion::at(Vec3 x) const {
-  return as_vec(turn_matrix(turn_rad) * as_eigen(x - centre)) + centre + shift_um;
-}
+Vec3 RigidMotion::at(Vec3 x) const { return as_vec(turn_matrix(turn_rad) * as_eigen(x - centre)) + centre + shift_um; }
 
 Matching match(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
                const MatchParameters& parameters, int threads) {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
-#include <optional>
+#include <numeric>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
@@ -15,13 +15,13 @@
 namespace mbtfm::stacks {
 namespace {
 
-constexpr double kReach = 2.5;       // widths: the window in which a spot is fitted
-constexpr double kWindow = 1.5;      // widths: its Gaussian weight, so that neighbours and tails count less
-constexpr double kPaint = 4;         // widths: 3e-4 of a picture is beyond
-constexpr double kTouching = 4;      // widths: nearer spots are fitted jointly
-constexpr int kMostNeighbours = 3;   // fitted with a spot; further ones are where they were
-constexpr double kStep = 0.5;        // widths, of one step
-constexpr double kSettled = 2e-3;    // widths, and of the height: well below the noise of the brightest
+constexpr double kReach = 2.5;      // widths: the window in which a spot is fitted
+constexpr double kWindow = 1.5;     // widths: its Gaussian weight, so that neighbours and tails count less
+constexpr double kPaint = 4;        // widths: 3e-4 of a picture is beyond
+constexpr double kTouching = 4;     // widths: nearer spots are fitted jointly
+constexpr int kMostNeighbours = 3;  // fitted with a spot; further ones are where they were
+constexpr double kStep = 0.5;       // widths, of one step
+constexpr double kSettled = 2e-3;   // widths, and of the height: well below the noise of the brightest
 constexpr int kChunk = 32;
 
 template <class Body>
@@ -78,9 +78,7 @@ double distance_in_widths(Vec3 a, Vec3 b, Widths w) {
 
 // --- the shape
 
-SpotShape::SpotShape(Widths everywhere) {
-  log_xy_[0] = std::log(everywhere.xy), log_z_[0] = std::log(everywhere.z);
-}
+SpotShape::SpotShape(Widths everywhere) { log_xy_[0] = std::log(everywhere.xy), log_z_[0] = std::log(everywhere.z); }
 
 std::array<double, SpotShape::kTerms> SpotShape::terms(Vec3 place) const {
   const Vec3 d = place - middle_;
@@ -118,8 +116,7 @@ SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& v
       normal.diagonal().array() += 1e-9 * n;
       solution = normal.ldlt().solve(a.transpose() * (weight.array() * y.array()).matrix());
       const Eigen::VectorXd left = (y - a * solution).cwiseAbs();
-      const double scale =
-          1.4826 * numerics::median(std::vector<double>(left.data(), left.data() + n)) + 1e-6;
+      const double scale = 1.4826 * numerics::median(std::vector<double>(left.data(), left.data() + n)) + 1e-6;
       for (int k = 0; k < n; ++k) {
         const double r = left[k] / (4.685 * scale);  // biweight: 95 % efficient
         weight[k] = r < 1 ? (1 - r * r) * (1 - r * r) : 0;
@@ -145,7 +142,8 @@ void SpotFit::paint(const Spot& spot, double share) {
   const int n = box.high[0] - box.low[0] + 1;
   for (int k = box.low[2]; k <= box.high[2]; ++k) {
     for (int j = box.low[1]; j <= box.high[1]; ++j) {
-      const auto height = static_cast<float>(share * spot.height) * p.z.value[k - box.low[2]] * p.y.value[j - box.low[1]];
+      const auto height =
+          static_cast<float>(share * spot.height) * p.z.value[k - box.low[2]] * p.y.value[j - box.low[1]];
       float* row = volume_.row(j, k) + box.low[0];
       for (int i = 0; i < n; ++i) row[i] += height * p.x.value[i];
     }
@@ -327,8 +325,8 @@ void SpotFit::drop_doubles(double share) {
   for (std::size_t s = 0; s < spots_.size(); ++s) {
     for (const int other : touching_[s]) {
       const Spot& o = spots_[static_cast<std::size_t>(other)];
-      const bool is_dimmer = o.height > spots_[s].height ||
-                             (o.height == spots_[s].height && static_cast<std::size_t>(other) < s);
+      const bool is_dimmer =
+          o.height > spots_[s].height || (o.height == spots_[s].height && static_cast<std::size_t>(other) < s);
       const double apart = distance_in_widths(o.place, spots_[s].place, shape_.at(spots_[s].place));
       if (is_dimmer && apart < share) is_double[s] = true;
     }
@@ -416,8 +414,8 @@ void SpotFit::measure_shape() {
     const Vec3 place = spots_[static_cast<std::size_t>(chosen[k])].place;
     const Widths was = shape_.at(place), is = widths[k];
     constexpr double kLikely = 3;  // a factor beyond which it is no bead, or two
-    const bool is_likely = is.xy > was.xy / kLikely && is.xy < was.xy * kLikely && is.z > was.z / kLikely &&
-                           is.z < was.z * kLikely;
+    const bool is_likely =
+        is.xy > was.xy / kLikely && is.xy < was.xy * kLikely && is.z > was.z / kLikely && is.z < was.z * kLikely;
     if (is_likely) samples.push_back({place, is});
   }
   constexpr std::size_t kFewest = 5;
