@@ -22,16 +22,17 @@ Between between(const std::vector<double>& z, double at) {
   return {above - 1, (at - z[above - 1]) / (z[above] - z[above - 1])};
 }
 
-/// Places along z with as many beads between each two.
-std::vector<double> places_along_z(const std::vector<Moved>& beads) {
-  constexpr std::size_t kBeads = 60, kMost = 60;
-  std::vector<double> z;
-  for (const Moved& bead : beads) z.push_back(bead.place_um.z);
-  std::ranges::sort(z);
-  const std::size_t n = std::clamp<std::size_t>(z.size() / kBeads, 1, kMost);
+/// The slices that see beads, or every second one, every third one …: ten beads for each at least.
+std::vector<double> places_along_z(const std::vector<Moved>& beads, const Slices& slices) {
+  constexpr double kBeads = 10, kMost = 250;
+  double low = beads[0].place_um.z, high = low;
+  for (const Moved& bead : beads) low = std::min(low, bead.place_um.z), high = std::max(high, bead.place_um.z);
+  const double most = std::clamp(static_cast<double>(beads.size()) / kBeads, 1.0, kMost);
+  const double least = std::max(1e-9, (high - low) / most);
+  const double step = slices.step_um > 0 ? slices.step_um * std::ceil(least / slices.step_um) : least;
+  const double first = slices.first_um + step * std::floor((low - slices.first_um) / step);
   std::vector<double> places;
-  for (std::size_t k = 0; k <= n; ++k) places.push_back(z[std::min(z.size() - 1, k * z.size() / n)]);
-  places.erase(std::unique(places.begin(), places.end()), places.end());
+  for (int k = 0; places.empty() || places.back() < high; ++k) places.push_back(first + k * step);
   return places;
 }
 
@@ -55,7 +56,7 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
   for (Eigen::Index k = 0; k < n_places; ++k) fit.solution[2 + 2 * k] = mx, fit.solution[3 + 2 * k] = my;
   const double unit = std::max(1e-6, numerics::median(sigmas)), unit_z = std::max(1e-6, numerics::median(sigmas_z));
   fit.weights.assign(beads.size(), 0);
-  constexpr int kRounds = 25;
+  constexpr int kRounds = 15;
   double scale = 0;
   for (int round = 0; round < kRounds; ++round) {
     Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
@@ -96,6 +97,14 @@ Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 c
       }
       normal(1, 1) += wz, right[1] += wz * left[b][2];
     }
+    // places that no bead at rest sees take after their neighbours: a bead's worth of smoothness
+    const double stiff = 1 / (unit * unit);
+    for (Eigen::Index k = 2; k + 2 < n; ++k) {
+      const double step = fit.solution[k + 2] - fit.solution[k];
+      normal(k, k) += stiff, normal(k + 2, k + 2) += stiff;
+      normal(k, k + 2) -= stiff, normal(k + 2, k) -= stiff;
+      right[k] += stiff * step, right[k + 2] -= stiff * step;
+    }
     normal.diagonal().array() *= 1 + 1e-9;
     normal.diagonal().array() += 1e-12;
     const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
@@ -120,7 +129,7 @@ Vec3 CommonMotion::at(Vec3 place_um) const {
                   (1 - b.share_above) * low.y + b.share_above * high.y, 0};
 }
 
-CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift) {
+CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices) {
   CommonMotion motion;
   if (beads.empty()) return motion;
   for (const Moved& bead : beads) motion.centre_um += (1 / static_cast<double>(beads.size())) * bead.place_um;
@@ -129,7 +138,7 @@ CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift) 
     const auto at_rest = std::ranges::count_if(fit.weights, [](double w) { return w > 0.25; });
     motion.share_at_rest = static_cast<double>(at_rest) / static_cast<double>(beads.size());
   };
-  const Fit sliced = fitted(beads, motion.z_um = places_along_z(beads), motion.centre_um);
+  const Fit sliced = fitted(beads, motion.z_um = places_along_z(beads, slices), motion.centre_um);
   const std::size_t n = motion.z_um.size();
   Vec2 mean;
   for (std::size_t k = 0; k < n; ++k) {

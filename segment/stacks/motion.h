@@ -28,9 +28,15 @@ struct CommonMotion {
   Vec3 at(Vec3 place_um) const;
 };
 
+/// Where the slices lie. step_um = 0: not known.
+struct Slices {
+  double first_um = 0, step_um = 0;
+};
+
 /// By robust least squares: beads that the cell moves do not count. Their share is not known before; the scale is that
-/// of the quietest third, so that up to two thirds may move. Along z the drift of slices is a line through places each
-/// of which has 60 beads. On `automatic` it belongs to the motion where it is three times its standard errors.
-CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift);
+/// of the quietest third, so that up to two thirds may move. A bead's picture is about as long as two slices, so its
+/// place moves by what is linear between those of the slices; where beads are few, of every second one, and so on. On
+/// `automatic` the drift belongs to the motion where it is three times its standard errors.
+CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices);
 
 }  // namespace mbtfm::stacks

@@ -337,7 +337,7 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
     return follow(
         placed(relaxed.detection, scale), placed(stressed.detection, scale),
         {.largest_displacement_um = track.largest_displacement_um, .outlier_threshold = track.outlier_threshold},
-        parameters.slice_drift, context.threads);
+        parameters.slice_drift, scale.slices(), context.threads);
   });
   write_field(context, followed.field);
   write_slices(context, followed.common);

@@ -91,7 +91,7 @@ std::vector<PlacedBead> placed(const Detection& detection, const Scale& scale) {
 }
 
 Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
-                const MatchParameters& parameters, Switch slice_drift, int threads) {
+                const MatchParameters& parameters, Switch slice_drift, const Slices& slices, int threads) {
   require_enough(relaxed.size(), "relaxed");
   require_enough(stressed.size(), "stressed");
   const Matching matching = match(relaxed, stressed, parameters, threads);
@@ -137,7 +137,7 @@ Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<Placed
     throw beads::NotFollowed("the stressed stack", "40 of the relaxed stack's beads or more, displaced",
                              std::to_string(moved.size()) + " of " + std::to_string(relaxed.size()));
   }
-  result.common = common_motion(moved, slice_drift);
+  result.common = common_motion(moved, slice_drift, slices);
   for (BeadInSpace& bead : result.field) {
     if (!(bead.displacement_um == Vec3{}))
       bead.displacement_um = bead.displacement_um - result.common.at(bead.position_um);

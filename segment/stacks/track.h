@@ -44,6 +44,7 @@ struct Scale {
   ZPoints z_points = ZPoints::into_gel;
   int depth = 0;
   Vec3 place_um(Vec3 voxel) const;
+  Slices slices() const { return {first_um + 0.5 * step_um, step_um}; }
 };
 
 /// The beads of a stack in the gel, those at the rim and the saturated ones flagged.
@@ -65,6 +66,6 @@ struct Followed {
 /// Match, take off what is common, weigh the errors by what neighbours tell of them.
 /// @throws beads::NotFollowed where there are too few beads, or the two stacks do not show the same
 Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
-                const MatchParameters& matching, Switch slice_drift, int threads);
+                const MatchParameters& matching, Switch slice_drift, const Slices& slices, int threads);
 
 }  // namespace mbtfm::stacks

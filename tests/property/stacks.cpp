@@ -108,7 +108,7 @@ TEST(Stacks, beads_of_another_place_are_refused) {
 TEST(Stacks, too_few_beads_are_refused_with_the_number_that_would_do) {
   const BeadClouds clouds = bead_clouds(25, 0.03, 0, 5, pull);
   try {
-    follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, 1);
+    follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 1);
     FAIL() << "not refused";
   } catch (const beads::NotFollowed& error) {
     EXPECT_NE(error.expected.find("40"), std::string::npos) << error.expected;
@@ -122,7 +122,7 @@ TEST(Stacks, drift_of_slices_and_the_turn_are_taken_off) {
     return Vec3{0.6 * std::sin(x.z / 8) + 0.004 * (x.y - 50), 0.02 * x.z - 0.004 * (x.x - 50), 0.7};
   };
   const BeadClouds clouds = bead_clouds(4000, 0.02, 0.03, 6, [&](Vec3 x) { return pull(x) + drift(x); });
-  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, 2);
+  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
   EXPECT_TRUE(followed.common.has_slice_drift);
   std::vector<double> across, along;
   for (std::size_t k = 0; k < clouds.displacement.size(); ++k) {
@@ -140,7 +140,7 @@ TEST(Stacks, drift_of_slices_and_the_turn_are_taken_off) {
 
 TEST(Stacks, without_drift_of_slices_none_is_taken_off) {
   const BeadClouds clouds = bead_clouds(3000, 0.02, 0.03, 7, pull);
-  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, 2);
+  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
   EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
 }
 
