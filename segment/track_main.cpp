@@ -401,7 +401,7 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
       throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
     }
   }
-  if (stacks::are_in_space(context.inputs_.at("relaxed"), context.inputs_.at("stressed"), parameters, given.stacks))
+  if (stacks::are_in_space(parameters, given.stacks))
     return stacks::run(parameters, given.surface_plane, given.stacks, context);
   return track(parameters, given.binning, context);
 }

@@ -130,8 +130,6 @@ std::vector<Image> read_slices(const std::filesystem::path& file, const PlaneCho
   return read_tiff_slices(file, choice);
 }
 
-int n_slices(const std::filesystem::path& file) { return is_tiff(head_of(file)) ? n_tiff_slices(file) : 1; }
-
 Image binned(Image image, int binning) {
   MBTFM_ASSERT(binning >= 1);
   if (binning == 1) return image;

@@ -52,8 +52,6 @@ inline Image read_image(const std::filesystem::path& file, int page) { return re
 /// that states no dimensions.
 /// @throws InputError as read_image, and where the file is no TIFF or its slices are not of one size
 std::vector<Image> read_slices(const std::filesystem::path& file, const PlaneChoice& choice);
-/// How many slices a file states; 1 where it states none or is no TIFF. @throws InputError as read_image
-int n_slices(const std::filesystem::path& file);
 
 // Of a side in one: beyond it no bead and no adhesion is left.
 inline constexpr int kLargestBinning = 16;

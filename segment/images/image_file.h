@@ -16,7 +16,6 @@ Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice);
 
 /// All its slices. @throws InputError
 std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice);
-int n_tiff_slices(const std::filesystem::path& file);
 
 /// Read a file that begins as a PNG; of RGB the mean where no channel is chosen. @throws InputError
 Image read_png(const std::filesystem::path& file, const PlaneChoice& choice);

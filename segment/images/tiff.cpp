@@ -68,11 +68,6 @@ class TiffReader {
     return slices;
   }
 
-  int n_slices() const {
-    const auto stack = stack_of(of_first_page_.description, file_.filename().string());
-    return stack ? stack->n_slices : 1;
-  }
-
  private:
   /// What the description says of channels, slices and frames; nothing of a file of one image.
   std::optional<Stack> dimensions(const PlaneChoice& choice) {
@@ -400,14 +395,6 @@ class TiffReader {
 
 std::vector<Image> read_tiff_slices(const std::filesystem::path& file, const PlaneChoice& choice) {
   return TiffReader(file).read_slices(choice);
-}
-
-int n_tiff_slices(const std::filesystem::path& file) {
-  try {
-    return TiffReader(file).n_slices();
-  } catch (const InvalidData&) {
-    return 1;  // what contradicts itself is told of where it is read
-  }
 }
 
 Image read_tiff(const std::filesystem::path& file, const PlaneChoice& choice) { return TiffReader(file).read(choice); }

@@ -24,7 +24,8 @@ struct Detection {
 /// 1. Light that varies slowly is taken off each slice; the noise of each is measured (Immerkaer, CVIU 64:300, 1996).
 /// 2. The widths of the beads' pictures follow from the autocorrelation, whose lag zero alone carries the noise.
 /// 3. Candidates are the maxima of a band-pass of these widths.
-/// 4. A Gaussian is fitted to each together with those that touch it, weighed by the noise of each voxel. Its widths are
+/// 4. A Gaussian is fitted to each together with those that touch it, weighed by the noise of each voxel. Its widths
+/// are
 ///    those of the bright, lonely beads near it in place and depth, fitted one by one.
 /// 5. Candidates of what the fit leaves are those that others hid.
 ///

@@ -18,9 +18,9 @@ constexpr auto words(TrackFlag) {
 /// A bead in one stack.
 struct PlacedBead {
   Vec3 position_um;
-  double brightness = 0;          ///< 0: not known
-  double sigma_um = 0;            ///< standard error along x and y
-  double sigma_z_um = 0;          ///< standard error along z
+  double brightness = 0;             ///< 0: not known
+  double sigma_um = 0;               ///< standard error along x and y
+  double sigma_z_um = 0;             ///< standard error along z
   TrackFlag flag = TrackFlag::none;  ///< what is wrong with it in its own stack
 };
 
@@ -39,8 +39,8 @@ struct RigidMotion {
 struct Match {
   int partner = -1;  ///< in the stressed stack; -1: none
   TrackFlag flag = TrackFlag::no_partner;
-  double similarity = 0;  ///< share of the neighbours that are met with again
-  Vec3 from_neighbours_um;  ///< displacement less that which the neighbours tell
+  double similarity = 0;                ///< share of the neighbours that are met with again
+  Vec3 from_neighbours_um;              ///< displacement less that which the neighbours tell
   double sigma_um = 0, sigma_z_um = 0;  ///< of that difference, by the standard errors of all of them
   bool has_neighbours = false;
 };

@@ -292,8 +292,7 @@ StageReport report_of(const Followed& f, const Scale& scale, const Read& relaxed
 
 }  // namespace
 
-bool are_in_space(const fs::path& relaxed, const fs::path& stressed, const beads::TrackParameters& track,
-                  const StackParameters& p) {
+bool are_in_space(const beads::TrackParameters& track, const StackParameters& p) {
   const auto is_whole = [](const images::PlaneChoice& c) { return c.z == images::kProjection && !c.page; };
   const bool are_whole = is_whole(track.relaxed_plane) && is_whole(track.stressed_plane);
   if (p.dimensions == Dimensions::plane) return false;
@@ -301,10 +300,7 @@ bool are_in_space(const fs::path& relaxed, const fs::path& stressed, const beads
     if (are_whole) return true;
     throw UsageError("track.dimensions = space takes all slices: leave relaxed_z, stressed_z and the pages unset");
   }
-  const auto is_stack = [](const fs::path& file) {
-    return fs::is_regular_file(file) && images::n_slices(file) >= kFewestSlices;
-  };
-  return are_whole && is_stack(relaxed) && is_stack(stressed);
+  return are_whole && p.z_points.has_value();
 }
 
 StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& surface_plane,

@@ -7,10 +7,9 @@
 
 namespace mbtfm::stacks {
 
-/// Whether the two files are to be followed in space.
-/// @throws InputError as images::read_image; UsageError where stacks are asked for and a slice or page was chosen
-bool are_in_space(const std::filesystem::path& relaxed, const std::filesystem::path& stressed,
-                  const beads::TrackParameters& track, const StackParameters& parameters);
+/// Whether the two files are stacks to be followed in space.
+/// @throws UsageError where that is asked for and a slice or page was chosen
+bool are_in_space(const beads::TrackParameters& track, const StackParameters& parameters);
 
 /// Inputs `relaxed`, `stressed` and, where it is given, `surface_beads`; outputs displacement_3d.csv and .vtp,
 /// slices.csv, surface_beads.csv.

@@ -18,7 +18,7 @@ namespace mbtfm::stacks {
 
 /// Whether beads are followed in the plane of the images or in space.
 enum class Dimensions {
-  automatic,  ///< in space where both images are stacks
+  automatic,  ///< in space where z_points is given, which means nothing in the plane
   plane,
   space
 };

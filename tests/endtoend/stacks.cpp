@@ -112,7 +112,8 @@ TEST_F(Stacks, what_does_not_go_together_is_refused_with_the_remedy) {
       {track(unscaled, unscaled), "track.z_step_um"},
       {track(relaxed(), coarser), "track.z_step_um"},
       {track(dark, stressed()), "bright beads"},
-      {"mbtfm-track --relaxed " + relaxed() + " --stressed " + stressed() + " --out " + (*folder_ / "out2").string(),
+      {"mbtfm-track --relaxed " + relaxed() + " --stressed " + stressed() + " --dimensions space --out " +
+           (*folder_ / "out2").string(),
        "track.z_points", 2},
       {track(relaxed(), stressed(), "--dimensions space --relaxed_z 3"), "leave relaxed_z", 2},
   };
