@@ -7,6 +7,7 @@
 #include <numbers>
 #include <string>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "segment/beads/track.h"
@@ -105,6 +106,8 @@ double similarity_of(const Eigen::Vector3f* a, int n_a, const Eigen::Vector3f* b
   return sum / static_cast<float>(n_a);
 }
 
+constexpr int kMostAround = 21;
+
 /// Displacement about a place as an affine function, by robust least squares over beads.
 struct LocalMotion {
   Eigen::Vector3d at_place = Eigen::Vector3d::Zero();
@@ -125,9 +128,11 @@ LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double 
   constexpr int kFewest = 6;  // for an affine map one knows more than four points of
   const auto n = static_cast<int>(samples.size());
   if (n < kFewest) return motion;
-  Eigen::Matrix<double, Eigen::Dynamic, 4> x(n, 4);
-  Eigen::Matrix<double, Eigen::Dynamic, 3> u(n, 3);
-  Eigen::VectorXd weight(n), certainty(n);
+  MBTFM_ASSERT(n <= kMostAround);
+  constexpr int kMost = kMostAround;  // on the stack: this is called for each bead, over and over
+  Eigen::Matrix<double, Eigen::Dynamic, 4, 0, kMost, 4> x(n, 4);
+  Eigen::Matrix<double, Eigen::Dynamic, 3, 0, kMost, 3> u(n, 3), left(n, 3);
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1> weight(n), certainty(n);
   for (int k = 0; k < n; ++k) {
     const Eigen::Vector3d d = as_eigen(samples[k].place - place) / scale_um;
     x.row(k) << 1, d.transpose();
@@ -143,7 +148,7 @@ LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double 
     normal = x.transpose() * weight.asDiagonal() * x;
     normal.diagonal() *= 1 + 1e-6;
     solution = normal.ldlt().solve(x.transpose() * weight.asDiagonal() * u);
-    const Eigen::MatrixXd left = u - x * solution;
+    left = u - x * solution;
     for (int k = 0; k < n; ++k) {
       across[k] = std::hypot(left(k, 0), left(k, 1));
       along[k] = std::abs(left(k, 2));
@@ -153,6 +158,7 @@ LocalMotion local_motion(Vec3 place, const std::vector<Sample>& samples, double 
     const double floor = 1e-5 * scale_um;
     motion.scatter_um = std::max(floor, freedom * numerics::median(across) / 1.1774);
     motion.scatter_z_um = std::max(floor, freedom * numerics::median(along) / 0.6745);
+    if (round + 1 == kRounds) break;  // the weights stay those of the solution
     for (int k = 0; k < n; ++k) {
       const double r = std::sqrt(across[k] * across[k] / (motion.scatter_um * motion.scatter_um) +
                                  along[k] * along[k] / (motion.scatter_z_um * motion.scatter_z_um)) /
