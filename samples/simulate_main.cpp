@@ -1,8 +1,10 @@
 /// mbtfm-simulate: a synthetic experiment with known truth.
 #include <string_view>
 
+#include "pipeline/contract/numbers.h"
 #include "pipeline/stage/stage.h"
 #include "samples/experiment/cell_folder.h"
+#include "samples/gels/folder.h"
 
 namespace {
 
@@ -28,8 +30,42 @@ void refuse_given_segmentation(const std::filesystem::path& cell) {
   }
 }
 
-StageReport run(const drawing::ScenarioParameters& parameters, stage::StageContext& context) {
+struct SimulateParameters {
+  drawing::ScenarioParameters cell;
+  gels::SpaceParameters space;
+};
+
+void declare(stage::ParameterList& list, SimulateParameters& p) {
+  declare(list, p.cell);
+  declare(list, p.space);
+}
+
+/// A cell on a gel in space.
+StageReport run_in_space(const SimulateParameters& p, stage::StageContext& context) {
+  const gels::GelScene scene = gels::simulate(p.space, gels::size_of(p.cell), context.threads, context.progress);
+  const auto file = [&](const std::string& name) { return context.output("out", name); };
+  gels::write_folder(scene, p.space, p.cell, file);
+  if (p.cell.images) gels::write_stacks(scene, p.space, p.cell, file, context.threads, context.progress);
+  double total_nN = 0;
+  for (const gels::Patch& patch : scene.patches) total_nN += norm(patch.force_nN);
+  StageReport report;
+  report.figures = {{"n_beads", static_cast<std::int64_t>(scene.truth.size())},
+                    {"n_patches", static_cast<std::int64_t>(scene.patches.size())},
+                    {"n_sources", static_cast<std::int64_t>(scene.sources.size())},
+                    {"total_force_nN", total_nN},
+                    {"largest_displacement_um", scene.largest_displacement_um},
+                    {"noise_um", scene.noise_um},
+                    {"share_beside_patches", scene.share_beside_patches}};
+  report.summary = std::string(name_of(p.space.scene)) + ": " + std::to_string(scene.patches.size()) +
+                   " patches, total force " + brief(total_nN) + " nN, largest displacement " +
+                   brief(scene.largest_displacement_um) + " um, " + std::to_string(scene.truth.size()) + " beads";
+  return report;
+}
+
+StageReport run(const SimulateParameters& all, stage::StageContext& context) {
+  const drawing::ScenarioParameters& parameters = all.cell;
   if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
+  if (all.space.scene != gels::SpaceScene::none) return run_in_space(all, context);
   const Work work(context.threads, context.progress);
   const experiment::Experiment experiment = experiment::simulate(parameters, work);
   const auto file = [&](const std::string& name) { return context.output("out", name); };
@@ -42,15 +78,10 @@ StageReport run(const drawing::ScenarioParameters& parameters, stage::StageConte
                     {"total_force_nN", experiment.total_force_nN},
                     {"largest_displacement_um", experiment.largest_displacement_um},
                     {"noise_um", experiment.noise_um}};
-  const auto rounded = [](double value) {
-    char text[32];
-    std::snprintf(text, sizeof text, "%.3g", value);
-    return std::string(text);
-  };
   report.summary = parameters.scenario + ": " + std::to_string(experiment.cell.adhesions.size()) + " adhesions, " +
                    std::to_string(experiment.cell.fibres.size()) + " fibres, total force " +
-                   rounded(experiment.total_force_nN) + " nN, largest displacement " +
-                   rounded(experiment.largest_displacement_um) + " um, noise " + rounded(experiment.noise_um) + " um";
+                   brief(experiment.total_force_nN) + " nN, largest displacement " +
+                   brief(experiment.largest_displacement_um) + " um, noise " + brief(experiment.noise_um) + " um";
   return report;
 }
 
@@ -58,7 +89,7 @@ StageReport run(const drawing::ScenarioParameters& parameters, stage::StageConte
 
 int main(int argc, char** argv) {
   using namespace mbtfm;
-  drawing::ScenarioParameters parameters;
+  SimulateParameters parameters;
   return stage::run_stage(
       {.name = "simulate",
        .purpose = "simulate a traction force microscopy experiment with known truth",
@@ -66,7 +97,7 @@ int main(int argc, char** argv) {
       argc, argv,
       [&](stage::ParameterList& list) {
         declare(list, parameters);
-        stage::read_toml(list, drawing::scenario_file(scenario_named(argc, argv, parameters.scenario)));
+        stage::read_toml(list, drawing::scenario_file(scenario_named(argc, argv, parameters.cell.scenario)));
       },
       [&](stage::StageContext& context) { return run(parameters, context); });
 }

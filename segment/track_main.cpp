@@ -16,6 +16,7 @@
 #include "segment/beads/picture.h"
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
+#include "segment/stacks/run.h"
 
 namespace mbtfm::beads {
 namespace {
@@ -368,6 +369,8 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
 
 struct TrackStageParameters {
   TrackParameters track;
+  stacks::StackParameters stacks;
+  images::PlaneChoice surface_plane;
   int binning = 1;  ///< to be quick: beads closer than a few pixels of the reduced images are lost
   stage::EffectSwitches effects;
 };
@@ -377,6 +380,8 @@ void declare(stage::ParameterList& list, TrackStageParameters& p) {
   list.table("track");
   list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
            "the images are reduced first: means of blocks of so many pixels a side");
+  declare(list, p.stacks);
+  declare(list, p.surface_plane, "surface", "the stack of beads on the surface");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});
 }
 
@@ -409,6 +414,8 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
       throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
     }
   }
+  if (stacks::are_in_space(parameters, given.stacks))
+    return stacks::run(parameters, given.surface_plane, given.stacks, context);
   return track(parameters, given.binning, context);
 }
 
@@ -423,11 +430,14 @@ int main(int argc, char** argv) {
        .purpose = "measure the displacement of the substrate from images of its beads, stressed and relaxed",
        .files =
            {{"stressed", Kind::optional_input,
-             "beads while the cell pulls (TIFF, PNG or JPEG); a folder of them: a time series"},
+             "beads while the cell pulls (TIFF, PNG or JPEG; a stack: in space); a folder of them: a time series"},
             {"relaxed", Kind::optional_input, "beads after the cell is removed (TIFF, PNG or JPEG)"},
+            {"surface_beads", Kind::optional_input,
+             "of stacks: beads of another colour on the gel's surface, relaxed; their places are for mbtfm-surface"},
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
-            {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp, beads.jpg"}}},
+            {"out", Kind::output_folder,
+             "folder for displacement.csv, displacement.vtp, beads.jpg; of stacks for displacement_3d.csv, .vtp"}}},
       argc, argv, mbtfm::beads::run);
 }

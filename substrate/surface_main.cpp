@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "pipeline/contract/axes.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/base64.h"
@@ -31,9 +32,6 @@
 namespace mbtfm::surface {
 namespace {
 
-enum class Upwards { into_gel, out_of_gel };
-constexpr auto words(Upwards) { return std::array{"into-gel", "out-of-gel"}; }
-
 enum class ZeroAt { as_given, mean };
 constexpr auto words(ZeroAt) { return std::array{"as-given", "mean"}; }
 
@@ -44,7 +42,7 @@ struct Parameters {
   std::string formula = {};
   std::optional<double> low_x_um, low_y_um, high_x_um, high_y_um;
   std::optional<double> spacing_um;
-  std::optional<Upwards> z_points;
+  std::optional<ZPoints> z_points;
   ZeroAt zero_at = ZeroAt::as_given;
   BeadMethod method = BeadMethod::likelihood;
   std::optional<double> sigma_z_um;
@@ -113,7 +111,7 @@ const T& due(const std::optional<T>& value, const std::string& name, const std::
 
 /// +1 where the z of the file points into the gel, else -1.
 double sign_of(const Parameters& p, const std::string& source) {
-  return due(p.z_points, "z_points", source) == Upwards::into_gel ? 1 : -1;
+  return due(p.z_points, "z_points", source) == ZPoints::into_gel ? 1 : -1;
 }
 
 struct Rectangle {

@@ -73,6 +73,26 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        1.5,
        "of simulated pairs the errors are 1.0 to 1.1 times sigma up to a ratio of 1.47, and 1.2 to 1.7 times at 1.6",
        "Focus both images on the same plane of beads. Of a stack, choose the plane with relaxed_z or stressed_z."},
+      {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
+       "of simulated stacks of 2 000 to 20 000 beads 1 to 3 of a hundred are lost; where many are, those of the "
+       "strained "
+       "parts are lost first",
+       "Look at the flags in displacement_3d.csv. `no partner`: a larger track.largest_displacement_um, a lower "
+       "track.detection_snr, or stacks that show the same depth. `ambiguous`: fewer beads."},
+      {little_at_rest, "little-at-rest", "track", caution, "share of the beads that do not move with the others", 0.6,
+       "the common motion is found from the beads at rest; beyond two thirds that move they cannot be told any more",
+       "Record a wider field or a deeper stack, so that part of the gel is at rest."},
+      {slices_moved, "slices-moved", "track", note,
+       "drift of the slices of one stack against the other's, over its standard error", 3, "chance alone makes it 1",
+       "Nothing where it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
+      {beads_scatter, "beads-scatter", "track", note,
+       "scatter of beads in space about their neighbours over their standard errors", 1.5,
+       "the standard errors of pictures hold to a quarter in simulated stacks; what is beyond comes from pictures that "
+       "are not those of beads, or from strains that neighbours do not share",
+       "Nothing: the standard errors hold it. Look for clumps of beads and for motion while a stack was recorded."},
+      {light_lost, "light-lost", "track", caution, "share of the light that the dimmer stack lacks", 0.5,
+       "beads are told apart by their light, too; with half of it the dim ones are lost in the noise",
+       "Record with less light, so that beads bleach less between the stacks."},
       {common_motion, "common-motion", "fit", note,
        "largest of growth, shears and turn of the whole field, over its standard error", 3,
        "chance alone takes one of the four beyond 3 standard errors in one cell of a hundred",

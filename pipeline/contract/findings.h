@@ -38,6 +38,11 @@ enum class FindingKind {
   moves_outward,
   tracked_by_correlation,
   defocused,
+  beads_lost,
+  little_at_rest,
+  slices_moved,
+  beads_scatter,
+  light_lost,
   // fit: the displacement
   common_motion,
   curved_motion,

@@ -314,6 +314,24 @@ void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, cons
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
+void write_points_vtp(const Path& file, const std::vector<Vec3>& points_um, const std::vector<GridArray>& arrays) {
+  vtkNew<vtkPolyData> poly;
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  vtkNew<vtkCellArray> vertices;
+  for (const Vec3& p : points_um) {
+    const vtkIdType i = points->InsertNextPoint(p.x, p.y, p.z);
+    vertices->InsertNextCell(1, &i);
+  }
+  poly->SetPoints(points);
+  poly->SetVerts(vertices);
+  for (const GridArray& array : arrays) {
+    MBTFM_ASSERT(array.values.size() == points_um.size() * static_cast<std::size_t>(array.components));
+    poly->GetPointData()->AddArray(double_array(array));
+  }
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
 void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
                         const std::vector<PointArray>& arrays) {
   check(adhesions);

@@ -39,6 +39,8 @@ void write_grid_vtu(const Path& file, const Grid& grid);
 void write_cell_vtp(const Path& file, const Cell& cell);
 /// A point cloud with arrays.
 void write_points_vtp(const Path& file, const std::vector<Vec2>& points_um, const std::vector<PointArray>& arrays);
+/// The same in space.
+void write_points_vtp(const Path& file, const std::vector<Vec3>& points_um, const std::vector<GridArray>& arrays);
 /// Adhesion ellipses with arrays by adhesion.
 void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions,
                         const std::vector<PointArray>& arrays);

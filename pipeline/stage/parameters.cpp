@@ -20,8 +20,9 @@ namespace mbtfm::stage {
 namespace {
 
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
-constexpr std::array kTables = {"gel", "images", "segment",  "track",    "network", "cables", "effects", "substrate",
-                                "fit", "stats",  "scenario", "traction", "checks",  "cell",   "indent",  "mean"};
+constexpr std::array kTables = {"gel",      "images",    "segment", "track",  "network",  "cables",
+                                "effects",  "substrate", "fit",     "stats",  "scenario", "space",
+                                "traction", "checks",    "cell",    "indent", "mean"};
 /// Keys of [gel] that not every program has.
 const std::vector<std::string> kMoreOfGel = {"radius_um"};
 /// The keys above the first table.
@@ -255,6 +256,19 @@ std::string to_text(const Parameter& p) {
                  [](bool* m) { return std::string(*m ? "true" : "false"); }, [](std::string* m) { return *m; },
                  [](const Choice& choice) { return choice.words.at(choice.get()); }},
       p.member);
+}
+
+std::string to_toml(const ParameterList& list, const std::vector<std::string>& tables) {
+  std::string text;
+  for (const std::string& table : tables) {
+    if (!table.empty()) text += "\n[" + table + "]\n";
+    for (const Parameter& p : list.all()) {
+      if (p.table != table || to_text(p).empty()) continue;  // not set
+      const bool is_text = std::holds_alternative<std::string*>(p.member) || std::holds_alternative<Choice>(p.member);
+      text += p.name + " = " + (is_text ? '"' + to_text(p) + '"' : to_text(p)) + "\n";
+    }
+  }
+  return text;
 }
 
 Parameter& parameter_named(ParameterList& list, const std::string& name) {

@@ -76,6 +76,8 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
 /// Set one parameter from text, as a flag does. @throws UsageError
 void set_from_text(Parameter& parameter, const std::string& text);
 std::string to_text(const Parameter& parameter);
+/// Parameters that are set, as a cell.toml, those of one table after another.
+std::string to_toml(const ParameterList& list, const std::vector<std::string>& tables);
 /// The parameter of this name. @throws UsageError that names the nearest one there is
 Parameter& parameter_named(ParameterList& list, const std::string& name);
 /// @throws UsageError where a required parameter was never set

@@ -12,21 +12,6 @@ namespace mbtfm::experiment {
 
 namespace {
 
-/// Parameters that are set, as TOML, those of one table after another.
-std::string to_toml(const stage::ParameterList& list, const std::vector<std::string>& tables) {
-  std::string text;
-  for (const std::string& table : tables) {
-    if (!table.empty()) text += "\n[" + table + "]\n";
-    for (const stage::Parameter& p : list.all()) {
-      if (p.table != table || stage::to_text(p).empty()) continue;  // not set
-      const bool is_text =
-          std::holds_alternative<std::string*>(p.member) || std::holds_alternative<stage::Choice>(p.member);
-      text += p.name + " = " + (is_text ? '"' + stage::to_text(p) + '"' : stage::to_text(p)) + "\n";
-    }
-  }
-  return text;
-}
-
 void write_segmentation(const Cell& cell, const std::string& folder, const FileNamer& file) {
   files::write_adhesions(file(folder + "/adhesions.csv"), cell.adhesions);
   files::write_fibres(file(folder + "/fibres.csv"), file(folder + "/fibre_points.csv"), cell.fibres);
@@ -49,8 +34,8 @@ void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& p
   drawing::ScenarioParameters copy = parameters;
   stage::ParameterList list;
   declare(list, copy);
-  files::write_text(file("cell.toml"), to_toml(list, {"", "gel"}));
-  files::write_text(file("truth/scenario.toml"), to_toml(list, {"", "gel", "scenario"}));
+  files::write_text(file("cell.toml"), stage::to_toml(list, {"", "gel"}));
+  files::write_text(file("truth/scenario.toml"), stage::to_toml(list, {"", "gel", "scenario"}));
   write_segmentation(e.cell, "truth", file);
   files::write_tensions(file("truth/tensions.csv"), e.tensions, e.cell.fibres);
   files::write_adhesion_forces(file("truth/adhesion_forces.csv"), e.forces, e.cell.adhesions);

@@ -69,6 +69,22 @@ std::optional<PixelSize> volocity_pixel_size(std::string_view description) {
   return PixelSize{*x_um, positive_number(line_value(description, "YCalibrationMicrons").value_or("")).value_or(*x_um)};
 }
 
+std::optional<double> ome_z_step_um(const std::string& xml) {
+  try {
+    const OmeImage ome = parse_ome(xml);
+    return ome_size_um(ome.size_z, ome.unit_z);
+  } catch (const InvalidData&) {
+    return std::nullopt;
+  }
+}
+
+std::optional<double> imagej_z_step_um(std::string_view description) {
+  const auto name = line_value(description, "unit");
+  const auto unit = name ? unit_um(*name) : std::nullopt;
+  const auto spacing = positive_number(line_value(description, "spacing").value_or(""));
+  return unit && spacing ? std::optional(*unit * *spacing) : std::nullopt;
+}
+
 /// Six significant digits: resolutions are stored as ratios (and read as float), so 0.1625 comes back as 0.16250000411.
 double without_ratio_noise(double value) {
   const double scale = std::pow(10.0, 5 - std::floor(std::log10(value)));
@@ -97,6 +113,13 @@ std::optional<double> pixel_size_um(const TiffCalibration& calibration) {
   // half a per cent: what two roundings to three digits may differ by
   if (!size || !(std::abs(size->x_um - size->y_um) <= 5e-3 * size->x_um)) return std::nullopt;
   return without_ratio_noise(size->x_um);
+}
+
+std::optional<double> z_step_um(const TiffCalibration& calibration) {
+  const std::string& text = calibration.description;
+  if (is_ome(text)) return ome_z_step_um(text);
+  if (text.starts_with("ImageJ=")) return imagej_z_step_um(text);
+  return positive_number(line_value(text, "ZCalibrationMicrons").value_or(""));
 }
 
 }  // namespace mbtfm::images

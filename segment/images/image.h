@@ -19,6 +19,7 @@ struct Image {
   std::optional<double> pixel_size_um;  ///< from the file's own calibration
   double full_scale = 0;                ///< the value at which the detector saturates; 0: none (float)
   bool is_lossy = false;                ///< as a JPEG is: intensities, and with them positions, are not the camera's
+  std::optional<double> z_step_um = {};  ///< to the next slice of its stack, from the file's own calibration
   float at(int column, int row) const { return pixels[static_cast<std::size_t>(row) * width + column]; }
   float& at(int column, int row) { return pixels[static_cast<std::size_t>(row) * width + column]; }
 };
@@ -62,5 +63,8 @@ Image binned(Image image, int binning);
 /// 16-bit TIFF, deflate, with ImageJ's calibration. Values are rounded and clamped to 0 … 65535.
 /// @throws OutputError
 void write_tiff(const std::filesystem::path& file, const Image& image);
+/// The slices of a stack as ImageJ writes them, with the pixel size and z step of the first.
+/// @throws OutputError
+void write_tiff(const std::filesystem::path& file, const std::vector<Image>& slices);
 
 }  // namespace mbtfm::images

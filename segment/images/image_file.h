@@ -52,6 +52,9 @@ struct TiffCalibration {
 /// where none of them speaks (a resolution without a unit of ImageJ is a printer's) or where pixels are not square.
 std::optional<double> pixel_size_um(const TiffCalibration& calibration);
 
+/// The distance of slices: OME-XML's PhysicalSizeZ, ImageJ's spacing in its unit, Volocity's ZCalibrationMicrons.
+std::optional<double> z_step_um(const TiffCalibration& calibration);
+
 /// The value of `key=value` at the start of a line; lines end as Unix, DOS or the old Macintosh (Volocity) ends them.
 std::optional<std::string_view> line_value(std::string_view text, std::string_view key);
 

@@ -55,6 +55,8 @@ struct OmeReader {
     image.unit_x = text(a, "PhysicalSizeXUnit");
     image.size_y = text(a, "PhysicalSizeY");
     image.unit_y = text(a, "PhysicalSizeYUnit");
+    image.size_z = text(a, "PhysicalSizeZ");
+    image.unit_z = text(a, "PhysicalSizeZUnit");
   }
 
   void begin_pages(const Attributes& a) {

@@ -23,7 +23,7 @@ struct OmeImage {
   int n_channels = 1, n_slices = 1, n_frames = 1;
   std::vector<std::string> channel_names;      ///< empty where one has none
   std::vector<OmePages> pages;                 ///< none: all pages in order
-  std::string size_x, unit_x, size_y, unit_y;  ///< PhysicalSizeX, …; empty: not given
+  std::string size_x, unit_x, size_y, unit_y, size_z, unit_z;  ///< PhysicalSizeX, …; empty: not given
   std::string companion;                       ///< the file that holds the metadata in this one's stead; empty: none
 };
 

@@ -56,11 +56,13 @@ class TiffReader {
     std::iota(pages.begin(), pages.end(), 0);
     if (const auto stack = stack_of(of_first_page_.description, file_.filename().string()))
       pages = chosen_pages(*stack, all, file_.string());
+    const std::optional<double> z_step = z_step_um(of_first_page_);
     std::vector<Image> slices;
     for (const int page : pages) {
       slices.push_back(read_page(page, all));
       const Image& first = slices.front();
       if (slices.size() == 1) require_plausible_bytes(file_, pages.size() * first.pixels.size());
+      slices.back().z_step_um = z_step;
       if (slices.back().width != first.width || slices.back().height != first.height)
         refuse("slices of one size", "slices of different sizes");
     }

@@ -262,5 +262,45 @@ TEST(ImagePlanes, real_hyperstacks_are_read_as_by_another_program) {
   }
 }
 
+TEST(ImagePlanes, the_distance_of_slices_is_the_files_own) {
+  const TemporaryFolder folder;
+  const fs::path file = folder / "a.tif";
+  const auto step_of = [&](const std::string& description) {
+    write_pages(file, 3, description);
+    return read_slices(file, {}).front().z_step_um;
+  };
+  const std::string imagej = "ImageJ=1.53t\nimages=3\nslices=3\n";
+  EXPECT_DOUBLE_EQ(step_of(imagej + "unit=micron\nspacing=0.45\n").value(), 0.45);
+  EXPECT_DOUBLE_EQ(step_of(imagej + "unit=nm\nspacing=300\n").value(), 0.3);
+  EXPECT_FALSE(step_of(imagej + "spacing=0.45\n")) << "without a unit it is no length";
+  EXPECT_FALSE(step_of(imagej + "unit=micron\n"));
+  EXPECT_FALSE(step_of(""));
+  const auto ome = [](const std::string& size) {
+    return "<?xml version=\"1.0\"?><OME><Image><Pixels DimensionOrder=\"XYZCT\" SizeX=\"4\" SizeY=\"3\" SizeZ=\"3\" "
+           "SizeC=\"1\" SizeT=\"1\" " +
+           size + "><Channel/></Pixels></Image></OME>";
+  };
+  EXPECT_DOUBLE_EQ(step_of(ome("PhysicalSizeZ=\"0.8\"")).value(), 0.8);
+  EXPECT_DOUBLE_EQ(step_of(ome("PhysicalSizeZ=\"800\" PhysicalSizeZUnit=\"nm\"")).value(), 0.8);
+  EXPECT_FALSE(step_of(ome("")));
+}
+
+TEST(ImagePlanes, a_stack_comes_back_as_it_was_written) {
+  const TemporaryFolder folder;
+  std::vector<Image> slices(5);
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    slices[k].width = 4, slices[k].height = 3, slices[k].pixel_size_um = 0.2, slices[k].z_step_um = 0.65;
+    slices[k].pixels.assign(12, static_cast<float>(10 * k));
+  }
+  write_tiff(folder / "a.tif", slices);
+  const std::vector<Image> read = read_slices(folder / "a.tif", {});
+  ASSERT_EQ(read.size(), slices.size());
+  for (std::size_t k = 0; k < slices.size(); ++k) {
+    EXPECT_EQ(read[k].pixels, slices[k].pixels);
+    EXPECT_DOUBLE_EQ(read[k].pixel_size_um.value(), 0.2);
+    EXPECT_DOUBLE_EQ(read[k].z_step_um.value(), 0.65);
+  }
+}
+
 }  // namespace
 }  // namespace mbtfm::images

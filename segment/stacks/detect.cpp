@@ -1,0 +1,209 @@
+#include "segment/stacks/detect.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/parallel.h"
+#include "segment/beads/beads.h"
+#include "segment/beads/plane.h"
+#include "segment/beads/track.h"
+#include "segment/stacks/band.h"
+#include "segment/stacks/near.h"
+
+namespace mbtfm::stacks {
+namespace {
+
+images::Image slice_of(const Volume& volume, int k) {
+  images::Image image{.width = volume.width, .height = volume.height, .pixels = {}, .pixel_size_um = {}};
+  image.pixels.assign(volume.row(0, k), volume.row(0, k) + static_cast<std::size_t>(volume.width) * volume.height);
+  return image;
+}
+
+/// Some slices, evenly through the stack.
+std::vector<int> some_slices(int depth) {
+  constexpr int kSome = 15;
+  std::vector<int> slices;
+  const int n = std::min(kSome, depth);
+  for (int s = 0; s < n; ++s) slices.push_back(static_cast<int>((s + 0.5) * depth / n));
+  return slices;
+}
+
+/// The width across, from slices where there is something to see.
+double width_across(const Volume& volume) {
+  constexpr double kBackground = 12;  // px: six widths of an ordinary bead
+  std::vector<double> widths;
+  for (const int k : some_slices(volume.depth)) {
+    const double width = beads::bead_sigma_of(beads::without_background(slice_of(volume, k), kBackground));
+    if (width > 0) widths.push_back(width);
+  }
+  return numerics::quantile(widths, 0.5);
+}
+
+/// Take the slowly varying light off each slice; the noise of each.
+Noise flatten(Volume& volume, double width, int threads) {
+  Noise noise;
+  noise.dark.resize(static_cast<std::size_t>(volume.depth));
+  numerics::parallel_for(volume.depth, threads, [&](int k) {
+    const beads::Plane plane = beads::without_background(slice_of(volume, k), beads::background_sigma(width));
+    noise.dark[static_cast<std::size_t>(k)] = beads::noise_of(plane);
+    std::copy(plane.values.begin(), plane.values.end(), volume.row(0, k));
+  });
+  // whole numbers are at least rounded
+  const double least = volume.full_scale > 0 ? 1 / std::sqrt(12.0) : 1e-6;
+  const std::vector<double> raw = noise.dark;
+  for (int k = 0; k < volume.depth; ++k) {
+    const int from = std::max(0, k - 2), to = std::min(volume.depth, k + 3);
+    noise.dark[static_cast<std::size_t>(k)] =
+        std::max(least, numerics::median(std::vector<double>(raw.begin() + from, raw.begin() + to)));
+  }
+  return noise;
+}
+
+/// The variance in proportion to light, roughly: what Immerkaer's mask answers where there is some light. It answers to
+/// the curvature of a bead's picture, too, but as the square of the light, so that the dim voxels decide.
+double light_variance_of(const Volume& volume, const Noise& noise) {
+  constexpr int kBins = 12;
+  std::vector<std::vector<float>> answers(kBins), lights(kBins);
+  for (const int k : some_slices(volume.depth)) {
+    const double dark = noise.dark[static_cast<std::size_t>(k)];
+    for (int j = 1; j + 1 < volume.height; ++j) {
+      const float *above = volume.row(j - 1, k), *here = volume.row(j, k), *below = volume.row(j + 1, k);
+      for (int i = 1; i + 1 < volume.width; ++i) {
+        const float corners = above[i - 1] + above[i + 1] + below[i - 1] + below[i + 1];
+        const float sides = above[i] + below[i] + here[i - 1] + here[i + 1];
+        const float mean = (corners + sides + here[i]) / 9;
+        if (!(mean > dark)) continue;
+        const auto bin = static_cast<std::size_t>(std::min(kBins - 1.0, std::floor(2 * std::log2(mean / dark))));
+        answers[bin].push_back(std::abs(corners - 2 * sides + 4 * here[i]) / 6);
+        lights[bin].push_back(mean);
+      }
+    }
+  }
+  std::vector<double> variances;
+  const double dark = numerics::median(noise.dark);
+  constexpr std::size_t kFewest = 300, kDimmest = 3;  // of a bin; bins
+  for (int bin = 0; bin < kBins && variances.size() < kDimmest; ++bin) {
+    auto& of_bin = answers[static_cast<std::size_t>(bin)];
+    if (of_bin.size() < kFewest) continue;
+    const double sd = numerics::median_in(of_bin) / 0.6745;
+    variances.push_back((sd * sd - dark * dark) / numerics::median_in(lights[static_cast<std::size_t>(bin)]));
+  }
+  return variances.empty() ? 0 : std::max(0.0, numerics::median(variances));
+}
+
+/// For Gaussian pictures of width s along z the autocorrelation is exp(-l²/4s²): s² = 3 / (4 ln(C1/C2)), lags in
+/// slices.
+double width_along_z(const Volume& volume) {
+  double near = 0, far = 0;
+  const std::size_t in_slice = static_cast<std::size_t>(volume.width) * volume.height;
+  for (int k = 0; k + 2 < volume.depth; ++k) {
+    const float* here = volume.row(0, k);
+    for (std::size_t v = 0; v < in_slice; v += 3) {
+      near += here[v] * here[v + in_slice];
+      far += here[v] * here[v + 2 * in_slice];
+    }
+  }
+  constexpr double kNarrowest = 0.5, kWidest = 20;
+  if (!(near > 0) || !(far > 0.02 * near)) return kNarrowest;
+  if (far >= near) return kWidest;
+  return std::clamp(std::sqrt(3 / (4 * std::log(near / far))), kNarrowest, kWidest);
+}
+
+/// Heights of a tenth of a bright bead's of the same depth are spurious more often than not: halos, bleed-through,
+/// dust.
+void drop_dimmest(std::vector<Peak>& peaks, int depth) {
+  constexpr int kLayers = 8;
+  std::vector<std::vector<double>> heights(kLayers);
+  const auto layer_of = [&](const Peak& p) {
+    return static_cast<std::size_t>(std::clamp(static_cast<int>(kLayers * p.place.z / depth), 0, kLayers - 1));
+  };
+  for (const Peak& p : peaks) heights[layer_of(p)].push_back(p.height);
+  std::vector<double> least;
+  for (const std::vector<double>& of_layer : heights) least.push_back(0.1 * numerics::quantile(of_layer, 0.9));
+  std::erase_if(peaks, [&](const Peak& p) { return p.height < least[layer_of(p)]; });
+}
+
+/// No more than can be told apart: one in a ball of three widths.
+void keep_highest(std::vector<Peak>& peaks, const Volume& volume, Widths w) {
+  constexpr double kBall = 4.0 / 3 * std::numbers::pi * 27;
+  const double room = static_cast<double>(volume.values.size()) / (kBall * w.xy * w.xy * w.z);
+  const auto most = static_cast<std::size_t>(std::max(100.0, room));
+  if (peaks.size() <= most) return;
+  std::ranges::stable_sort(peaks, [](const Peak& a, const Peak& b) { return a.height > b.height; });
+  peaks.resize(most);
+}
+
+std::vector<Spot> spots_of(const std::vector<Peak>& peaks) {
+  std::vector<Spot> spots;
+  for (const Peak& p : peaks) spots.push_back({.place = p.place, .height = p.height});
+  return spots;
+}
+
+/// What stands out of the rest: a bead that another hid, unless it is what the other's picture has beyond a Gaussian.
+std::vector<Peak> hidden(const SpotFit& fit, double detection_snr, int threads) {
+  const Volume& rest = fit.rest();
+  const Widths w = fit.shape().at({0.5 * rest.width, 0.5 * rest.height, 0.5 * rest.depth});
+  std::vector<Peak> peaks = peaks_of(rest, w, fit.noise(), detection_snr, threads);
+  drop_dimmest(peaks, rest.depth);
+  std::vector<Vec3> places;
+  const double stretch = w.xy / w.z;
+  for (const Spot& spot : fit.spots()) places.push_back({spot.place.x, spot.place.y, stretch * spot.place.z});
+  constexpr double kNear = 4, kOwnLight = 0.3;  // widths; of the neighbour's height
+  const Near near(places, kNear * w.xy);
+  std::erase_if(peaks, [&](const Peak& p) {
+    const Vec3 at{p.place.x, p.place.y, stretch * p.place.z};
+    return std::ranges::any_of(near.within(at, kNear * w.xy, 100), [&](int s) {
+      return p.height < kOwnLight * fit.spots()[static_cast<std::size_t>(s)].height;
+    });
+  });
+  return peaks;
+}
+
+}  // namespace
+
+Detection detect(std::vector<images::Image> slices, double detection_snr, const char* which, int threads) {
+  Volume volume = volume_of(std::move(slices));
+  const std::string name = std::string("the ") + which + " stack";
+  const double across = width_across(volume);
+  if (!(across > 0)) throw beads::NotFollowed(name, "bright beads", "nothing but noise");
+  Noise noise = flatten(volume, across, threads);
+  noise.light_variance = light_variance_of(volume, noise);
+  const Widths first{across, width_along_z(volume)};
+  std::vector<Peak> peaks = peaks_of(volume, first, noise, detection_snr, threads);
+  drop_dimmest(peaks, volume.depth);
+  keep_highest(peaks, volume, first);
+  SpotFit fit(volume, SpotShape(first), noise, threads);
+  fit.add(spots_of(peaks));
+  constexpr int kFirstRounds = 3, kRounds = 6;
+  constexpr double kSame = 0.8;  // widths: two so near make one maximum, the second is a maximum of noise
+  fit.improve(kFirstRounds);
+  for (int pass = 0; pass < 2; ++pass) {
+    fit.measure_shape();
+    fit.improve(kFirstRounds);
+    fit.measure_noise();
+  }
+  fit.drop_doubles(kSame);
+  fit.add(spots_of(hidden(fit, detection_snr, threads)));
+  fit.improve(kRounds);
+  fit.drop_doubles(kSame);
+  fit.improve(kFirstRounds);
+  fit.measure_noise();
+  fit.measure_errors();
+  fit.drop_where([&](const Spot& s) {
+    return s.place.x < 0 || s.place.y < 0 || s.place.z < 0 || s.place.x > volume.width - 1 ||
+           s.place.y > volume.height - 1 || s.place.z > volume.depth - 1;
+  });
+  const auto n_saturated = std::count(volume.is_saturated.begin(), volume.is_saturated.end(), true);
+  return {.width = volume.width,
+          .height = volume.height,
+          .depth = volume.depth,
+          .spots = fit.spots(),
+          .shape = fit.shape(),
+          .noise = fit.noise(),
+          .share_saturated = static_cast<double>(n_saturated) / static_cast<double>(volume.values.size())};
+}
+
+}  // namespace mbtfm::stacks

@@ -1,0 +1,173 @@
+#include "segment/stacks/motion.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/numerics/order_statistics.h"
+
+namespace mbtfm::stacks {
+namespace {
+
+/// Shares of the two places along z between which a bead lies.
+struct Between {
+  std::size_t below = 0;
+  double share_above = 0;
+};
+Between between(const std::vector<double>& z, double at) {
+  if (z.size() < 2 || at <= z.front()) return {};
+  if (at >= z.back()) return {z.size() - 2, 1};
+  const auto above = static_cast<std::size_t>(std::ranges::upper_bound(z, at) - z.begin());
+  return {above - 1, (at - z[above - 1]) / (z[above] - z[above - 1])};
+}
+
+/// The slices that see beads, or every second one, every third one …: ten beads for each at least.
+std::vector<double> places_along_z(const std::vector<Moved>& beads, const Slices& slices) {
+  constexpr double kBeads = 10, kMost = 250;
+  double low = beads[0].place_um.z, high = low;
+  for (const Moved& bead : beads) low = std::min(low, bead.place_um.z), high = std::max(high, bead.place_um.z);
+  const double most = std::clamp(static_cast<double>(beads.size()) / kBeads, 1.0, kMost);
+  const double least = std::max(1e-9, (high - low) / most);
+  const double step = slices.step_um > 0 ? slices.step_um * std::ceil(least / slices.step_um) : least;
+  const double first = slices.first_um + step * std::floor((low - slices.first_um) / step);
+  std::vector<double> places;
+  for (int k = 0; places.empty() || places.back() < high; ++k) places.push_back(first + k * step);
+  return places;
+}
+
+/// The unknowns: turn, shift along z, then x and y for each place along z.
+struct Fit {
+  Eigen::VectorXd solution, sigma;
+  std::vector<double> weights;
+};
+
+Fit fitted(const std::vector<Moved>& beads, const std::vector<double>& z, Vec3 centre) {
+  const auto n_places = static_cast<Eigen::Index>(z.size());
+  const Eigen::Index n = 2 + 2 * n_places;
+  Fit fit{.solution = Eigen::VectorXd::Zero(n), .sigma = Eigen::VectorXd::Zero(n), .weights = {}};
+  std::vector<double> x, y, along, sigmas, sigmas_z;
+  for (const Moved& b : beads) {
+    x.push_back(b.displacement_um.x), y.push_back(b.displacement_um.y), along.push_back(b.displacement_um.z);
+    sigmas.push_back(b.sigma_um), sigmas_z.push_back(b.sigma_z_um);
+  }
+  const double mx = numerics::median(x), my = numerics::median(y);
+  fit.solution[1] = numerics::median(along);
+  for (Eigen::Index k = 0; k < n_places; ++k) fit.solution[2 + 2 * k] = mx, fit.solution[3 + 2 * k] = my;
+  const double unit = std::max(1e-6, numerics::median(sigmas)), unit_z = std::max(1e-6, numerics::median(sigmas_z));
+  fit.weights.assign(beads.size(), 0);
+  constexpr int kRounds = 15;
+  double scale = 0;
+  for (int round = 0; round < kRounds; ++round) {
+    Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(n, n);
+    Eigen::VectorXd right = Eigen::VectorXd::Zero(n);
+    std::vector<Eigen::Vector3d> left(beads.size());
+    std::vector<double> sizes;
+    for (std::size_t b = 0; b < beads.size(); ++b) {
+      const Vec3 d = beads[b].place_um - centre, u = beads[b].displacement_um;
+      const Between at = between(z, beads[b].place_um.z);
+      const auto low = static_cast<Eigen::Index>(2 + 2 * at.below), high = std::min<Eigen::Index>(low + 2, n - 2);
+      const double s = at.share_above;
+      left[b] = {u.x - (1 - s) * fit.solution[low] - s * fit.solution[high] + fit.solution[0] * d.y,
+                 u.y - (1 - s) * fit.solution[low + 1] - s * fit.solution[high + 1] - fit.solution[0] * d.x,
+                 u.z - fit.solution[1]};
+      sizes.push_back(std::sqrt((left[b][0] * left[b][0] + left[b][1] * left[b][1]) / (unit * unit) +
+                                left[b][2] * left[b][2] / (unit_z * unit_z)));
+    }
+    // the quietest third of three normal components lies below 1.24 standard deviations
+    scale = std::max(1.0, numerics::quantile(sizes, 1.0 / 3) / 1.24);
+    for (std::size_t b = 0; b < beads.size(); ++b) {
+      const double r = sizes[b] / (6 * scale);  // three components: 4.685 for one
+      fit.weights[b] = r < 1 ? (1 - r * r) * (1 - r * r) : 0;
+      if (fit.weights[b] == 0) continue;
+      const Vec3 d = beads[b].place_um - centre;
+      const Between at = between(z, beads[b].place_um.z);
+      const auto low = static_cast<Eigen::Index>(2 + 2 * at.below), high = std::min<Eigen::Index>(low + 2, n - 2);
+      const double s = at.share_above;
+      const double w = fit.weights[b] / (unit * unit), wz = fit.weights[b] / (unit_z * unit_z);
+      const Eigen::Index at_x[] = {0, low, high}, at_y[] = {0, low + 1, high + 1};
+      const double of_x[] = {-d.y, 1 - s, s}, of_y[] = {d.x, 1 - s, s};
+      for (int p = 0; p < 3; ++p) {
+        right[at_x[p]] += w * of_x[p] * left[b][0];
+        right[at_y[p]] += w * of_y[p] * left[b][1];
+        for (int q = 0; q < 3; ++q) {
+          normal(at_x[p], at_x[q]) += w * of_x[p] * of_x[q];
+          normal(at_y[p], at_y[q]) += w * of_y[p] * of_y[q];
+        }
+      }
+      normal(1, 1) += wz, right[1] += wz * left[b][2];
+    }
+    // places that no bead at rest sees take after their neighbours: a bead's worth of smoothness
+    const double stiff = 1 / (unit * unit);
+    for (Eigen::Index k = 2; k + 2 < n; ++k) {
+      const double step = fit.solution[k + 2] - fit.solution[k];
+      normal(k, k) += stiff, normal(k + 2, k + 2) += stiff;
+      normal(k, k + 2) -= stiff, normal(k + 2, k) -= stiff;
+      right[k] += stiff * step, right[k + 2] -= stiff * step;
+    }
+    normal.diagonal().array() *= 1 + 1e-9;
+    normal.diagonal().array() += 1e-12;
+    const Eigen::LDLT<Eigen::MatrixXd> factor(normal);
+    fit.solution += factor.solve(right);
+    if (round + 1 == kRounds) {
+      const Eigen::MatrixXd inverse = factor.solve(Eigen::MatrixXd::Identity(n, n));
+      fit.sigma = scale * inverse.diagonal().cwiseMax(0).cwiseSqrt();
+    }
+  }
+  return fit;
+}
+
+}  // namespace
+
+Vec3 CommonMotion::at(Vec3 place_um) const {
+  const Vec3 d = place_um - centre_um;
+  Vec3 u = shift_um + Vec3{-turn_rad * d.y, turn_rad * d.x, 0};
+  if (!has_slice_drift || z_um.empty()) return u;
+  const Between b = between(z_um, place_um.z);
+  const Vec2 low = slices_um[b.below], high = slices_um[std::min(b.below + 1, slices_um.size() - 1)];
+  return u + Vec3{(1 - b.share_above) * low.x + b.share_above * high.x,
+                  (1 - b.share_above) * low.y + b.share_above * high.y, 0};
+}
+
+CommonMotion common_motion(const std::vector<Moved>& beads, Switch slice_drift, const Slices& slices) {
+  CommonMotion motion;
+  if (beads.empty()) return motion;
+  for (const Moved& bead : beads) motion.centre_um += (1 / static_cast<double>(beads.size())) * bead.place_um;
+  const auto take = [&](const Fit& fit) {
+    motion.turn_rad = fit.solution[0], motion.turn_sigma_rad = fit.sigma[0];
+    const auto at_rest = std::ranges::count_if(fit.weights, [](double w) { return w > 0.25; });
+    motion.share_at_rest = static_cast<double>(at_rest) / static_cast<double>(beads.size());
+  };
+  const Fit sliced = fitted(beads, motion.z_um = places_along_z(beads, slices), motion.centre_um);
+  const std::size_t n = motion.z_um.size();
+  Vec2 mean;
+  for (std::size_t k = 0; k < n; ++k) {
+    const auto at = static_cast<Eigen::Index>(2 + 2 * k);
+    motion.slices_um.push_back({sliced.solution[at], sliced.solution[at + 1]});
+    motion.slices_sigma_um.push_back(std::max(sliced.sigma[at], sliced.sigma[at + 1]));
+    mean += (1 / static_cast<double>(n)) * motion.slices_um.back();
+  }
+  double squares = 0;
+  for (std::size_t k = 0; k < n; ++k) {
+    const Vec2 off = motion.slices_um[k] = motion.slices_um[k] - mean;
+    squares += dot(off, off) / (motion.slices_sigma_um[k] * motion.slices_sigma_um[k] + 1e-18);
+  }
+  motion.slice_drift_ratio = n > 1 ? std::sqrt(squares / (2.0 * static_cast<double>(n - 1))) : 0;
+  constexpr double kCertain = 3;
+  const bool is_called_for = n > 2 && motion.slice_drift_ratio > kCertain;
+  motion.has_slice_drift = slice_drift == Switch::on || (slice_drift == Switch::automatic && is_called_for);
+  if (motion.has_slice_drift) {
+    take(sliced);
+    motion.shift_um = {mean.x, mean.y, sliced.solution[1]};
+    const double error = motion.slices_sigma_um.front() / std::sqrt(static_cast<double>(n));
+    motion.shift_sigma_um = {error, error, sliced.sigma[1]};
+    return motion;
+  }
+  const Fit whole = fitted(beads, {0}, motion.centre_um);
+  take(whole);
+  motion.shift_um = {whole.solution[2], whole.solution[3], whole.solution[1]};
+  motion.shift_sigma_um = {whole.sigma[2], whole.sigma[3], whole.sigma[1]};
+  return motion;
+}
+
+}  // namespace mbtfm::stacks

@@ -1,0 +1,493 @@
+#include "segment/stacks/spots.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numeric>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/parallel.h"
+#include "segment/stacks/near.h"
+
+namespace mbtfm::stacks {
+namespace {
+
+constexpr double kReach = 2.5;      // widths: the window in which a spot is fitted
+constexpr double kWindow = 1.5;     // widths: its Gaussian weight, so that neighbours and tails count less
+constexpr double kPaint = 4;        // widths: 3e-4 of a picture is beyond
+constexpr double kTouching = 4;     // widths: nearer spots are fitted jointly
+constexpr int kMostNeighbours = 3;  // fitted with a spot; further ones are where they were
+constexpr double kStep = 0.5;       // widths, of one step
+constexpr double kSettled = 2e-3;   // widths, and of the height: well below the noise of the brightest
+constexpr int kChunk = 32;
+
+template <class Body>
+void for_each(std::size_t n, int threads, const Body& body) {
+  const auto count = static_cast<int>(n);
+  numerics::parallel_for((count + kChunk - 1) / kChunk, threads, [&](int chunk) {
+    for (int k = chunk * kChunk; k < std::min(count, (chunk + 1) * kChunk); ++k) body(static_cast<std::size_t>(k));
+  });
+}
+
+/// Voxels around a place, both ends included.
+struct Box {
+  int low[3], high[3];
+  bool is_empty() const { return low[0] > high[0] || low[1] > high[1] || low[2] > high[2]; }
+};
+
+Box box_around(const Volume& volume, Vec3 place, Widths w, double reach) {
+  const double centre[] = {place.x, place.y, place.z}, width[] = {w.xy, w.xy, w.z};
+  const int size[] = {volume.width, volume.height, volume.depth};
+  Box box;
+  for (int a = 0; a < 3; ++a) {
+    const int half = std::max(1, static_cast<int>(std::ceil(reach * width[a])));
+    const int middle = static_cast<int>(std::lround(centre[a]));
+    box.low[a] = std::max(0, middle - half), box.high[a] = std::min(size[a] - 1, middle + half);
+  }
+  return box;
+}
+
+/// exp(-d²/2s²) on the voxels of a side of a box, and d in units of s.
+struct Profile {
+  std::vector<float> value, offset;
+  Profile(double centre, int low, int high, double sigma) {
+    for (int at = low; at <= high; ++at) {
+      const auto d = static_cast<float>((at - centre) / sigma);
+      offset.push_back(d);
+      value.push_back(std::exp(-0.5f * d * d));
+    }
+  }
+};
+
+struct Profiles {
+  Profile x, y, z;
+  Profiles(Vec3 place, const Box& box, Widths w)
+      : x(place.x, box.low[0], box.high[0], w.xy),
+        y(place.y, box.low[1], box.high[1], w.xy),
+        z(place.z, box.low[2], box.high[2], w.z) {}
+};
+
+double distance_in_widths(Vec3 a, Vec3 b, Widths w) {
+  return std::hypot((a.x - b.x) / w.xy, (a.y - b.y) / w.xy, (a.z - b.z) / w.z);
+}
+
+}  // namespace
+
+// --- the shape
+
+SpotShape::SpotShape(Widths everywhere) { log_xy_[0] = std::log(everywhere.xy), log_z_[0] = std::log(everywhere.z); }
+
+std::array<double, SpotShape::kTerms> SpotShape::terms(Vec3 place) const {
+  const Vec3 d = place - middle_;
+  const double x = d.x / half_.x, y = d.y / half_.y, z = d.z / half_.z;
+  return {1, z, z * z, x, y, x * x + y * y};
+}
+
+Widths SpotShape::at(Vec3 place) const {
+  const auto t = terms(place);
+  double xy = 0, z = 0;
+  for (int k = 0; k < kTerms; ++k) xy += t[k] * log_xy_[k], z += t[k] * log_z_[k];
+  return {std::exp(xy), std::exp(z)};
+}
+
+SpotShape SpotShape::through(const std::vector<Sample>& samples, const Volume& volume) {
+  MBTFM_ASSERT(!samples.empty());
+  SpotShape shape;
+  const auto half = [](int n) { return std::max(1.0, 0.5 * (n - 1)); };
+  shape.half_ = {half(volume.width), half(volume.height), half(volume.depth)};
+  shape.middle_ = shape.half_;
+  // twenty samples for each term and more: an unsure slope does more harm than none
+  const auto n = static_cast<int>(samples.size());
+  const int n_terms = n >= 240 ? kTerms : n >= 80 ? 2 : 1;
+  const auto fitted = [&](std::array<double, kTerms>& into, const auto& value) {
+    Eigen::VectorXd weight = Eigen::VectorXd::Ones(n), y(n), solution;
+    Eigen::MatrixXd a(n, n_terms);
+    for (int k = 0; k < n; ++k) {
+      const auto t = shape.terms(samples[k].place);
+      for (int m = 0; m < n_terms; ++m) a(k, m) = t[m];
+      y[k] = std::log(value(samples[k].widths));
+    }
+    constexpr int kRounds = 10;
+    for (int round = 0; round < kRounds; ++round) {
+      Eigen::MatrixXd normal = a.transpose() * weight.asDiagonal() * a;
+      normal.diagonal().array() += 1e-9 * n;
+      solution = normal.ldlt().solve(a.transpose() * (weight.array() * y.array()).matrix());
+      const Eigen::VectorXd left = (y - a * solution).cwiseAbs();
+      const double scale = 1.4826 * numerics::median(std::vector<double>(left.data(), left.data() + n)) + 1e-6;
+      for (int k = 0; k < n; ++k) {
+        const double r = left[k] / (4.685 * scale);  // biweight: 95 % efficient
+        weight[k] = r < 1 ? (1 - r * r) * (1 - r * r) : 0;
+      }
+    }
+    for (int m = 0; m < n_terms; ++m) into[m] = solution[m];
+  };
+  fitted(shape.log_xy_, [](Widths w) { return w.xy; });
+  fitted(shape.log_z_, [](Widths w) { return w.z; });
+  return shape;
+}
+
+// --- the fit
+
+SpotFit::SpotFit(Volume& volume, SpotShape shape, Noise noise, int threads)
+    : volume_(volume), shape_(shape), noise_(std::move(noise)), threads_(threads) {}
+
+void SpotFit::paint(const Spot& spot, double share) {
+  const Widths w = shape_.at(spot.place);
+  const Box box = box_around(volume_, spot.place, w, kPaint);
+  if (box.is_empty()) return;
+  const Profiles p(spot.place, box, w);
+  const int n = box.high[0] - box.low[0] + 1;
+  for (int k = box.low[2]; k <= box.high[2]; ++k) {
+    for (int j = box.low[1]; j <= box.high[1]; ++j) {
+      const auto height =
+          static_cast<float>(share * spot.height) * p.z.value[k - box.low[2]] * p.y.value[j - box.low[1]];
+      float* row = volume_.row(j, k) + box.low[0];
+      for (int i = 0; i < n; ++i) row[i] += height * p.x.value[i];
+    }
+  }
+}
+
+void SpotFit::add(const std::vector<Spot>& spots) {
+  for (const Spot& spot : spots) {
+    paint(spot, -1);
+    spots_.push_back(spot);
+  }
+  find_neighbours();
+}
+
+/// In space stretched by the widths in the middle; they vary little over a few of them.
+void SpotFit::find_neighbours() {
+  touching_.assign(spots_.size(), {});
+  if (spots_.empty()) return;
+  const auto stretched = [&](const Spot& spot) {
+    const Widths w = shape_.at(spot.place);
+    return Vec3{spot.place.x, spot.place.y, spot.place.z * w.xy / w.z};
+  };
+  std::vector<Vec3> places;
+  for (const Spot& spot : spots_) places.push_back(stretched(spot));
+  const Near near(places, kTouching * shape_.at(spots_[0].place).xy);
+  for_each(spots_.size(), threads_, [&](std::size_t s) {
+    const double reach = kTouching * shape_.at(spots_[s].place).xy;
+    for (const int other : near.within(places[s], reach, kMostNeighbours + 1)) {
+      if (static_cast<std::size_t>(other) != s) touching_[s].push_back(other);
+    }
+    if (touching_[s].size() > kMostNeighbours) touching_[s].resize(kMostNeighbours);
+  });
+}
+
+struct SpotFit::Step {
+  Spot spot;
+  bool is_sound = false;
+  bool is_settled = false;
+};
+
+SpotFit::Step SpotFit::step_of(int number, bool with_errors) const {
+  constexpr int kOwn = 5;  // height, three of the place, level; four more for each neighbour
+  constexpr int kMost = kOwn + 4 * kMostNeighbours;
+  const Spot& spot = spots_[static_cast<std::size_t>(number)];
+  Step result{.spot = spot};
+  const Widths w = shape_.at(spot.place);
+  const Box box = box_around(volume_, spot.place, w, kReach);
+  if (box.is_empty() || !(spot.height > 0)) return result;
+  std::vector<Profiles> profiles{{spot.place, box, w}};
+  std::vector<double> heights{spot.height};
+  for (const int other : touching_[static_cast<std::size_t>(number)]) {
+    const Spot& o = spots_[static_cast<std::size_t>(other)];
+    profiles.emplace_back(o.place, box, shape_.at(o.place));
+    heights.push_back(o.height);
+  }
+  const Profiles weight(spot.place, box, {kWindow * w.xy, kWindow * w.z});
+  const auto n_spots = static_cast<int>(profiles.size());
+  const int n = 1 + 4 * n_spots;
+  std::array<double, kMost * kMost> normal{}, spread{};
+  std::array<double, kMost> right{}, row{};
+  double sum_weight = 0, sum_squares = 0, light = 0, light_saturated = 0;
+  for (int k = box.low[2]; k <= box.high[2]; ++k) {
+    const int dk = k - box.low[2];
+    for (int j = box.low[1]; j <= box.high[1]; ++j) {
+      const int dj = j - box.low[1];
+      const float* values = volume_.row(j, k) + box.low[0];
+      for (int i = box.low[0]; i <= box.high[0]; ++i) {
+        const int di = i - box.low[0];
+        row[0] = 1;
+        double all_light = 0;
+        for (int s = 0; s < n_spots; ++s) {
+          const Profiles& p = profiles[s];
+          const double g = p.x.value[di] * p.y.value[dj] * p.z.value[dk];
+          double* r = &row[1 + 4 * s];
+          r[0] = g, r[1] = g * p.x.offset[di], r[2] = g * p.y.offset[dj], r[3] = g * p.z.offset[dk];
+          all_light += heights[s] * g;
+        }
+        const double own = spot.height * row[1];
+        light += own;
+        if (!volume_.is_saturated.empty() && volume_.is_saturated[volume_.index(i, j, k)]) {
+          light_saturated += own;
+          continue;
+        }
+        const double variance = noise_.variance(k, all_light), value = values[di];
+        const double in_window = weight.x.value[di] * weight.y.value[dj] * weight.z.value[dk];
+        const double v = in_window / variance;
+        for (int a = 0; a < n; ++a) {
+          const double va = v * row[a];
+          right[a] += va * value;
+          for (int b = 0; b <= a; ++b) normal[a * kMost + b] += va * row[b];
+        }
+        if (!with_errors) continue;
+        sum_weight += in_window, sum_squares += in_window * value * value / variance;
+        for (int a = 0; a < n; ++a) {
+          const double va = v * v * variance * row[a];
+          for (int b = 0; b <= a; ++b) spread[a * kMost + b] += va * row[b];
+        }
+      }
+    }
+  }
+  result.spot.share_saturated = light > 0 ? light_saturated / light : 0;
+  using Matrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMost, kMost>;
+  Matrix a(n, n), m(n, n);
+  Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMost, 1> b(n);
+  for (int p = 0; p < n; ++p) {
+    b[p] = right[p];
+    for (int q = 0; q <= p; ++q) {
+      a(p, q) = a(q, p) = normal[p * kMost + q];
+      m(p, q) = m(q, p) = spread[p * kMost + q];
+    }
+    a(p, p) *= 1 + 1e-9;
+  }
+  const Eigen::LLT<Matrix> factor(a);
+  if (factor.info() != Eigen::Success) return result;
+  result.is_sound = true;
+  const auto change = factor.solve(b).eval();
+  const double to_widths = 1 / spot.height;
+  if (with_errors) {
+    const Matrix half = factor.solve(m), covariance = factor.solve(half.transpose());
+    result.spot.sigma = to_widths * w.xy * std::sqrt(0.5 * std::max(0.0, covariance(2, 2) + covariance(3, 3)));
+    result.spot.sigma_z = to_widths * w.z * std::sqrt(std::max(0.0, covariance(4, 4)));
+    result.spot.misfit = sum_weight > 0 ? sum_squares / sum_weight : 1;
+    return result;
+  }
+  const auto held = [&](double by) { return std::clamp(by * to_widths, -kStep, kStep); };
+  const Vec3 by{held(change[2]), held(change[3]), held(change[4])};
+  result.spot.place += Vec3{w.xy * by.x, w.xy * by.y, w.z * by.z};
+  result.spot.height = std::clamp(spot.height + change[1], 0.5 * spot.height, 2 * spot.height);
+  result.is_settled = norm(by) < kSettled && std::abs(result.spot.height - spot.height) < kSettled * spot.height;
+  return result;
+}
+
+void SpotFit::improve(int rounds) {
+  std::vector<int> wanted(spots_.size());
+  std::iota(wanted.begin(), wanted.end(), 0);
+  const std::vector<Spot> first = spots_;
+  for (int round = 0; round < rounds && !wanted.empty(); ++round) {
+    std::vector<Step> steps(wanted.size());
+    for_each(wanted.size(), threads_, [&](std::size_t k) { steps[k] = step_of(wanted[k], false); });
+    std::vector<int> unsettled;
+    for (std::size_t k = 0; k < wanted.size(); ++k) {
+      Spot& spot = spots_[static_cast<std::size_t>(wanted[k])];
+      if (!steps[k].is_sound) continue;
+      if (!steps[k].is_settled) unsettled.push_back(wanted[k]);
+      // a fit that runs away from its maximum is not believed
+      constexpr double kFarthest = 1.5;
+      const Vec3 begin = first[static_cast<std::size_t>(wanted[k])].place;
+      if (distance_in_widths(steps[k].spot.place, begin, shape_.at(begin)) > kFarthest) continue;
+      paint(spot, 1);
+      spot = steps[k].spot;
+      paint(spot, -1);
+    }
+    wanted = std::move(unsettled);
+  }
+  find_neighbours();
+}
+
+void SpotFit::drop(const std::vector<bool>& is_bad) {
+  std::vector<Spot> kept;
+  for (std::size_t s = 0; s < spots_.size(); ++s) {
+    if (is_bad[s]) {
+      paint(spots_[s], 1);
+    } else {
+      kept.push_back(spots_[s]);
+    }
+  }
+  spots_ = std::move(kept);
+  find_neighbours();
+}
+
+void SpotFit::drop_where(const std::function<bool(const Spot&)>& is_bad) {
+  std::vector<bool> marks(spots_.size());
+  for (std::size_t s = 0; s < spots_.size(); ++s) marks[s] = is_bad(spots_[s]);
+  drop(marks);
+}
+
+void SpotFit::drop_doubles(double share) {
+  std::vector<bool> is_double(spots_.size());
+  for (std::size_t s = 0; s < spots_.size(); ++s) {
+    for (const int other : touching_[s]) {
+      const Spot& o = spots_[static_cast<std::size_t>(other)];
+      const bool is_dimmer =
+          o.height > spots_[s].height || (o.height == spots_[s].height && static_cast<std::size_t>(other) < s);
+      const double apart = distance_in_widths(o.place, spots_[s].place, shape_.at(spots_[s].place));
+      if (is_dimmer && apart < share) is_double[s] = true;
+    }
+  }
+  drop(is_double);
+}
+
+// --- what is measured of many spots
+
+Widths SpotFit::fitted_widths(const Spot& spot) const {
+  Spot now = spot;
+  const Widths begin = shape_.at(spot.place);
+  Widths w = begin;
+  const Box box = box_around(volume_, spot.place, begin, 3.5);
+  const Profiles first(spot.place, box, begin);
+  constexpr int kSteps = 12;
+  for (int step = 0; step < kSteps; ++step) {
+    const Profiles p(now.place, box, w);
+    Eigen::Matrix<double, 7, 7> normal = Eigen::Matrix<double, 7, 7>::Zero();
+    Eigen::Matrix<double, 7, 1> right = Eigen::Matrix<double, 7, 1>::Zero();
+    for (int k = box.low[2]; k <= box.high[2]; ++k) {
+      const int dk = k - box.low[2];
+      for (int j = box.low[1]; j <= box.high[1]; ++j) {
+        const int dj = j - box.low[1];
+        const float* values = volume_.row(j, k) + box.low[0];
+        for (int i = box.low[0]; i <= box.high[0]; ++i) {
+          const int di = i - box.low[0];
+          const double x = p.x.offset[di], y = p.y.offset[dj], z = p.z.offset[dk];
+          const double g = p.x.value[di] * p.y.value[dj] * p.z.value[dk];
+          const double taken = spot.height * first.x.value[di] * first.y.value[dj] * first.z.value[dk];
+          Eigen::Matrix<double, 7, 1> row;
+          row << 1, g, g * x, g * y, g * z, g * (x * x + y * y), g * z * z;
+          const double left = values[di] + taken - now.height * g;
+          const double weight = 1 / noise_.variance(k, now.height * g);
+          normal += weight * row * row.transpose();
+          right += weight * left * row;
+        }
+      }
+    }
+    const Eigen::Matrix<double, 7, 1> change = normal.ldlt().solve(right) / now.height;
+    if (!change.allFinite()) return {};
+    const auto held = [](double by) { return std::clamp(by, -0.3, 0.3); };
+    now.place += Vec3{w.xy * held(change[2]), w.xy * held(change[3]), w.z * held(change[4])};
+    now.height *= 1 + held(change[1]);
+    w.xy *= std::exp(held(change[5])), w.z *= std::exp(held(change[6]));
+    if (change.tail<6>().cwiseAbs().maxCoeff() < 1e-3) return w;
+  }
+  return {};
+}
+
+void SpotFit::measure_shape() {
+  std::vector<int> lonely;
+  for (std::size_t s = 0; s < spots_.size(); ++s) {
+    const Spot& spot = spots_[s];
+    const Widths w = shape_.at(spot.place);
+    constexpr double kFromRim = 3;
+    const bool is_inside = spot.place.x > kFromRim * w.xy && spot.place.x < volume_.width - 1 - kFromRim * w.xy &&
+                           spot.place.y > kFromRim * w.xy && spot.place.y < volume_.height - 1 - kFromRim * w.xy &&
+                           spot.place.z > kFromRim * w.z && spot.place.z < volume_.depth - 1 - kFromRim * w.z;
+    if (touching_[s].empty() && is_inside && spot.share_saturated == 0) lonely.push_back(static_cast<int>(s));
+  }
+  // the brighter half of each depth, some thousand in all
+  constexpr int kLayers = 8;
+  std::vector<std::vector<int>> layers(kLayers);
+  for (const int s : lonely) {
+    const double z = spots_[static_cast<std::size_t>(s)].place.z;
+    layers[static_cast<std::size_t>(std::clamp(static_cast<int>(kLayers * z / volume_.depth), 0, kLayers - 1))]
+        .push_back(s);
+  }
+  std::vector<int> chosen;
+  constexpr std::size_t kMostOfLayer = 200;
+  for (std::vector<int>& layer : layers) {
+    std::ranges::sort(layer, [&](int a, int b) {
+      const double ha = spots_[static_cast<std::size_t>(a)].height, hb = spots_[static_cast<std::size_t>(b)].height;
+      return ha != hb ? ha > hb : a < b;
+    });
+    layer.resize(std::min((layer.size() + 1) / 2, kMostOfLayer));
+    chosen.insert(chosen.end(), layer.begin(), layer.end());
+  }
+  std::vector<Widths> widths(chosen.size());
+  for_each(chosen.size(), threads_,
+           [&](std::size_t k) { widths[k] = fitted_widths(spots_[static_cast<std::size_t>(chosen[k])]); });
+  std::vector<SpotShape::Sample> samples;
+  for (std::size_t k = 0; k < chosen.size(); ++k) {
+    const Vec3 place = spots_[static_cast<std::size_t>(chosen[k])].place;
+    const Widths was = shape_.at(place), is = widths[k];
+    constexpr double kLikely = 3;  // a factor beyond which it is no bead, or two
+    const bool is_likely =
+        is.xy > was.xy / kLikely && is.xy < was.xy * kLikely && is.z > was.z / kLikely && is.z < was.z * kLikely;
+    if (is_likely) samples.push_back({place, is});
+  }
+  constexpr std::size_t kFewest = 5;
+  if (samples.size() < kFewest) return;
+  for (const Spot& spot : spots_) paint(spot, 1);
+  shape_ = SpotShape::through(samples, volume_);
+  for (const Spot& spot : spots_) paint(spot, -1);
+  find_neighbours();
+}
+
+/// Mean squares of what is left by a spot's own light in the cores of lonely spots, over that light: less the dark
+/// noise, a line through zero whose quadratic part is the picture's misfit and not noise.
+void SpotFit::measure_noise() {
+  constexpr int kBins = 24;
+  struct Bin {
+    std::vector<float> squares;
+    double light = 0;
+  };
+  std::vector<Bin> bins(kBins);
+  const double darkest = numerics::median(noise_.dark);
+  const auto bin_of = [&](double light) {  // by the square root of two from the dark noise on
+    return static_cast<int>(std::floor(2 * std::log2(std::max(light / darkest, 1e-9))));
+  };
+  const std::size_t step = 1 + spots_.size() / 3000;
+  for (std::size_t s = 0; s < spots_.size(); s += step) {
+    const Spot& spot = spots_[s];
+    if (!touching_[s].empty() || spot.share_saturated > 0) continue;
+    const Widths w = shape_.at(spot.place);
+    const Box box = box_around(volume_, spot.place, w, 1.5);
+    const Profiles p(spot.place, box, w);
+    for (int k = box.low[2]; k <= box.high[2]; ++k) {
+      for (int j = box.low[1]; j <= box.high[1]; ++j) {
+        for (int i = box.low[0]; i <= box.high[0]; ++i) {
+          const double light =
+              spot.height * p.x.value[i - box.low[0]] * p.y.value[j - box.low[1]] * p.z.value[k - box.low[2]];
+          const int bin = bin_of(light);
+          if (bin < 0 || bin >= kBins) continue;
+          const double left = volume_.at(i, j, k), dark = noise_.variance(k, 0);
+          bins[static_cast<std::size_t>(bin)].squares.push_back(static_cast<float>(left * left - dark));
+          bins[static_cast<std::size_t>(bin)].light += light;
+        }
+      }
+    }
+  }
+  // y = b x + c x² with weights 1/x²: relative errors are alike
+  double xx = 0, xxx = 0, xxxx = 0, xy = 0, xxy = 0;
+  for (Bin& bin : bins) {
+    if (bin.squares.size() < 50) continue;
+    const double x = bin.light / static_cast<double>(bin.squares.size());
+    std::ranges::sort(bin.squares);
+    bin.squares.resize(bin.squares.size() - bin.squares.size() / 50);  // what an unseen neighbour leaves
+    double y = 0;
+    for (const float value : bin.squares) y += value;
+    y /= static_cast<double>(bin.squares.size());
+    const double weight = static_cast<double>(bin.squares.size()) / (x * x);
+    xx += weight * x * x, xxx += weight * x * x * x, xxxx += weight * x * x * x * x;
+    xy += weight * x * y, xxy += weight * x * x * y;
+  }
+  const double determinant = xx * xxxx - xxx * xxx;
+  if (!(determinant > 0)) return;
+  double b = (xy * xxxx - xxy * xxx) / determinant;
+  if ((xxy * xx - xy * xxx) / determinant < 0) b = xy / xx;  // no misfit at all
+  noise_.light_variance = std::max(0.0, b);
+}
+
+void SpotFit::measure_errors() {
+  std::vector<Step> steps(spots_.size());
+  for_each(spots_.size(), threads_, [&](std::size_t s) { steps[s] = step_of(static_cast<int>(s), true); });
+  for (std::size_t s = 0; s < spots_.size(); ++s) {
+    if (steps[s].is_sound) spots_[s] = steps[s].spot;
+  }
+  drop_where([](const Spot& spot) { return !(spot.sigma > 0 && spot.sigma_z > 0); });
+}
+
+}  // namespace mbtfm::stacks

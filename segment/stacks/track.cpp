@@ -1,0 +1,149 @@
+#include "segment/stacks/track.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/numerics/order_statistics.h"
+#include "segment/beads/track.h"
+
+namespace mbtfm::stacks {
+namespace {
+
+/// A third of a picture's light cut off leaves its flanks, from which the fit has the place.
+constexpr double kSaturated = 1.0 / 3;
+
+TrackFlag own_flag(const Spot& spot, const Detection& d) {
+  const Widths w = d.shape.at(spot.place);
+  const double x = std::min(spot.place.x, d.width - 1 - spot.place.x),
+               y = std::min(spot.place.y, d.height - 1 - spot.place.y),
+               z = std::min(spot.place.z, d.depth - 1 - spot.place.z);
+  if (std::min(x, y) < w.xy || z < w.z) return TrackFlag::edge;
+  if (spot.share_saturated > kSaturated) return TrackFlag::saturated;
+  return TrackFlag::none;
+}
+
+void require_enough(std::size_t n, const char* which) {
+  constexpr std::size_t kFewest = 40;
+  if (n >= kFewest) return;
+  throw beads::NotFollowed(std::string("the ") + which + " stack",
+                           "40 beads or more: twenty neighbours of each, and as many at rest", std::to_string(n));
+}
+
+/// How far beads are from what their neighbours tell, over what standard errors explain: medians, so that what is wrong
+/// does not count. Strain that is no affine map counts as error; it is one of the neighbours' prediction.
+struct Agreement {
+  double across_um = 0, along_um = 0, ratio = 1, ratio_z = 1;
+};
+Agreement agreement_of(const std::vector<Match>& matches) {
+  std::vector<double> across, along, over, over_z;
+  for (const Match& m : matches) {
+    if (m.flag != TrackFlag::none || !m.has_neighbours) continue;
+    across.push_back(std::hypot(m.from_neighbours_um.x, m.from_neighbours_um.y));
+    along.push_back(std::abs(m.from_neighbours_um.z));
+    if (m.sigma_um > 0) over.push_back(across.back() / m.sigma_um);
+    if (m.sigma_z_um > 0) over_z.push_back(along.back() / m.sigma_z_um);
+  }
+  if (across.empty()) return {};
+  // medians of a Rayleigh and of a folded normal variable
+  constexpr double kRayleigh = 1.1774, kNormal = 0.6745;
+  Agreement result{numerics::median(across) / kRayleigh, numerics::median(along) / kNormal};
+  if (!over.empty()) result.ratio = numerics::median(over) / kRayleigh;
+  if (!over_z.empty()) result.ratio_z = numerics::median(over_z) / kNormal;
+  return result;
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, StackParameters& p) {
+  list.table("track");
+  list.add("dimensions", p.dimensions,
+           "beads are followed in the plane of the images, or in space through the slices of stacks; auto: in space if "
+           "z_points is given");
+  list.add("z_step_um", p.z_step_um, Range::mesh_um(),
+           "distance of the slices, as the stage moved (um); unset: from the files' own calibration");
+  list.add("z_points", p.z_points,
+           "where the slices of a stack lead from the first to the last, which no program can tell: into-gel or "
+           "out-of-gel; auto: stacks are projected and beads followed in the plane");
+  list.add("first_slice_z_um", p.first_slice_z_um, Range::between(-1e4, 1e4),
+           "z of the outer face of the slice nearest to the gel's surface (um); z points into the gel");
+  list.add("refractive_index_ratio", p.refractive_index_ratio, Range::between(0.5, 2),
+           "refractive index of the gel over that of the immersion: the focus moves so much further than the stage");
+  list.add(
+      "slice_drift", p.slice_drift,
+      "take off how the slices of one stack moved against those of the other; auto: if it is three times its error");
+}
+
+Vec3 Scale::place_um(Vec3 voxel) const {
+  const double slice = z_points == ZPoints::into_gel ? voxel.z : depth - 1 - voxel.z;
+  return {pixel_um * (voxel.x + 0.5), pixel_um * (voxel.y + 0.5), first_um + step_um * (slice + 0.5)};
+}
+
+std::vector<PlacedBead> placed(const Detection& detection, const Scale& scale) {
+  std::vector<PlacedBead> beads;
+  for (const Spot& spot : detection.spots) {
+    beads.push_back({.position_um = scale.place_um(spot.place),
+                     .brightness = spot.height,
+                     .sigma_um = scale.pixel_um * spot.sigma,
+                     .sigma_z_um = scale.step_um * spot.sigma_z,
+                     .flag = own_flag(spot, detection)});
+  }
+  return beads;
+}
+
+Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
+                const MatchParameters& parameters, Switch slice_drift, const Slices& slices, int threads) {
+  require_enough(relaxed.size(), "relaxed");
+  require_enough(stressed.size(), "stressed");
+  const Matching matching = match(relaxed, stressed, parameters, threads);
+  const Agreement agreement = agreement_of(matching.matches);
+  Followed result;
+  result.first = matching.first;
+  result.spacing_um = matching.spacing_um;
+  result.n_stressed = static_cast<int>(stressed.size());
+  result.neighbours_um = agreement.across_um, result.neighbours_z_um = agreement.along_um;
+  result.error_ratio = agreement.ratio, result.error_ratio_z = agreement.ratio_z;
+  const double scale = std::max(1.0, agreement.ratio), scale_z = std::max(1.0, agreement.ratio_z);
+  std::vector<Moved> moved;
+  std::vector<double> light;
+  for (std::size_t k = 0; k < relaxed.size(); ++k) {
+    const PlacedBead& a = relaxed[k];
+    const Match& m = matching.matches[k];
+    TrackFlag flag = m.flag;
+    BeadInSpace bead{.position_um = a.position_um, .displacement_um = {}, .flag = {}};
+    bead.sigma_um = scale * a.sigma_um, bead.sigma_z_um = scale_z * a.sigma_z_um;
+    if (m.partner >= 0) {
+      const PlacedBead& b = stressed[static_cast<std::size_t>(m.partner)];
+      // in the frame of the relaxed stack: the common turn and shift are taken back before
+      RigidMotion back = matching.first;
+      back.turn_rad = -back.turn_rad, back.centre = matching.first.centre + matching.first.shift_um;
+      back.shift_um = -1 * matching.first.shift_um;
+      bead.displacement_um = back.at(b.position_um) - a.position_um;
+      bead.sigma_um = scale * std::hypot(a.sigma_um, b.sigma_um);
+      bead.sigma_z_um = scale_z * std::hypot(a.sigma_z_um, b.sigma_z_um);
+      if (flag == TrackFlag::none) flag = a.flag != TrackFlag::none ? a.flag : b.flag;
+      if (flag == TrackFlag::none) {
+        moved.push_back({bead.position_um, bead.displacement_um, bead.sigma_um, bead.sigma_z_um});
+        if (a.brightness > 0 && b.brightness > 0) light.push_back(b.brightness / a.brightness);
+      }
+    } else if (a.flag != TrackFlag::none) {
+      flag = a.flag;
+    }
+    bead.flag = name_of(flag);
+    ++result.flags[bead.flag];
+    result.field.push_back(std::move(bead));
+  }
+  result.n_good = static_cast<int>(moved.size());
+  if (moved.size() < 40) {
+    throw beads::NotFollowed("the stressed stack", "40 of the relaxed stack's beads or more, displaced",
+                             std::to_string(moved.size()) + " of " + std::to_string(relaxed.size()));
+  }
+  result.common = common_motion(moved, slice_drift, slices);
+  for (BeadInSpace& bead : result.field) {
+    if (!(bead.displacement_um == Vec3{}))
+      bead.displacement_um = bead.displacement_um - result.common.at(bead.position_um);
+  }
+  if (!light.empty()) result.light_ratio = numerics::median(light);
+  return result;
+}
+
+}  // namespace mbtfm::stacks

@@ -1,0 +1,71 @@
+/// Displacement in the volume of a gel from two stacks of its beads: pulled by the cell, and relaxed.
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "pipeline/contract/axes.h"
+#include "pipeline/contract/beads_in_space.h"
+#include "pipeline/contract/findings.h"
+#include "pipeline/stage/parameters.h"
+#include "segment/stacks/detect.h"
+#include "segment/stacks/match.h"
+#include "segment/stacks/motion.h"
+
+namespace mbtfm::stacks {
+
+/// Whether beads are followed in the plane of the images or in space.
+enum class Dimensions {
+  automatic,  ///< in space where z_points is given, which means nothing in the plane
+  plane,
+  space
+};
+constexpr auto words(Dimensions) { return std::array{"auto", "plane", "space"}; }
+
+/// Fewer slices say nothing of a bead's picture along z.
+inline constexpr int kFewestSlices = 8;
+
+struct StackParameters {
+  Dimensions dimensions = Dimensions::automatic;
+  std::optional<double> z_step_um;    ///< of the stage; unset: from the files
+  std::optional<ZPoints> z_points;    ///< from the first slice to the last
+  double first_slice_z_um = 0;        ///< z of the outer face of the slice that lies nearest to the surface
+  double refractive_index_ratio = 1;  ///< of gel and immersion; 1: they are matched
+  Switch slice_drift = Switch::automatic;
+};
+void declare(stage::ParameterList& list, StackParameters& parameters);
+
+/// Voxels to places in the gel.
+struct Scale {
+  double pixel_um = 0, step_um = 0;  ///< of the focus: the stage's, times the ratio of the refractive indices
+  double first_um = 0;
+  ZPoints z_points = ZPoints::into_gel;
+  int depth = 0;
+  Vec3 place_um(Vec3 voxel) const;
+  Slices slices() const { return {first_um + 0.5 * step_um, step_um}; }
+};
+
+/// The beads of a stack in the gel, those at the rim and the saturated ones flagged.
+std::vector<PlacedBead> placed(const Detection& detection, const Scale& scale);
+
+struct Followed {
+  std::vector<BeadInSpace> field;  ///< one entry for each bead of the relaxed stack, good or flagged
+  CommonMotion common;             ///< taken off the field; its turn beyond `first`'s
+  RigidMotion first;
+  double spacing_um = 0;  ///< mean distance of beads
+  int n_good = 0, n_stressed = 0;
+  double neighbours_um = 0, neighbours_z_um = 0;  ///< how far beads are from what their neighbours tell, robust sd
+  double error_ratio = 1,
+         error_ratio_z = 1;  ///< that over what the pictures' errors explain; in each sigma where above 1
+  double light_ratio = 0;    ///< of the stressed beads' light over the relaxed ones'; 0: not known
+  std::map<std::string, int> flags;
+};
+
+/// Match, take off what is common, weigh the errors by what neighbours tell of them.
+/// @throws beads::NotFollowed where there are too few beads, or the two stacks do not show the same
+Followed follow(const std::vector<PlacedBead>& relaxed, const std::vector<PlacedBead>& stressed,
+                const MatchParameters& matching, Switch slice_drift, const Slices& slices, int threads);
+
+}  // namespace mbtfm::stacks

@@ -1,0 +1,253 @@
+/// Laws of following beads in space.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "pipeline/numerics/order_statistics.h"
+#include "segment/beads/track.h"
+#include "segment/stacks/detect.h"
+#include "segment/stacks/near.h"
+#include "segment/stacks/track.h"
+#include "tests/support/stack_scene.h"
+
+namespace mbtfm::stacks {
+namespace {
+
+using test::bead_clouds;
+using test::BeadClouds;
+
+struct Score {
+  double followed = 0, wrong = 0;
+};
+/// Of those that have a partner.
+Score score_of(const BeadClouds& clouds, const Matching& matching) {
+  Score score;
+  int n_good = 0;
+  for (std::size_t k = 0; k < clouds.relaxed.size(); ++k) {
+    const Match& m = matching.matches[k];
+    if (m.flag != TrackFlag::none) continue;
+    ++n_good;
+    if (m.partner == static_cast<int>(k) && k < clouds.displacement.size()) {
+      score.followed += 1.0 / static_cast<double>(clouds.displacement.size());
+    } else {
+      score.wrong += 1;
+    }
+  }
+  score.wrong /= std::max(1, n_good);
+  return score;
+}
+
+/// A cell's pull: 3 um on its rim, strains of 0.3.
+Vec3 pull(Vec3 x) {
+  const Vec3 d{x.x - 50, x.y - 50, x.z};
+  const double a = std::exp(-dot(d, d) / (2 * 15 * 15));
+  return {-0.3 * d.x * a, -0.3 * d.y * a, 1.5 * a};
+}
+
+constexpr double kLeastFollowed = 0.95, kMostWrong = 0.01;  // what the program promises
+
+TEST(Stacks, beads_are_followed_whatever_a_cell_a_stage_and_a_dish_do) {
+  struct Case {
+    const char* what;
+    std::function<Vec3(Vec3)> displacement;
+  };
+  const auto turned = [](double degrees) {
+    return [angle = degrees * std::numbers::pi / 180](Vec3 x) {
+      const double c = std::cos(angle), s = std::sin(angle), dx = x.x - 50, dy = x.y - 50;
+      return Vec3{c * dx - s * dy - dx, s * dx + c * dy - dy, 0};
+    };
+  };
+  const std::vector<Case> cases = {
+      {"at rest", [](Vec3) { return Vec3{}; }},
+      {"a cell pulls", pull},
+      {"a stage that went far",
+       [](Vec3 x) {
+         return pull(x) + Vec3{25, -18, 6};
+       }},
+      {"a gel that swells",
+       [](Vec3 x) {
+         return Vec3{0.04 * (x.x - 50), 0.04 * (x.y - 50), 0.06 * x.z};
+       }},
+      {"a dish that is turned a little", turned(2)},
+      {"a dish that is turned",
+       [&](Vec3 x) {
+         return turned(-23)(x) + Vec3{5, 3, -2};
+       }},
+  };
+  for (const Case& c : cases) {
+    SCOPED_TRACE(c.what);
+    const BeadClouds clouds = bead_clouds(1500, 0.03, 0.05, 1, c.displacement);
+    const Score score = score_of(clouds, match(clouds.relaxed, clouds.stressed, {}, 2));
+    EXPECT_GT(score.followed, kLeastFollowed);
+    EXPECT_LT(score.wrong, kMostWrong);
+  }
+}
+
+TEST(Stacks, the_roles_of_the_two_stacks_may_be_exchanged) {
+  const BeadClouds clouds = bead_clouds(1500, 0.03, 0.05, 2, pull);
+  const Matching there = match(clouds.relaxed, clouds.stressed, {}, 2);
+  const Matching back = match(clouds.stressed, clouds.relaxed, {}, 2);
+  int n_both = 0, n_other = 0;
+  for (std::size_t k = 0; k < there.matches.size(); ++k) {
+    if (there.matches[k].flag != TrackFlag::none) continue;
+    const Match& m = back.matches[static_cast<std::size_t>(there.matches[k].partner)];
+    if (m.flag != TrackFlag::none) continue;
+    m.partner == static_cast<int>(k) ? ++n_both : ++n_other;
+  }
+  EXPECT_GT(n_both, static_cast<int>(kLeastFollowed * 1500));
+  EXPECT_EQ(n_other, 0);
+}
+
+TEST(Stacks, beads_of_another_place_are_refused) {
+  const BeadClouds clouds = bead_clouds(400, 0.03, 0, 3, pull), others = bead_clouds(400, 0.03, 0, 4, pull);
+  EXPECT_THROW(match(clouds.relaxed, others.stressed, {}, 2), beads::NotFollowed);
+}
+
+TEST(Stacks, too_few_beads_are_refused_with_the_number_that_would_do) {
+  const BeadClouds clouds = bead_clouds(25, 0.03, 0, 5, pull);
+  try {
+    follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 1);
+    FAIL() << "not refused";
+  } catch (const beads::NotFollowed& error) {
+    EXPECT_NE(error.expected.find("40"), std::string::npos) << error.expected;
+    EXPECT_EQ(error.found, "25");
+  }
+}
+
+/// Beads at rest are at rest again whatever the slices did; the cell's pull stays.
+TEST(Stacks, drift_of_slices_and_the_turn_are_taken_off) {
+  const auto drift = [](Vec3 x) {
+    return Vec3{0.6 * std::sin(x.z / 8) + 0.004 * (x.y - 50), 0.02 * x.z - 0.004 * (x.x - 50), 0.7};
+  };
+  const BeadClouds clouds = bead_clouds(4000, 0.02, 0.03, 6, [&](Vec3 x) { return pull(x) + drift(x); });
+  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
+  EXPECT_TRUE(followed.common.has_slice_drift);
+  std::vector<double> across, along;
+  for (std::size_t k = 0; k < clouds.displacement.size(); ++k) {
+    const BeadInSpace& bead = followed.field[k];
+    if (!bead.flag.empty()) continue;
+    const Vec3 off = bead.displacement_um - pull(clouds.relaxed[k].position_um);
+    across.push_back(std::hypot(off.x, off.y)), along.push_back(std::abs(off.z));
+  }
+  ASSERT_GT(across.size(), 3500u);
+  // errors of two places, 0.028 and 0.085 um, whose medians are 1.18 and 0.67 of that, and a half more for what is
+  // left of a sine of 8 um between places 0.8 um apart, and of the cell's own mean motion
+  EXPECT_LT(numerics::median(across), 1.5 * 1.18 * 0.028);
+  EXPECT_LT(numerics::median(along), 1.5 * 0.67 * 0.085);
+}
+
+TEST(Stacks, without_drift_of_slices_none_is_taken_off) {
+  const BeadClouds clouds = bead_clouds(3000, 0.02, 0.03, 7, pull);
+  const Followed followed = follow(clouds.relaxed, clouds.stressed, {}, Switch::automatic, {}, 2);
+  EXPECT_FALSE(followed.common.has_slice_drift) << followed.common.slice_drift_ratio;
+}
+
+// --- pictures
+
+struct Errors {
+  std::vector<double> across, along;  ///< over the standard errors
+  int n_found = 0, n_spurious = 0;
+};
+
+TEST(Stacks, places_have_the_errors_they_claim) {
+  Errors errors;
+  int n_beads = 0;
+  for (unsigned seed = 1; seed <= 3; ++seed) {
+    const test::StackScene scene = test::stack_scene(250, seed, [](Vec3) { return Vec3{0.21, -0.17, 0.33}; });
+    const Scale scale{.pixel_um = scene.microscope.pixel_size_um,
+                      .step_um = scene.microscope.focus_step_um(),
+                      .first_um = 0,
+                      .z_points = ZPoints::into_gel,
+                      .depth = scene.microscope.n_slices};
+    std::vector<PlacedBead> found[2];
+    for (const bool is_stressed : {false, true})
+      found[is_stressed] = placed(detect(scene.stack(is_stressed, seed), 5, "test", 2), scale);
+    const Matching matching = match(found[0], found[1], {}, 2);
+    std::vector<Vec3> places;
+    for (const auto& bead : scene.relaxed) places.push_back(bead.position_um);
+    const Near near(places, 2);
+    n_beads += 250;
+    for (std::size_t k = 0; k < found[0].size(); ++k) {
+      if (near.within(found[0][k].position_um, 0.8, 1).empty()) ++errors.n_spurious;
+      const Match& m = matching.matches[k];
+      if (m.flag != TrackFlag::none || found[0][k].flag != TrackFlag::none) continue;
+      const PlacedBead &a = found[0][k], &b = found[1][static_cast<std::size_t>(m.partner)];
+      const Vec3 off = b.position_um - a.position_um - Vec3{0.21, -0.17, 0.33};
+      errors.across.push_back(std::abs(off.x) / std::hypot(a.sigma_um, b.sigma_um));
+      errors.across.push_back(std::abs(off.y) / std::hypot(a.sigma_um, b.sigma_um));
+      errors.along.push_back(std::abs(off.z) / std::hypot(a.sigma_z_um, b.sigma_z_um));
+      ++errors.n_found;
+    }
+  }
+  EXPECT_GT(errors.n_found, 0.8 * n_beads);  // a tenth lies at the rim
+  EXPECT_LT(errors.n_spurious, 0.03 * n_beads);
+  // 68 % of normal errors lie within one standard error; the promise is 0.8 to 1.3
+  for (const auto* over : {&errors.across, &errors.along}) {
+    const double ratio = numerics::quantile(*over, 0.683);
+    EXPECT_GT(ratio, 0.8);
+    EXPECT_LT(ratio, 1.3);
+  }
+}
+
+TEST(Stacks, the_same_beads_for_any_number_of_threads) {
+  const test::StackScene scene = test::stack_scene(200, 11, pull);
+  const Detection one = detect(scene.stack(false, 11), 5, "test", 1),
+                  two = detect(scene.stack(false, 11), 5, "test", 2);
+  ASSERT_EQ(one.spots.size(), two.spots.size());
+  for (std::size_t k = 0; k < one.spots.size(); ++k) {
+    EXPECT_EQ(one.spots[k].place, two.spots[k].place);
+    EXPECT_EQ(one.spots[k].sigma_z, two.spots[k].sigma_z);
+  }
+}
+
+TEST(Stacks, noise_alone_shows_no_beads) {
+  test::StackScene scene = test::stack_scene(0, 1, pull);
+  try {
+    const Detection found = detect(scene.stack(false, 1), 5, "test", 2);
+    EXPECT_LT(found.spots.size(), 5u);
+  } catch (const beads::NotFollowed&) {
+    SUCCEED();
+  }
+}
+
+TEST(Stacks, beads_whose_light_is_cut_off_are_flagged_and_the_others_are_not) {
+  test::StackScene scene = test::stack_scene(150, 21, pull);
+  for (std::size_t k = 0; k < 15; ++k) scene.relaxed[k].brightness = 60;
+  std::vector<images::Image> stack = scene.stack(false, 21);
+  for (images::Image& slice : stack) {
+    slice.full_scale = 1500;
+    for (float& v : slice.pixels) v = std::min(v, 1500.0f);
+  }
+  const Detection found = detect(std::move(stack), 5, "test", 2);
+  const Scale scale{scene.microscope.pixel_size_um, scene.microscope.focus_step_um(), 0, ZPoints::into_gel,
+                    scene.microscope.n_slices};
+  const std::vector<PlacedBead> beads = placed(found, scale);
+  std::vector<Vec3> places;
+  for (const PlacedBead& bead : beads) places.push_back(bead.position_um);
+  const Near near(places, 2);
+  int n_flagged = 0, n_inside = 0;
+  for (std::size_t k = 0; k < scene.relaxed.size(); ++k) {
+    const auto at = near.within(scene.relaxed[k].position_um, 0.8, 1);
+    if (at.empty() || beads[static_cast<std::size_t>(at[0])].flag == TrackFlag::edge) continue;
+    const bool is_flagged = beads[static_cast<std::size_t>(at[0])].flag == TrackFlag::saturated;
+    if (k < 15) {
+      ++n_inside, n_flagged += is_flagged;
+    } else {
+      EXPECT_FALSE(is_flagged) << "bead " << k;
+    }
+  }
+  EXPECT_GE(n_inside, 8);
+  EXPECT_EQ(n_flagged, n_inside);
+}
+
+TEST(Stacks, slices_out_of_the_gel_are_its_mirror_image) {
+  const Scale into{0.2, 0.5, 3, ZPoints::into_gel, 40}, out{0.2, 0.5, 3, ZPoints::out_of_gel, 40};
+  EXPECT_DOUBLE_EQ(into.place_um({0, 0, 0}).z, 3.25);
+  EXPECT_DOUBLE_EQ(out.place_um({0, 0, 39}).z, 3.25);
+  EXPECT_DOUBLE_EQ(into.place_um({9, 4, 7}).x, out.place_um({9, 4, 7}).x);
+}
+
+}  // namespace
+}  // namespace mbtfm::stacks
