@@ -140,14 +140,16 @@ void solve_small(Equilibrium& equilibrium, Deformed& deformed) {
 /// @returns whether it converged
 bool converges(Equilibrium& equilibrium, Deformed& deformed, double share) {
   constexpr int kMostSteps = 25, kMostHalvings = 8;
-  constexpr double kSmall = 1e-11;  // of the elements' forces: a thousand times their rounding
+  constexpr double kSmall = 1e-11;  // of the elements' forces on the way: a thousand times their rounding
+  double size_nN = 0;
   std::vector<Vec2>& u = deformed.displacement_um;
   for (int step = 0; step < kMostSteps; ++step) {
     numerics::BlockMatrix<2> matrix = deformed.body.unknowns->matrix();
     const Assembled now = equilibrium.assemble(u, share, &matrix);
     if (!now.is_sound) return false;
     deformed.energy_fJ = now.energy_fJ;
-    if (norm_of(now.forces_nN) <= kSmall * now.size_nN) return true;
+    size_nN = std::max(size_nN, now.size_nN);
+    if (norm_of(now.forces_nN) <= kSmall * size_nN) return true;
     if (!equilibrium.factorise(matrix)) return false;
     const std::vector<Vec2> change = equilibrium.step(now.forces_nN);
     deformed.iterations += 1;
