@@ -12,7 +12,9 @@ namespace {
 
 constexpr int kAngles = 72;  // at which the misfit is looked at first: outlines of up to some 18 spikes
 constexpr int kCoarsePoints = 90;
-constexpr int kFinePoints = 300;  // of an outline of 100 um: a point each micrometre
+constexpr double kWorthRefining = 1.5,
+                 kCoarseMisfit = 0.02;  // misfit of few points; what their chords leave, of the size
+constexpr int kFinePoints = 300;        // of an outline of 100 um: a point each micrometre
 
 /// Points at equal distances along the closed line.
 Polygon resampled(const Polygon& polygon, int n) {
@@ -118,6 +120,7 @@ std::vector<double> signed_distances(const Polygon& outline, const Polygon& refe
   return distances;
 }
 
+/// To the least misfit near a motion.
 Way refined(const Polygon& outline, const Polygon& reference, Motion motion) {
   constexpr int kMostSteps = 200, kMostHalvings = 12;
   constexpr double kStill = 1e-9;  // of the size
@@ -151,8 +154,7 @@ Way refined(const Polygon& outline, const Polygon& reference, Motion motion) {
 }
 
 /// Angles where the misfit is less than at both neighbours.
-std::vector<double> starts(const Polygon& outline, const Polygon& reference, const Motion& centred) {
-  const Polygon few = resampled(outline, kCoarsePoints), of_reference = resampled(reference, kCoarsePoints);
+std::vector<double> starts(const Polygon& few, const Polygon& of_reference, const Motion& centred) {
   std::vector<double> misfit;
   const auto angle = [](int k) { return 2 * std::numbers::pi * k / kAngles; };
   for (int k = 0; k < kAngles; ++k) {
@@ -214,18 +216,26 @@ double misfit_um(const Polygon& a_um, const Polygon& b_um) {
 
 std::vector<Way> ways_onto(const Polygon& outline_um, const Polygon& reference_um, Mirrors mirrors) {
   const Polygon outline = resampled(outline_um, kFinePoints), reference = resampled(reference_um, kFinePoints);
+  const Polygon few = resampled(outline_um, kCoarsePoints), of_reference = resampled(reference_um, kCoarsePoints);
   const double size = size_um(reference_um);
-  std::vector<Way> ways;
+  std::vector<Way> coarse;
   for (const bool is_mirrored : {false, true}) {
     if (is_mirrored && mirrors == Mirrors::not_tried) continue;
     const Motion centred{centroid_um(outline_um), centroid_um(reference_um), 0, is_mirrored};
-    for (const double angle : starts(outline, reference, centred)) {
+    for (const double angle : starts(few, of_reference, centred)) {
       Motion start = centred;
       start.angle_rad = angle;
-      const Way way = refined(outline, reference, start);
-      if (std::ranges::none_of(ways, [&](const Way& other) { return is_same_way(way, other, size); }))
-        ways.push_back(way);
+      coarse.push_back(refined(few, of_reference, start));
     }
+  }
+  const double best = std::ranges::min_element(coarse, {}, &Way::misfit_um)->misfit_um;
+  std::vector<Way> ways;
+  for (const Way& way : coarse) {
+    // of few points those that fit badly are as far off as they will be
+    const bool is_good = way.misfit_um < kWorthRefining * best + kCoarseMisfit * size;
+    const Way fine = is_good ? refined(outline, reference, way.motion) : way;
+    if (std::ranges::none_of(ways, [&](const Way& other) { return is_same_way(fine, other, size); }))
+      ways.push_back(fine);
   }
   std::ranges::stable_sort(ways, {}, &Way::misfit_um);
   return ways;

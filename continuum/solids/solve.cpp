@@ -140,17 +140,23 @@ void solve_small(Equilibrium& equilibrium, Deformed& deformed) {
 /// @returns whether it converged
 bool converges(Equilibrium& equilibrium, Deformed& deformed, double share) {
   constexpr int kMostSteps = 25, kMostHalvings = 8;
-  constexpr double kSmall = 1e-11;  // of the elements' forces: a thousand times their rounding
+  constexpr double kSmall = 1e-8;  // of the elements' forces on the way: the next step squares it, to rounding
+  double size_nN = 0;
   std::vector<Vec2>& u = deformed.displacement_um;
   for (int step = 0; step < kMostSteps; ++step) {
     numerics::BlockMatrix<2> matrix = deformed.body.unknowns->matrix();
     const Assembled now = equilibrium.assemble(u, share, &matrix);
     if (!now.is_sound) return false;
     deformed.energy_fJ = now.energy_fJ;
-    if (norm_of(now.forces_nN) <= kSmall * now.size_nN) return true;
+    size_nN = std::max(size_nN, now.size_nN);
+    const bool is_last = norm_of(now.forces_nN) <= kSmall * size_nN;
     if (!equilibrium.factorise(matrix)) return false;
     const std::vector<Vec2> change = equilibrium.step(now.forces_nN);
     deformed.iterations += 1;
+    if (is_last) {
+      u = moved(u, 1, change);
+      return true;
+    }
     double length = 1;
     std::vector<Vec2> next = moved(u, length, change);
     for (int halving = 0; halving < kMostHalvings; ++halving) {

@@ -121,15 +121,16 @@ TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name)
   for (const char* name : {"mean.vtp", "mean.json", "mean.svg", "blur.csv", "reference.csv"})
     EXPECT_FALSE(files::read_text(file("mean/") + name).empty()) << name;
   // its own mean as a model is blurred once more
-  const auto again = test::run_program(mean + " --pattern " + file("mean/reference.csv") + " --out " + file("again"));
+  const std::string pattern = mean + " --pattern " + file("mean/reference.csv") + " --lambda_um_per_kPa 0.1";
+  const auto again = test::run_program(pattern + " --model " + file("mean/mean.csv") + " --out " + file("again"));
   EXPECT_EQ(again.code, 0) << again.output;
 
   write_cell(folder_ / "cells/round", 0, 9, 0);
-  const auto refused = test::run_program(mean + " --pattern " + file("mean/reference.csv") + " --out " + file("no"));
+  const auto refused = test::run_program(pattern + " --out " + file("no"));
   EXPECT_EQ(refused.code, 3) << refused.output;
   EXPECT_NE(refused.output.find("cell 'round'"), std::string::npos) << refused.output;
   EXPECT_FALSE(std::filesystem::exists(file("no/mean.csv")));
-  const auto left = test::run_program(mean + " --others left-out --out " + file("left"));
+  const auto left = test::run_program(pattern + " --others left-out --out " + file("left"));
   EXPECT_EQ(left.code, 0) << left.output;
   EXPECT_NE(left.output.find("cells-left-out"), std::string::npos) << left.output;
 }
