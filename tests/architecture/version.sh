@@ -60,4 +60,12 @@ cp -r "$scratch/tarball/." "$repo/inside"
 expect "$(version "$repo/inside")" "$tarball" "a tarball in another repository is not that repository's commit"
 echo six >"$scratch/tarball/pipeline/a.cpp"
 differ "$tarball" "$(version "$scratch/tarball")" "other sources have another hash"
+project=$(realpath "$(dirname "$script")/..")
+release=$(sed -n 's/^project(mbtfm VERSION \([0-9.]*\).*/\1/p' "$project/CMakeLists.txt")
+says() { expect "$(sed -n "$2" "$project/$1" | head -n 1)" "${release//./\\.}" "the release is the same in CMakeLists.txt and $1"; }
+says python/pyproject.toml 's/^version = "\(.*\)"/\1/p'
+says python/mbtfm/__init__.py 's/^__version__ = "\(.*\)"/\1/p'
+says debian/changelog 's/^mbtfm (\([^)]*\)).*/\1/p'
+says packaging/conda/meta.yaml 's/.*set version = "\(.*\)".*/\1/p'
+says CHANGELOG.md 's/^## \([0-9].*\)/\1/p'
 echo "$n laws of the version hold"
