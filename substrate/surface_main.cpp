@@ -11,6 +11,7 @@
 #include "pipeline/files/base64.h"
 #include "pipeline/files/columns.h"
 #include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/triangle_mesh.h"
 #include "pipeline/files/vtk_files.h"
@@ -180,54 +181,13 @@ Made from_formula(const Parameters& p) {
   return {.map = sampled(formula_of(p.formula), r.low, r.high, spacing), .from = "formula " + p.formula};
 }
 
-/// x_um, y_um, z_um on a lattice; an empty z, or a vertex without a row, is a hole.
-HeightMap read_lattice(const Path& file) {
-  const files::CsvTable table(file);
-  table.require({"x_um", "y_um", "z_um"});
-  const auto lines_of = [&](const std::string& column) {
-    std::vector<double> lines;
-    for (int row = 0; row < table.n_rows(); ++row) lines.push_back(table.number(row, column));
-    std::ranges::sort(lines);
-    const double same = lines.empty() ? 0 : 1e-6 * (lines.back() - lines.front());
-    lines.erase(std::unique(lines.begin(), lines.end(), [&](double a, double b) { return b - a <= same; }),
-                lines.end());
-    if (lines.size() < 4)
-      throw InputError(file.string(), "a lattice of at least 4 different " + column, std::to_string(lines.size()),
-                       "points that lie on no lattice are read with --points");
-    return lines;
-  };
-  const auto x = lines_of("x_um"), y = lines_of("y_um");
-  const auto step = [](const std::vector<double>& lines) {
-    return (lines.back() - lines.front()) / static_cast<double>(lines.size() - 1);
-  };
-  HeightMap map{.origin_um = {x[0], y[0]},
-                .spacing_um = {step(x), step(y)},
-                .n_x = static_cast<int>(x.size()),
-                .n_y = static_cast<int>(y.size()),
-                .z_um = {},
-                .sigma_um = {}};
-  map.z_um.assign(x.size() * y.size(), std::numeric_limits<double>::quiet_NaN());
-  for (int row = 0; row < table.n_rows(); ++row) {
-    const double i = (table.number(row, "x_um") - x[0]) / map.spacing_um.x,
-                 j = (table.number(row, "y_um") - y[0]) / map.spacing_um.y;
-    constexpr double kOff = 0.01;  // of a spacing: numbers of few digits
-    for (const auto& [at, column] : {std::pair{i, "x_um"}, std::pair{j, "y_um"}}) {
-      if (std::abs(at - std::round(at)) > kOff)
-        table.fail(row, column, "a place of an even lattice", "points that lie on no lattice are read with --points");
-    }
-    const auto at = static_cast<std::size_t>(std::lround(j)) * x.size() + static_cast<std::size_t>(std::lround(i));
-    if (const auto z = table.optional_number(row, "z_um")) map.z_um[at] = *z;
-  }
-  return map;
-}
-
 double pixel_of(const images::Image& image, const Parameters& p, const std::string& source) {
   return p.pixel_size_um ? *p.pixel_size_um : due(image.pixel_size_um, "pixel_size_um", source);
 }
 
 Made from_height_map(const Path& file, const Parameters& p) {
   if (file.extension() == ".csv") {
-    HeightMap map = read_lattice(file);
+    HeightMap map = files::read_heights(file);
     const std::string from = std::to_string(map.n_x) + " x " + std::to_string(map.n_y) + " heights of a table";
     return finished(std::move(map), p, "height_map", from);
   }

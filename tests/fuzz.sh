@@ -1,12 +1,12 @@
 #!/usr/bin/env bash
 # Reads damaged files with every reader, under the address and undefined-behaviour sanitizers: with clang and its
 # libFuzzer where they are installed (Debian: clang, libclang-rt-14-dev), else with GCC and the suite's own loop.
-#   tests/fuzz.sh [FAMILY]...      csv, field, vtu, settings, records, image, ome, roi; all without one
+#   tests/fuzz.sh [FAMILY]...      csv, field, vtu, surface, settings, records, image, ome, roi; all without one
 # MBTFM_FUZZ_INPUTS: how many inputs by family (a million). What breaks a reader is kept in the build folder's tests/.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 families=("$@")
-[ $# -gt 0 ] || families=(csv field vtu settings records image ome roi)
+[ $# -gt 0 ] || families=(csv field vtu surface settings records image ome roi)
 inputs=${MBTFM_FUZZ_INPUTS:-1000000}
 export UBSAN_OPTIONS=print_stacktrace=1
 

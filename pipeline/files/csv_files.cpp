@@ -1,6 +1,9 @@
 #include <algorithm>
+#include <cmath>
 #include <cstdio>
+#include <limits>
 #include <map>
+#include <utility>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/results.h"
@@ -67,6 +70,69 @@ void write_fibres(const Path& fibres_file, const Path& points_file, const std::v
 }
 
 std::vector<Vec2> read_points(const Path& file) { return read(file, point_table()); }
+
+namespace {
+
+constexpr const char* kOffLattice = "points that lie on no lattice are read with --points";
+
+/// The lines of a lattice across one axis, evenly apart.
+struct Lines {
+  double first = 0, step = 1;
+  std::size_t n = 0;
+};
+
+Lines lines_of(const CsvTable& table, const std::string& column, const Path& file) {
+  std::vector<double> at;
+  for (int row = 0; row < table.n_rows(); ++row) at.push_back(table.number(row, column));
+  std::ranges::sort(at);
+  const double same = at.empty() ? 0 : 1e-6 * (at.back() - at.front());
+  at.erase(std::unique(at.begin(), at.end(), [&](double a, double b) { return b - a <= same; }), at.end());
+  if (at.size() < 4)
+    throw InputError(file.string(), "a lattice of at least 4 different " + column, std::to_string(at.size()),
+                     kOffLattice);
+  return {.first = at.front(), .step = (at.back() - at.front()) / static_cast<double>(at.size() - 1), .n = at.size()};
+}
+
+std::size_t line_of(const CsvTable& table, int row, const std::string& column, const Lines& lines) {
+  constexpr double kOff = 0.01;  // of a step: numbers of few digits
+  const double place = (table.number(row, column) - lines.first) / lines.step;
+  if (!(std::abs(place - std::round(place)) <= kOff))
+    table.fail(row, column, "a place of an even lattice", kOffLattice);
+  return static_cast<std::size_t>(std::lround(place));
+}
+
+/// Before memory is taken for them: points along a diagonal have as many vertices as the square of their number.
+void require_mostly_there(const CsvTable& table, const Lines& x, const Lines& y, const Path& file) {
+  constexpr std::size_t kSparsest = 10;
+  if (x.n * y.n <= kSparsest * static_cast<std::size_t>(table.n_rows())) return;
+  throw InputError(file.string(),
+                   "heights at a tenth at least of the " + std::to_string(x.n) + " x " + std::to_string(y.n) +
+                       " vertices of its lattice",
+                   std::to_string(table.n_rows()) + " rows", kOffLattice);
+}
+
+}  // namespace
+
+HeightMap read_heights(const Path& file) {
+  const CsvTable table(file);
+  table.require({"x_um", "y_um", "z_um"});
+  const Lines x = lines_of(table, "x_um", file), y = lines_of(table, "y_um", file);
+  require_mostly_there(table, x, y, file);
+  HeightMap map{.origin_um = {x.first, y.first},
+                .spacing_um = {x.step, y.step},
+                .n_x = static_cast<int>(x.n),
+                .n_y = static_cast<int>(y.n),
+                .z_um = {},
+                .sigma_um = {}};
+  map.z_um.assign(x.n * y.n, std::numeric_limits<double>::quiet_NaN());
+  std::vector<char> has_row(map.z_um.size(), 0);
+  for (int row = 0; row < table.n_rows(); ++row) {
+    const std::size_t at = line_of(table, row, "y_um", y) * x.n + line_of(table, row, "x_um", x);
+    if (std::exchange(has_row[at], 1) != 0) table.fail(row, "x_um", "one row for each place of the lattice");
+    if (const auto z = table.optional_number(row, "z_um")) map.z_um[at] = *z;
+  }
+  return map;
+}
 
 namespace {
 

@@ -10,6 +10,7 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/path.h"
 #include "pipeline/contract/results.h"
+#include "pipeline/contract/surface.h"
 #include "pipeline/files/named_array.h"
 
 namespace mbtfm::files {
@@ -41,6 +42,8 @@ std::string displacement_of_frame(int frame);
 
 /// Columns x_um, y_um.
 std::vector<Vec2> read_points(const Path& file);
+/// Columns x_um, y_um, z_um at places of an even lattice, in any order. A vertex without a row or a z has NaN.
+HeightMap read_heights(const Path& file);
 
 /// Columns fibre_id, tension_nN at least.
 std::vector<Tension> read_tensions(const Path& file);

@@ -53,13 +53,13 @@ Extent extent_of(const TriangleMesh& mesh) {
 }
 
 HeightMap lattice_over(const Extent& extent, double spacing_um) {
-  constexpr double kMost = 1e8;  // vertices: 0.8 GB
+  constexpr double kMost = 2e7;  // vertices: 0.6 GB while they are found
   const Vec2 size = extent.high_um - extent.low_um;
   // a size that is a multiple but for rounding gets no further vertex
   const auto n_along = [&](double length) { return std::max(4.0, std::ceil(length / spacing_um - 1e-9) + 1); };
   const double n_x = n_along(size.x), n_y = n_along(size.y);
   if (!(n_x * n_y <= kMost)) {
-    throw InvalidData(kMesh, "a spacing that makes at most a hundred million vertices",
+    throw InvalidData(kMesh, "a spacing that makes at most twenty million vertices",
                       brief(spacing_um) + " um over " + brief(size.x) + " x " + brief(size.y) + " um");
   }
   HeightMap map{.origin_um = extent.low_um,
@@ -106,6 +106,18 @@ bool is_closed(const TriangleMesh& mesh) {
                         brief(std::min(z_a, z_b)) + " and " + brief(std::max(z_a, z_b)) + " um");
 }
 
+/// A height field covers its extent once at most, twice where each face is there with its back; what covers it again
+/// and again would be looked at as often.
+void require_one_layer(const TriangleMesh& mesh, const Extent& extent) {
+  constexpr double kMost = 4;
+  double covered = 0;
+  for (const auto& triangle : mesh.triangles) covered += std::abs(plan_area(corners_of(mesh, triangle)));
+  const Vec2 size = extent.high_um - extent.low_um;
+  if (covered <= kMost * size.x * size.y) return;
+  throw InvalidData(kMesh, "a height field, one height over each place",
+                    "triangles that cover its extent " + brief(covered / (size.x * size.y)) + " times");
+}
+
 /// Where a line along z meets a triangle, or passes it within rounding.
 struct Hit {
   double z_um = 0;
@@ -132,11 +144,12 @@ class Sampler {
     }
     (area > 0 ? n_positive_ : n_negative_) += 1;
     const double slope = slope_of(t);
-    const auto [x_low, x_high] = std::minmax({t[0].x, t[1].x, t[2].x});
     const auto [y_low, y_high] = std::minmax({t[0].y, t[1].y, t[2].y});
-    const int i_end = last(x_high, map_.origin_um.x, map_.spacing_um.x, map_.n_x),
-              j_end = last(y_high, map_.origin_um.y, map_.spacing_um.y, map_.n_y);
+    const int j_end = last(y_high, map_.origin_um.y, map_.spacing_um.y, map_.n_y);
     for (int j = first(y_low, map_.origin_um.y, map_.spacing_um.y); j <= j_end; ++j) {
+      const auto [x_low, x_high] = across(t, map_.origin_um.y + j * map_.spacing_um.y);
+      if (x_low > x_high) continue;  // past it by rounding
+      const int i_end = last(x_high, map_.origin_um.x, map_.spacing_um.x, map_.n_x);
       for (int i = first(x_low, map_.origin_um.x, map_.spacing_um.x); i <= i_end; ++i) meet(t, slope, area, i, j);
     }
   }
@@ -158,6 +171,24 @@ class Sampler {
   }
   int last(double high, double origin, double spacing, int n) const {
     return std::min(n - 1, static_cast<int>(std::floor((high + reach_um_ - origin) / spacing)));
+  }
+
+  /// What a triangle spans along x within reach of a line y: of a sliver that lies askew little of its extent.
+  std::pair<double, double> across(const Corners& t, double y) const {
+    std::pair span(std::numeric_limits<double>::infinity(), -std::numeric_limits<double>::infinity());
+    for (int k = 0; k < 3; ++k) {
+      const bool rises = t[k].y <= t[(k + 1) % 3].y;
+      const Vec3 low = t[rises ? k : (k + 1) % 3], high = t[rises ? (k + 1) % 3 : k];
+      if (high.y < y - reach_um_ || low.y > y + reach_um_) continue;
+      const double slope = high.y > low.y ? (high.x - low.x) / (high.y - low.y) : 0;
+      const auto x_at = [&](double at) {
+        return at <= low.y ? low.x : at >= high.y ? high.x : low.x + slope * (at - low.y);
+      };
+      for (const double x : {x_at(y - reach_um_), x_at(y + reach_um_)})
+        span = {std::min(span.first, x), std::max(span.second, x)};
+      if (high.y == low.y) span = {std::min({span.first, low.x, high.x}), std::max({span.second, low.x, high.x})};
+    }
+    return span;
   }
 
   static double slope_of(const Corners& t) {
@@ -242,6 +273,7 @@ MeshSurface sample_mesh(const TriangleMesh& mesh, double spacing_um) {
   const Extent extent = extent_of(mesh);
   if (!(extent.high_um.x > extent.low_um.x && extent.high_um.y > extent.low_um.y))
     throw InvalidData(kMesh, "triangles that span an area, seen along z", "all above one line");
+  require_one_layer(mesh, extent);
   Sampler sampler(mesh, spacing_um);
   for (const auto& triangle : mesh.triangles) sampler.add(corners_of(mesh, triangle));
   return std::move(sampler).surface();

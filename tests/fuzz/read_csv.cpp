@@ -45,7 +45,9 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   const auto& tables = fuzz::cell_tables();
   const auto file = fuzz::put("input.csv", fuzz::text_of(bytes, n));
   fuzz::answer([&] { files::read_displacement(file); });
+  fuzz::answer([&] { files::read_displacement_in_space(file); });
   fuzz::answer([&] { files::read_points(file); });
+  fuzz::answer([&] { files::read_heights(file); });
   fuzz::answer([&] { files::read_tensions(file); });
   fuzz::answer([&] { files::read_adhesion_forces(file); });
   for (const std::string& name : tables) fuzz::answer([&] { files::read_cell(fuzz::folder() / ("damaged-" + name)); });

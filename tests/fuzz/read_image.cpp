@@ -87,5 +87,6 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* bytes, std::size_t n) 
   fuzz::answer([&] { images::read_image(file); });
   fuzz::answer([&] { images::read_image(file, {.channel = "2", .z = "1", .time = 1}); });
   fuzz::answer([&] { images::read_image(file, 1); });
+  fuzz::answer([&] { images::read_slices(file, {.may_lack_pixels = true}); });
   return 0;
 }

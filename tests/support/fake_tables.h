@@ -5,7 +5,9 @@
 #include <vector>
 
 #include "pipeline/contract/network.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
 
 namespace mbtfm::test {
 
@@ -89,7 +91,17 @@ inline std::vector<std::filesystem::path> write_tables(const std::filesystem::pa
       {{.adhesion_id = 1, .force_nN = {-2.9, 0.1}, .sigma_nN = 0.3, .connected = true, .moment_nN_um = 0.02},
        {.adhesion_id = 7, .force_nN = {2.9, -0.1}, .sigma_nN = {}, .connected = false, .moment_nN_um = {}}},
       small_cell().adhesions);
-  return {folder / "displacement.csv", folder / "tensions.csv", folder / "adhesion_forces.csv"};
+  files::write_displacement_in_space(
+      folder / "displacement_3d.csv",
+      {{{1, 2, 3.25}, {0.1, -0.2, 1.0 / 3}, 0.01, 0.03, ""}, {{4, 5, 6}, {}, 0, 0, "defocused"}});
+  files::CsvText heights({"x_um", "y_um", "z_um"});
+  for (int k = 0; k < 20; ++k) {
+    for (const double value : {1.5 * (k % 5), 2.0 * (k / 5), 0.25 * k - 1}) heights.add(value);
+    heights.end_row();
+  }
+  files::write_text(folder / "heights.csv", heights.str());
+  return {folder / "displacement.csv", folder / "tensions.csv", folder / "adhesion_forces.csv",
+          folder / "displacement_3d.csv", folder / "heights.csv"};
 }
 
 }  // namespace mbtfm::test

@@ -1,5 +1,7 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -273,6 +275,55 @@ TEST(Files, displacements_in_space_come_back_and_are_checked) {
   EXPECT_EQ(files::read_displacement_in_space(folder / "bare.csv").front().displacement_um.z, 0.5);
   files::write_text(folder / "flat.csv", "x_um,y_um,ux_um,uy_um\n1,2,0,0\n");
   EXPECT_THROW(files::read_displacement_in_space(folder / "flat.csv"), InputError);
+}
+
+TEST(Files, heights_of_a_lattice_come_in_any_order_and_have_holes) {
+  const TemporaryFolder folder;
+  std::string text = "z_um,y_um,x_um\n";
+  for (const int i : {2, 0, 3, 1})
+    for (const int j : {1, 3, 0, 2})
+      if (i != 3 || j != 2)
+        text += (i == 1 && j == 1 ? "" : std::to_string(10 * j + i)) + "," + std::to_string(2 * j) + "," +
+                std::to_string(i) + "\n";
+  files::write_text(folder / "lattice.csv", text);
+  const HeightMap map = files::read_heights(folder / "lattice.csv");
+  EXPECT_EQ(map.spacing_um, (Vec2{1, 2}));
+  for (std::size_t k = 0; k < 16; ++k) {
+    const std::size_t i = k % 4, j = k / 4;
+    const bool is_hole = (i == 1 && j == 1) || (i == 3 && j == 2);
+    if (is_hole) {
+      EXPECT_TRUE(std::isnan(map.z_um[k]));
+    } else {
+      EXPECT_EQ(map.z_um[k], static_cast<double>(10 * j + i));
+    }
+  }
+}
+
+/// Of a lattice from its lines: n rows may claim n x n vertices.
+TEST(Files, heights_along_a_diagonal_are_refused_before_memory_is_taken) {
+  const TemporaryFolder folder;
+  std::string text = "x_um,y_um,z_um\n";
+  for (int k = 0; k < 100'000; ++k) text += std::to_string(k) + "," + std::to_string(k) + ",1\n";
+  files::write_text(folder / "diagonal.csv", text);
+  try {
+    files::read_heights(folder / "diagonal.csv");
+    FAIL() << "80 GB of heights";
+  } catch (const InputError& error) {
+    EXPECT_NE(error.expected.find("100000 x 100000 vertices"), std::string::npos) << error.what();
+  }
+}
+
+TEST(Files, two_heights_for_one_place_are_refused_by_line) {
+  const TemporaryFolder folder;
+  std::string text = "x_um,y_um,z_um\n";
+  for (int k = 0; k < 16; ++k) text += std::to_string(k % 4) + "," + std::to_string(k / 4) + ",1\n";
+  files::write_text(folder / "twice.csv", text + "2,1,5\n");
+  try {
+    files::read_heights(folder / "twice.csv");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(error.where.find(":18"), std::string::npos) << error.what();
+  }
 }
 
 /// What a later stage computes with comes back as it was; a result has the digits that mean something.

@@ -3,22 +3,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <cstring>
 #include <functional>
 #include <numbers>
 
 #include "pipeline/contract/errors.h"
-#include "pipeline/contract/numbers.h"
 #include "pipeline/files/text.h"
 #include "pipeline/files/triangle_mesh.h"
 #include "substrate/surface/mesh.h"
+#include "tests/support/mesh_files.h"
 #include "tests/support/temporary_folder.h"
 
 namespace mbtfm::surface {
 namespace {
 
-using test::TemporaryFolder;
+using namespace test;
 
 constexpr double kSide = 2;  // um, of the mesh's squares
 constexpr int kSquares = 12;
@@ -57,105 +55,6 @@ Vec2 vertex(const HeightMap& map, std::size_t k) {
   const auto n_x = static_cast<std::size_t>(map.n_x);
   return map.origin_um +
          Vec2{static_cast<double>(k % n_x) * map.spacing_um.x, static_cast<double>(k / n_x) * map.spacing_um.y};
-}
-
-template <class T>
-void put(std::string& bytes, T value) {
-  char own[sizeof(T)];
-  std::memcpy(own, &value, sizeof(T));
-  bytes.append(own, sizeof(T));
-}
-template <class T>
-void put_swapped(std::string& bytes, T value) {
-  std::string own;
-  put(own, value);
-  bytes.append(own.rbegin(), own.rend());
-}
-
-std::string text_of(Vec3 p) { return shortest(p.x) + " " + shortest(p.y) + " " + shortest(p.z); }
-
-std::string stl_text(const TriangleMesh& mesh) {
-  std::string text = "solid gel\n";
-  for (const auto& t : mesh.triangles) {
-    text += "  facet normal 0 0 1\n    outer loop\n";
-    for (const int c : t) text += "      vertex " + text_of(mesh.points_um[c]) + "\n";
-    text += "    endloop\n  endfacet\n";
-  }
-  return text + "endsolid gel\n";
-}
-
-std::string stl_binary(const TriangleMesh& mesh) {
-  std::string bytes = "solid, says the header, though this is binary";
-  bytes.resize(80);
-  put(bytes, static_cast<std::uint32_t>(mesh.triangles.size()));
-  for (const auto& t : mesh.triangles) {
-    for (int k = 0; k < 3; ++k) put(bytes, 0.0F);
-    for (const int c : t) {
-      const Vec3 p = mesh.points_um[c];
-      for (const double x : {p.x, p.y, p.z}) put(bytes, static_cast<float>(x));
-    }
-    put(bytes, std::uint16_t{0});
-  }
-  return bytes;
-}
-
-std::string ply_head(const std::string& format, std::size_t n_points, std::size_t n_faces) {
-  return "ply\nformat " + format + " 1.0\ncomment a gel\nelement vertex " + std::to_string(n_points) +
-         "\nproperty double x\nproperty double y\nproperty double z\nproperty uchar red\nelement face " +
-         std::to_string(n_faces) + "\nproperty list uchar int vertex_indices\nend_header\n";
-}
-
-std::string ply_text(const TriangleMesh& mesh) {
-  std::string text = ply_head("ascii", mesh.points_um.size(), mesh.triangles.size());
-  for (const Vec3 p : mesh.points_um) text += text_of(p) + " 255\n";
-  for (const auto& [a, b, c] : mesh.triangles)
-    text += "3 " + std::to_string(a) + " " + std::to_string(b) + " " + std::to_string(c) + "\n";
-  return text;
-}
-
-enum class Order { little_endian, big_endian };
-
-std::string ply_binary(const TriangleMesh& mesh, Order order) {
-  const bool is_big = order == Order::big_endian;
-  std::string bytes =
-      ply_head(is_big ? "binary_big_endian" : "binary_little_endian", mesh.points_um.size(), mesh.triangles.size());
-  const auto add = [&](auto value) { is_big ? put_swapped(bytes, value) : put(bytes, value); };
-  for (const Vec3 p : mesh.points_um) {
-    for (const double x : {p.x, p.y, p.z}) add(x);
-    add(std::uint8_t{255});
-  }
-  for (const auto& t : mesh.triangles) {
-    add(std::uint8_t{3});
-    for (const std::int32_t c : t) add(c);
-  }
-  return bytes;
-}
-
-/// Every other corner counted back from the last point.
-std::string obj_text(const TriangleMesh& mesh) {
-  std::string text = "# a gel\nmtllib none.mtl\no gel\n";
-  for (const Vec3 p : mesh.points_um) text += "v " + text_of(p) + "\n";
-  text += "vn 0 0 1\n";
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const int back = b - static_cast<int>(mesh.points_um.size());
-    text += "f " + std::to_string(a + 1) + "//1 " + std::to_string(back) + "//1 " + std::to_string(c + 1) + "//1\n";
-  }
-  return text;
-}
-
-std::string vtp_text(const TriangleMesh& mesh) {
-  std::string points, corners, ends;
-  for (const Vec3 p : mesh.points_um) points += text_of(p) + "\n";
-  for (std::size_t k = 0; k < mesh.triangles.size(); ++k) {
-    for (const int c : mesh.triangles[k]) corners += std::to_string(c) + " ";
-    ends += std::to_string(3 * (k + 1)) + " ";
-  }
-  return "<VTKFile type=\"PolyData\" version=\"0.1\"><PolyData><Piece NumberOfPoints=\"" +
-         std::to_string(mesh.points_um.size()) + "\" NumberOfPolys=\"" + std::to_string(mesh.triangles.size()) +
-         "\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">" + points +
-         "</DataArray></Points><Polys><DataArray type=\"Int64\" Name=\"connectivity\" format=\"ascii\">" + corners +
-         "</DataArray><DataArray type=\"Int64\" Name=\"offsets\" format=\"ascii\">" + ends +
-         "</DataArray></Polys></Piece></PolyData></VTKFile>\n";
 }
 
 TriangleMesh read_back(const TemporaryFolder& folder, const std::string& name, const std::string& bytes,
@@ -314,6 +213,28 @@ TEST(SurfaceMesh, a_closed_mesh_is_refused_with_the_remedy) {
   EXPECT_NE(refusal(ball).find("cut the mesh"), std::string::npos) << refusal(ball);
   ball.triangles.pop_back();
   EXPECT_NE(refusal(ball).find("an overhang at"), std::string::npos) << refusal(ball);
+}
+
+/// The work goes with what the triangles cover.
+TEST(SurfaceMesh, triangles_that_cover_an_area_again_and_again_are_refused_and_twice_is_read) {
+  TriangleMesh mesh = height_field(wavy);
+  mesh.triangles.insert(mesh.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+  EXPECT_EQ(refusal(mesh), "sampled");
+  for (int k = 0; k < 2; ++k) mesh.triangles.insert(mesh.triangles.end(), mesh.triangles.begin(), mesh.triangles.end());
+  EXPECT_NE(refusal(mesh).find("cover its extent 8 times"), std::string::npos) << refusal(mesh);
+}
+
+/// Triangles from one corner to points along the two opposite sides, some of them slivers askew to the lattice.
+TEST(SurfaceMesh, slivers_askew_give_the_plane_that_they_lie_in) {
+  const auto height = [](Vec2 p) { return 0.3 * p.x - 0.2 * p.y + 1; };
+  TriangleMesh mesh;
+  const auto add = [&](Vec2 p) { mesh.points_um.push_back({p.x, p.y, height(p)}); };
+  add({0, 0});
+  constexpr int kPoints = 200;
+  for (int k = 0; k <= kPoints; ++k) add(k <= kPoints / 2 ? Vec2{10, 0.1 * k} : Vec2{20 - 0.1 * k, 10});
+  for (int k = 1; k <= kPoints; ++k) mesh.triangles.push_back({0, k, k + 1});
+  const HeightMap map = sample_mesh(mesh, 0.13).map;
+  for (std::size_t k = 0; k < map.z_um.size(); ++k) EXPECT_NEAR(map.z_um[k], height(vertex(map, k)), kRounding) << k;
 }
 
 TEST(SurfaceMesh, what_spans_no_area_is_refused) {
