@@ -80,6 +80,11 @@ void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_
   throw InputError(file.string(), kTooLarge, std::to_string(n_bytes) + " of them" + in_bytes_of(file), kDamaged);
 }
 
+void require_packed_bytes(const std::filesystem::path& file, std::uint64_t n_bytes, std::uint64_t most_by_byte) {
+  if (n_bytes / most_by_byte <= std::filesystem::file_size(file)) return;
+  throw InputError(file.string(), kTooLarge, std::to_string(n_bytes) + " of them" + in_bytes_of(file), kDamaged);
+}
+
 void declare(stage::ParameterList& list, PlaneChoice& choice, const std::string& prefix, const std::string& image) {
   choice.prefix = prefix;
   list.add(prefix + "_channel", choice.channel,

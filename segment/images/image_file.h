@@ -35,6 +35,12 @@ void require_plausible_size(const std::filesystem::path& file, std::uint64_t wid
 /// @throws InputError
 void require_plausible_bytes(const std::filesystem::path& file, std::uint64_t n_bytes);
 
+/// The same where it is known what a byte of the file can become at most.
+/// @param most_by_byte  decoded bytes
+/// @throws InputError
+void require_packed_bytes(const std::filesystem::path& file, std::uint64_t n_bytes, std::uint64_t most_by_byte);
+inline constexpr std::uint64_t kMostByDeflate = 1032;  // 258 bytes of two bits
+
 /// The image's calibration as its TIFF tags tell it.
 struct TiffCalibration {
   std::string description;                      ///< ImageDescription; empty: none

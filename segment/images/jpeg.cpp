@@ -141,6 +141,8 @@ Image read_jpeg(const std::filesystem::path& file, const PlaneChoice& choice) {
   require_plausible_size(file, r.jpeg.image_width, r.jpeg.image_height);
   const std::size_t n_bytes = static_cast<std::size_t>(r.jpeg.image_width) * r.jpeg.image_height * n_channels;
   require_plausible_bytes(file, n_bytes);
+  constexpr std::uint64_t kMostByJpeg = 3 * 64 * 8;  // a bit at least for 8 x 8 pixels of three colours
+  require_packed_bytes(file, n_bytes, kMostByJpeg);
   r.bytes.resize(n_bytes);
   const bool is_mean = is_rgb && choice.channel.empty();
   const std::vector<std::string> names = is_rgb ? kRgbNames : std::vector<std::string>{""};

@@ -122,6 +122,7 @@ Image read_png(const std::filesystem::path& file, const PlaneChoice& choice) {
   require_plausible_size(file, r.width, r.height);
   const std::size_t row_bytes = static_cast<std::size_t>(r.width) * r.channels * (r.bits == 16 ? 2 : 1);
   require_plausible_bytes(file, row_bytes * r.height);
+  require_packed_bytes(file, row_bytes * r.height, kMostByDeflate);
   r.bytes.resize(row_bytes * r.height);
   for (std::size_t j = 0; j < r.height; ++j) r.rows.push_back(r.bytes.data() + j * row_bytes);
   const bool is_rgb = r.channels >= 3;

@@ -42,7 +42,8 @@ class TiffReader {
     // channels are pages, or else the samples of each pixel
     PlaneChoice of_stack = choice, of_page = choice;
     (stack.n_channels > 1 ? of_page : of_stack).channel.clear();
-    const std::vector<int> pages = chosen_pages(stack, of_stack, file_.string());
+    std::vector<int> pages = chosen_pages(stack, of_stack, file_.string());
+    std::ranges::sort(pages);  // the brightest of slices is the same in any order
     Image image = read_page(pages.front(), of_page);
     require_plausible_bytes(file_, pages.size() * image.pixels.size() * std::max(1, layout_.bits / 8));
     for (std::size_t i = 1; i < pages.size(); ++i) project(image, read_page(pages[i], of_page));
@@ -78,10 +79,18 @@ class TiffReader {
     }
   }
 
+  /// Counted once: all pages are gone through for it.
   int n_pages() {
-    const auto n = static_cast<int>(TIFFNumberOfDirectories(tiff_.get()));
+    if (!n_pages_) n_pages_ = static_cast<int>(TIFFNumberOfDirectories(tiff_.get()));
     messages_.first_error.clear();  // of a damaged chain of pages: it counts as far as it goes
-    return n;
+    return *n_pages_;
+  }
+
+  /// From one to the next without those before.
+  bool go_to(int page) {
+    if (page > 0 && static_cast<int>(TIFFCurrentDirectory(tiff_.get())) == page - 1)
+      return TIFFReadDirectory(tiff_.get()) == 1;
+    return TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(page)) == 1;
   }
 
   void project(Image& image, const Image& slice) const {
@@ -92,7 +101,7 @@ class TiffReader {
 
   Image read_page(int page, const PlaneChoice& choice) {
     const bool is_raw = page > 0 && n_imagej_images(of_first_page_.description) > 1 && n_pages() == 1;
-    if (!TIFFSetDirectory(tiff_.get(), static_cast<tdir_t>(is_raw ? 0 : page))) {
+    if (!go_to(is_raw ? 0 : page)) {
       messages_.first_error = std::to_string(n_pages()) + " pages";
       fail("page " + std::to_string(page + 1));
     }
@@ -127,14 +136,33 @@ class TiffReader {
     return image;
   }
 
+  /// Decoded bytes that a byte of the file can become, at most.
+  static std::uint64_t most_by_byte(std::uint16_t compression) {
+    switch (compression) {
+      case COMPRESSION_NONE:
+        return 1;
+      case COMPRESSION_PACKBITS:
+        return 64;  // 128 bytes of two
+      case COMPRESSION_LZW:
+        return 4096;  // entries of its table, of more than a byte each
+      case COMPRESSION_DEFLATE:
+      case COMPRESSION_ADOBE_DEFLATE:
+        return kMostByDeflate;
+      default:
+        return 1u << 16;
+    }
+  }
+
   Image empty_image() const {
+    const auto compression = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
+    const std::uint64_t n_samples = static_cast<std::uint64_t>(layout_.width) * layout_.height * layout_.samples;
+    require_packed_bytes(file_, n_samples * layout_.bits / 8, most_by_byte(compression));
     Image image;
     image.width = static_cast<int>(layout_.width);
     image.height = static_cast<int>(layout_.height);
     image.pixel_size_um = calibration_;
     image.full_scale = full_scale();
-    const auto packing = tag<std::uint16_t>(TIFFTAG_COMPRESSION, COMPRESSION_NONE);
-    image.is_lossy = packing == COMPRESSION_JPEG || packing == COMPRESSION_OJPEG;
+    image.is_lossy = compression == COMPRESSION_JPEG || compression == COMPRESSION_OJPEG;
     image.pixels.assign(static_cast<std::size_t>(layout_.width) * layout_.height, 0.0f);
     return image;
   }
@@ -386,6 +414,7 @@ class TiffReader {
   TiffCalibration of_first_page_;
   std::optional<double> calibration_;
   Layout layout_;
+  std::optional<int> n_pages_;
   bool may_lack_pixels_ = false;
 };
 
