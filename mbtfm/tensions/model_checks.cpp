@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/triangle.h"
 
 namespace mbtfm::tensions {
 
@@ -151,45 +152,48 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
 }
 
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions, int threads) {
+  const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
+  if (n_pairs < 1) return {};
+  const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
   const MeshFit& mesh = fit.meshes.front();
   const ReducedData data = fit.model_error ? whitened(fit.data.reduced, *fit.model_error, threads) : fit.data.reduced;
   const Eigen::MatrixXd& C = *data.compliance;
-  const Eigen::VectorXd residual = data.target - C * fit.forces_nN;
+  const Eigen::VectorXd residual = data.target - displace(data, fit.forces_nN);
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.
-  const Eigen::MatrixXd CJ = numerics::product(C, mesh.force_derivatives, threads);
+  const Eigen::MatrixXd CJ = displace(data, mesh.force_derivatives, threads);
   const Eigen::MatrixXd cross_terms = numerics::transposed_product(CJ, C, threads);
   Eigen::MatrixXd H = CJ.transpose() * CJ;
   H.diagonal() += 1e-9 * H.diagonal() + Eigen::VectorXd::Constant(H.rows(), 1e-300);
   const Eigen::LLT<Eigen::MatrixXd> solver(H);
-  Eigen::MatrixXd K = Eigen::MatrixXd::Zero(C.cols(), C.cols());
-  numerics::add_upper_gram(C, K, threads);
-  numerics::add_upper_gram(solver.matrixL().solve(cross_terms), K, threads, -1);
-  numerics::mirror_upper(K);
+  const Eigen::MatrixXd explained = solver.matrixL().solve(cross_terms);
   const Eigen::VectorXd q =
       C.transpose() * residual - cross_terms.transpose() * solver.solve(CJ.transpose() * residual);
 
-  const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
-  if (n_pairs < 1) return {};
-  const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
   std::vector<MissingFibre> found;
-  for (std::size_t a = 0; a < adhesions.size(); ++a) {
-    for (std::size_t b = a + 1; b < adhesions.size(); ++b) {
-      const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
-      const Vec2 unit = (1 / norm(chord)) * chord;
-      const Eigen::Vector2d e(unit.x, unit.y);  // the fibre pulls a towards b, and b towards a
-      const auto i = 2 * static_cast<Eigen::Index>(a), j = 2 * static_cast<Eigen::Index>(b);
-      const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
-      const double curvature =
-          e.dot((K.block<2, 2>(i, i) + K.block<2, 2>(j, j) - K.block<2, 2>(i, j) - K.block<2, 2>(j, i)) * e);
-      if (slope <= 0 || curvature <= 0) continue;
-      const double gain = slope * slope / curvature / fit.variance;
-      if (gain < limit * limit) continue;
-      found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
-                       .end_adhesion_id = adhesions[b].adhesion_id,
-                       .tension_nN = slope / curvature,
-                       .chi_squared_gain = gain});
+  std::vector<Eigen::Matrix2d> own(adhesions.size());  // blocks of K = Cᵀ P C on its diagonal
+  numerics::for_each_gram_block(C, threads, [&](Eigen::Index first, const Eigen::MatrixXd& gram) {
+    const Eigen::MatrixXd K = gram - numerics::transposed_product(explained.leftCols(gram.rows()),
+                                                                  explained.middleCols(first, gram.cols()), threads);
+    for (auto b = static_cast<std::size_t>(first / 2); 2 * static_cast<Eigen::Index>(b) < gram.rows(); ++b) {
+      const auto j = 2 * static_cast<Eigen::Index>(b);
+      own[b] = K.block<2, 2>(j, j - first).selfadjointView<Eigen::Upper>();
+      for (std::size_t a = 0; a < b; ++a) {
+        const Vec2 chord = adhesions[b].position_um - adhesions[a].position_um;
+        const Vec2 unit = (1 / norm(chord)) * chord;
+        const Eigen::Vector2d e(unit.x, unit.y);  // the fibre pulls a towards b, and b towards a
+        const auto i = 2 * static_cast<Eigen::Index>(a);
+        const double slope = e.dot(q.segment<2>(i) - q.segment<2>(j));
+        const double curvature = e.dot((own[a] + own[b]) * e) - 2 * e.dot(K.block<2, 2>(i, j - first) * e);
+        if (slope <= 0 || curvature <= 0) continue;
+        const double gain = slope * slope / curvature / fit.variance;
+        if (gain < limit * limit) continue;
+        found.push_back({.start_adhesion_id = adhesions[a].adhesion_id,
+                         .end_adhesion_id = adhesions[b].adhesion_id,
+                         .tension_nN = slope / curvature,
+                         .chi_squared_gain = gain});
+      }
     }
-  }
+  });
   std::stable_sort(found.begin(), found.end(), [](const MissingFibre& x, const MissingFibre& y) {
     return x.chi_squared_gain > y.chi_squared_gain;
   });

@@ -6,6 +6,7 @@
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/triangle.h"
 
 namespace mbtfm::tensions {
 
@@ -69,8 +70,12 @@ ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData&
     left_of_squares += left_of(displace(data, mesh.forces_nN - mean.forces_nN));
   }
   const double left = left_of(data.target - C * mean.forces_nN);
-  const Eigen::MatrixXd by_load = C * loads.cwiseSqrt().asDiagonal();
-  const double per_phi = left_of(by_load);
+  double per_phi = 0;
+  constexpr Eigen::Index kAtOnce = 512;  // columns: a whole is as large as C
+  for (Eigen::Index first = 0; first < C.cols(); first += kAtOnce) {
+    const Eigen::Index count = std::min(kAtOnce, C.cols() - first);
+    per_phi += left_of(C.middleCols(first, count) * loads.segment(first, count).cwiseSqrt().asDiagonal());
+  }
   const double beyond_noise = left - noise_variance * static_cast<double>(data.n_felt - qr.rank());
   const double measured = per_phi > 0 ? std::max(0.0, beyond_noise / per_phi) : 0;
   // From few adhesions the misfit tells next to nothing of single forces: of twenty numbers a third, of one nothing.
@@ -109,18 +114,17 @@ RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const Mode
 }
 
 ReducedData whitened(const ReducedData& data, const ModelError& error, int threads) {
-  Eigen::MatrixXd C = *data.compliance * (error.force_variance_nN2 / error.noise_variance).cwiseSqrt().asDiagonal();
-  Eigen::MatrixXd relative = Eigen::MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
-  numerics::add_upper_outer(C, relative, threads);
-  C = *data.compliance;
-  const bool is_definite = numerics::upper_cholesky(relative, threads);
+  MBTFM_ASSERT(data.is_upper);
+  const Eigen::MatrixXd& C = *data.compliance;
+  Eigen::MatrixXd root = Eigen::MatrixXd::Identity(C.rows(), C.rows()), target = data.target;
+  numerics::add_triangle_outer(C, error.force_variance_nN2 / error.noise_variance, root, threads);
+  const bool is_definite = numerics::upper_root(root, threads);
   MBTFM_ASSERT(is_definite);
-  numerics::solve_upper_transposed(relative, C, threads);
-  numerics::solve_upper_transposed(relative, target);
   ReducedData white = data;
-  white.is_upper = false;
-  white.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(C));
+  numerics::solve_upper(root, target);
   white.target = target;
+  numerics::divide_into(C, root, threads);
+  white.compliance = std::make_shared<const Eigen::MatrixXd>(std::move(root));
   return white;
 }
 

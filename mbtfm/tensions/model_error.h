@@ -54,7 +54,8 @@ RoughnessOfTotal roughness_of_total(const Eigen::VectorXd& forces_nN, const Mode
 /// @param beads_variance  s²; a floor of (a thousandth of what beads move on average)² is put under it
 ModelError model_error(const std::vector<MeshForces>& meshes, const ReducedData& data, double beads_variance);
 
-/// The data in coordinates in which both errors together have the variance s².
+/// The data in coordinates in which both errors together have the variance s². @param data  C an upper triangle, as is
+/// that of the result
 ReducedData whitened(const ReducedData& data, const ModelError& error, int threads = 1);
 
 }  // namespace mbtfm::tensions

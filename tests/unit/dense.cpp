@@ -5,10 +5,13 @@
 
 #include <Eigen/Cholesky>
 
+#include "pipeline/numerics/triangle.h"
+
 namespace mbtfm {
 namespace {
 
 using Eigen::MatrixXd;
+using Eigen::VectorXd;
 
 // Rounding of sums of some hundred products of numbers up to 1.
 constexpr double kRounding = 1e-12;
@@ -91,6 +94,36 @@ TEST_P(Dense, a_downdated_factor_is_that_of_the_difference) {
   EXPECT_LE((factor - A).norm(), 1e-12 * n * A.norm());
   if (n == 0) return;
   EXPECT_FALSE(numerics::downdate_upper(A, 2 * A.topRows(1)));
+}
+
+TEST_P(Dense, triangles_give_what_full_matrices_give) {
+  const int n = GetParam();
+  const MatrixXd U = numbers(n, n, 12).triangularView<Eigen::Upper>();
+  const VectorXd weight = numbers(n, 1, 13).cwiseAbs2();
+  const MatrixXd wanted = MatrixXd::Identity(n, n) + U.lazyProduct(weight.asDiagonal() * U.transpose());
+  MatrixXd R = MatrixXd::Identity(n, n), of_one_thread = R;
+  numerics::add_triangle_outer(U, weight, R, 2);
+  numerics::add_triangle_outer(U, weight, of_one_thread);
+  ASSERT_TRUE(numerics::upper_root(R, 2) && numerics::upper_root(of_one_thread));
+  const MatrixXd root = R.triangularView<Eigen::Upper>();
+  EXPECT_LE((root.lazyProduct(root.transpose()) - wanted).norm(), kRounding * (1 + n) * wanted.norm());
+  numerics::divide_into(U, R, 2);
+  numerics::divide_into(U, of_one_thread);
+  EXPECT_TRUE(R == of_one_thread) << "the bits of any number of threads";
+  EXPECT_TRUE(R.isUpperTriangular(0));
+  // backward: the entries of the root and of the quotient are at most those of the triangle
+  EXPECT_LE((root.lazyProduct(R) - U).norm(), kRounding * (1 + n) * (root.norm() * R.norm() + 1));
+  const MatrixXd gram = U.transpose().lazyProduct(U);
+  Eigen::Index next = 0;
+  numerics::for_each_gram_block(U, 2, [&](Eigen::Index first, const MatrixXd& block) {
+    ASSERT_EQ(first, next);
+    ASSERT_EQ(block.rows(), first + block.cols());
+    next += block.cols();
+    for (Eigen::Index j = 0; j < block.cols(); ++j)
+      EXPECT_LE((block.col(j) - gram.col(first + j).head(block.rows())).head(first + j + 1).norm(),
+                kRounding * (1 + n) * (1 + gram.norm()));
+  });
+  EXPECT_EQ(next, n);
 }
 
 INSTANTIATE_TEST_SUITE_P(Sizes, Dense, testing::Values(0, 1, 2, 127, 128, 129, 300, 700));
