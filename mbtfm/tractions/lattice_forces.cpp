@@ -66,15 +66,10 @@ Known known_from(const Normal& normal, double variance) {
 
 /// The logarithm of how likely the data are without forces, as (14), for a known variance; up to a constant.
 std::vector<double> log_likelihoods_of(const LambdaScan& scan) {
-  std::vector<double> values;
-  double log_determinant = 0;
-  for (std::size_t i = 0; i < scan.points.size(); ++i) {
+  std::vector<double> values = log_determinants_of(scan.points);
+  for (std::size_t i = 0; i < values.size(); ++i) {
     const ScanPoint& p = scan.points[i];
-    if (i > 0) {
-      const ScanPoint& before = scan.points[i - 1];
-      log_determinant += (before.degrees + p.degrees) * std::log(before.lambda / p.lambda);
-    }
-    values.push_back(-0.5 * (p.misfit + p.lambda * p.lambda * p.norm) / scan.variance - 0.5 * log_determinant);
+    values[i] = -0.5 * (p.misfit + p.lambda * p.lambda * p.norm) / scan.variance - 0.5 * values[i];
   }
   return values;
 }

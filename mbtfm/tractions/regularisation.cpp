@@ -69,6 +69,16 @@ double robust_variance(std::vector<double> residuals, double degrees, double deg
   return deviation * deviation * n / std::max(n - 2 * degrees + degrees_of_square, 1e-6 * n);
 }
 
+std::vector<double> log_determinants_of(const std::vector<ScanPoint>& points) {
+  std::vector<double> values;
+  double sum = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (i > 0) sum += (points[i - 1].degrees + points[i].degrees) * std::log(points[i - 1].lambda / points[i].lambda);
+    values.push_back(sum);
+  }
+  return values;
+}
+
 LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
                  std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at) {
   MBTFM_ASSERT(points.size() >= 5);
@@ -105,16 +115,12 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
       n_last - 2);
   if (curvature_at(corner_at) > kLeastCurvature) scan.by_l_curve = lambda_at(corner_at);
 
-  // (14) The determinant from its derivative: d log det(1 + G Gᵀ / lambda²) / d log lambda² = −degrees.
-  double log_determinant = 0;
+  // (14)
+  const std::vector<double> log_determinants = log_determinants_of(scan.points);
   for (std::size_t i = 0; i < scan.points.size(); ++i) {
     const ScanPoint& p = scan.points[i];
-    if (i > 0) {
-      const ScanPoint& before = scan.points[i - 1];
-      log_determinant += (before.degrees + p.degrees) * std::log(before.lambda / p.lambda);
-    }
     const double energy = p.misfit + p.lambda * p.lambda * p.norm;
-    scan.evidence.push_back(-0.5 * n_data * log_of(energy) - 0.5 * log_determinant);
+    scan.evidence.push_back(-0.5 * n_data * log_of(energy) - 0.5 * log_determinants[i]);
   }
   const double highest = *std::max_element(scan.evidence.begin(), scan.evidence.end());
   for (double& e : scan.evidence) e -= highest;

@@ -44,6 +44,9 @@ constexpr auto words(LambdaCriterion) { return std::array{"risk", "gcv", "l-curv
 LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removable,
                  std::optional<double> stated_variance, const std::function<double(double lambda)>& variance_left_at);
 
+/// By point, log det(1 + G Gᵀ / lambda²) but for a constant: d log det / d log lambda² = −degrees.
+std::vector<double> log_determinants_of(const std::vector<ScanPoint>& points);
+
 /// The data's variance from residuals: their median magnitude, which the few that the model cannot follow do not move,
 /// over what is left of Gaussian noise where the tractions have followed it, tr (1 − H)² of n.
 double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square);
