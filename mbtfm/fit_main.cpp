@@ -20,7 +20,7 @@ StageReport run(const Parameters& parameters, stage::StageContext& context) {
   context.progress(0, "reading");
   const Inputs inputs = read_inputs(context, parameters);
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
-  const FittedCell cell = fit_cell(inputs, parameters, {.threads = context.threads, .progress = context.progress});
+  const FittedCell cell = fit_cell(inputs, parameters, {context.threads, context.progress});
   expect_plausible(context, cell.found, inputs.cell.adhesions);
   write_results(context, cell, inputs.beads);
   context.progress(1, "done");

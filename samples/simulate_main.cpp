@@ -30,10 +30,11 @@ void refuse_given_segmentation(const std::filesystem::path& cell) {
 
 StageReport run(const drawing::ScenarioParameters& parameters, stage::StageContext& context) {
   if (parameters.images) refuse_given_segmentation(context.outputs_.at("out"));
-  const experiment::Experiment experiment = experiment::simulate(parameters, context.threads, context.progress);
+  const Work work(context.threads, context.progress);
+  const experiment::Experiment experiment = experiment::simulate(parameters, work);
   const auto file = [&](const std::string& name) { return context.output("out", name); };
   experiment::write_cell_folder(experiment, parameters, file);
-  if (parameters.images) experiment::write_images(experiment, parameters, file, context.threads, context.progress);
+  if (parameters.images) experiment::write_images(experiment, parameters, file, work);
   StageReport report;
   report.figures = {{"n_adhesions", static_cast<std::int64_t>(experiment.cell.adhesions.size())},
                     {"n_fibres", static_cast<std::int64_t>(experiment.cell.fibres.size())},

@@ -19,7 +19,7 @@ EnsembleFit fit_again(const FittedCell& c, const std::vector<cables::CableNetwor
   FitParameters parameters = c.parameters.fit;
   parameters.loss = loss;
   parameters.bootstrap = 0;
-  return fit_ensemble(networks, data, adhesion_ids_of(c.seen), parameters, threads, {});
+  return fit_ensemble(networks, data, adhesion_ids_of(c.seen), parameters, threads);
 }
 
 Change change_with_data(const FittedCell& c, const Effect& e, LinearData data, int threads) {

@@ -19,8 +19,7 @@ EnsembleFit fit_networks(const ReadyCell& cell, LinearData data, const FitParame
       p.substrate == TrialDisplacement::per_evaluation
           ? solved_misfit(*cell.gel, points_of(cell.scene.beads), ellipses_of(cell.scene.cell), data)
           : SolvedMisfit{};
-  return fit_ensemble(cell.networks, std::move(data), adhesion_ids_of(cell.scene.cell), p, work.threads, work.progress,
-                      misfit, &cell.start);
+  return fit_ensemble(cell.networks, std::move(data), adhesion_ids_of(cell.scene.cell), p, work, misfit, &cell.start);
 }
 
 struct ReadyAndFitted {
@@ -44,7 +43,7 @@ EnsembleFit on_strained_gel(ReadyCell& ready, EnsembleFit fit, const Inputs& inp
     fit = fit_on_strained_gel(
         {on, ready.scene.beads, ready.decisions.under_load.is_on}, fit,
         [&](LinearData data, const Trial& start) {
-          return fit_ensemble(ready.networks, std::move(data), adhesion_ids_of(on.cell), p.fit, work.threads, {}, {},
+          return fit_ensemble(ready.networks, std::move(data), adhesion_ids_of(on.cell), p.fit, work.threads, {},
                               &start);
         },
         work);
@@ -104,13 +103,13 @@ EnsembleFit fit_of_second(Cell second, const ReadyCell& first, const Parameters&
   const std::vector<cables::CableNetwork> networks =
       of_cables(span_ensemble(second, p, threads), first.networks.front().parameters());
   const auto fitted = [&](LinearData data, const Trial* start) {
-    return fit_ensemble(networks, std::move(data), adhesion_ids_of(second), p.fit, threads, {}, {}, start);
+    return fit_ensemble(networks, std::move(data), adhesion_ids_of(second), p.fit, threads, {}, start);
   };
   EnsembleFit fit = fitted(data_of(on, first.scene.beads), nullptr);
   if (!first.decisions.strain.is_on) return fit;
   return fit_on_strained_gel(
       {on, first.scene.beads, first.decisions.under_load.is_on}, std::move(fit),
-      [&](LinearData data, const Trial& start) { return fitted(std::move(data), &start); }, Work{.threads = threads});
+      [&](LinearData data, const Trial& start) { return fitted(std::move(data), &start); }, threads);
 }
 
 Found found_by(const ReadyCell& cell, const EnsembleFit& fit, const std::optional<Cell>& second, const Parameters& p,
@@ -146,8 +145,8 @@ std::vector<FrameFit> fit_frames(const ReadyCell& cell, const EnsembleFit& first
   };
   return fit_series(series.frames, cell.networks, series.response,
                     beads_in_region(beads_of(series.frames), cell.scene.cell, p.fit), adhesion_ids_of(cell.scene.cell),
-                    p.fit, allows_common_motion(p.effects), cell.decisions.time_coupling.is_on, work.threads,
-                    work.progress, next_start(first), inputs.known_frames, allow);
+                    p.fit, allows_common_motion(p.effects), cell.decisions.time_coupling.is_on, work, next_start(first),
+                    inputs.known_frames, allow);
 }
 
 ModelFields fields_of(const ReadyCell& cell, const EnsembleFit& fit, const ModelChecks& checks,

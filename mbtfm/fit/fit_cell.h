@@ -37,6 +37,6 @@ struct FittedCell {
 };
 
 /// @throws InputError, InvalidData, UsageError, NotSolved
-FittedCell fit_cell(const Inputs& inputs, const Parameters& parameters, const tensions::Work& work);
+FittedCell fit_cell(const Inputs& inputs, const Parameters& parameters, const Work& work);
 
 }  // namespace mbtfm::fit

@@ -10,7 +10,7 @@
 #include "mbtfm/fit/parameters.h"
 #include "mbtfm/tensions/fit_results.h"
 #include "mbtfm/tensions/placement.h"
-#include "mbtfm/tensions/work.h"
+#include "pipeline/contract/work.h"
 
 namespace mbtfm::fit {
 
@@ -45,7 +45,7 @@ struct ReadyFit {
 /// @param parameters  as_switched()
 /// @throws InputError where the network is not that of the cell; UsageError where a switch asks for what the scene has
 /// not
-ReadyFit make_ready(const Inputs& inputs, const Parameters& parameters, const tensions::Work& work);
+ReadyFit make_ready(const Inputs& inputs, const Parameters& parameters, const Work& work);
 /// The same on networks of other cables.
 ReadyCell with_cables(ReadyCell cell, const tensions::LinearData& data, const cables::CableParameters& cables,
                       const Inputs& inputs);

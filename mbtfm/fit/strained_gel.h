@@ -6,7 +6,7 @@
 
 #include "mbtfm/fit/data_of_beads.h"
 #include "mbtfm/tensions/ensemble.h"
-#include "mbtfm/tensions/work.h"
+#include "pipeline/contract/work.h"
 
 namespace mbtfm::fit {
 
@@ -26,6 +26,6 @@ struct StrainedScene {
 /// @param fit  on the linear gel
 /// @throws NotSolved where the gel finds no state under these forces, or the fits do not settle
 tensions::EnsembleFit fit_on_strained_gel(const StrainedScene& scene, tensions::EnsembleFit fit, const Refit& refit,
-                                          const tensions::Work& work);
+                                          const Work& work);
 
 }  // namespace mbtfm::fit

@@ -471,8 +471,9 @@ void check_networks(const network::Ensemble& networks) {
 }  // namespace
 
 EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, const std::vector<int>& adhesion_ids,
-                         const FitParameters& parameters, int threads, const Progress& progress,
-                         const SolvedMisfit& solved_misfit, const Trial* start) {
+                         const FitParameters& parameters, const Work& work, const SolvedMisfit& solved_misfit,
+                         const Trial* start) {
+  const int threads = work.threads;
   check_networks(networks);
   const int n_meshes = static_cast<int>(networks.size());
   EnsembleFit all;
@@ -482,8 +483,7 @@ EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, con
   int n_done = 0;
   const auto tell = [&] {
     const std::lock_guard lock(mutex);
-    if (progress)
-      progress(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
+    work.tell(double(++n_done) / (n_meshes + 1), "fitting tensions on " + std::to_string(n_meshes) + " meshes");
   };
   // bad beads are known by a fit in which all count
   if ((data.bead_weight.array() != 1).any()) data = unweighted(std::move(data));

@@ -11,6 +11,7 @@
 
 #include "mbtfm/tensions/intervals.h"
 #include "mbtfm/tensions/model_error.h"
+#include "pipeline/contract/work.h"
 
 namespace mbtfm::tensions {
 
@@ -77,8 +78,8 @@ struct EnsembleFit {
 /// @param adhesion_ids  the adhesion of each pair of columns of the data's compliance
 /// @param start  tensions to start from, and an equilibrium of the first network near by; null: all equal
 EnsembleFit fit_ensemble(const network::Ensemble& networks, LinearData data, const std::vector<int>& adhesion_ids,
-                         const FitParameters& parameters, int threads, const Progress& progress,
-                         const SolvedMisfit& solved_misfit = {}, const Trial* start = nullptr);
+                         const FitParameters& parameters, const Work& work, const SolvedMisfit& solved_misfit = {},
+                         const Trial* start = nullptr);
 
 /// Of Student's t at the estimate's degrees of freedom.
 double quantile_975(const Estimate& estimate);

@@ -203,23 +203,22 @@ Responses responses_of(const DisplacementField& beads, const std::vector<SeriesF
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const network::Ensemble& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
-                                 bool is_coupled, int threads, const Progress& progress, Trial start,
-                                 const std::vector<FrameFit>& kept, const AllowMore& allow) {
+                                 bool is_coupled, const Work& work, Trial start, const std::vector<FrameFit>& kept,
+                                 const AllowMore& allow) {
   std::vector<FrameFit> fits;
   const auto fitted = [&](const SeriesFrame& frame) {
     FrameData good = good_beads_of(frame, response, is_used);
-    LinearData data = reduce(good.beads, std::move(good.response), good.is_used, threads,
+    LinearData data = reduce(good.beads, std::move(good.response), good.is_used, work.threads,
                              moves ? affine_motions(good.beads) : Eigen::MatrixXd());
-    const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, threads);
+    const TensionProblem problem(networks.front(), data.reduced, adhesion_ids, {}, work.threads);
     const Trial begin = problem.evaluate(start.tensions_nN, &start);
     if (allow) data = allow(std::move(data), begin.forces_nN);
-    return described(frame, fit_ensemble(networks, std::move(data), adhesion_ids, parameters, threads, {}, {}, &begin));
+    return described(frame,
+                     fit_ensemble(networks, std::move(data), adhesion_ids, parameters, work.threads, {}, &begin));
   };
   for (const SeriesFrame& frame : frames) {
-    if (progress) {
-      progress(static_cast<double>(fits.size()) / static_cast<double>(frames.size()),
-               "frame " + std::to_string(frame.frame));
-    }
+    work.tell(static_cast<double>(fits.size()) / static_cast<double>(frames.size()),
+              "frame " + std::to_string(frame.frame));
     const FrameFit not_fitted{.frame = frame.frame, .refused = frame.refused, .displacement_sha256 = frame.sha256};
     fits.push_back(not_fitted);
     if (!frame.refused.empty()) continue;

@@ -65,8 +65,8 @@ using AllowMore = std::function<LinearData(LinearData, const Eigen::VectorXd& fo
 std::vector<FrameFit> fit_series(const std::vector<SeriesFrame>& frames, const network::Ensemble& networks,
                                  const substrate::SharedResponse& response, const std::vector<bool>& is_used,
                                  const std::vector<int>& adhesion_ids, const FitParameters& parameters, bool moves,
-                                 bool is_coupled, int threads, const Progress& progress, Trial start,
-                                 const std::vector<FrameFit>& kept = {}, const AllowMore& allow = {});
+                                 bool is_coupled, const Work& work, Trial start, const std::vector<FrameFit>& kept = {},
+                                 const AllowMore& allow = {});
 
 /// By frame and fibre. @param interval_s  between frames, if known
 void write_tracks(const Path& file, const std::vector<FrameFit>& fits, const std::vector<Fibre>& fibres,

@@ -61,11 +61,11 @@ void write_cell_folder(const Experiment& e, const drawing::ScenarioParameters& p
   files::write_displacement(file("2_track/displacement.csv"), e.measured);
 }
 
-void write_images(const Experiment& e, const drawing::ScenarioParameters& p, const FileNamer& file, int threads,
-                  const Progress& progress) {
+void write_images(const Experiment& e, const drawing::ScenarioParameters& p, const FileNamer& file, const Work& work) {
+  const int threads = work.threads;
   const drawing::MicroscopeParameters m = drawing::at_quality(p.microscope);
   const auto write = [&](const std::string& name, const images::Image& photons, int exposure) {
-    if (progress) progress(0.5 + 0.1 * exposure, "rendering " + name);
+    work.tell(0.5 + 0.1 * exposure, "rendering " + name);
     images::write_tiff(file(name), drawing::recorded(photons, m, p.seed, exposure, threads));
   };
   std::vector<Vec2> relaxed, stressed;

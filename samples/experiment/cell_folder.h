@@ -17,6 +17,6 @@ void write_cell_folder(const Experiment& experiment, const drawing::ScenarioPara
 
 /// The four images, and truth/beads.csv. The noise is in the stressed positions of the beads.
 void write_images(const Experiment& experiment, const drawing::ScenarioParameters& parameters, const FileNamer& file,
-                  int threads, const Progress& progress);
+                  const Work& work);
 
 }  // namespace mbtfm::experiment

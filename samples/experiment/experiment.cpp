@@ -22,10 +22,6 @@ namespace {
 /// Far from the small numbers people give a reconstruction, so that the two never share a mesh.
 constexpr std::uint64_t kFirstSimulationSeed = 0x73696d00;
 
-void tell(const Progress& progress, double fraction, std::string_view what) {
-  if (progress) progress(fraction, what);
-}
-
 /// The simulation's network. The width of material that a cable stands for is counted in cables of the reference mesh:
 /// tension and stiffness by width are then those of the cell, whatever the mesh.
 Network span(const Cell& cell, const drawing::ScenarioParameters& p) {
@@ -168,19 +164,19 @@ std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
   return beads;
 }
 
-Experiment simulate(const drawing::ScenarioParameters& p, int threads, const Progress& progress) {
+Experiment simulate(const drawing::ScenarioParameters& p, const Work& work) {
   Experiment e;
-  tell(progress, 0, "drawing the cell");
+  work.tell(0, "drawing the cell");
   drawing::DrawnCell drawn = drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), p.seed);
   e.tensions = tensions_of(drawn, p.tension);
   e.cell = std::move(drawn.cell);
-  tell(progress, 0.1, "spanning the network");
+  work.tell(0.1, "spanning the network");
   e.network = span(e.cell, p);
-  tell(progress, 0.2, "contracting it");
+  work.tell(0.2, "contracting it");
   e.forces = force_list(e.cell, forces_by_adhesion(e.network, e.tensions));
   for (const AdhesionForce& f : e.forces) e.total_force_nN += norm(f.force_nN);
-  tell(progress, 0.4, "deforming the gel");
-  e.displacement = displacement_of(e, p, threads);
+  work.tell(0.4, "deforming the gel");
+  e.displacement = displacement_of(e, p, work.threads);
   for (const Bead& bead : e.displacement) {
     e.largest_displacement_um = std::max(e.largest_displacement_um, norm(bead.displacement_um));
   }

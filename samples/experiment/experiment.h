@@ -7,8 +7,8 @@
 #include "pipeline/contract/cell.h"
 #include "pipeline/contract/geometry.h"
 #include "pipeline/contract/network.h"
-#include "pipeline/contract/report.h"
 #include "pipeline/contract/results.h"
+#include "pipeline/contract/work.h"
 #include "samples/drawing/draw.h"
 #include "samples/drawing/scenario.h"
 
@@ -32,7 +32,7 @@ inline constexpr double kReferenceEdge_um = 1.5;
 /// Draw, contract, deform, measure. The network is the simulation's own: other edge length, other seed than any
 /// reconstruction's.
 /// @throws UsageError where the scenario leaves no room, NotSolved where the cables find no equilibrium
-Experiment simulate(const drawing::ScenarioParameters& parameters, int threads, const Progress& progress = {});
+Experiment simulate(const drawing::ScenarioParameters& parameters, const Work& work = {});
 
 /// Random positions on the field, no two nearer than the scenario's bead distance.
 /// @throws UsageError where they do not fit

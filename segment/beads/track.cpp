@@ -407,8 +407,8 @@ std::string RelaxedBeads::remedy(const images::Image& stressed, double pixel_siz
 }
 
 Tracking track_beads(const images::Image& relaxed, const images::Image& stressed, double pixel_size_um,
-                     const TrackParameters& parameters, int threads, const Progress& progress) {
-  return RelaxedBeads(relaxed, parameters, threads).track(stressed, pixel_size_um, progress);
+                     const TrackParameters& parameters, const Work& work) {
+  return RelaxedBeads(relaxed, parameters, work.threads).track(stressed, pixel_size_um, work.progress);
 }
 
 }  // namespace mbtfm::beads

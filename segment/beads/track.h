@@ -8,7 +8,7 @@
 #include "pipeline/contract/beads.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/geometry.h"
-#include "pipeline/contract/report.h"
+#include "pipeline/contract/work.h"
 #include "pipeline/stage/parameters.h"
 #include "segment/images/image.h"
 
@@ -160,6 +160,6 @@ class RelaxedBeads {
 
 /// Both at once.
 Tracking track_beads(const images::Image& relaxed, const images::Image& stressed, double pixel_size_um,
-                     const TrackParameters& parameters = {}, int threads = 1, const Progress& progress = {});
+                     const TrackParameters& parameters = {}, const Work& work = {});
 
 }  // namespace mbtfm::beads

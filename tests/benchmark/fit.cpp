@@ -80,7 +80,7 @@ void meshes(benchmark::State& state) {
   parameters.n_meshes = static_cast<int>(state.range(0));
   for (auto _ : state) {
     tensions::LinearData data = tensions::reduce(scene.beads, scene.compliance_um_per_nN);
-    benchmark::DoNotOptimize(tensions::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 2, {}));
+    benchmark::DoNotOptimize(tensions::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 2));
   }
 }
 BENCHMARK(meshes)->Arg(1)->Arg(8)->Unit(benchmark::kMillisecond)->UseRealTime();

@@ -29,7 +29,7 @@ EnsembleFit fit_of(const TensionScene& scene, const LinearData& data, Loss loss 
   parameters.loss = loss;
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-  return fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {});
+  return fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1);
 }
 
 TEST(CommonMotion, whatever_it_is_the_tensions_and_their_errors_stay) {

@@ -80,7 +80,7 @@ TEST(Contractile, a_model_that_is_linear_is_fitted_as_linear_least_squares_has_i
   test::measure(scene, 0.05, 11);
 
   const std::vector<Ropes> models{Ropes(scene.adhesion_ids, forces)};
-  const EnsembleFit fit = fit_ensemble(models, scene.data, scene.adhesion_ids, {.loss = Loss::squares}, 2, {});
+  const EnsembleFit fit = fit_ensemble(models, scene.data, scene.adhesion_ids, {.loss = Loss::squares}, 2);
 
   const double sigma_um = scene.beads.front().sigma_um;
   const MatrixXd J = scene.compliance_um_per_nN * forces / sigma_um;

@@ -42,7 +42,7 @@ EnsembleFit fitted(const std::vector<cables::CableNetwork>& on, LinearData data,
   FitParameters parameters;
   parameters.n_meshes = static_cast<int>(on.size());
   parameters.loss = loss;
-  return fit_ensemble(on, data, s.adhesion_ids, parameters, 2, {});
+  return fit_ensemble(on, data, s.adhesion_ids, parameters, 2);
 }
 
 TEST(EffectsOfTheFit, stress_fibres_where_the_cell_has_any) {

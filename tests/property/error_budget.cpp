@@ -55,7 +55,7 @@ struct Fitted {
 Fitted fitted(TensionScene scene) {
   Fitted f{std::move(scene), {}, {}};
   f.networks.emplace_back(f.scene.cables.network());
-  f.fit = fit_ensemble(f.networks, f.scene.data, f.scene.adhesion_ids, {.n_meshes = 1}, 2, {});
+  f.fit = fit_ensemble(f.networks, f.scene.data, f.scene.adhesion_ids, {.n_meshes = 1}, 2);
   return f;
 }
 
@@ -89,7 +89,7 @@ TEST(ErrorBudget, without_further_errors_its_parts_are_those_of_the_intervals) {
   std::vector<cables::CableNetwork> networks;
   for (std::uint64_t seed = 11; seed < 15; ++seed)
     networks.emplace_back(mesh::generate_network(cell, {.seed = seed}).network);
-  const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2, {});
+  const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {}, 2);
   const ErrorBudget budget = error_budget({.fit = fit,
                                            .data = fit.data,
                                            .networks = networks,
@@ -201,7 +201,7 @@ TEST(ErrorBudget, tells_what_a_fit_that_stops_early_leaves_undone) {
     Fitted early{scene(), {}, {}};
     early.networks.emplace_back(early.scene.cables.network());
     early.fit = fit_ensemble(early.networks, early.scene.data, early.scene.adhesion_ids,
-                             {.loss = Loss::squares, .n_meshes = 1, .max_steps = steps}, 2, {});
+                             {.loss = Loss::squares, .n_meshes = 1, .max_steps = steps}, 2);
     const Eigen::VectorXd left = test::values_of(early.fit) - end;
     // further off the misfit bends, and nearer the whole fit's own last step counts
     if (left.norm() > 0.1 * end.norm() || left.norm() < 1e-4 * end.norm()) continue;

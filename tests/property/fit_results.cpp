@@ -31,7 +31,7 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
     for (int m = 0; m < 2; ++m) {
       networks.emplace_back(mesh::generate_network(cell, {.seed = 10 * seed + m}).network);
     }
-    const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {.loss = Loss::squares}, 2, {});
+    const EnsembleFit fit = fit_ensemble(networks, scene.data, scene.adhesion_ids, {.loss = Loss::squares}, 2);
     const std::vector<AdhesionForce> forces = forces_of(fit, cell);
     for (std::size_t a = 0; a < forces.size(); ++a, ++n) {
       const double truth = scene.forces_nN.segment<2>(2 * static_cast<Eigen::Index>(a)).norm();

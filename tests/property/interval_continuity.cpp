@@ -62,7 +62,7 @@ Answer answer_of(const Case& c, double relative, unsigned seed) {
     b.displacement_um.y *= 1 + relative * normal(random);
   }
   LinearData data = reduce(beads, c.scene.compliance_um_per_nN);
-  const EnsembleFit fit = fit_ensemble(c.networks, data, c.scene.adhesion_ids, {.loss = Loss::squares}, 2, {});
+  const EnsembleFit fit = fit_ensemble(c.networks, data, c.scene.adhesion_ids, {.loss = Loss::squares}, 2);
   const auto n = static_cast<Eigen::Index>(fit.tensions_nN.size());
   Answer answer{
       .value = Eigen::VectorXd(n), .error = Eigen::VectorXd(n), .low = Eigen::VectorXd(n), .high = Eigen::VectorXd(n)};

@@ -45,7 +45,7 @@ struct Hidden {
         reduce(scene.beads, substrate::dense_response(scene.compliance_um_per_nN), {}, 1, affine_motions(scene.beads));
     std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    const EnsembleFit fit = fit_ensemble(networks, data, scene.adhesion_ids, {}, 1, {});
+    const EnsembleFit fit = fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
     return missing_adhesions(fit, fit.data, cell, kGel, 1);
   }
 };

@@ -35,7 +35,7 @@ struct ShiftedCell {
     PlacedCell place = place_cell(
         cell, networks.front(), scene.beads, data, [&](const DisplacementField& at) { return data_of(at); }, kGel, {},
         start, setting, 1);
-    EnsembleFit found = fit_ensemble(networks, std::move(place.data), scene.adhesion_ids, {}, 1, {});
+    EnsembleFit found = fit_ensemble(networks, std::move(place.data), scene.adhesion_ids, {}, 1);
     if (!place.effect.is_on) return {std::move(found), {place.placement, Eigen::Vector3d::Zero()}};
     const MotionsBeside motions = motions_beside(found.data, found);
     return {std::move(found), placement_among(motions, place.placement)};
@@ -171,12 +171,12 @@ TEST(Placement, its_part_of_an_error_is_what_beads_would_tell_more_if_it_were_kn
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(still.scene.cables.network(), still.scene.cables.parameters());
   const LinearData known = still.data_of(still.scene.beads);
-  const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1, {});
+  const EnsembleFit with_known = fit_ensemble(networks, known, still.scene.adhesion_ids, {}, 1);
   const Eigen::VectorXd& forces = with_known.forces_nN;
   const LinearData unknown =
       with_more_motions(known, placement_motions(kGel, still.scene.ellipses, forces, still.scene.points_um,
                                                  known.response->displace(forces), {30, 30}, 1));
-  const EnsembleFit fit = fit_ensemble(networks, unknown, still.scene.adhesion_ids, {}, 1, {});
+  const EnsembleFit fit = fit_ensemble(networks, unknown, still.scene.adhesion_ids, {}, 1);
   const ErrorBudget budget = error_budget({.fit = fit,
                                            .data = fit.data,
                                            .networks = networks,
@@ -208,7 +208,7 @@ TEST(Placement, frames_of_a_series_hold_the_error_of_the_place) {
   const Trial start = next_start(single);
   const auto frame_fit = [&](const AllowMore& allow) {
     return fit_series({{.frame = 1, .refused = {}, .beads = shifted.scene.beads}}, networks, data.response, {},
-                      shifted.scene.adhesion_ids, {}, true, false, 1, {}, start, {}, allow)
+                      shifted.scene.adhesion_ids, {}, true, false, 1, start, {}, allow)
         .front();
   };
   const FrameFit held = frame_fit({});

@@ -51,7 +51,7 @@ std::vector<FrameFit> fit(const Series& series, const std::vector<FrameFit>& kep
   parameters.n_meshes = 1;
   const Trial start = uniform_start({networks.front(), series.scene.data.reduced, series.scene.adhesion_ids});
   return fit_series(series.frames, networks, substrate::dense_response(series.scene.compliance_um_per_nN), {},
-                    series.scene.adhesion_ids, parameters, true, true, 2, {}, start, kept);
+                    series.scene.adhesion_ids, parameters, true, true, 2, start, kept);
 }
 
 TEST(Series, tensions_and_total_force_that_change_are_followed_within_their_standard_errors) {

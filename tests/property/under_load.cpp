@@ -40,7 +40,7 @@ struct PullingCell {
   EnsembleFit fit(LinearData data) const {
     std::vector<cables::CableNetwork> networks;
     networks.emplace_back(scene.cables.network(), scene.cables.parameters());
-    return fit_ensemble(networks, data, scene.adhesion_ids, {}, 1, {});
+    return fit_ensemble(networks, data, scene.adhesion_ids, {}, 1);
   }
 };
 

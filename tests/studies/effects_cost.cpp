@@ -129,7 +129,7 @@ void compare_fibres(int n) {
     tensions::LinearData data = scene.data;
     std::vector<cables::CableNetwork> networks;
     networks.emplace_back(mesh::generate_network(cell, {}).network);
-    tensions::fit_ensemble(networks, data, scene.adhesion_ids, {.n_meshes = 1}, 1, {});
+    tensions::fit_ensemble(networks, data, scene.adhesion_ids, {.n_meshes = 1}, 1);
   };
   const auto fit_without = [&] {
     Cell cell = fibrous;
@@ -159,12 +159,12 @@ void compare_series(int n) {
   const auto off = [&] {
     const Effect coupling = tensions::decide_time_coupling(true, Switch::off);
     tensions::fit_series(frames, networks, substrate::dense_response(scene.compliance_um_per_nN), {},
-                         scene.adhesion_ids, parameters, false, coupling.is_on, 1, {}, start);
+                         scene.adhesion_ids, parameters, false, coupling.is_on, 1, start);
   };
   const auto one_by_one = [&] {
     for (const tensions::SeriesFrame& frame : frames) {
       tensions::LinearData data = tensions::reduce(frame.beads, scene.compliance_um_per_nN);
-      tensions::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {}, {}, &start);
+      tensions::fit_ensemble(networks, data, scene.adhesion_ids, parameters, 1, {}, &start);
     }
   };
   compare("time coupling", n, off, one_by_one);

@@ -97,7 +97,7 @@ void print_row(const Scene& s, tensions::LinearData data, mesh::NetworkParameter
   }
   tensions::FitParameters parameters;
   parameters.n_meshes = n_meshes;
-  const tensions::EnsembleFit fit = tensions::fit_ensemble(networks, data, s.adhesion_ids, parameters, 1, {});
+  const tensions::EnsembleFit fit = tensions::fit_ensemble(networks, data, s.adhesion_ids, parameters, 1);
   const double seconds = static_cast<double>(std::clock() - begin) / CLOCKS_PER_SEC;
   double of_mean = 0, of_single = 0, size = 0, over_stated = 0;
   int n_covered = 0, n = 0;

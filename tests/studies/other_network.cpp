@@ -108,7 +108,7 @@ tensions::EnsembleFit fit(const std::vector<cables::CableNetwork>& networks, con
                           const OtherNetwork& o, int threads = 2) {
   tensions::FitParameters parameters;
   parameters.n_meshes = static_cast<int>(networks.size());
-  return tensions::fit_ensemble(networks, data, o.adhesion_ids, parameters, threads, {});
+  return tensions::fit_ensemble(networks, data, o.adhesion_ids, parameters, threads);
 }
 
 struct Score {

@@ -175,7 +175,7 @@ inline tensions::EnsembleFit fit_own_network(const TensionScene& scene, tensions
   parameters.n_meshes = 1;
   std::vector<cables::CableNetwork> networks;
   networks.emplace_back(scene.cables.network());
-  return tensions::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2, {});
+  return tensions::fit_ensemble(networks, scene.data, scene.adhesion_ids, parameters, 2);
 }
 
 using tensions::values_of;

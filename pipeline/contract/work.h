@@ -2,14 +2,18 @@
 #pragma once
 
 #include <string_view>
+#include <utility>
 
 #include "pipeline/contract/report.h"
 
-namespace mbtfm::tensions {
+namespace mbtfm {
 
 struct Work {
-  int threads = 1;
-  Progress progress = {};  ///< may be empty
+  /// Threads alone are work, too.
+  Work(int n_threads = 1, Progress to_tell = {}) : threads(n_threads), progress(std::move(to_tell)) {}
+
+  int threads;
+  Progress progress;  ///< may be empty
 
   void tell(double fraction, std::string_view what) const {
     if (progress) progress(fraction, what);
@@ -21,4 +25,4 @@ struct Work {
   }
 };
 
-}  // namespace mbtfm::tensions
+}  // namespace mbtfm
