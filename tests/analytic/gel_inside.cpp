@@ -119,6 +119,17 @@ TEST(InsideOfTheGel, a_thick_layer_is_a_half_space_and_the_matrix_turns_with_the
   EXPECT_DOUBLE_EQ(under(0, 0), under(1, 1));
 }
 
+/// The base holds it there: what is left falls as exp(-pi r / 2h).
+TEST(InsideOfTheGel, beyond_the_tables_reach_a_layer_is_at_rest) {
+  const Gel gel = gel_of(10, 0.45, 20);
+  const LayerInside layer(gel);
+  for (const double r : {39.9 * 20, 40.1 * 20, 400.0 * 20}) {
+    const double half_space = largest(half_space_inside_um_per_nN(gel, {r, 0}, 5));
+    // the table is right to 1e-9 of what it holds near the force, of which the half-space has a fortieth here
+    EXPECT_LT(largest(layer.compliance_um_per_nN({r, 0}, 5)), 1e-7 * half_space) << r;
+  }
+}
+
 /// Mean of the point field over the ellipse, by rings: midpoints in the square of the radius and in the angle.
 Eigen::Matrix3d mean_by_rings(const LayerInside* layer, const Gel& gel, const substrate::Ellipse& ellipse, Vec2 point,
                               double z_um, int n) {

@@ -2,11 +2,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <numbers>
 
 #include "pipeline/contract/errors.h"
 #include "substrate/boxes/elastic_system.h"
 #include "substrate/choice/factory.h"
 #include "substrate/curved/linear.h"
+#include "substrate/curved/surface_loads.h"
 #include "substrate/material.h"
 #include "substrate/response.h"
 #include "tests/support/cubed_sphere.h"
@@ -334,6 +336,45 @@ TEST(CurvedModel, takes_the_thickest_gel_and_refuses_a_point_too_far_for_any_mes
   const std::vector<Vec3> far = {{1e5, 1e5, 0.5}};
   EXPECT_THROW(gel_of(thin, "curved")->response({ellipses, 3}, {far, substrate::Components::all})->matrix(),
                OutOfMemory);
+}
+
+/// Of a parabola, which the elements hold exactly, the area under an ellipse lies further out than the ellipse's
+/// centre.
+TEST(AnEllipse, pulls_at_the_centre_of_the_area_that_it_covers_of_the_slope) {
+  constexpr double kBend = 0.05;
+  const substrate::Ellipse ellipse{{6, 0.5}, 4, 3, 0.4};
+  boxes::GridLines lines;
+  for (int k = 0; k <= 16; ++k) lines.x_um.push_back(-16 + 2 * k);
+  lines.y_um = lines.x_um;
+  lines.z_um = {0, 5, 15, 30};
+  const Block block(
+      Shape{[](Vec2 p) { return kBend * p.x * p.x; }, 30}, lines, [](const boxes::Box&) { return false; }, Sides::held,
+      100000, 1);
+  const Space space(block.mesh(), 1);
+  std::vector<Vec2> place(static_cast<std::size_t>(space.nodes().size()));
+  for (std::size_t node = 0; node < block.mesh().position_um.size(); ++node) {
+    const int free = space.nodes().index_of(static_cast<int>(node));
+    const Eigen::Vector3d& at = block.mesh().position_um[node];
+    if (free >= 0) place[static_cast<std::size_t>(free)] = {at.x(), at.y()};
+  }
+  Vec2 pulled, centre;
+  for (const boxes::NodeWeight& w :
+       load_weights(block, space, {.shapes = std::vector<substrate::Ellipse>{ellipse}}).front())
+    pulled += w.weight * place[static_cast<std::size_t>(w.node)];
+  double area = 0;
+  constexpr int kRings = 400;
+  for (int k = 0; k < kRings * kRings; ++k) {
+    const double r = std::sqrt((k / kRings + 0.5) / kRings), turn = 2 * std::numbers::pi * (k % kRings) / kRings;
+    const double u = r * ellipse.semi_major_um * std::cos(turn), v = r * ellipse.semi_minor_um * std::sin(turn);
+    const double c = std::cos(ellipse.angle_rad), s = std::sin(ellipse.angle_rad);
+    const Vec2 at = ellipse.centre_um + Vec2{c * u - s * v, s * u + c * v};
+    const double stretch = std::hypot(1, 2 * kBend * at.x);
+    area += stretch;
+    centre += stretch * at;
+  }
+  centre = (1 / area) * centre;
+  ASSERT_GT(centre.x - ellipse.centre_um.x, 0.1);
+  EXPECT_LT(norm(pulled - centre), 0.01 * (centre.x - ellipse.centre_um.x));
 }
 
 TEST(TractionsOfASurfaceMesh, pull_back_exactly_as_they_displace_and_add_up_to_the_force_of_an_even_one) {

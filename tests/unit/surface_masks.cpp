@@ -47,6 +47,16 @@ TEST(Masks, tell_the_surface_far_finer_than_their_slices) {
   }
 }
 
+/// A slope that is no simple fraction meets slices at every height alike.
+TEST(Masks, a_columns_stated_error_is_its_root_mean_square) {
+  const auto askew = [](Vec2 p) { return 10 + std::numbers::sqrt2 / 3 * p.x - std::numbers::sqrt3 / 5 * p.y; };
+  const VoxelPoints found = points_of_masks(masks_of(askew));
+  double square = 0;
+  for (const Vec3& p : found.points_um) square += std::pow(p.z - askew({p.x, p.y}), 2);
+  // 3000 columns tell it to 1/sqrt(6000), were they independent
+  EXPECT_NEAR(std::sqrt(square / static_cast<double>(found.points_um.size())) / found.sigma_um, 1, 0.05);
+}
+
 TEST(Masks, specks_and_bubbles_do_not_matter) {
   test::hard_case("masks with specks above the gel and bubbles in it", "the same surface, and how many were left out");
   VoxelStack s = masks_of(slope);

@@ -118,6 +118,18 @@ TEST(HeightMap, small_holes_are_filled_smoothly) {
   EXPECT_EQ(filled(whole, 5).n_filled, 0);
 }
 
+/// A plate without load is biharmonic, and the differences of a quartic are its derivatives.
+TEST(HeightMap, a_hole_in_a_biharmonic_quartic_is_filled_exactly) {
+  const auto quartic = [](Vec2 p) { return 1e-4 * (std::pow(p.x, 4) - 6 * p.x * p.x * p.y * p.y + std::pow(p.y, 4)); };
+  for (const double spacing_um : {0.5, 0.8}) {
+    const HeightMap whole = sampled(quartic, {-8, -8}, {8, 8}, spacing_um);
+    const FilledMap mended = filled(with_holes(whole, [](Vec2 p) { return norm(p - Vec2{2, 1}) < 2; }), 5);
+    EXPECT_GT(mended.n_filled, 12);
+    for (std::size_t k = 0; k < whole.z_um.size(); ++k)
+      EXPECT_NEAR(mended.map.z_um[k], whole.z_um[k], 1e-9) << k;  // heights of 3 um, a matrix of condition 1e5
+  }
+}
+
 TEST(HeightMap, a_wide_hole_is_refused_by_place) {
   const HeightMap map = with_holes(sampled(bumpy, {-20, -20}, {20, 20}, 0.5), [](Vec2 p) {
     return norm(p - Vec2{5, 3}) < 3;
@@ -200,6 +212,20 @@ TEST(SurfacePoints, strays_are_told_and_pull_little) {
   EXPECT_LT(misfit_of(fit).rms_um, 0.2);
   EXPECT_GT(fit.strays.size(), 55u);  // nine of ten of 80 lie further than five errors
   EXPECT_LT(fit.strays.size(), 100u);
+}
+
+TEST(SurfacePoints, errors_of_the_distribution_that_is_assumed_have_their_scale) {
+  constexpr double kScale = 0.3;
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> place(-20, 20);
+  std::student_t_distribution<double> error(4);
+  std::vector<Vec3> points;
+  for (int k = 0; k < 2000; ++k) {
+    const double x = place(random), y = place(random);
+    points.push_back({x, y, bumpy({x, y}) + kScale * error(random)});
+  }
+  // known to sqrt((nu + 3) / (2 nu n)) = 2 % (Lange, Little, Taylor); what the surface follows takes as much again
+  EXPECT_NEAR(fit_points(points, {}).error_scale, kScale, 0.06 * kScale);
 }
 
 TEST(SurfacePoints, without_errors_the_surface_goes_through_them) {
