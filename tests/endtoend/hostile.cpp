@@ -436,6 +436,34 @@ TEST_F(HostileCells, touch_nothing_outside_and_stop_no_other_cell) {
   }
 }
 
+/// The superuser may read everything, unless told not to.
+std::string as_owner_alone() {
+  if (geteuid() != 0) return {};
+  const std::string none = "-dac_override,-dac_read_search";
+  return "setpriv --bounding-set=" + none + " --inh-caps=" + none + " ";
+}
+
+TEST_F(HostileCells, a_folder_that_may_not_be_read_is_skipped_and_named) {
+  if (!as_owner_alone().empty() && std::system((as_owner_alone() + "true").c_str()) != 0)
+    GTEST_SKIP() << "setpriv takes no rights away here";
+  const TemporaryFolder folder;
+  const fs::path study = folder / "study", closed = study / "lost+found";
+  copy_cell("sound", study / "sound");
+  fs::create_directories(closed);
+  fs::permissions(closed, fs::perms::none);
+  const std::string stages = " --stages-dir " + stages_.string();
+  for (const std::string& command : {"batch --list " + study.string() + stages, "batch " + study.string() + stages,
+                                     "batch --table " + study.string() + stages, "stats " + study.string()}) {
+    const Outcome outcome = test::run_program("mbtfm " + command, as_owner_alone());
+    EXPECT_EQ(outcome.code, 0) << command << ": " << outcome.output;
+    if (!command.starts_with("stats")) {
+      EXPECT_NE(outcome.output.find("lost+found"), std::string::npos) << command << ": " << outcome.output;
+    }
+  }
+  EXPECT_NE(files::read_text(study / "statistics/cells.csv").find("lost+found"), std::string::npos);
+  fs::permissions(closed, fs::perms::owner_all);
+}
+
 TEST_F(HostileCells, a_link_under_the_name_of_an_unfinished_table_is_not_followed) {
   const TemporaryFolder folder;
   const Scene scene{folder.path()};
