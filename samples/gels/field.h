@@ -3,7 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <complex>
+#include <cstddef>
 #include <numbers>
 #include <utility>
 #include <vector>

@@ -27,15 +27,16 @@ const fs::path kDocs = fs::path(MBTFM_SOURCE_DIR) / "docs";
 
 TEST(Documents, the_examples_of_the_format_page_are_read) {
   const std::string page = files::read_text(kDocs / "formats.md");
-  const std::regex example("```csv ([a-z_]+\\.csv)\n([^`]*)```");
+  const std::regex example("```csv ([a-z_0-9]+\\.csv)\n([^`]*)```");
   const test::TemporaryFolder folder;
   int n_examples = 0;
   for (std::sregex_iterator at(page.begin(), page.end(), example), end; at != end; ++at, ++n_examples) {
     files::write_text(folder / (*at)[1], (*at)[2].str());
   }
-  EXPECT_EQ(n_examples, 7);
+  EXPECT_EQ(n_examples, 8);
   EXPECT_EQ(files::read_cell(folder.path()).fibres.size(), 2u);
   EXPECT_EQ(files::read_displacement(folder / "displacement.csv").size(), 2u);
+  EXPECT_EQ(files::read_displacement_in_space(folder / "displacement_3d.csv").size(), 2u);
   EXPECT_EQ(files::read_tensions(folder / "tensions.csv").size(), 3u);
   EXPECT_EQ(files::read_adhesion_forces(folder / "adhesion_forces.csv").size(), 2u);
 }
