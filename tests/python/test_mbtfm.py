@@ -170,7 +170,9 @@ class Cells(unittest.TestCase):
         told = []
         redone = mbtfm.run(cell, only=["segment"], progress=told.append)
         self.assertEqual(list(redone.fibres.type), ["ventral", "arc"])
-        np.testing.assert_allclose(redone.fibre_lines_um[2][0], lines_um[1][0][::-1], atol=0.02)  # floats of pixels, and resampling
+        np.testing.assert_allclose(redone.fibre_lines_um[2][0], lines_um[1][0][::-1], atol=1e-4)  # float32 of some 250 pixels
+        drawn = mbtfm.read_rois(cell / "fibres.zip")
+        np.testing.assert_allclose((drawn[0].points_px + rois.LINE_ORIGIN_PX) * size, lines_um[0][:, ::-1], atol=1e-4)
         self.assertIn("drawn by hand", next(e for e in told if e.kind == "stage" and e.stage == "segment").content["summary"])
 
     def test_nothing_but_lines_is_written_and_nothing_half(self):
