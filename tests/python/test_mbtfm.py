@@ -3,6 +3,9 @@
 MBTFM_BIN: the folder of the programs.
 """
 
+import contextlib
+import io
+import os
 import re
 import shutil
 import sys
@@ -183,6 +186,20 @@ class Cells(unittest.TestCase):
         with mock.patch.object(mbtfm.Cell, "pixel_size_um", 0.1), self.assertRaises(ValueError):
             napari.write_fibres(str(target), [np.full((3, 2), np.nan)], {"shape_type": "path"})
         self.assertEqual(list(self.first.glob("*fibres.zip*")), [])
+
+
+class Readme(unittest.TestCase):
+    def test_its_example_runs(self):
+        text = (Path(__file__).parents[2] / "python/README.md").read_text()
+        (block,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+        before = os.getcwd()
+        with tempfile.TemporaryDirectory(prefix="mbtfm-python-") as folder, contextlib.redirect_stdout(io.StringIO()) as said:
+            try:
+                os.chdir(folder)
+                exec(compile(block, "python/README.md", "exec"), {})
+            finally:
+                os.chdir(before)
+        self.assertIn("tension_nN", said.getvalue())
 
 
 class Manifest(unittest.TestCase):
