@@ -45,8 +45,10 @@ Result result_of(const Path& cell) {
 
 std::string result_line(const Path& cell) {
   const Result result = result_of(cell);
-  std::string line = "total force " + readable(result.fit.total_force_nN);
-  if (result.total_error_nN) line += " ± " + readable(*result.total_error_nN);
+  std::optional<int> decimals;
+  if (result.total_error_nN && *result.total_error_nN > 0) decimals = decimals_for(*result.total_error_nN);
+  std::string line = "total force " + rounded(result.fit.total_force_nN, decimals);
+  if (result.total_error_nN) line += " ± " + rounded(*result.total_error_nN, decimals);
   line += " nN";
   std::string tensions;
   for (const auto& [type, of] : result.types)

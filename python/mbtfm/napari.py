@@ -13,7 +13,7 @@ import numpy as np
 import pandas as pd
 
 from .cell import Array, Cell, read
-from .rois import Roi, write_rois
+from .rois import LINE_ORIGIN_PX, Roi, write_rois
 
 Layer = Tuple[Any, Dict[str, Any], str]
 ReaderFunction = Callable[[Union[str, Sequence[str]]], List[Layer]]
@@ -150,7 +150,7 @@ def write_fibres(path: str, data: Any, meta: Dict[str, Any]) -> List[str]:
         if kind not in ("path", "line"):
             raise ValueError(f"shape {index + 1} is a {kind}: fibres are paths or lines")
         points_um = np.asarray(shape, dtype=float)[:, -2:] * scale + translate
-        rois.append(Roi(_name_of(index + 1, features, index), points_um[:, ::-1] / size_um))
+        rois.append(Roi(_name_of(index + 1, features, index), points_um[:, ::-1] / size_um - LINE_ORIGIN_PX))
     if not rois:
         raise ValueError("the layer has no lines: nothing was written")
     write_rois(path, rois)

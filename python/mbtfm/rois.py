@@ -1,6 +1,7 @@
 """ImageJ selections (RoiSet.zip): lines drawn by hand, as mbtfm reads and writes them.
 
-Coordinates are pixels; the upper left corner of the image is (0, 0), the centre of its first pixel (0.5, 0.5).
+Coordinates are pixels. ImageJ counts those of areas from the upper left corner of the image, those of lines from the centre of its
+first pixel (LINE_ORIGIN_PX from that corner).
 Source of the format: ij.io.RoiDecoder and RoiEncoder of ImageJ 1.53.
 """
 
@@ -19,6 +20,9 @@ from .cell import Array, PathLike
 _POLYGON, _POLYLINE = 0, 5
 _VERSION, _SUB_PIXEL = 228, 128
 _HEADER, _HEADER2 = 64, 64
+
+
+LINE_ORIGIN_PX = 0.5
 
 
 @dataclass(frozen=True)

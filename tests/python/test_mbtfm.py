@@ -3,6 +3,9 @@
 MBTFM_BIN: the folder of the programs.
 """
 
+import contextlib
+import io
+import os
 import re
 import shutil
 import sys
@@ -170,7 +173,9 @@ class Cells(unittest.TestCase):
         told = []
         redone = mbtfm.run(cell, only=["segment"], progress=told.append)
         self.assertEqual(list(redone.fibres.type), ["ventral", "arc"])
-        np.testing.assert_allclose(redone.fibre_lines_um[2][0], lines_um[1][0][::-1], atol=0.02)  # floats of pixels, and resampling
+        np.testing.assert_allclose(redone.fibre_lines_um[2][0], lines_um[1][0][::-1], atol=1e-4)  # float32 of some 250 pixels
+        drawn = mbtfm.read_rois(cell / "fibres.zip")
+        np.testing.assert_allclose((drawn[0].points_px + rois.LINE_ORIGIN_PX) * size, lines_um[0][:, ::-1], atol=1e-4)
         self.assertIn("drawn by hand", next(e for e in told if e.kind == "stage" and e.stage == "segment").content["summary"])
 
     def test_nothing_but_lines_is_written_and_nothing_half(self):
@@ -181,6 +186,20 @@ class Cells(unittest.TestCase):
         with mock.patch.object(mbtfm.Cell, "pixel_size_um", 0.1), self.assertRaises(ValueError):
             napari.write_fibres(str(target), [np.full((3, 2), np.nan)], {"shape_type": "path"})
         self.assertEqual(list(self.first.glob("*fibres.zip*")), [])
+
+
+class Readme(unittest.TestCase):
+    def test_its_example_runs(self):
+        text = (Path(__file__).parents[2] / "python/README.md").read_text()
+        (block,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+        before = os.getcwd()
+        with tempfile.TemporaryDirectory(prefix="mbtfm-python-") as folder, contextlib.redirect_stdout(io.StringIO()) as said:
+            try:
+                os.chdir(folder)
+                exec(compile(block, "python/README.md", "exec"), {})
+            finally:
+                os.chdir(before)
+        self.assertIn("tension_nN", said.getvalue())
 
 
 class Manifest(unittest.TestCase):
