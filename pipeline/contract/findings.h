@@ -67,7 +67,14 @@ enum class FindingKind {
   surface_level,
   surface_off_zero,
   // fit: the gel
-  modulus_error_unknown
+  modulus_error_unknown,
+  // sheet
+  sheet_thick,
+  sheet_strain,
+  sheet_coarse,
+  sheet_not_identifiable,
+  tractions_off_balance,
+  tractions_outside
 };
 
 struct KindOfFinding {

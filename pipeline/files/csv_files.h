@@ -42,6 +42,10 @@ std::string displacement_of_frame(int frame);
 /// Columns x_um, y_um.
 std::vector<Vec2> read_points(const Path& file);
 
+/// Between the columns and rows of points that lie on a lattice.
+/// @param file  they are from, for the message. @throws InputError where there are less than two columns or rows
+Vec2 lattice_spacing_um(const std::vector<Vec2>& points_um, const Path& file);
+
 /// Columns fibre_id, tension_nN at least.
 std::vector<Tension> read_tensions(const Path& file);
 void write_tensions(const Path& file, const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres);
