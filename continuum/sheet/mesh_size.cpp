@@ -21,8 +21,8 @@ TriangleSize size_on_springs(const Region& region, double penetration_um) {
   constexpr double kPerPenetration = 8, kPerWidth = 12;  // measured: 1e-4 of the largest displacement and tension
   constexpr double kMostTriangles = 1e5;                 // some seconds; a penetration length far below the width
   TriangleSize size{.at_curves_um = std::min(penetration_um / kPerPenetration, narrow / kPerWidth),
-                    .largest_um = narrow / 5,
-                    .growth = 0.18,
+                    .largest_um = narrow / 7,
+                    .growth = 0.15,
                     .most_turn_rad = 0.2,
                     .most_notch_rad = 0.06};
   while (expected_triangles(region, size) > kMostTriangles) size = with_edge(size, 1.2 * size.at_curves_um);

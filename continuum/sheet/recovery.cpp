@@ -2,7 +2,9 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <map>
 #include <tuple>
 
 namespace mbtfm::sheet {
@@ -50,13 +52,14 @@ class PatchFit {
     right_.setZero();
   }
 
-  void add_value(const Shape& shape, const Tensor& value) {
-    const Terms<n> t = terms_of<n>(local(shape.place_um));
-    const Eigen::Matrix<double, n, n> square = shape.weight_um2 * t.transpose() * t;
+  void add_value(const Shape& shape, const Tensor& value) { add_value(shape.place_um, shape.weight_um2, value); }
+  void add_value(Vec2 place_um, double weight_um2, const Tensor& value) {
+    const Terms<n> t = terms_of<n>(local(place_um));
+    const Eigen::Matrix<double, n, n> square = weight_um2 * t.transpose() * t;
     const std::array<double, 3> values = {value.xx, value.yy, value.xy};
     for (int c = 0; c < 3; ++c) {
       normal_.template block<n, n>(n * c, n * c) += square;
-      right_.template segment<n>(n * c) += shape.weight_um2 * values[c] * t.transpose();
+      right_.template segment<n>(n * c) += weight_um2 * values[c] * t.transpose();
     }
   }
   /// div S = traction: an error of it over the patch is one of S.
@@ -115,6 +118,7 @@ std::vector<std::vector<int>> triangles_around(const Elements& elements) {
 
 /// A free side's three nodes: outward normal, the line's pull, and what the place counts beside the triangles' points.
 struct EdgePlace {
+  int node;
   Vec2 place_um, normal, pull_nN_per_um;
   double weight_um2;
 };
@@ -137,7 +141,8 @@ std::vector<EdgePlace> places_of(const Triangles& triangles, const Triangles::Si
                    Vec2{std::cos(angle) * chord.x - std::sin(angle) * chord.y,
                         std::sin(angle) * chord.x + std::cos(angle) * chord.y};
     const Vec2 n = outward * Vec2{t.y, -t.x};
-    places.push_back({x[i], n, -outward * line_tension_nN * curvature * n, kWeight * share * length * length});
+    places.push_back(
+        {side.nodes[i], x[i], n, -outward * line_tension_nN * curvature * n, kWeight * share * length * length});
   }
   return places;
 }
@@ -170,8 +175,14 @@ Patch fitted(const Around& around, std::size_t corner) {
     for (std::size_t i = 3; i < 6; ++i)
       for (const std::size_t side : around.free_sides[static_cast<std::size_t>(elements.nodes(t)[i])])
         for (const EdgePlace& place :
-             places_of(elements.triangles(), elements.triangles().sides[side], around.known->line_tension_nN))
-          fit.add_edge(place.place_um, place.normal, place.pull_nN_per_um, place.weight_um2);
+             places_of(elements.triangles(), elements.triangles().sides[side], around.known->line_tension_nN)) {
+          const std::optional<Tensor>& value = around.known->at_nodes[static_cast<std::size_t>(place.node)];
+          if (value) {
+            fit.add_value(place.place_um, place.weight_um2, *value);
+          } else {
+            fit.add_edge(place.place_um, place.normal, place.pull_nN_per_um, place.weight_um2);
+          }
+        }
   }
   return fit.solved();
 }
@@ -214,6 +225,8 @@ std::vector<Tensor> recovered(const Elements& elements, const std::vector<Tensor
       const Vec2 place = triangles.nodes_um[middle];
       at_nodes[middle] = 0.5 * (patches[a].at(place) + patches[b].at(place));
     }
+  if (known != nullptr)
+    for (std::size_t node = 0; node < n_nodes; ++node) at_nodes[node] = known->at_nodes[node].value_or(at_nodes[node]);
   return at_nodes;
 }
 
@@ -228,9 +241,115 @@ std::vector<Tensor> recovered(const Elements& elements, const std::vector<Tensor
   return recovered(elements, at_points, &known);
 }
 
+namespace {
+
+/// The nodes round each rim in their order, from corner to between to corner.
+std::vector<std::vector<int>> rings_of(const Triangles& triangles, int n_rims) {
+  std::map<int, const Triangles::Side*> from;  // by its first node: of rims, where each node begins one side
+  for (const Triangles::Side& side : triangles.sides)
+    if (side.curve < n_rims) from.emplace(side.nodes[0], &side);
+  std::vector<std::vector<int>> rings;
+  while (!from.empty()) {
+    std::vector<int>& ring = rings.emplace_back();
+    for (auto at = from.begin(); at != from.end();) {
+      ring.push_back(at->second->nodes[0]);
+      ring.push_back(at->second->nodes[2]);
+      const int next = at->second->nodes[1];
+      from.erase(at);
+      at = from.find(next);
+    }
+  }
+  return rings;
+}
+
+/// d/dp of the polynomial through five nodes, in the third of them.
+std::array<double, 5> slope_weights(const std::array<double, 5>& p) {
+  std::array<double, 5> weights{};
+  for (std::size_t j = 0; j < 5; ++j) {
+    double product = 1;
+    for (std::size_t k = 0; k < 5; ++k)
+      if (k != j) product *= p[j] - p[k];
+    double sum = 0;
+    for (std::size_t l = 0; l < 5; ++l) {
+      if (l == j) continue;
+      double others = 1;
+      for (std::size_t k = 0; k < 5; ++k)
+        if (k != j && k != l) others *= p[2] - p[k];
+      sum += others;
+    }
+    weights[j] = sum / product;
+  }
+  return weights;
+}
+
+/// Strain along the rim at each of its nodes, of the polynomials through five of them in a row; none next to a corner.
+std::vector<std::optional<double>> strain_along_rims(const Elements& elements, int n_rims, const NodeVectors& u) {
+  constexpr double kCorner = 0.5;  // rad between two sides
+  std::vector<std::optional<double>> strain(static_cast<std::size_t>(elements.n_nodes()));
+  const std::vector<Vec2>& x = elements.triangles().nodes_um;
+  for (const std::vector<int>& ring : rings_of(elements.triangles(), n_rims)) {
+    const std::size_t n = ring.size();
+    for (std::size_t i = 0; i < n && n >= 10; ++i) {
+      std::array<int, 5> nodes;
+      std::array<double, 5> p{};
+      bool is_smooth = true;
+      for (std::size_t k = 0; k < 5; ++k) {
+        nodes[k] = ring[(i + n + k - 2) % n];
+        if (k > 0)
+          p[k] = p[k - 1] + norm(x[static_cast<std::size_t>(nodes[k])] - x[static_cast<std::size_t>(nodes[k - 1])]);
+        if (k < 2) continue;
+        const Vec2 a = x[static_cast<std::size_t>(nodes[k - 1])] - x[static_cast<std::size_t>(nodes[k - 2])];
+        const Vec2 b = x[static_cast<std::size_t>(nodes[k])] - x[static_cast<std::size_t>(nodes[k - 1])];
+        is_smooth = is_smooth && std::abs(std::atan2(cross(a, b), dot(a, b))) < kCorner;
+      }
+      if (!is_smooth) continue;
+      const std::array<double, 5> weights = slope_weights(p);
+      Vec2 along, change;
+      for (std::size_t k = 0; k < 5; ++k) {
+        along += weights[k] * x[static_cast<std::size_t>(nodes[k])];
+        change += weights[k] * at_node(u, nodes[k]);
+      }
+      strain[static_cast<std::size_t>(nodes[2])] = dot(along, change) / dot(along, along);
+    }
+  }
+  return strain;
+}
+
+/// S at the nodes of free rims: across by what pulls there, along by the strain.
+std::vector<std::optional<Tensor>> tension_at_rims(const Elements& elements, const Sheet& sheet, const NodeVectors& u,
+                                                   const std::vector<char>& is_free) {
+  const std::vector<std::optional<double>> strain = strain_along_rims(elements, sheet.n_rims, u);
+  std::vector<double> contraction(strain.size());
+  for (int t = 0; t < elements.n_triangles(); ++t)
+    for (const int node : elements.nodes(t))
+      contraction[static_cast<std::size_t>(node)] =
+          sheet.contraction_nN_per_um[static_cast<std::size_t>(Elements::kPoints * t)];
+  std::vector<std::optional<Tensor>> tension(strain.size());
+  const double nu = sheet.material.poisson_ratio, youngs = sheet.material.youngs_tension_nN_per_um();
+  const Triangles& triangles = elements.triangles();
+  for (std::size_t k = 0; k < triangles.sides.size(); ++k) {
+    if (!is_free[k]) continue;
+    for (const EdgePlace& place : places_of(triangles, triangles.sides[k], sheet.line_tension_nN)) {
+      const auto node = static_cast<std::size_t>(place.node);
+      if (!strain[node]) continue;
+      const double s = contraction[node], across = dot(place.pull_nN_per_um, place.normal);
+      const double along = s + nu * (across - s) + youngs * *strain[node];
+      const Vec2 n = place.normal;
+      tension[node] = Tensor{across * n.x * n.x + along * n.y * n.y, across * n.y * n.y + along * n.x * n.x,
+                             (across - along) * n.x * n.y};
+    }
+  }
+  return tension;
+}
+
+}  // namespace
+
 KnownOfTension known_on_springs(const Elements& elements, const Sheet& sheet, const NodeVectors& u) {
-  KnownOfTension known{
-      .divergence_kPa = {}, .line_tension_nN = sheet.line_tension_nN, .n_rims = sheet.n_rims, .is_free = {}};
+  KnownOfTension known{.divergence_kPa = {},
+                       .line_tension_nN = sheet.line_tension_nN,
+                       .n_rims = sheet.n_rims,
+                       .is_free = {},
+                       .at_nodes = {}};
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (int p = 0; p < Elements::kPoints; ++p)
       known.divergence_kPa.push_back(sheet.spring_nN_per_um3[static_cast<std::size_t>(Elements::kPoints * t + p)] *
@@ -240,6 +359,7 @@ KnownOfTension known_on_springs(const Elements& elements, const Sheet& sheet, co
     const bool is_held = !sheet.held.empty() && (sheet.held[middle][0] || sheet.held[middle][1]);
     known.is_free.push_back(side.curve < sheet.n_rims && !is_held);
   }
+  known.at_nodes = tension_at_rims(elements, sheet, u, known.is_free);
   return known;
 }
 

@@ -19,7 +19,8 @@ struct KnownOfTension {
   std::vector<Vec2> divergence_kPa;  ///< T at each point of the elements
   double line_tension_nN = 0;
   int n_rims = 1;
-  std::vector<char> is_free;  ///< by side of the triangles: S n = Λ dt/ds there
+  std::vector<char> is_free;                    ///< by side of the triangles: S n = Λ dt/ds there
+  std::vector<std::optional<Tensor>> at_nodes;  ///< of free rims: along them S follows from u, which is closer
 };
 /// The same, where polynomials that break the balance pay for it, too: several times closer at the edge. Source: Wiberg
 /// & Abdulwahab, Int. J. Numer. Methods Eng. 36 (1993) 2703.
