@@ -2,10 +2,12 @@
 #include <algorithm>
 #include <memory>
 
+#include "continuum/sheet/borders.h"
 #include "continuum/sheet/decide.h"
 #include "continuum/sheet/from_traction.h"
 #include "continuum/sheet/mesh_size.h"
 #include "continuum/sheet/parameters.h"
+#include "continuum/sheet/picture.h"
 #include "continuum/sheet/tables.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tractions/neighbour_noise.h"
@@ -14,6 +16,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/text.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
 #include "segment/cells/mask.h"
@@ -138,7 +141,34 @@ std::size_t write_solution(stage::StageContext& context, const Solution& solutio
   write_sheet(context.output("out", "sheet.csv"), rows);
   write_patches(context.output("out", "traction.csv"), solution);
   write_sheet_vtu(context.output("out", "sheet.vtu"), solution);
+  files::write_text(context.output("out", "sheet.svg"), picture_of(solution, "mbtfm-sheet; x to the right, y down"));
   return static_cast<std::size_t>(std::ranges::count_if(rows, [](const SheetPoint& row) { return !row.ux_um; }));
+}
+
+/// borders.csv and cell_tension.csv. @returns means over all borders, by their length
+Figures write_cells(stage::StageContext& context, const Solution& solution, const std::optional<double>& pixel_um) {
+  if (!context.has_input("cells")) return {};
+  const Path file = context.input("cells");
+  if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
+  constexpr int kWidestLine_px = 15;
+  constexpr double kShortest_um = 2;
+  const cells::LabelMask mask = cells::with_parts_labelled(cells::read_mask(file));
+  const CellLabels labels = with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, kWidestLine_px);
+  const std::vector<Border> borders = borders_of(labels, solution, kShortest_um);
+  write_borders(context.output("out", "borders.csv"), borders);
+  write_cell_tensions(context.output("out", "cell_tension.csv"), cell_tensions(labels, solution));
+  double length = 0, normal = 0, shear = 0, magnitude = 0;
+  for (const Border& b : borders) {
+    length += b.length_um;
+    normal += b.length_um * b.normal_nN_per_um;
+    shear += b.length_um * b.shear_nN_per_um;
+    magnitude += b.length_um * b.magnitude_nN_per_um;
+  }
+  if (length == 0) return {};
+  return {{"n_borders", static_cast<std::int64_t>(borders.size())},
+          {"border_normal_nN_per_um", normal / length},
+          {"border_shear_nN_per_um", shear / length},
+          {"border_magnitude_nN_per_um", magnitude / length}};
 }
 
 Figures figures_of(const Solution& solution, const Balance& balance) {
@@ -429,6 +459,7 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   const Balance balance = balance_of(done.solution);
   const std::size_t n_outside = write_solution(context, done.solution);
   append(done.figures, figures_of(done.solution, balance));
+  append(done.figures, write_cells(context, done.solution, p.pixel_size_um));
   files::write_figures(context.output("out", "sheet.json"), done.figures);
   notice_mesh(context, done.solution);
   context.progress(1, "done");
@@ -454,19 +485,19 @@ int main(int argc, char** argv) {
   return mbtfm::stage::run_stage<Parameters>(
       {.name = "sheet",
        .purpose = "contract a sheet of cells on its ground, or find a colony's tensions from tractions",
-       .files = {{"outline", Kind::input,
-                  "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
-                 {"traction", Kind::optional_input,
-                  "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 where they lie on no lattice): "
-                  "tensions follow from it"},
-                 {"displacement", Kind::optional_input,
-                  "displacement.csv of the beads: contraction and stiffness are fitted to them"},
-                 {"area", Kind::optional_input,
-                  "with --traction: where the sheet is free to end, around the outline; the outline, if not given"},
-                 {"points", Kind::optional_input,
-                  "points at which sheet.csv is written: x_um, y_um; else at the nodes"},
-                 {"out", Kind::output_folder,
-                  "sheet.csv, traction.csv, sheet.vtu and sheet.json are written here; of a fit sheet_fit.csv, "
-                  "sheet_models.csv and displacement.csv, too"}}},
+       .files =
+           {{"outline", Kind::input,
+             "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
+            {"traction", Kind::optional_input,
+             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 where they lie on no lattice): "
+             "tensions follow from it"},
+            {"displacement", Kind::optional_input,
+             "displacement.csv of the beads: contraction and stiffness are fitted to them"},
+            {"area", Kind::optional_input,
+             "with --traction: where the sheet is free to end, around the outline; the outline, if not given"},
+            {"points", Kind::optional_input, "points at which sheet.csv is written: x_um, y_um; else at the nodes"},
+            {"out", Kind::output_folder,
+             "sheet.csv, traction.csv, sheet.vtu, sheet.svg and sheet.json are written here; of a fit sheet_fit.csv, "
+             "sheet_models.csv and displacement.csv, too"}}},
       argc, argv, run);
 }

@@ -24,7 +24,8 @@ struct Parts {
   double all_nN = 0, outside_nN = 0;  ///< sums of magnitudes
 };
 
-/// Squares cut so finely that no part is larger than a triangle. Their sums of force and torque are the patches' own.
+/// A patch whose centre lies in the area belongs to it as a whole: a square, cut so finely that no part is larger than
+/// a triangle. What of the square lies beyond the edge acts at the centre.
 Parts parts_of(const std::vector<GroundPatch>& tractions, const Elements& elements) {
   constexpr int kMostCuts = 12;
   const Locator locator(elements);
@@ -34,19 +35,19 @@ Parts parts_of(const std::vector<GroundPatch>& tractions, const Elements& elemen
     parts.all_nN += force;
     if (force == 0) continue;
     const auto centre = locator.find(patch.position_um, 0);
-    const double triangle = centre ? std::sqrt(elements.area_um2(centre->triangle)) : 0.25 * side;
+    if (!centre) {
+      parts.outside_nN += force;
+      continue;
+    }
+    const double triangle = std::sqrt(elements.area_um2(centre->triangle));
     const int n = std::clamp(static_cast<int>(std::ceil(2 * side / triangle)), 1, kMostCuts);
     for (int i = 0; i < n; ++i)
       for (int j = 0; j < n; ++j) {
         const Vec2 at = patch.position_um + side * Vec2{(i + 0.5) / n - 0.5, (j + 0.5) / n - 0.5};
-        const auto place = locator.find(at, 0);
+        const Locator::Place place = locator.find(at, 0).value_or(*centre);
         const double area = patch.area_um2 / (n * n);
-        if (place) {
-          parts.inside.push_back(
-              {place->triangle, elements.shape(place->triangle, place->r, place->s), area, area * patch.traction_kPa});
-        } else {
-          parts.outside_nN += area * norm(patch.traction_kPa);
-        }
+        parts.inside.push_back(
+            {place.triangle, elements.shape(place.triangle, place.r, place.s), area, area * patch.traction_kPa});
       }
   }
   return parts;

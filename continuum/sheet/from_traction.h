@@ -21,8 +21,8 @@ struct FromTraction {
 };
 
 /// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
-/// does not depend on its modulus. Each patch acts as the square of its area; what of it lies outside of the region is
-/// left out. A net force and torque are taken off by an even traction and an even turn (least squares in T).
+/// does not depend on its modulus. A patch whose centre lies in the region acts as the square of its area; the
+/// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T).
 /// @throws InputError where more than kMostUnbalanced is out of balance
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
                            const TriangleSize& size, int threads);

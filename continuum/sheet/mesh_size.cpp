@@ -18,13 +18,13 @@ double narrow_um(const Region& region) {
 
 TriangleSize size_on_springs(const Region& region, double penetration_um) {
   const double narrow = narrow_um(region);
-  constexpr double kPerPenetration = 8, kPerWidth = 12;  // measured: 1e-4 of the largest displacement and tension
-  constexpr double kMostTriangles = 1e5;                 // some seconds; a penetration length far below the width
+  constexpr double kPerPenetration = 8, kPerWidth = 15;  // measured: 1e-4 of the largest displacement and tension
+  constexpr double kMostTriangles = 5e4;                 // some seconds; a penetration length far below the width
   TriangleSize size{.at_curves_um = std::min(penetration_um / kPerPenetration, narrow / kPerWidth),
-                    .largest_um = narrow / 7,
-                    .growth = 0.15,
+                    .largest_um = narrow / 10,
+                    .growth = 0.13,
                     .most_turn_rad = 0.2,
-                    .most_notch_rad = 0.06};
+                    .most_notch_rad = 0.05};
   while (expected_triangles(region, size) > kMostTriangles) size = with_edge(size, 1.2 * size.at_curves_um);
   return size;
 }
@@ -36,13 +36,14 @@ TriangleSize size_on_gel(const Region& region, const Material& material, const G
   // how far into the sheet its edge is felt: the gel's counterpart of a penetration length
   double reach = material.stiffness_nN_per_um() * (1 - gel.poisson_ratio) / mu;
   if (adhesion_nN_per_um3) reach = std::max(reach, std::sqrt(material.stiffness_nN_per_um() / *adhesion_nN_per_um3));
-  const double edge = std::clamp(reach / 3, narrow / 100, narrow / 30);
-  return {.at_curves_um = edge, .largest_um = narrow / 3, .growth = 0.4, .most_turn_rad = 0.35};
+  // measured: 1 % of the largest displacement, which lies at the edge; finer where a soft sheet gives way near it alone
+  const double per_width = std::clamp(1.6 * narrow / reach, 60.0, 90.0);
+  return {.at_curves_um = narrow / per_width, .largest_um = narrow / 4, .growth = 0.9, .most_turn_rad = 0.35};
 }
 
 TriangleSize size_for_fit(const Region& region) {
   const double narrow = narrow_um(region);
-  return {.at_curves_um = narrow / 30, .largest_um = narrow / 3, .growth = 0.4, .most_turn_rad = 0.35};
+  return {.at_curves_um = narrow / 40, .largest_um = narrow / 4, .growth = 0.9, .most_turn_rad = 0.35};
 }
 
 TriangleSize size_for_tractions(const Region& region, const std::vector<GroundPatch>& tractions) {

@@ -33,25 +33,42 @@ using FaceBase = CGAL::Delaunay_mesh_face_base_2<Kernel>;
 using Delaunay =
     CGAL::Constrained_Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase, FaceBase>>;
 
-/// How large triangles may be: at the vertices of the curves as these are apart, growing from there.
+/// How large triangles may be: at the vertices of the curves as these are apart, growing from there. Vertices stand in
+/// blocks of neighbours, of which most are too far away to matter.
 class SizeField {
  public:
   SizeField(std::vector<Vec2> points_um, std::vector<double> sizes_um, const TriangleSize& size)
-      : points_um_(std::move(points_um)), sizes_um_(std::move(sizes_um)), size_(size) {}
+      : points_um_(std::move(points_um)), sizes_um_(std::move(sizes_um)), size_(size) {
+    constexpr std::size_t kBlock = 32;
+    for (std::size_t first = 0; first < points_um_.size(); first += kBlock) {
+      const std::size_t end = std::min(first + kBlock, points_um_.size());
+      Block block{first, end, points_um_[(first + end) / 2], 0, sizes_um_[first]};
+      for (std::size_t k = first; k < end; ++k) {
+        block.radius_um = std::max(block.radius_um, norm(points_um_[k] - block.centre_um));
+        block.least_um = std::min(block.least_um, sizes_um_[k]);
+      }
+      blocks_.push_back(block);
+    }
+  }
   double at(Vec2 p) const {
     double least = size_.largest_um;
-    for (std::size_t k = 0; k < points_um_.size(); ++k) {
-      const Vec2 d = p - points_um_[k];
-      const double left = least - sizes_um_[k];
-      if (left > 0 && size_.growth * size_.growth * dot(d, d) < left * left)
-        least = sizes_um_[k] + size_.growth * std::sqrt(dot(d, d));
+    for (const Block& block : blocks_) {
+      if (block.least_um + size_.growth * (norm(p - block.centre_um) - block.radius_um) >= least) continue;
+      for (std::size_t k = block.first; k < block.end; ++k)
+        least = std::min(least, sizes_um_[k] + size_.growth * norm(p - points_um_[k]));
     }
     return least;
   }
 
  private:
+  struct Block {
+    std::size_t first, end;
+    Vec2 centre_um;
+    double radius_um, least_um;
+  };
   std::vector<Vec2> points_um_;
   std::vector<double> sizes_um_;
+  std::vector<Block> blocks_;
   TriangleSize size_;
 };
 

@@ -5,6 +5,7 @@
 #include <regex>
 #include <sstream>
 
+#include "continuum/sheet/borders.h"
 #include "continuum/sheet/tables.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tensions/tables.h"
@@ -66,7 +67,7 @@ std::string column_page() {
          "[formats.md](formats.md). *May lack*: older files, or files made elsewhere, need not have this column.\n"
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
-         sheet::pages_of_tables() + sheets::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() +
+         sheet::pages_of_tables() + sheet::pages_of_cells() + sheets::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() +
          statistics::pages_of_tables();
 }
 

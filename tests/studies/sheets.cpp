@@ -6,6 +6,7 @@
 
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/tables.h"
 #include "pipeline/files/csv.h"
 #include "substrate/greens/models.h"
 
@@ -23,6 +24,40 @@ Region outline(double radius_um, double spike_um, double w) {
     points.push_back(r * Vec2{std::cos(t), std::sin(t)});
   }
   return {{Curve(points)}, {}};
+}
+
+/// Discs of any penetration length, against their closed form.
+void print_discs() {
+  const files::CsvTable csv(std::filesystem::path(MBTFM_SOURCE_DIR "/tests/data/reference/chapter4/sheet_disc.csv"));
+  std::puts("disc | nodes | u | S_rr | S_tt (of the largest)");
+  for (int row = 0; row < csv.n_rows();) {
+    const int of_case = csv.integer(row, "case", 0);
+    const auto value = [&](const char* column) { return csv.number(row, column); };
+    Scene scene;
+    scene.region = outline(value("radius_um"), 0, 1);
+    scene.material = {value("E_kPa"), value("nu"), value("h_um")};
+    scene.contraction.nN_per_um = value("s_nN_per_um");
+    scene.adhesion_nN_per_um3 = value("kappa_nN_per_um3");
+    scene.line_tension_nN = value("line_nN");
+    scene.size = size_on_springs(scene.region, value("penetration_um"));
+    const Solution solution = solve_on_springs(scene, 1);
+    std::array<double, 3> off{}, largest{};
+    for (; row < csv.n_rows() && csv.integer(row, "case", 0) == of_case; ++row) {
+      const double c = std::cos(0.7), s = std::sin(0.7);
+      const SheetPoint at = at_points_of(solution, {value("r_um") * Vec2{c, s}}).front();
+      const double xx = at.sxx_nN_per_um.value(), yy = at.syy_nN_per_um.value(), xy = at.sxy_nN_per_um.value();
+      const std::array<double, 3> ours = {c * at.ux_um.value() + s * at.uy_um.value(),
+                                          c * c * xx + s * s * yy + 2 * c * s * xy,
+                                          s * s * xx + c * c * yy - 2 * c * s * xy};
+      const std::array<double, 3> exact = {value("ur_um"), value("Srr_nN_per_um"), value("Stt_nN_per_um")};
+      for (std::size_t k = 0; k < 3; ++k) {
+        off[k] = std::max(off[k], std::abs(ours[k] - exact[k]));
+        largest[k] = std::max(largest[k], std::abs(exact[k]));
+      }
+    }
+    std::printf("%d | %d | %.1e | %.1e | %.1e\n", of_case, solution.elements->n_nodes(), off[0] / largest[0],
+                off[1] / largest[1], off[2] / largest[2]);
+  }
 }
 
 double seconds_since(std::chrono::steady_clock::time_point start) {
@@ -124,6 +159,7 @@ void print_spikes_on_gel() {
 }  // namespace
 
 int main() {
+  print_discs();
   print_thesis_edges();
   print_spike_ratios();
   print_spikes_on_gel();

@@ -68,7 +68,6 @@ struct SolvedSheet {
 struct Deviation {
   double difference = 0, largest = 0;
   void add(double ours, double theirs) {
-    if (std::getenv("DBG")) std::printf("   %.6g %.6g diff %.2e\n", ours, theirs, ours - theirs);
     difference = std::max(difference, std::abs(ours - theirs));
     largest = std::max(largest, std::abs(theirs));
   }
