@@ -75,30 +75,10 @@ Load read_forces(const Path& adhesions_file, const Path& file) {
   return load;
 }
 
-/// Steps of a lattice: the smallest distance between its columns and between its rows.
-Vec2 spacing_of(const std::vector<Vec2>& points, const Path& file) {
-  const auto step = [&](double Vec2::*axis) {
-    std::vector<double> values;
-    for (const Vec2& p : points) values.push_back(p.*axis);
-    std::sort(values.begin(), values.end());
-    double smallest = 0;
-    for (std::size_t k = 1; k < values.size(); ++k) {
-      const double gap = values[k] - values[k - 1];
-      // columns of a lattice, written with some digits
-      if (gap > 1e-6 * (values.back() - values.front()) && (smallest == 0 || gap < smallest)) smallest = gap;
-    }
-    return smallest;
-  };
-  const Vec2 spacing = {step(&Vec2::x), step(&Vec2::y)};
-  if (spacing.x > 0 && spacing.y > 0) return spacing;
-  throw InputError(file.string(), "tractions on a lattice of at least two columns and rows, or a column area_um2",
-                   std::to_string(points.size()) + " rows");
-}
-
 SurfaceLoad read_surface_tractions(const Path& file) {
   const files::CsvTable table(file);
   const std::vector<Vec2> points = files::read_points(file);
-  const Vec2 spacing = spacing_of(points, file);
+  const Vec2 spacing = files::lattice_spacing_um(points, file);
   std::map<std::array<long long, 2>, int> vertex_at;
   const auto place = [&](Vec2 p) {
     return std::array{std::llround((p.x - points[0].x) / spacing.x), std::llround((p.y - points[0].y) / spacing.y)};
@@ -135,7 +115,7 @@ Load read_tractions(const Path& file) {
   const files::CsvTable table(file);
   const std::vector<Vec2> points = files::read_points(file);
   const bool has_areas = table.has("area_um2"), is_in_space = table.has("tz_kPa");
-  const Vec2 spacing = has_areas ? Vec2{} : spacing_of(points, file);
+  const Vec2 spacing = has_areas ? Vec2{} : files::lattice_spacing_um(points, file);
   Load load;
   for (int row = 0; row < table.n_rows(); ++row) {
     const double area = has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y;

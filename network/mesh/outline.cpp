@@ -5,7 +5,7 @@
 #include <limits>
 #include <numbers>
 
-#include "network/mesh/polyline.h"
+#include "pipeline/contract/polyline.h"
 
 namespace mbtfm::mesh {
 namespace {

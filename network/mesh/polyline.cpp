@@ -58,29 +58,6 @@ Polyline without_short_pieces(Polyline points_um, double shortest_um) {
   return points_um;
 }
 
-std::vector<double> even_division_um(double length_um, const std::function<double(double)>& size_um, int fewest) {
-  std::vector<double> at = {0};
-  std::vector<double> count = {0};  // of edges up to there: the integral of 1 / h
-  constexpr double kStep = 0.25;    // of an edge: h grows by at most a third over it
-  double inverse = 1 / size_um(0);
-  while (at.back() < length_um) {
-    const double next = std::min(length_um, at.back() + kStep / inverse);
-    const double next_inverse = 1 / size_um(next);
-    count.push_back(count.back() + 0.5 * (next - at.back()) * (inverse + next_inverse));
-    at.push_back(next);
-    inverse = next_inverse;
-  }
-  const int pieces = std::max(fewest, static_cast<int>(std::lround(count.back())));
-  std::vector<double> division;
-  std::size_t k = 0;
-  for (int i = 1; i < pieces; ++i) {
-    const double wanted = count.back() * i / pieces;
-    while (count[k + 1] < wanted) ++k;
-    division.push_back(at[k] + (at[k + 1] - at[k]) * (wanted - count[k]) / (count[k + 1] - count[k]));
-  }
-  return division;
-}
-
 Polyline evenly_divided(const Polyline& points_um, const SizeField& size, int fewest) {
   std::vector<double> start = {0};
   for (std::size_t i = 1; i < points_um.size(); ++i) {
@@ -108,28 +85,6 @@ Polyline densified(const Polyline& points_um, double longest_um) {
   }
   dense.push_back(points_um.back());
   return dense;
-}
-
-Polygon evenly_resampled(const Polygon& polygon, int n) {
-  double perimeter = 0;
-  const std::size_t size = polygon.size();
-  for (std::size_t i = 0; i < size; ++i) perimeter += norm(polygon[(i + 1) % size] - polygon[i]);
-  Polygon points;
-  points.reserve(n);
-  double start = 0;
-  for (std::size_t i = 0; i < size; ++i) {
-    const Vec2 a = polygon[i];
-    const Vec2 step = polygon[(i + 1) % size] - a;
-    const double length = norm(step);
-    while (static_cast<int>(points.size()) < n) {
-      const double s = perimeter * static_cast<double>(points.size()) / n;
-      if (s >= start + length) break;
-      points.push_back(a + ((s - start) / length) * step);
-    }
-    start += length;
-  }
-  while (static_cast<int>(points.size()) < n) points.push_back(polygon.front());  // rounding at the very end
-  return points;
 }
 
 }  // namespace mbtfm::mesh

@@ -28,14 +28,20 @@ enum class EffectKind {
   channel_shift,
   beyond_cut,
   robust_loss,
-  time_coupling
+  time_coupling,
+  // sheets
+  gel_response,
+  adhesion_slip,
+  edge_tension,
+  third_dimension
 };
 /// For people, and in records.
 constexpr auto words(EffectKind) {
   return std::array{"affine drift",     "correlation windows",   "finite thickness", "finite sides",
                     "depth-graded gel", "vertical displacement", "uneven surface",   "large strain",
                     "stress fibres",    "elasticity of cables",  "common motion",    "beads under load",
-                    "channel shift",    "forces beyond the cut", "robust loss",      "time coupling"};
+                    "channel shift",    "forces beyond the cut", "robust loss",      "time coupling",
+                    "gel's response",   "adhesion slip",         "edge tension",     "third dimension"};
 }
 
 struct Effect {

@@ -78,7 +78,14 @@ enum class FindingKind {
   // mean
   registration_ambiguous,
   cells_left_out,
-  few_cells
+  few_cells,
+  // sheet
+  sheet_thick,
+  sheet_strain,
+  sheet_coarse,
+  sheet_not_identifiable,
+  tractions_off_balance,
+  tractions_outside
 };
 
 struct KindOfFinding {

@@ -1,6 +1,7 @@
-/// Along and near open lines.
+/// Along and near lines.
 #pragma once
 
+#include <functional>
 #include <vector>
 
 #include "pipeline/contract/cell.h"
@@ -17,5 +18,13 @@ double distance_to_line_um(const Polyline& line_um, Vec2 point_um);
 /// Places on a fibre for its label in a picture, the best first: the middle, then ever nearer to the ends; those where
 /// another fibre passes within `clear_um` last.
 std::vector<Vec2> label_places_um(const Fibre& fibre, const std::vector<Fibre>& fibres, double clear_um);
+
+/// Where to cut a line so that each piece has about the wanted length there.
+/// @param size_um  wanted length as a function of the arc length
+/// @param fewest  pieces
+std::vector<double> even_division_um(double length_um, const std::function<double(double)>& size_um, int fewest);
+
+/// `n` points at equal steps of arc length along the closed line.
+Polygon evenly_resampled(const Polygon& polygon, int n);
 
 }  // namespace mbtfm

@@ -217,6 +217,25 @@ std::string displacement_of_frame(int frame) {
   return name;
 }
 
+Vec2 lattice_spacing_um(const std::vector<Vec2>& points, const Path& file) {
+  const auto step = [&](double Vec2::*axis) {
+    std::vector<double> values;
+    for (const Vec2& p : points) values.push_back(p.*axis);
+    std::sort(values.begin(), values.end());
+    double smallest = 0;
+    for (std::size_t k = 1; k < values.size(); ++k) {
+      const double gap = values[k] - values[k - 1];
+      // columns of a lattice, written with some digits
+      if (gap > 1e-6 * (values.back() - values.front()) && (smallest == 0 || gap < smallest)) smallest = gap;
+    }
+    return smallest;
+  };
+  const Vec2 spacing = {step(&Vec2::x), step(&Vec2::y)};
+  if (spacing.x > 0 && spacing.y > 0) return spacing;
+  throw InputError(file.string(), "tractions on a lattice of at least two columns and rows, or a column area_um2",
+                   std::to_string(points.size()) + " rows");
+}
+
 std::vector<Tension> read_tensions(const Path& file) {
   std::vector<Tension> tensions;
   for (const FibreTension& row : read(file, tension_table())) tensions.push_back(row.tension);

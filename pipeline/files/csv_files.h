@@ -45,6 +45,10 @@ std::vector<Vec2> read_points(const Path& file);
 /// Columns x_um, y_um, z_um at places of an even lattice, in any order. A vertex without a row or a z has NaN.
 HeightMap read_heights(const Path& file);
 
+/// Between the columns and rows of points that lie on a lattice.
+/// @param file  they are from, for the message. @throws InputError where there are less than two columns or rows
+Vec2 lattice_spacing_um(const std::vector<Vec2>& points_um, const Path& file);
+
 /// Columns fibre_id, tension_nN at least.
 std::vector<Tension> read_tensions(const Path& file);
 void write_tensions(const Path& file, const std::vector<Tension>& tensions, const std::vector<Fibre>& fibres);

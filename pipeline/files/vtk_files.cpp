@@ -356,7 +356,7 @@ void write_grid_vtu(const Path& file, const Grid& grid) {
   for (const auto& p : grid.points_um) points->InsertNextPoint(p.data());
   vtkNew<vtkUnstructuredGrid> data;
   data->SetPoints(points);
-  const int type = grid.corners == 4 ? VTK_QUAD : VTK_HEXAHEDRON;
+  const int type = grid.corners == 4 ? VTK_QUAD : grid.corners == 6 ? VTK_QUADRATIC_TRIANGLE : VTK_HEXAHEDRON;
   data->Allocate(static_cast<vtkIdType>(grid.cells.size()) / grid.corners);
   for (std::size_t first = 0; first < grid.cells.size(); first += grid.corners) {
     vtkIdType corners[8];

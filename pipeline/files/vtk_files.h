@@ -26,7 +26,8 @@ struct GridArray {
   int components = 1;
   std::vector<double> values;
 };
-/// Quadrilaterals (4 corners, round) or hexahedra (8 corners: one face round, then the face across).
+/// Quadrilaterals (4 corners, round), hexahedra (8 corners: one face round, then the face across) or quadratic
+/// triangles (3 corners, then the points between them: 6).
 struct Grid {
   int corners = 4;
   std::vector<std::array<double, 3>> points_um;

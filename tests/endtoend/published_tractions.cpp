@@ -5,8 +5,11 @@
 #include <fstream>
 #include <numbers>
 
+#include "continuum/sheet/from_traction.h"
+#include "continuum/sheet/mesh_size.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/files/csv.h"
+#include "segment/cells/mask.h"
 #include "segment/images/image.h"
 
 namespace mbtfm::tractions {
@@ -306,6 +309,58 @@ TEST(OthersData, tractions_of_colonies_are_those_of_the_program_that_published_t
     EXPECT_NEAR(sums.tractions_Pa, theirs.tractions_Pa, 0.1 * theirs.tractions_Pa);
     EXPECT_NEAR(sums.contractility_nN, published.contractility_nN, 0.1 * published.contractility_nN);
     EXPECT_NEAR(sums.energy_fJ, published.energy_fJ, 0.1 * published.energy_fJ);
+  }
+}
+
+/// The closed line of a label as an outline.
+sheet::Region region_enclosed(const images::Image& mask, float label) {
+  const std::vector<bool> is_inside = enclosed(mask, label);
+  cells::LabelMask filled{.name = "mask", .width = mask.width, .height = mask.height, .labels = {}};
+  for (const bool inside : is_inside) filled.labels.push_back(inside ? 1 : 0);
+  Polygon ring;
+  double largest = 0;
+  for (const Polygon& one : cells::rings_px(filled, 1)) {
+    if (signed_area_um2(one) <= largest) continue;  // specks, and holes, which turn the other way
+    largest = signed_area_um2(one);
+    ring.clear();
+    for (const Vec2 p : one) ring.push_back(kCameraPixel_um * p);
+  }
+  return {{sheet::Curve(ring)}, {}};
+}
+
+/// pyTFM's figures are means over the colony, of a sheet that ends at a larger area drawn by hand. What that area does
+/// is in the second line: the same tractions on the colony alone.
+TEST(OthersData, tensions_of_colonies_are_those_of_the_program_that_published_them) {
+  const fs::path folder = kData / "displacement/pytfm_colonies";
+  if (!fs::exists(folder)) GTEST_SKIP() << "no ../shared/data here";
+  struct Published {
+    const char* name;
+    double mean, variation, shear, shear_tolerance, on_colony_alone;  // nN/um
+  };
+  for (const Published& published :
+       {Published{"WT03", 3.00, 0.268, -0.418, 0.05, 1.25}, {"KO04", 5.18, 0.279, 0.134, 0.08, 2.83}}) {
+    const Colony colony = read_colony(folder, published.name);
+    const images::Image mask = images::read_image(folder / (std::string(published.name) + "_mask.png"));
+    std::vector<sheet::GroundPatch> tractions;
+    for (std::size_t p = 0; p < colony.published_kPa.size(); ++p)
+      tractions.push_back(
+          {colony.inputs.beads[p].position_um, colony.step_um * colony.step_um, colony.published_kPa[p], {}});
+    const sheet::Region area = region_enclosed(mask, 2), cells = region_enclosed(mask, 3);
+    const auto figures_on = [&](const sheet::Region& region, double poisson_ratio) {
+      const sheet::FromTraction found = sheet::tensions_from(tractions, region, {1, poisson_ratio, 1},
+                                                             sheet::size_for_tractions(region, tractions), 2);
+      EXPECT_NEAR(found.balance.mean_tension_nN_per_um / found.balance.virial_tension_nN_per_um, 1, 1e-9);
+      return sheet::figures_inside(found.solution, cells.rims.front().points_um());
+    };
+    const sheet::TensionFigures theirs = figures_on(area, 0.5), other = figures_on(area, 0),
+                                alone = figures_on(cells, 0.5);
+    std::printf("%s: mean %.3f (published %.2f), cv %.3f (%.3f), shear %.3f (%.3f); nu = 0: %.3f; colony alone: %.3f\n",
+                published.name, theirs.mean_nN_per_um, published.mean, theirs.variation, published.variation,
+                theirs.shear_nN_per_um, published.shear, other.mean_nN_per_um, alone.mean_nN_per_um);
+    EXPECT_NEAR(theirs.mean_nN_per_um, published.mean, 0.02 * published.mean);
+    EXPECT_NEAR(theirs.variation, published.variation, 0.01);
+    EXPECT_NEAR(theirs.shear_nN_per_um, published.shear, published.shear_tolerance * std::abs(published.shear));
+    EXPECT_NEAR(alone.mean_nN_per_um, published.on_colony_alone, 0.02 * published.on_colony_alone);
   }
 }
 

@@ -1,0 +1,139 @@
+#include "continuum/sheet/forward.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace mbtfm::sheet {
+namespace {
+
+Solution prepared(std::shared_ptr<const Elements> elements, const Scene& scene) {
+  Solution solution;
+  solution.elements = std::move(elements);
+  Sheet& sheet = solution.sheet;
+  sheet.material = scene.material;
+  sheet.contraction_nN_per_um = contraction_at_points(*solution.elements, scene.region, scene.contraction);
+  sheet.line_tension_nN = scene.line_tension_nN;
+  sheet.n_rims = static_cast<int>(scene.region.rims.size());
+  return solution;
+}
+
+/// Length of the rims, and what the line's pull adds to Σ x · F.
+double rim_length_um(const Elements& elements, int n_rims) {
+  double length = 0;
+  const std::vector<Vec2>& x = elements.triangles().nodes_um;
+  for (const Triangles::Side& side : elements.triangles().sides) {
+    if (side.curve >= n_rims) continue;
+    for (const double q : {-0.7745966692414834, 0.0, 0.7745966692414834}) {
+      const Vec2 along = (q - 0.5) * x[static_cast<std::size_t>(side.nodes[0])] +
+                         (q + 0.5) * x[static_cast<std::size_t>(side.nodes[1])] +
+                         (-2 * q) * x[static_cast<std::size_t>(side.nodes[2])];
+      length += (q == 0 ? 8.0 : 5.0) / 9 * norm(along);
+    }
+  }
+  return length;
+}
+
+}  // namespace
+
+std::shared_ptr<const Elements> elements_of(const Scene& scene) {
+  constexpr std::size_t kMostTriangles = 200000;  // 2 GB of a factor
+  return std::make_shared<const Elements>(triangulated(scene.region, scene.size, kMostTriangles));
+}
+
+std::vector<double> contraction_at_points(const Elements& elements, const Region& region,
+                                          const Contraction& contraction) {
+  std::vector<double> s = even(elements, contraction.nN_per_um);
+  if (!contraction.edge_band_um) return s;
+  for (int t = 0; t < elements.n_triangles(); ++t)
+    for (int p = 0; p < Elements::kPoints; ++p) {
+      double nearest = std::numeric_limits<double>::infinity();
+      for (const Curve& rim : region.rims)
+        nearest = std::min(nearest, distance_to_boundary_um(rim.points_um(), elements.at(t, p).place_um));
+      if (nearest > *contraction.edge_band_um) s[static_cast<std::size_t>(Elements::kPoints * t + p)] = 0;
+    }
+  return s;
+}
+
+Solution solve_on_springs(const Scene& scene, int threads) {
+  Solution solution = prepared(elements_of(scene), scene);
+  const Elements& elements = *solution.elements;
+  solution.sheet.spring_nN_per_um3 = even(elements, scene.adhesion_nN_per_um3.value_or(0));
+  if (scene.strain == Strain::large) {
+    LargeStrain large = on_springs_large(elements, solution.sheet, scene.measure, threads);
+    solution.u = std::move(large.u);
+    solution.report = large.report;
+    solution.at_points = large_tension_at_points(elements, solution.sheet, scene.measure, solution.u);
+  } else {
+    solution.u = on_springs(elements, solution.sheet, threads);
+    solution.report = {.converged = true, .iterations = 1, .last_change = 0, .reason = "one linear solve"};
+    solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
+  }
+  solution.at_nodes = scene.strain == Strain::large ? recovered(elements, solution.at_points)
+                                                    : recovered(elements, solution.at_points,
+                                                                known_on_springs(elements, solution.sheet, solution.u));
+  for (int t = 0; t < elements.n_triangles(); ++t) {
+    GroundPatch patch;
+    for (int p = 0; p < Elements::kPoints; ++p) {
+      const Shape& shape = elements.at(t, p);
+      patch.area_um2 += shape.weight_um2;
+      patch.position_um += shape.weight_um2 * shape.place_um;
+      patch.displacement_um += shape.weight_um2 * value_of(solution.u, elements.nodes(t), shape);
+    }
+    patch.position_um = 1 / patch.area_um2 * patch.position_um;
+    patch.displacement_um = 1 / patch.area_um2 * patch.displacement_um;
+    patch.traction_kPa =
+        solution.sheet.spring_nN_per_um3[static_cast<std::size_t>(Elements::kPoints * t)] * patch.displacement_um;
+    solution.patches.push_back(patch);
+  }
+  return solution;
+}
+
+Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> triangles, const Scene& scene) {
+  Solution solution = prepared(std::move(triangles), scene);
+  const Elements& elements = *solution.elements;
+  OnGel::Solution found = ground.solve(scene.material, forces_of_contraction_nN(elements, solution.sheet));
+  solution.u = std::move(found.u);
+  solution.report = found.report;
+  solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
+  solution.at_nodes = recovered(elements, solution.at_points);
+  const Eigen::VectorXd gel_um = ground.gel_um(found.forces_nN);
+  for (int t = 0; t < elements.n_triangles(); ++t) {
+    const double area = ground.areas_um2()[static_cast<std::size_t>(t)];
+    solution.patches.push_back({ground.patches()[static_cast<std::size_t>(t)].centre_um, area,
+                                1 / area * at_node(found.forces_nN, t), at_node(gel_um, t)});
+  }
+  return solution;
+}
+
+Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads) {
+  const std::shared_ptr<const Elements> elements = elements_of(scene);
+  return solve_on(OnGel(*elements, gel, scene.adhesion_nN_per_um3, threads), elements, scene);
+}
+
+Balance balance_of(const Solution& solution) {
+  Balance balance;
+  const Elements& elements = *solution.elements;
+  Vec2 centre;
+  for (const GroundPatch& patch : solution.patches) {
+    balance.area_um2 += patch.area_um2;
+    centre += patch.area_um2 * patch.position_um;
+  }
+  centre = 1 / balance.area_um2 * centre;
+  double virial = 0;
+  for (const GroundPatch& patch : solution.patches) {
+    const Vec2 force = patch.area_um2 * patch.traction_kPa, arm = patch.position_um - centre;
+    balance.total_force_nN += norm(force);
+    balance.net_force_nN += force;
+    balance.net_torque_nN_um += cross(arm, force);
+    balance.largest_torque_nN_um += norm(arm) * norm(force);
+    virial += dot(arm, force);
+  }
+  balance.mean_tension_nN_per_um = mean_of(mean_over(elements, solution.at_points));
+  balance.virial_tension_nN_per_um =
+      -(virial + solution.sheet.line_tension_nN * rim_length_um(elements, solution.sheet.n_rims)) /
+      (2 * balance.area_um2);
+  balance.elastic_energy_fJ = 0.5 * solution.u.dot(forces_of_contraction_nN(elements, solution.sheet));
+  return balance;
+}
+
+}  // namespace mbtfm::sheet

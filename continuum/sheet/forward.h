@@ -1,0 +1,86 @@
+/// A contracting sheet from its outline to tractions and tensions.
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "continuum/sheet/on_gel.h"
+#include "continuum/sheet/on_springs.h"
+#include "continuum/sheet/recovery.h"
+#include "pipeline/contract/words.h"
+
+namespace mbtfm::sheet {
+
+/// What the sheet stands on.
+enum class Ground {
+  gel,      ///< bonded, or through the springs of its adhesions
+  springs,  ///< each place by itself
+  none      ///< tractions are given
+};
+constexpr auto words(Ground) { return std::array{"gel", "springs", "none"}; }
+
+/// How large strains may be.
+enum class Strain { small, large };
+constexpr auto words(Strain) { return std::array{"small", "large"}; }
+
+/// Where the sheet contracts.
+struct Contraction {
+  double nN_per_um = 0;
+  std::optional<double> edge_band_um = {};  ///< only so near to the edge; unset: everywhere
+};
+
+struct Scene {
+  Region region;
+  Material material;
+  Contraction contraction;
+  double line_tension_nN = 0;
+  std::optional<double> adhesion_nN_per_um3 = {};  ///< unset: bonded, where there is a gel
+  Strain strain = Strain::small;
+  ContractionMeasure measure = ContractionMeasure::surface_tension;
+  TriangleSize size;
+};
+
+/// A part of the ground, and what acts on it.
+struct GroundPatch {
+  Vec2 position_um;
+  double area_um2 = 0;
+  Vec2 traction_kPa;
+  Vec2 displacement_um;  ///< of the gel, or of the sheet on springs
+};
+
+struct Solution {
+  std::shared_ptr<const Elements> elements;
+  Sheet sheet;
+  NodeVectors u;
+  std::vector<Tensor> at_points, at_nodes;  ///< S
+  std::vector<GroundPatch> patches;         ///< by triangle
+  Report report;
+};
+
+/// Contraction at each point of the elements.
+std::vector<double> contraction_at_points(const Elements& elements, const Region& region,
+                                          const Contraction& contraction);
+
+/// @throws InvalidData, NotSolved
+Solution solve_on_springs(const Scene& scene, int threads);
+/// The same in two steps, to solve for several sheets on one ground.
+std::shared_ptr<const Elements> elements_of(const Scene& scene);
+Solution solve_on(const OnGel& ground, std::shared_ptr<const Elements> elements, const Scene& scene);
+/// Small strains. @throws InvalidData, NotSolved
+Solution solve_on_gel(const Scene& scene, const substrate::Substrate& gel, int threads);
+
+/// What must hold of any solution.
+struct Balance {
+  double total_force_nN = 0;  ///< sum of magnitudes over the patches
+  Vec2 net_force_nN;
+  double net_torque_nN_um = 0;          ///< about the centre of area
+  double largest_torque_nN_um = 0;      ///< sum of distance times magnitude
+  double elastic_energy_fJ = 0;         ///< of sheet and ground: half of what contraction has done
+  double mean_tension_nN_per_um = 0;    ///< ½ tr S, mean over the area
+  double virial_tension_nN_per_um = 0;  ///< −1/(2A) Σ x · F, less Λ × the rim / (2 A)
+  double area_um2 = 0;
+};
+Balance balance_of(const Solution& solution);
+
+}  // namespace mbtfm::sheet

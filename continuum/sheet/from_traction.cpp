@@ -1,0 +1,180 @@
+#include "continuum/sheet/from_traction.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "continuum/sheet/stiffness.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::sheet {
+namespace {
+
+/// A part of a patch, where the sheet takes it.
+struct Part {
+  int triangle = 0;
+  Shape shape;
+  double area_um2 = 0;
+  Vec2 force_nN;
+};
+
+struct Parts {
+  std::vector<Part> inside;
+  double all_nN = 0, outside_nN = 0;  ///< sums of magnitudes
+};
+
+/// A patch whose centre lies in the area belongs to it as a whole: a square, cut so finely that no part is larger than
+/// a triangle. What of the square lies beyond the edge acts at the centre.
+Parts parts_of(const std::vector<GroundPatch>& tractions, const Elements& elements) {
+  constexpr int kMostCuts = 12;
+  const Locator locator(elements);
+  Parts parts;
+  for (const GroundPatch& patch : tractions) {
+    const double side = std::sqrt(patch.area_um2), force = patch.area_um2 * norm(patch.traction_kPa);
+    parts.all_nN += force;
+    if (force == 0) continue;
+    const auto centre = locator.find(patch.position_um, 0);
+    if (!centre) {
+      parts.outside_nN += force;
+      continue;
+    }
+    const double triangle = std::sqrt(elements.area_um2(centre->triangle));
+    const int n = std::clamp(static_cast<int>(std::ceil(2 * side / triangle)), 1, kMostCuts);
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j) {
+        const Vec2 at = patch.position_um + side * Vec2{(i + 0.5) / n - 0.5, (j + 0.5) / n - 0.5};
+        const Locator::Place place = locator.find(at, 0).value_or(*centre);
+        const double area = patch.area_um2 / (n * n);
+        parts.inside.push_back(
+            {place.triangle, elements.shape(place.triangle, place.r, place.s), area, area * patch.traction_kPa});
+      }
+  }
+  return parts;
+}
+
+/// Takes net force and torque off. @returns what was there
+Unbalanced balance(Parts& parts) {
+  Vec2 centre, net;
+  double area = 0, sum = 0;
+  for (const Part& part : parts.inside) {
+    centre += part.area_um2 * part.shape.place_um;
+    area += part.area_um2;
+    net += part.force_nN;
+    sum += norm(part.force_nN);
+  }
+  centre = 1 / area * centre;
+  double torque = 0, largest = 0, inertia = 0;
+  for (const Part& part : parts.inside) {
+    const Vec2 arm = part.shape.place_um - centre;
+    torque += cross(arm, part.force_nN);
+    largest += norm(arm) * norm(part.force_nN);
+    inertia += part.area_um2 * dot(arm, arm);
+  }
+  for (Part& part : parts.inside) {
+    const Vec2 arm = part.shape.place_um - centre;
+    part.force_nN = part.force_nN - part.area_um2 * (1 / area * net + torque / inertia * Vec2{-arm.y, arm.x});
+  }
+  return {norm(net) / sum, std::abs(torque) / largest, parts.outside_nN / parts.all_nN};
+}
+
+std::vector<GroundPatch> patches_of(const Parts& parts, const Elements& elements) {
+  std::vector<GroundPatch> patches(static_cast<std::size_t>(elements.n_triangles()));
+  std::vector<Vec2> forces(patches.size()), places(patches.size());
+  std::vector<int> counts(patches.size());
+  for (const Part& part : parts.inside) {
+    const auto t = static_cast<std::size_t>(part.triangle);
+    forces[t] += part.force_nN;
+    places[t] += part.shape.place_um;
+    ++counts[t];
+  }
+  for (std::size_t t = 0; t < patches.size(); ++t) {
+    patches[t].area_um2 = elements.area_um2(static_cast<int>(t));
+    patches[t].position_um = counts[t] > 0 ? 1.0 / counts[t] * places[t] : elements.at(static_cast<int>(t), 0).place_um;
+    patches[t].traction_kPa = 1 / patches[t].area_um2 * forces[t];
+  }
+  return patches;
+}
+
+/// As balance_of(), of the parts themselves: exact.
+Balance balance_of_parts(const Parts& parts, const Solution& solution) {
+  Balance result = balance_of(solution);
+  result.net_force_nN = {};
+  result.net_torque_nN_um = result.total_force_nN = result.largest_torque_nN_um = 0;
+  double virial = 0;
+  for (const Part& part : parts.inside) {
+    result.total_force_nN += norm(part.force_nN);
+    result.net_force_nN += part.force_nN;
+    result.net_torque_nN_um += cross(part.shape.place_um, part.force_nN);
+    result.largest_torque_nN_um += norm(part.shape.place_um) * norm(part.force_nN);
+    virial += dot(part.shape.place_um, part.force_nN);
+  }
+  result.virial_tension_nN_per_um = -virial / (2 * result.area_um2);
+  return result;
+}
+
+}  // namespace
+
+FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
+                           const TriangleSize& size, int threads) {
+  constexpr std::size_t kMostTriangles = 200000;
+  FromTraction result;
+  Solution& solution = result.solution;
+  solution.elements = std::make_shared<const Elements>(triangulated(region, size, kMostTriangles));
+  const Elements& elements = *solution.elements;
+  Parts parts = parts_of(tractions, elements);
+  if (parts.inside.empty())
+    throw InputError("the tractions", "some inside of the outline", "none",
+                     "outline and tractions must have one origin");
+  result.unbalanced = balance(parts);
+  const double worst = std::max(result.unbalanced.net_force_share, result.unbalanced.net_torque_share);
+  if (worst > kMostUnbalanced)
+    throw InputError("the tractions inside of the outline",
+                     "a net force and torque below " + brief(kMostUnbalanced) + " of what the forces could add up to",
+                     "a net force of " + brief(result.unbalanced.net_force_share) + " and a net torque of " +
+                         brief(result.unbalanced.net_torque_share),
+                     "the outline must hold the whole colony; or the tractions belong to another field");
+  solution.sheet.material = material;
+  solution.sheet.contraction_nN_per_um = even(elements, 0);
+  solution.sheet.n_rims = static_cast<int>(region.rims.size());
+  NodeVectors load = NodeVectors::Zero(2 * elements.n_nodes());
+  for (const Part& part : parts.inside)
+    for (int i = 0; i < 6; ++i) {
+      const auto node = elements.nodes(part.triangle)[i];
+      load(2 * node) -= part.shape.value[i] * part.force_nN.x;
+      load(2 * node + 1) -= part.shape.value[i] * part.force_nN.y;
+    }
+  Stiffness stiffness(elements, pins(elements));
+  for (int t = 0; t < elements.n_triangles(); ++t) stiffness.add(t, elastic_stiffness(elements, t, material));
+  MBTFM_ASSERT(stiffness.factorise(0, threads));
+  solution.u = stiffness.solve(load);
+  solution.report = {.converged = true, .iterations = 1, .last_change = 0, .reason = "one linear solve"};
+  solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
+  solution.at_nodes = recovered(elements, solution.at_points);
+  solution.patches = patches_of(parts, elements);
+  result.balance = balance_of_parts(parts, solution);
+  return result;
+}
+
+TensionFigures figures_inside(const Solution& solution, const Polygon& outline_um) {
+  TensionFigures figures;
+  double sum = 0, squares = 0, shear = 0;
+  for (int t = 0; t < solution.elements->n_triangles(); ++t)
+    for (int p = 0; p < Elements::kPoints; ++p) {
+      const Shape& shape = solution.elements->at(t, p);
+      if (!contains(outline_um, shape.place_um)) continue;
+      const Tensor& S = solution.at_points[static_cast<std::size_t>(Elements::kPoints * t + p)];
+      figures.area_um2 += shape.weight_um2;
+      sum += shape.weight_um2 * mean_of(S);
+      squares += shape.weight_um2 * mean_of(S) * mean_of(S);
+      shear += shape.weight_um2 * S.xy;
+    }
+  if (figures.area_um2 == 0) return figures;
+  figures.mean_nN_per_um = sum / figures.area_um2;
+  const double variance = squares / figures.area_um2 - figures.mean_nN_per_um * figures.mean_nN_per_um;
+  figures.variation = std::sqrt(std::max(0.0, variance)) / std::abs(figures.mean_nN_per_um);
+  figures.shear_nN_per_um = shear / figures.area_um2;
+  return figures;
+}
+
+}  // namespace mbtfm::sheet

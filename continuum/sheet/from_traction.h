@@ -1,0 +1,41 @@
+/// Tensions of a sheet from the tractions under it ("monolayer stress microscopy").
+#pragma once
+
+#include <vector>
+
+#include "continuum/sheet/forward.h"
+
+namespace mbtfm::sheet {
+
+/// What is out of balance of the tractions, and what of them the sheet cannot take.
+struct Unbalanced {
+  double net_force_share = 0;   ///< |Σ F| / Σ |F|
+  double net_torque_share = 0;  ///< |Σ (x − c) × F| / Σ |x − c| |F|
+  double outside_share = 0;     ///< of Σ |F|: outside of the area
+};
+
+struct FromTraction {
+  Solution solution;      ///< u is of a sheet with the material's stiffness, up to a motion as a whole
+  Unbalanced unbalanced;  ///< before it was taken off
+  Balance balance;
+};
+
+/// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
+/// does not depend on its modulus. A patch whose centre lies in the region acts as the square of its area; the
+/// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T).
+/// @throws InputError where more than kMostUnbalanced is out of balance
+FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
+                           const TriangleSize& size, int threads);
+
+inline constexpr double kMostUnbalanced = 0.2;
+
+/// Of ½ tr S and S_xy, over the part of the sheet inside of an outline.
+struct TensionFigures {
+  double mean_nN_per_um = 0;
+  double variation = 0;  ///< standard deviation over mean
+  double shear_nN_per_um = 0;
+  double area_um2 = 0;
+};
+TensionFigures figures_inside(const Solution& solution, const Polygon& outline_um);
+
+}  // namespace mbtfm::sheet

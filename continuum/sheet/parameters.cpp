@@ -1,0 +1,52 @@
+#include "continuum/sheet/parameters.h"
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::sheet {
+
+void declare(stage::ParameterList& list, SheetParameters& p) {
+  list.table("sheet");
+  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the cells (kPa)");
+  list.add("poisson_ratio", p.poisson_ratio, Range::between(0, 0.5), "Poisson's ratio of the cells, in plane stress");
+  list.add("thickness_um", p.thickness_um, Range::size_um(), "thickness of the cells (um)");
+  list.add("contraction_nN_per_um", p.contraction_nN_per_um, Range::between(0, 1e4),
+           "contraction of the sheet as a tension: the pull on each length of its edge (nN/um, the same as mN/m)");
+  list.add("contraction_kPa", p.contraction_kPa, Range::between(0, 1e4),
+           "the same as a stress, times thickness_um (kPa); give one of the two");
+  list.add("edge_band_um", p.edge_band_um, Range::size_um(),
+           "the sheet contracts only so near to its edge (um); unset: everywhere");
+  list.add("line_tension_nN", p.line_tension_nN, Range::between(0, 1e4), "tension of a cable along the edge (nN)");
+  list.add("adhesion_stiffness_nN_per_um3", p.adhesion_stiffness_nN_per_um3, Range::between(1e-9, 1e9),
+           "stiffness of the adhesions per area, or of springs that stand for the ground (nN/um3 = kPa/um); unset: the "
+           "sheet is bonded to the gel");
+  list.add("ground", p.ground,
+           "what the sheet stands on; auto: the gel, or springs where no gel is given or the gel is much stiffer than "
+           "the adhesions; none: the tractions are given");
+  list.add("strain", p.strain,
+           "small strains or large ones; auto: large on springs where the contraction calls for it");
+  list.add("contraction_measure", p.contraction_measure,
+           "large strain: what the contraction is a tension of: the deformed surface, or the material at rest");
+  list.add("mesh_um", p.mesh_um, Range::mesh_um(), "size of the triangles at the edge (um); unset: by the scene");
+}
+
+Material material_of(const SheetParameters& p) {
+  if (!p.youngs_modulus_kPa)
+    throw UsageError(
+        "[sheet] youngs_modulus_kPa is missing: give it in cell.toml, or the beads' --displacement to fit it");
+  if (!p.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
+  return {*p.youngs_modulus_kPa, p.poisson_ratio, *p.thickness_um};
+}
+
+double contraction_of(const SheetParameters& p) {
+  if (p.contraction_nN_per_um && p.contraction_kPa)
+    throw UsageError("[sheet] contraction_nN_per_um and contraction_kPa are both given: which of them counts?");
+  if (p.contraction_nN_per_um) return *p.contraction_nN_per_um;
+  if (!p.contraction_kPa)
+    throw UsageError(
+        "[sheet] contraction_nN_per_um (or contraction_kPa) is missing: give it, or the beads' "
+        "--displacement to fit it");
+  if (!p.thickness_um) throw UsageError("[sheet] thickness_um is missing: contraction_kPa is multiplied by it");
+  return *p.contraction_kPa * *p.thickness_um;
+}
+
+}  // namespace mbtfm::sheet

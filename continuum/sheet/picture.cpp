@@ -1,0 +1,131 @@
+#include "continuum/sheet/picture.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+
+#include "pipeline/charts/chart.h"
+#include "pipeline/charts/colour_map.h"
+
+namespace mbtfm::sheet {
+namespace {
+
+using charts::Chart;
+
+struct Frame {
+  Vec2 low, high;
+};
+
+Frame frame_of(const Elements& elements) {
+  Frame frame{elements.triangles().nodes_um.front(), elements.triangles().nodes_um.front()};
+  for (const Vec2 p : elements.triangles().nodes_um) {
+    frame.low = {std::min(frame.low.x, p.x), std::min(frame.low.y, p.y)};
+    frame.high = {std::max(frame.high.x, p.x), std::max(frame.high.y, p.y)};
+  }
+  const double rim = 0.04 * std::max(frame.high.x - frame.low.x, frame.high.y - frame.low.y);
+  return {frame.low - Vec2{rim, rim}, frame.high + Vec2{rim, rim}};
+}
+
+Chart map_of(const std::string& title, const Frame& frame) {
+  Chart map(title, {.label = "x (um)", .low = frame.low.x, .high = frame.high.x},
+            {.label = "y (um)", .low = frame.high.y, .high = frame.low.y});
+  map.same_scales();
+  return map;
+}
+
+/// Squares of a lattice over the frame, by their middle.
+void for_each_square(const Frame& frame, int most_across, const std::function<void(Vec2 middle, double half)>& body) {
+  const Vec2 size = frame.high - frame.low;
+  const double side = std::max(size.x, size.y) / most_across;
+  for (double y = frame.low.y + 0.5 * side; y < frame.high.y; y += side)
+    for (double x = frame.low.x + 0.5 * side; x < frame.high.x; x += side) body({x, y}, 0.5 * side);
+}
+
+/// Values at places of the sheet, in colours from their least to their largest.
+void draw_values(Chart& map, const Solution& solution, const Frame& frame, const std::string& unit,
+                 const std::function<double(const Locator::Place&, const Shape&)>& value_at) {
+  constexpr int kAcross = 80;
+  struct Square {
+    Vec2 middle;
+    double half, value;
+  };
+  const Locator locator(*solution.elements);
+  std::vector<Square> squares;
+  double low = std::numeric_limits<double>::infinity(), high = -low;
+  for_each_square(frame, kAcross, [&](Vec2 middle, double half) {
+    const auto place = locator.find(middle, 0);
+    if (!place) return;
+    const double value = value_at(*place, solution.elements->shape(place->triangle, place->r, place->s));
+    squares.push_back({middle, half, value});
+    low = std::min(low, value);
+    high = std::max(high, value);
+  });
+  const double range = high > low ? high - low : 1;
+  for (const Square& s : squares) {
+    const std::string colour = charts::hex(charts::colour_at(charts::ColourMap::viridis, (s.value - low) / range));
+    const Vec2 d{1.02 * s.half, 1.02 * s.half};  // no white lines between
+    map.bar(s.middle - d, s.middle + d, "fill:" + colour + ";stroke:none");
+  }
+  for (const double share : {1.0, 0.5, 0.0})
+    map.key(charts::readable(low + share * range) + " " + unit,
+            charts::hex(charts::colour_at(charts::ColourMap::viridis, share)));
+}
+
+void draw_rims(Chart& map, const Solution& solution) {
+  std::vector<std::pair<Vec2, Vec2>> pieces;
+  const Triangles& triangles = solution.elements->triangles();
+  for (const Triangles::Side& side : triangles.sides) {
+    if (side.curve >= solution.sheet.n_rims) continue;
+    const auto at = [&](int i) {
+      return triangles.nodes_um[static_cast<std::size_t>(side.nodes[static_cast<std::size_t>(i)])];
+    };
+    pieces.emplace_back(at(0), at(2));
+    pieces.emplace_back(at(2), at(1));
+  }
+  map.pieces(pieces, "stroke:#333;stroke-width:1;fill:none");
+}
+
+/// Means of the tractions over squares, the longest a square's side and a half.
+void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
+  constexpr int kAcross = 18;
+  const double side = std::max(frame.high.x - frame.low.x, frame.high.y - frame.low.y) / kAcross;
+  struct Sum {
+    Vec2 place, force;
+    double area = 0;
+  };
+  std::map<std::pair<int, int>, Sum> sums;
+  for (const GroundPatch& patch : solution.patches) {
+    const Vec2 d = 1 / side * (patch.position_um - frame.low);
+    Sum& sum = sums[{static_cast<int>(d.x), static_cast<int>(d.y)}];
+    sum.place += patch.area_um2 * patch.position_um;
+    sum.force += patch.area_um2 * patch.traction_kPa;
+    sum.area += patch.area_um2;
+  }
+  double longest = 0;
+  for (const auto& [square, sum] : sums) longest = std::max(longest, norm(sum.force) / sum.area);
+  if (longest == 0) return;
+  const double px_per_kPa = 1.5 * Chart::kFrameWidth_px / kAcross / longest;
+  for (const auto& [square, sum] : sums)
+    map.arrow(1 / sum.area * sum.place, px_per_kPa / sum.area * sum.force, "stroke:#D55E00;stroke-width:1.5");
+  map.subtitle("longest arrow: a mean of " + charts::readable(1000 * longest) + " Pa", "#555");
+}
+
+}  // namespace
+
+std::string picture_of(const Solution& solution, const std::string& caption) {
+  const Frame frame = frame_of(*solution.elements);
+  Chart tension = map_of("Mean tension", frame), traction = map_of("Traction on the ground", frame);
+  draw_values(tension, solution, frame, "nN/um", [&](const Locator::Place& place, const Shape& shape) {
+    return mean_of(value_of(solution.at_nodes, solution.elements->nodes(place.triangle), shape));
+  });
+  draw_values(traction, solution, frame, "kPa", [&](const Locator::Place& place, const Shape&) {
+    return norm(solution.patches[static_cast<std::size_t>(place.triangle)].traction_kPa);
+  });
+  draw_rims(tension, solution);
+  draw_rims(traction, solution);
+  draw_tractions(traction, solution, frame);
+  return charts::svg_file({tension, traction}, 2, {caption});
+}
+
+}  // namespace mbtfm::sheet

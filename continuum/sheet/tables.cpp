@@ -1,0 +1,93 @@
+#include "continuum/sheet/tables.h"
+
+#include <cmath>
+
+#include "pipeline/files/columns.h"
+#include "pipeline/files/vtk_files.h"
+
+namespace mbtfm::sheet {
+namespace {
+
+const files::Table<SheetPoint>& sheet_table() {
+  using Row = SheetPoint;
+  static const files::Table<Row> table{
+      .file = "sheet.csv",
+      .row = "each point given to `mbtfm-sheet`, or each node of its mesh; empty fields where a point is outside",
+      .columns = {
+          {"x_um", "the point", [](const Row& row) { return row.position_um.x; }},
+          {"y_um", "the point", [](const Row& row) { return row.position_um.y; }},
+          {"ux_um", "displacement of the sheet", [](const Row& row) { return row.ux_um; }},
+          {"uy_um", "displacement of the sheet", [](const Row& row) { return row.uy_um; }},
+          {"sxx_nN_per_um", "tension along x, contraction included (the same as mN/m)",
+           [](const Row& row) { return row.sxx_nN_per_um; }},
+          {"syy_nN_per_um", "tension along y", [](const Row& row) { return row.syy_nN_per_um; }},
+          {"sxy_nN_per_um", "shear", [](const Row& row) { return row.sxy_nN_per_um; }},
+          {"mean_tension_nN_per_um", "half of sxx + syy", [](const Row& row) { return row.mean_tension_nN_per_um; }},
+          {"max_shear_nN_per_um", "half the difference of the principal tensions",
+           [](const Row& row) { return row.max_shear_nN_per_um; }}}};
+  return table;
+}
+
+SheetPoint row_of(Vec2 place, Vec2 u, const Tensor& S) {
+  return {place, u.x, u.y, S.xx, S.yy, S.xy, mean_of(S), largest_shear(S)};
+}
+
+}  // namespace
+
+std::vector<SheetPoint> at_nodes_of(const Solution& solution) {
+  std::vector<SheetPoint> rows;
+  for (int i = 0; i < solution.elements->n_nodes(); ++i)
+    rows.push_back(row_of(solution.elements->triangles().nodes_um[static_cast<std::size_t>(i)], at_node(solution.u, i),
+                          solution.at_nodes[static_cast<std::size_t>(i)]));
+  return rows;
+}
+
+std::vector<SheetPoint> at_points_of(const Solution& solution, const std::vector<Vec2>& points_um) {
+  const Locator locator(*solution.elements);
+  std::vector<SheetPoint> rows;
+  for (const Vec2 p : points_um) {
+    const auto place = locator.find(p);
+    if (!place) {
+      rows.push_back({.position_um = p});
+      continue;
+    }
+    const Shape shape = solution.elements->shape(place->triangle, place->r, place->s);
+    const auto& nodes = solution.elements->nodes(place->triangle);
+    rows.push_back(row_of(p, value_of(solution.u, nodes, shape), value_of(solution.at_nodes, nodes, shape)));
+  }
+  return rows;
+}
+
+void write_sheet(const Path& file, const std::vector<SheetPoint>& points) { files::write(file, sheet_table(), points); }
+
+void write_sheet_vtu(const Path& file, const Solution& solution) {
+  const Elements& elements = *solution.elements;
+  files::Grid grid{.corners = 6, .points_um = {}, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
+  files::GridArray u{"displacement_um", 3, {}}, S{"tension_nN_per_um", 3, {}}, mean{"mean_tension_nN_per_um", 1, {}},
+      shear{"max_shear_nN_per_um", 1, {}}, axis{"largest_tension_axis", 3, {}}, traction{"traction_kPa", 3, {}},
+      gel{"ground_displacement_um", 3, {}};
+  for (int i = 0; i < elements.n_nodes(); ++i) {
+    const Vec2 x = elements.triangles().nodes_um[static_cast<std::size_t>(i)], at = at_node(solution.u, i);
+    const Tensor& s = solution.at_nodes[static_cast<std::size_t>(i)];
+    grid.points_um.push_back({x.x, x.y, 0});
+    u.values.insert(u.values.end(), {at.x, at.y, 0});
+    S.values.insert(S.values.end(), {s.xx, s.yy, s.xy});
+    mean.values.push_back(mean_of(s));
+    shear.values.push_back(largest_shear(s));
+    const double angle = 0.5 * std::atan2(2 * s.xy, s.xx - s.yy);
+    axis.values.insert(axis.values.end(), {std::cos(angle), std::sin(angle), 0});
+  }
+  for (int t = 0; t < elements.n_triangles(); ++t) {
+    grid.cells.insert(grid.cells.end(), elements.nodes(t).begin(), elements.nodes(t).end());
+    const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
+    traction.values.insert(traction.values.end(), {patch.traction_kPa.x, patch.traction_kPa.y, 0});
+    gel.values.insert(gel.values.end(), {patch.displacement_um.x, patch.displacement_um.y, 0});
+  }
+  grid.point_arrays = {u, S, mean, shear, axis};
+  grid.cell_arrays = {traction, gel};
+  files::write_grid_vtu(file, grid);
+}
+
+std::string pages_of_tables() { return page_of(sheet_table()); }
+
+}  // namespace mbtfm::sheet

@@ -1,0 +1,503 @@
+/// mbtfm-sheet: contracting sheets and colonies on their ground, and tensions from tractions.
+#include <algorithm>
+#include <memory>
+
+#include "continuum/sheet/borders.h"
+#include "continuum/sheet/decide.h"
+#include "continuum/sheet/from_traction.h"
+#include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/parameters.h"
+#include "continuum/sheet/picture.h"
+#include "continuum/sheet/tables.h"
+#include "mbtfm/sheets/tables.h"
+#include "mbtfm/tractions/neighbour_noise.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/text.h"
+#include "pipeline/stage/effects.h"
+#include "pipeline/stage/stage.h"
+#include "segment/cells/mask.h"
+#include "segment/rois/roi.h"
+#include "substrate/choice/factory.h"
+
+namespace mbtfm::sheet {
+namespace {
+
+struct Parameters {
+  std::optional<double> pixel_size_um;
+  std::optional<double> gel_modulus_kPa;  ///< unset: there is no gel
+  Gel gel;
+  substrate::SubstrateParameters substrate;
+  SheetParameters sheet;
+  bool fit_line_tension = false;                  ///< most colonies have none
+  tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
+};
+
+void declare(stage::ParameterList& list, Parameters& p) {
+  list.add("pixel_size_um", p.pixel_size_um, Range::pixel_um(),
+           "pixel size of an outline that is a mask or a selection (um)");
+  declare(list, p.gel);
+  stage::Parameter& modulus = parameter_named(list, "youngs_modulus_kPa");
+  modulus.member = &p.gel_modulus_kPa;
+  modulus.is_required = false;
+  modulus.default_value = "";
+  modulus.meaning += "; unset: the sheet stands on springs, or on nothing";
+  declare(list, p.substrate);
+  declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
+  declare(list, p.sheet);
+  list.add("fit_line_tension", p.fit_line_tension, "with --displacement: fit line_tension_nN, too");
+  list.add("loss", p.loss, "with --displacement: of the residuals; all but squares take beads less that stray");
+}
+
+// --- inputs
+
+/// The largest part of a mask, or an ImageJ selection, in um.
+std::vector<Polygon> rings_of_picture(const Path& file, double pixel_um) {
+  constexpr double kAnySize = 1e12;
+  cells::OutlineParameters any;
+  any.outline_smallest_um2 = 0;
+  any.outline_smallest_hole_um2 = 0;
+  any.outline_largest_um2 = kAnySize;
+  cells::CellOutline outline;
+  if (file.extension() == ".roi" || file.extension() == ".zip") {
+    constexpr int kAnyField = 1 << 20;
+    outline = cells::hand_drawn_outline({file.string(), rois::read_rois(file)}, {kAnyField, kAnyField, pixel_um});
+  } else {
+    const cells::LabelMask mask = cells::read_mask(file);
+    outline = cells::mask_outlines(mask, 0, {mask.width, mask.height, pixel_um}, any).front();
+  }
+  std::vector<Polygon> rings = {outline.outer_um};
+  rings.insert(rings.end(), outline.holes_um.begin(), outline.holes_um.end());
+  return rings;
+}
+
+/// Without points that repeat the one before.
+Polygon distinct(const Polygon& ring) {
+  Polygon points;
+  for (const Vec2 p : ring)
+    if (points.empty() || !(points.back() == p)) points.push_back(p);
+  while (points.size() > 1 && points.front() == points.back()) points.pop_back();
+  return points;
+}
+
+/// @throws InputError where a ring crosses itself or another, or has no area
+std::vector<Polygon> read_rings(const Path& file, const std::optional<double>& pixel_um) {
+  std::vector<Polygon> rings;
+  if (file.extension() == ".csv") {
+    rings = files::read_outline(file);
+  } else {
+    if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
+    rings = rings_of_picture(file, *pixel_um);
+  }
+  for (Polygon& ring : rings) {
+    ring = distinct(ring);
+    if (ring.size() < 3 || signed_area_um2(ring) == 0)
+      throw InputError(file.string(), "an outline around an area", "one around none");
+  }
+  const std::string crossing = crossing_of(rings);
+  if (!crossing.empty())
+    throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
+                     "a piece runs from a point to the next; remove the loop, or draw the outline again");
+  return rings;
+}
+
+Region region_of(const std::vector<Polygon>& rings) {
+  Region region;
+  for (const Polygon& ring : rings) region.rims.emplace_back(ring);
+  return region;
+}
+
+std::vector<GroundPatch> read_tractions(const Path& file) {
+  const files::CsvTable table(file);
+  const std::vector<Vec2> points = files::read_points(file);
+  const bool has_areas = table.has("area_um2");
+  const Vec2 spacing = has_areas ? Vec2{} : files::lattice_spacing_um(points, file);
+  std::vector<GroundPatch> patches;
+  for (int row = 0; row < table.n_rows(); ++row)
+    patches.push_back({points[static_cast<std::size_t>(row)],
+                       has_areas ? table.number(row, "area_um2", Range::positive()) : spacing.x * spacing.y,
+                       {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")},
+                       {}});
+  return patches;
+}
+
+// --- outputs
+
+void write_patches(const Path& file, const Solution& solution) {
+  std::vector<tractions::Patch> patches;
+  for (const GroundPatch& p : solution.patches)
+    patches.push_back({p.position_um, p.area_um2, p.traction_kPa, p.displacement_um});
+  tractions::write_tractions(file, patches);
+}
+
+/// sheet.csv, traction.csv, sheet.vtu. @returns points that lie outside
+std::size_t write_solution(stage::StageContext& context, const Solution& solution) {
+  const std::vector<SheetPoint> rows = context.has_input("points")
+                                           ? at_points_of(solution, files::read_points(context.input("points")))
+                                           : at_nodes_of(solution);
+  write_sheet(context.output("out", "sheet.csv"), rows);
+  write_patches(context.output("out", "traction.csv"), solution);
+  write_sheet_vtu(context.output("out", "sheet.vtu"), solution);
+  files::write_text(context.output("out", "sheet.svg"), picture_of(solution, "mbtfm-sheet; x to the right, y down"));
+  return static_cast<std::size_t>(std::ranges::count_if(rows, [](const SheetPoint& row) { return !row.ux_um; }));
+}
+
+/// borders.csv and cell_tension.csv. @returns means over all borders, by their length
+Figures write_cells(stage::StageContext& context, const Solution& solution, const std::optional<double>& pixel_um) {
+  if (!context.has_input("cells")) return {};
+  const Path file = context.input("cells");
+  if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
+  constexpr int kWidestLine_px = 15;
+  constexpr double kShortest_um = 2;
+  const cells::LabelMask mask = cells::with_parts_labelled(cells::read_mask(file));
+  const CellLabels labels = with_lines_filled({mask.width, mask.height, *pixel_um, mask.labels}, kWidestLine_px);
+  const std::vector<Border> borders = borders_of(labels, solution, kShortest_um);
+  write_borders(context.output("out", "borders.csv"), borders);
+  write_cell_tensions(context.output("out", "cell_tension.csv"), cell_tensions(labels, solution));
+  double length = 0, normal = 0, shear = 0, magnitude = 0;
+  for (const Border& b : borders) {
+    length += b.length_um;
+    normal += b.length_um * b.normal_nN_per_um;
+    shear += b.length_um * b.shear_nN_per_um;
+    magnitude += b.length_um * b.magnitude_nN_per_um;
+  }
+  if (length == 0) return {};
+  return {{"n_borders", static_cast<std::int64_t>(borders.size())},
+          {"border_normal_nN_per_um", normal / length},
+          {"border_shear_nN_per_um", shear / length},
+          {"border_magnitude_nN_per_um", magnitude / length}};
+}
+
+Figures figures_of(const Solution& solution, const Balance& balance) {
+  double largest_um = 0;
+  for (int i = 0; i < solution.elements->n_nodes(); ++i)
+    largest_um = std::max(largest_um, norm(at_node(solution.u, i)));
+  double largest_kPa = 0;
+  for (const GroundPatch& patch : solution.patches) largest_kPa = std::max(largest_kPa, norm(patch.traction_kPa));
+  return {{"n_triangles", std::int64_t{solution.elements->n_triangles()}},
+          {"n_nodes", std::int64_t{solution.elements->n_nodes()}},
+          {"area_um2", balance.area_um2},
+          {"mean_tension_nN_per_um", balance.mean_tension_nN_per_um},
+          {"virial_tension_nN_per_um", balance.virial_tension_nN_per_um},
+          {"largest_displacement_um", largest_um},
+          {"largest_traction_kPa", largest_kPa},
+          {"total_force_nN", balance.total_force_nN},
+          {"net_force_nN", norm(balance.net_force_nN)},
+          {"net_torque_nN_um", balance.net_torque_nN_um},
+          {"mesh_relative_error", relative_error(*solution.elements, solution.at_points, solution.at_nodes)},
+          {"iterations", std::int64_t{solution.report.iterations}}};
+}
+
+void append(Figures& to, const Figures& more) { to.insert(to.end(), more.begin(), more.end()); }
+
+/// What is said of every sheet.
+void notice_mesh(stage::StageContext& context, const Solution& solution) {
+  const double error = relative_error(*solution.elements, solution.at_points, solution.at_nodes);
+  context.notice(noticed(FindingKind::sheet_coarse, error,
+                         "Between the triangles the tensions jump by " + brief(error) + " of themselves."));
+}
+
+// --- the sheet under its own contraction
+
+Effect thickness_effect(const Material& material, const Region& region) {
+  const double ratio = material.thickness_um / narrow_um(region);
+  Effect effect =
+      stage::decided(EffectKind::third_dimension, Switch::off, ratio, kThinnest, "thickness over half width");
+  return effect;
+}
+
+void notice_shape(stage::StageContext& context, const Material& material, const Region& region) {
+  const double ratio = material.thickness_um / narrow_um(region);
+  context.notice(
+      noticed(FindingKind::sheet_thick, ratio,
+              "The cells are " + brief(ratio) + " of their half width thick: a sheet moves less than they."));
+}
+
+struct Run {
+  Solution solution;
+  Figures figures;
+  std::vector<Effect> effects;
+  std::string told = {};  ///< for the last line
+};
+
+Run run_forward(const Parameters& p, stage::StageContext& context, const Region& region) {
+  Scene scene;
+  scene.region = region;
+  scene.material = material_of(p.sheet);
+  scene.contraction = {contraction_of(p.sheet), p.sheet.edge_band_um};
+  scene.line_tension_nN = p.sheet.line_tension_nN;
+  scene.adhesion_nN_per_um3 = p.sheet.adhesion_stiffness_nN_per_um3;
+  scene.measure = p.sheet.contraction_measure;
+  const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
+  if (x > kMostContraction)
+    throw UsageError(
+        "[sheet] contraction: a sheet that nothing holds would contract by " + brief(x) + ", more than the " +
+        brief(kMostContraction) +
+        " up to which a sheet is known to be stable; check contraction, youngs_modulus_kPa and thickness_um");
+  std::optional<Gel> gel;
+  if (p.gel_modulus_kPa) {
+    gel = p.gel;
+    gel->youngs_modulus_kPa = *p.gel_modulus_kPa;
+    check(*gel);
+  }
+  const auto [ground, response] = decide_ground(p.sheet.ground, scene.material, scene.adhesion_nN_per_um3, gel);
+  const Effect strain = decide_strain(p.sheet.strain, x, ground);
+  scene.strain = strain.is_on ? Strain::large : Strain::small;
+  Run result;
+  const double M = scene.material.stiffness_nN_per_um();
+  result.figures = {{"ground", std::string(name_of(ground))},
+                    {"strain", std::string(name_of(scene.strain))},
+                    {"stiffness_nN_per_um", M},
+                    {"contraction_nN_per_um", scene.contraction.nN_per_um},
+                    {"free_contraction", x}};
+  if (ground == Ground::springs) {
+    const double l_um = std::sqrt(M / *scene.adhesion_nN_per_um3);
+    scene.size = size_on_springs(region, l_um);
+    result.figures.emplace_back("penetration_um", l_um);
+    context.assumed.clear();  // of a gel
+  } else {
+    scene.size = size_on_gel(region, scene.material, *gel, scene.adhesion_nN_per_um3);
+  }
+  if (p.sheet.mesh_um) scene.size = with_edge(scene.size, *p.sheet.mesh_um);
+  context.progress(0.1, "solving for the sheet");
+  if (ground == Ground::springs) {
+    result.solution = solve_on_springs(scene, context.threads);
+  } else {
+    const auto model = choice::make_substrate(*gel, p.substrate, context.threads);
+    result.solution = solve_on_gel(scene, *model, context.threads);
+    append(result.figures, model->figures());
+    result.effects = model->effects();
+  }
+  const bool slips = ground == Ground::gel && scene.adhesion_nN_per_um3.has_value();
+  const double line = scene.line_tension_nN / (narrow_um(region) * std::max(scene.contraction.nN_per_um, 1e-300));
+  result.effects.insert(
+      result.effects.end(),
+      {response, strain,
+       stage::decided(EffectKind::adhesion_slip, switched(slips), slips,
+                      slips ? "adhesion_stiffness_nN_per_um3 is given" : "no springs between sheet and gel"),
+       stage::decided(EffectKind::edge_tension, switched(scene.line_tension_nN > 0), scene.line_tension_nN > 0,
+                      "its pull is " + brief(line) + " of the contraction's"),
+       thickness_effect(scene.material, region)});
+  notice_shape(context, scene.material, region);
+  if (scene.strain == Strain::small)
+    context.notice(
+        noticed(FindingKind::sheet_strain, x, "A sheet that nothing holds would contract by " + brief(x) + "."));
+  return result;
+}
+
+// --- the sheet under given tractions
+
+Region grown(const Region& region, stage::StageContext& context, const Parameters& p) {
+  if (context.has_input("area")) return region_of(read_rings(context.input("area"), p.pixel_size_um));
+  return region;
+}
+
+Run run_from_traction(const Parameters& p, stage::StageContext& context, const Region& region) {
+  if (p.sheet.ground && *p.sheet.ground != Ground::none)
+    throw UsageError("with --traction the ground is the tractions: leave ground out, or set ground = none");
+  context.assumed.clear();  // of a gel: none takes part
+  const std::vector<GroundPatch> tractions = read_tractions(context.input("traction"));
+  const Region area = grown(region, context, p);
+  // any modulus gives the same tensions
+  const Material material{p.sheet.youngs_modulus_kPa.value_or(1), p.sheet.poisson_ratio,
+                          p.sheet.thickness_um.value_or(1)};
+  TriangleSize size = size_for_tractions(area, tractions);
+  if (p.sheet.mesh_um) size = with_edge(size, *p.sheet.mesh_um);
+  context.progress(0.1, "solving for the tensions");
+  FromTraction found = tensions_from(tractions, area, material, size, context.threads);
+  const Polygon& outline = region.rims.front().points_um();
+  const TensionFigures inside = figures_inside(found.solution, outline);
+  Run result{.solution = std::move(found.solution), .figures = {}, .effects = {}};
+  result.figures = {{"ground", std::string(name_of(Ground::none))},
+                    {"inside_mean_tension_nN_per_um", inside.mean_nN_per_um},
+                    {"inside_variation", inside.variation},
+                    {"inside_shear_nN_per_um", inside.shear_nN_per_um},
+                    {"inside_area_um2", inside.area_um2},
+                    {"net_force_share", found.unbalanced.net_force_share},
+                    {"net_torque_share", found.unbalanced.net_torque_share},
+                    {"outside_share", found.unbalanced.outside_share},
+                    {"exact_virial_tension_nN_per_um", found.balance.virial_tension_nN_per_um}};
+  // what Poisson's ratio, which nobody knows, makes of it
+  for (const double nu : {0.0, 0.5}) {
+    const Material other{material.youngs_modulus_kPa, nu, material.thickness_um};
+    const FromTraction with_nu = tensions_from(tractions, area, other, size, context.threads);
+    result.figures.emplace_back(nu == 0 ? "inside_mean_tension_nu_0_nN_per_um" : "inside_mean_tension_nu_05_nN_per_um",
+                                figures_inside(with_nu.solution, outline).mean_nN_per_um);
+  }
+  const double worst = std::max(found.unbalanced.net_force_share, found.unbalanced.net_torque_share);
+  context.notice(noticed(FindingKind::tractions_off_balance, worst,
+                         "Net force and torque of the tractions are " + brief(found.unbalanced.net_force_share) +
+                             " and " + brief(found.unbalanced.net_torque_share) +
+                             " of what the forces could add up to."));
+  context.notice(noticed(
+      FindingKind::tractions_outside, found.unbalanced.outside_share,
+      brief(100 * found.unbalanced.outside_share) + " % of the forces act outside of the area and are left out."));
+  return result;
+}
+
+// --- the sheet under the beads' displacements
+
+/// Beads without flags, and with an error each where any neighbours tell it.
+DisplacementField read_beads(stage::StageContext& context) {
+  DisplacementField beads = files::read_displacement(context.input("displacement"));
+  std::erase_if(beads, [](const Bead& bead) { return !bead.flag.empty(); });
+  context.expect_plausible("beads_per_um2", beads_per_um2(beads));
+  if (std::ranges::all_of(beads, [](const Bead& b) { return b.sigma_um > 0; })) return beads;
+  const std::optional<double> sigma_um = tractions::noise_from_neighbours_um(beads);
+  const bool is_found = sigma_um && *sigma_um > 0;  // a computed field has none
+  for (Bead& bead : beads) bead.sigma_um = is_found ? *sigma_um : 0;
+  if (is_found) context.assumed.push_back(stage::assumed_noise(*sigma_um));
+  return beads;
+}
+
+void write_model_displacement(const Path& file, DisplacementField beads, const std::vector<Vec2>& model_um) {
+  for (std::size_t i = 0; i < beads.size(); ++i) {
+    beads[i].displacement_um = model_um[i];
+    beads[i].sigma_um = 0;
+  }
+  files::write_displacement(file, beads);
+}
+
+std::string sentence_of(const sheets::SheetEstimate& e) {
+  const std::string name = name_of(e.quantity);
+  if (e.identifiable) return name + " " + brief(e.value) + " (" + brief(*e.low) + " to " + brief(*e.high) + ")";
+  if (e.low) return name + " > " + brief(*e.low);
+  if (e.high) return name + " < " + brief(*e.high);
+  return name + " not known";
+}
+
+Run run_fit(const Parameters& p, stage::StageContext& context, const Region& region) {
+  if (!p.gel_modulus_kPa) throw UsageError("[gel] youngs_modulus_kPa is missing: the beads move with the gel");
+  if (p.sheet.ground && *p.sheet.ground != Ground::gel)
+    throw UsageError("with --displacement the ground is the gel: leave ground out, or set ground = gel");
+  if (p.sheet.contraction_nN_per_um || p.sheet.contraction_kPa)
+    throw UsageError(
+        "with --displacement the contraction is fitted: leave contraction_nN_per_um and contraction_kPa out");
+  if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
+  Gel gel = p.gel;
+  gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
+  check(gel);
+  const DisplacementField beads = read_beads(context);
+  const double narrow = narrow_um(region), nu = p.sheet.poisson_ratio;
+  Scene scene;
+  scene.region = region;
+  scene.material = {1, nu, *p.sheet.thickness_um};
+  scene.contraction = {1, p.sheet.edge_band_um};
+  scene.adhesion_nN_per_um3 = p.sheet.adhesion_stiffness_nN_per_um3;
+  scene.size = size_for_fit(region);
+  if (p.sheet.mesh_um) scene.size = with_edge(scene.size, *p.sheet.mesh_um);
+  const auto model = choice::make_substrate(gel, p.substrate, context.threads);
+  context.progress(0.1, "solving for the sheet at each stiffness");
+  const auto elements = elements_of(scene);
+  const OnGel ground(*elements, *model, scene.adhesion_nN_per_um3, context.threads);
+  const sheets::StiffnessTable table({.elements = elements,
+                                      .contraction = contraction_at_points(*elements, region, scene.contraction),
+                                      .poisson_ratio = nu,
+                                      .thickness_um = *p.sheet.thickness_um,
+                                      .n_rims = static_cast<int>(region.rims.size()),
+                                      .has_line = p.fit_line_tension},
+                                     ground, gel, narrow, context.threads);
+  context.progress(0.7, "fitting");
+  std::optional<double> known;
+  if (p.sheet.youngs_modulus_kPa)
+    known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
+  const sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known);
+
+  scene.material.youngs_modulus_kPa = fit.stiffness_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
+  scene.contraction.nN_per_um = fit.loads(0);
+  scene.line_tension_nN = p.fit_line_tension ? fit.loads(1) : 0;
+  Run result{.solution = solve_on(ground, elements, scene), .figures = {}, .effects = model->effects()};
+  std::vector<Vec2> places, forces;
+  for (const Bead& bead : beads) places.push_back(bead.position_um);
+  for (const GroundPatch& patch : result.solution.patches) forces.push_back(patch.area_um2 * patch.traction_kPa);
+  write_model_displacement(context.output("out", "displacement.csv"), beads,
+                           model->displacements_um(places, ground.patches(), forces));
+  write_estimates(context.output("out", "sheet_fit.csv"), fit);
+  write_models(context.output("out", "sheet_models.csv"), fit);
+  std::string told;
+  for (const sheets::SheetEstimate& e : fit.estimates) told += (told.empty() ? "" : "; ") + sentence_of(e);
+  result.told = told;
+  const auto stiffness =
+      std::ranges::find(fit.estimates, sheets::Quantity::stiffness, &sheets::SheetEstimate::quantity);
+  context.notice(noticed(FindingKind::sheet_not_identifiable, stiffness->identifiable ? 0 : 1, told + "."));
+  result.figures = {{"ground", std::string(name_of(Ground::gel))},
+                    {"strain", std::string(name_of(Strain::small))},
+                    {"stiffness_nN_per_um", fit.stiffness_nN_per_um},
+                    {"contraction_nN_per_um", fit.loads(0)},
+                    {"youngs_modulus_kPa", scene.material.youngs_modulus_kPa},
+                    {"correlation", fit.correlation},
+                    {"relative_l2", fit.relative_l2},
+                    {"expected_relative_l2", fit.expected_relative_l2},
+                    {"n_beads", std::int64_t{fit.n_beads}},
+                    {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
+                    {"aic", fit.models.back().aic},
+                    {"aic_of_nothing", fit.models.front().aic}};
+  const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
+  result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
+  result.effects.push_back(decide_strain(p.sheet.strain, x, Ground::gel));
+  result.effects.push_back(thickness_effect(scene.material, region));
+  notice_shape(context, scene.material, region);
+  context.notice(
+      noticed(FindingKind::sheet_strain, x, "A sheet that nothing holds would contract by " + brief(x) + "."));
+  return result;
+}
+
+StageReport run(const Parameters& p, stage::StageContext& context) {
+  context.progress(0, "reading");
+  const Region region = region_of(read_rings(context.input("outline"), p.pixel_size_um));
+  const bool has_tractions = context.has_input("traction");
+  if (p.sheet.ground == Ground::none && !has_tractions)
+    throw UsageError("ground = none needs the --traction under the sheet: nothing else holds it");
+  const bool has_beads = context.has_input("displacement");
+  if (has_beads && has_tractions) throw UsageError("expected --displacement or --traction, not both");
+  Run done = has_tractions ? run_from_traction(p, context, region)
+             : has_beads   ? run_fit(p, context, region)
+                           : run_forward(p, context, region);
+  const Balance balance = balance_of(done.solution);
+  const std::size_t n_outside = write_solution(context, done.solution);
+  append(done.figures, figures_of(done.solution, balance));
+  append(done.figures, write_cells(context, done.solution, p.pixel_size_um));
+  files::write_figures(context.output("out", "sheet.json"), done.figures);
+  notice_mesh(context, done.solution);
+  context.progress(1, "done");
+
+  StageReport report;
+  report.converged = done.solution.report.converged;
+  report.summary = std::to_string(done.solution.elements->n_triangles()) + " triangles, mean tension " +
+                   brief(balance.mean_tension_nN_per_um) + " nN/um over " + brief(balance.area_um2) +
+                   " um2, total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
+  if (!done.told.empty()) report.summary += "; " + done.told;
+  if (n_outside > 0) report.summary += "; " + std::to_string(n_outside) + " points lie outside of the sheet";
+  report.figures = done.figures;
+  report.effects = done.effects;
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::sheet
+
+int main(int argc, char** argv) {
+  using Kind = mbtfm::stage::FileArgument::Kind;
+  using namespace mbtfm::sheet;
+  return mbtfm::stage::run_stage<Parameters>(
+      {.name = "sheet",
+       .purpose = "contract a sheet of cells on its ground, or find a colony's tensions from tractions",
+       .files =
+           {{"outline", Kind::input,
+             "outline of the sheet: outline.csv, a mask (PNG, TIFF) or an ImageJ selection (.roi, .zip)"},
+            {"traction", Kind::optional_input,
+             "traction.csv under the sheet (x_um, y_um, tx_kPa, ty_kPa; area_um2 where they lie on no lattice): "
+             "tensions follow from it"},
+            {"displacement", Kind::optional_input,
+             "displacement.csv of the beads: contraction and stiffness are fitted to them"},
+            {"area", Kind::optional_input,
+             "with --traction: where the sheet is free to end, around the outline; the outline, if not given"},
+            {"points", Kind::optional_input, "points at which sheet.csv is written: x_um, y_um; else at the nodes"},
+            {"out", Kind::output_folder,
+             "sheet.csv, traction.csv, sheet.vtu, sheet.svg and sheet.json are written here; of a fit sheet_fit.csv, "
+             "sheet_models.csv and displacement.csv, too"}}},
+      argc, argv, run);
+}

@@ -1,0 +1,57 @@
+/// Contraction, stiffness and line tension of a sheet, from the displacements of the beads under it.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "mbtfm/sheets/stiffness_table.h"
+#include "mbtfm/tensions/linear_data.h"
+#include "mbtfm/tensions/tension_fit.h"
+
+namespace mbtfm::sheets {
+
+enum class Quantity { contraction, stiffness, line_tension, contraction_over_stiffness };
+constexpr auto words(Quantity) {
+  return std::array{"contraction_nN_per_um", "stiffness_nN_per_um", "line_tension_nN", "contraction_over_stiffness"};
+}
+
+struct SheetEstimate {
+  Quantity quantity = Quantity::contraction;
+  double value = 0;
+  std::optional<double> sigma;      ///< standard error; none where the beads do not tell the quantity
+  std::optional<double> low, high;  ///< 95 %; none where the beads set no limit to that side
+  bool identifiable = true;         ///< limited to both sides
+};
+
+/// A model of the gel's motion: nothing, the sheet, the sheet with a cable along its edge.
+struct SheetModel {
+  std::string name;
+  int n_parameters = 0;
+  double chi_squared = 0, relative_l2 = 0, aic = 0, bic = 0;
+};
+
+struct SheetFit {
+  std::vector<SheetEstimate> estimates;
+  double stiffness_nN_per_um = 0;
+  Eigen::VectorXd loads;            ///< contraction, line tension
+  Eigen::VectorXd node_amplitudes;  ///< of the table's forces: what the sheet does at the solution
+  double correlation = 0;           ///< of the errors of contraction and log stiffness
+  double variance = 1;              ///< of a weighted component of a bead, that the error bars are made with
+  double relative_l2 = 0, expected_relative_l2 = 0;
+  int n_beads = 0, n_down_weighted = 0;
+  std::vector<SheetModel> models;
+  Report report;
+};
+
+/// The beads' data in terms of the table. @param ground  whose patches carry the table's forces
+tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
+                             const substrate::Substrate& gel, int threads);
+
+/// Least squares (or a robust loss) over all stiffnesses of the table: of each the best loads are linear, so the misfit
+/// is a function of one number, which is scanned and then refined (variable projection). 95 % intervals: where the
+/// misfit, least over all else, is 1.96² variances above the best.
+/// @param stiffness_nN_per_um  known; unset: fitted
+SheetFit fit_sheet(tensions::LinearData data, const StiffnessTable& table, tensions::Loss loss,
+                   std::optional<double> stiffness_nN_per_um = {});
+
+}  // namespace mbtfm::sheets

@@ -1,0 +1,47 @@
+#include "mbtfm/sheets/tables.h"
+
+#include "pipeline/files/columns.h"
+
+namespace mbtfm::sheets {
+namespace {
+
+using files::kForPeople;
+
+const files::Table<SheetEstimate>& estimate_table() {
+  using Row = SheetEstimate;
+  static const files::Table<Row> table{
+      .file = "sheet_fit.csv",
+      .row = "each number of a sheet that the beads were asked for (`mbtfm-sheet --displacement`)",
+      .columns = {{"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
+                  {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
+                  {"sigma",
+                   "standard error; empty where the beads do not tell the quantity",
+                   &Row::sigma,
+                   {.digits = kForPeople}},
+                  {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},
+                  {"high", "upper end of the 95 % interval; empty: none", &Row::high, {.digits = kForPeople}},
+                  {"identifiable", "the beads limit it to both sides", &Row::identifiable}}};
+  return table;
+}
+
+const files::Table<SheetModel>& model_table() {
+  using Row = SheetModel;
+  static const files::Table<Row> table{
+      .file = "sheet_models.csv",
+      .row = "each model of what moves the beads under a sheet",
+      .columns = {{"model", "nothing, or the sheet", &Row::name},
+                  {"n_parameters", "that were fitted", &Row::n_parameters},
+                  {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, {.digits = kForPeople}},
+                  {"relative_l2", "of the misfit", &Row::relative_l2, {.digits = kForPeople}},
+                  {"aic", "Akaike's criterion", &Row::aic, {.digits = kForPeople}},
+                  {"bic", "the Bayesian criterion", &Row::bic, {.digits = kForPeople}}}};
+  return table;
+}
+
+}  // namespace
+
+void write_estimates(const Path& file, const SheetFit& fit) { files::write(file, estimate_table(), fit.estimates); }
+void write_models(const Path& file, const SheetFit& fit) { files::write(file, model_table(), fit.models); }
+std::string pages_of_tables() { return page_of(estimate_table()) + page_of(model_table()); }
+
+}  // namespace mbtfm::sheets

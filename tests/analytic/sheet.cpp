@@ -1,0 +1,313 @@
+/// Sheets on springs against closed forms and an independent spectral program (tests/data/reference/chapter4).
+#include <gtest/gtest.h>
+
+#include <chrono>
+#include <sstream>
+
+#include "continuum/sheet/from_traction.h"
+#include "continuum/sheet/mesh_size.h"
+#include "continuum/sheet/tables.h"
+#include "tests/support/sheets.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::sheet;
+using test::Deviation;
+using test::SolvedSheet;
+
+TEST(Sheet, discs_on_springs_are_the_closed_form) {
+  const auto csv = test::chapter4("sheet_disc");
+  int row = 0;
+  while (row < csv.n_rows()) {
+    const int of_case = csv.integer(row, "case", 0);
+    const auto value = [&](const char* column) { return csv.number(row, column); };
+    const double R = value("radius_um");
+    if (R > 30 * value("penetration_um")) {  // meshes of 100 000 nodes and more: tests/studies/sheets.cpp
+      while (row < csv.n_rows() && csv.integer(row, "case", 0) == of_case) ++row;
+      continue;
+    }
+    const Region region{{Curve(test::circle(R))}, {}};
+    SolvedSheet disc(region, size_on_springs(region, value("penetration_um")));
+    disc.sheet.material = {value("E_kPa"), value("nu"), value("h_um")};
+    disc.sheet.contraction_nN_per_um = even(disc.elements, value("s_nN_per_um"));
+    disc.sheet.spring_nN_per_um3 = even(disc.elements, value("kappa_nN_per_um3"));
+    disc.sheet.line_tension_nN = value("line_nN");
+    const double kappa = value("kappa_nN_per_um3");
+    const auto start = std::chrono::steady_clock::now();
+    disc.solve();
+    std::printf("%.2f s ", std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+    Deviation u, rr, tt;
+    for (; row < csv.n_rows() && csv.integer(row, "case", 0) == of_case; ++row) {
+      // off the axes, where the mesh has no symmetry
+      const double r = value("r_um"), c = std::cos(0.7), s = std::sin(0.7);
+      const auto at = disc.at(r * Vec2{c, s});
+      ASSERT_TRUE(at);
+      u.add(at->u.x * c + at->u.y * s, value("ur_um"));
+      const Tensor& S = at->S;
+      rr.add(c * c * S.xx + s * s * S.yy + 2 * c * s * S.xy, value("Srr_nN_per_um"));
+      tt.add(s * s * S.xx + c * c * S.yy - 2 * c * s * S.xy, value("Stt_nN_per_um"));
+    }
+    std::printf("case %d: %d nodes, u %.1e rr %.1e tt %.1e (kappa %g)\n", of_case, disc.elements.n_nodes(),
+                u.relative(), rr.relative(), tt.relative(), kappa);
+    EXPECT_LE(u.relative(), 1e-4) << "case " << of_case;
+    EXPECT_LE(rr.relative(), 1e-4) << "case " << of_case;
+    EXPECT_LE(tt.relative(), 1e-4) << "case " << of_case;
+  }
+}
+
+std::vector<double> numbers_in(const std::string& text) {
+  std::istringstream stream(text);
+  std::vector<double> numbers;
+  for (double value = 0; stream >> value;) numbers.push_back(value);
+  return numbers;
+}
+
+TEST(Sheet, rings_of_adhesion_and_annuli_are_the_closed_form) {
+  const auto csv = test::chapter4("sheet_rings");
+  int row = 0;
+  while (row < csv.n_rows()) {
+    const int of_case = csv.integer(row, "case", 0);
+    const auto value = [&](const char* column) { return csv.number(row, column); };
+    const std::vector<double> radii = numbers_in(csv.text(row, "radii_um")),
+                              kappas = numbers_in(csv.text(row, "kappas_nN_per_um3"));
+    Region region{{Curve(test::circle(radii.back()))}, {}};
+    if (radii.front() > 0) region.rims.emplace_back(test::circle(radii.front()));
+    for (std::size_t k = 1; k + 1 < radii.size(); ++k) region.lines.emplace_back(test::circle(radii[k]));
+    const Material material{value("E_kPa"), value("nu"), value("h_um")};
+    const double stiffest = *std::max_element(kappas.begin(), kappas.end());
+    SolvedSheet rings(region, size_on_springs(region, std::sqrt(material.stiffness_nN_per_um() / stiffest)));
+    rings.sheet.material = material;
+    rings.sheet.contraction_nN_per_um = even(rings.elements, value("s_nN_per_um"));
+    for (int t = 0; t < rings.elements.n_triangles(); ++t)
+      for (int p = 0; p < Elements::kPoints; ++p) {
+        std::size_t k = 0;
+        while (k + 2 < radii.size() && norm(rings.elements.at(t, p).place_um) > radii[k + 1]) ++k;
+        rings.sheet.spring_nN_per_um3.push_back(kappas[k]);
+      }
+    if (value("inner_edge_free") == 0) {
+      rings.sheet.held.assign(static_cast<std::size_t>(rings.elements.n_nodes()), {false, false});
+      for (const auto& side : rings.elements.triangles().sides)
+        if (side.curve == 1)
+          for (const int node : side.nodes) rings.sheet.held[static_cast<std::size_t>(node)] = {true, true};
+    }
+    rings.solve();
+    Deviation u, rr, tt;
+    for (; row < csv.n_rows() && csv.integer(row, "case", 0) == of_case; ++row) {
+      const double r = value("r_um"), c = std::cos(0.7), s = std::sin(0.7);
+      const auto at = rings.at(r * Vec2{c, s});
+      ASSERT_TRUE(at);
+      u.add(at->u.x * c + at->u.y * s, value("ur_um"));
+      const Tensor& S = at->S;
+      rr.add(c * c * S.xx + s * s * S.yy + 2 * c * s * S.xy, value("Srr_nN_per_um"));
+      tt.add(s * s * S.xx + c * c * S.yy - 2 * c * s * S.xy, value("Stt_nN_per_um"));
+    }
+    std::printf("rings %d: %d nodes, u %.1e rr %.1e tt %.1e\n", of_case, rings.elements.n_nodes(), u.relative(),
+                rr.relative(), tt.relative());
+    EXPECT_LE(u.relative(), 1e-4) << "case " << of_case;
+    EXPECT_LE(rr.relative(), 1e-4) << "case " << of_case;
+    EXPECT_LE(tt.relative(), 1e-4) << "case " << of_case;
+  }
+}
+
+TEST(Sheet, strips_are_the_closed_form) {
+  const auto csv = test::chapter4("sheet_strip");
+  for (int row = 0; row < csv.n_rows();) {
+    const std::string sides = csv.text(row, "sides");
+    const int first = row;
+    const auto value = [&](const char* column) { return csv.number(row, column); };
+    const bool is_narrow = sides.starts_with("narrow");
+    const double length = value("length_um");
+    // A narrow one must be so narrow that its springs do not hold it across: by (width / l)² / 8.
+    const double width = is_narrow ? 0.1 : 10;
+    const Region region{{Curve(test::rectangle(length, width))}, {}};
+    const Material material{value("E_kPa"), value("nu"), value("h_um")};
+    const double l = std::sqrt(material.stiffness_nN_per_um() / value("kappa_nN_per_um3"));
+    TriangleSize size = size_on_springs(region, l);
+    if (is_narrow) size = {.at_curves_um = width, .largest_um = width};
+    SolvedSheet strip(region, size);
+    strip.sheet.material = material;
+    strip.sheet.contraction_nN_per_um = even(strip.elements, value("s_nN_per_um"));
+    strip.sheet.spring_nN_per_um3 = even(strip.elements, value("kappa_nN_per_um3"));
+    if (!is_narrow) strip.sheet.held.assign(static_cast<std::size_t>(strip.elements.n_nodes()), {false, true});
+    strip.solve();
+    Deviation u, xx;
+    for (; row < csv.n_rows() && csv.text(row, "sides") == sides && value("length_um") == length; ++row) {
+      const auto at = strip.at({value("x_um"), 0.01});
+      ASSERT_TRUE(at);
+      u.add(at->u.x, value("ux_um"));
+      xx.add(at->S.xx, value("Sxx_nN_per_um"));
+    }
+    std::printf("strip %d: %d nodes, u %.1e xx %.1e\n", first, strip.elements.n_nodes(), u.relative(), xx.relative());
+    EXPECT_LE(u.relative(), 1e-4) << "row " << first;
+    EXPECT_LE(xx.relative(), 1e-4) << "row " << first;
+  }
+}
+
+Polygon outline(const std::string& shape) {
+  const auto csv = test::chapter4("outlines");
+  Polygon points;
+  for (int row = 0; row < csv.n_rows(); ++row)
+    if (csv.text(row, "shape") == shape) points.push_back({csv.number(row, "x_um"), csv.number(row, "y_um")});
+  return points;
+}
+
+/// A sheet of the row's outline and numbers.
+SolvedSheet sheet_of(const files::CsvTable& csv, int row, double finer = 1) {
+  const auto value = [&](const char* column) { return csv.number(row, column); };
+  const Region region{{Curve(outline(csv.text(row, "shape")))}, {}};
+  const Material material{value("E_kPa"), value("nu"), value("h_um")};
+  TriangleSize size = size_on_springs(region, std::sqrt(material.stiffness_nN_per_um() / value("kappa_nN_per_um3")));
+  size.at_curves_um /= finer;
+  size.largest_um /= finer;
+  size.most_turn_rad /= finer;
+  size.most_notch_rad /= finer;
+  SolvedSheet made(region, size);
+  made.sheet.material = material;
+  made.sheet.contraction_nN_per_um = even(made.elements, value("s_nN_per_um"));
+  made.sheet.spring_nN_per_um3 = even(made.elements, value("kappa_nN_per_um3"));
+  return made;
+}
+
+TEST(Sheet, any_outline_is_the_spectral_solution) {
+  const auto csv = test::chapter4("sheet_outline");
+  for (int row = 0; row < csv.n_rows();) {
+    const std::string shape = csv.text(row, "shape");
+    SolvedSheet made = sheet_of(csv, row);
+    made.solve();
+    Deviation u, S;
+    double stated = 0;
+    for (; row < csv.n_rows() && csv.text(row, "shape") == shape; ++row) {
+      const auto value = [&](const char* column) { return csv.number(row, column); };
+      const auto at = made.at({value("x_um"), value("y_um")});
+      if (!at) continue;
+      u.add(at->u.x, value("ux_um"));
+      u.add(at->u.y, value("uy_um"));
+      S.add(at->S.xx, value("Sxx_nN_per_um"));
+      S.add(at->S.yy, value("Syy_nN_per_um"));
+      S.add(at->S.xy, value("Sxy_nN_per_um"));
+      stated = std::max(stated, value("u_error_um"));
+    }
+    const auto energies = test::chapter4("sheet_energy");
+    for (int k = 0; k < energies.n_rows(); ++k) {
+      if (energies.text(k, "shape") != shape) continue;
+      const double exact = energies.number(k, "energy_fJ");
+      EXPECT_NEAR(0.5 * made.u.dot(forces_of_contraction_nN(made.elements, made.sheet)), exact, 1e-4 * exact) << shape;
+      // the polygon of the file is smaller than the curve that it stands for
+      EXPECT_NEAR(made.elements.area_um2(), energies.number(k, "area_um2"), 1e-4 * made.elements.area_um2()) << shape;
+    }
+    std::printf("%s: %d nodes, u %.1e (stated %.1e), S %.1e\n", shape.c_str(), made.elements.n_nodes(), u.relative(),
+                stated / u.largest, S.relative());
+    EXPECT_LE(u.difference, std::max(1e-4 * u.largest, stated)) << shape;
+  }
+}
+
+/// Thesis, section 4.2: where l is large against a spike its tip pulls more than a disc's edge, where it is small less.
+TEST(Sheet, tips_of_spikes_pull_more_than_a_disc_where_the_penetration_length_is_long) {
+  const auto csv = test::chapter4("spike_ratio");
+  for (int row = 0; row < csv.n_rows(); ++row) {
+    const auto value = [&](const char* column) { return csv.number(row, column); };
+    const double l = value("penetration_um"), R = value("radius_um"), a = value("spike_height_um"), w = value("w");
+    if (a != 50 || (l != 12 && l != 200)) continue;  // the others: tests/studies/sheets.cpp
+    const auto pull_at_tip = [&](double spike_um) {
+      const auto radius = [=](double t) { return R + spike_um * std::exp((std::cos(4 * t) - 1) / w); };
+      Scene scene;
+      scene.region.rims.emplace_back(test::ring(radius, 2880));
+      scene.material = {10, value("nu"), 2};
+      scene.contraction.nN_per_um = 1;
+      scene.adhesion_nN_per_um3 = scene.material.stiffness_nN_per_um() / (l * l);
+      scene.size = size_on_springs(scene.region, l);
+      const Solution solution = solve_on_springs(scene, 1);
+      const auto rows = at_points_of(solution, {{R + spike_um, 0}});
+      return *scene.adhesion_nN_per_um3 * std::hypot(rows.front().ux_um.value(), rows.front().uy_um.value());
+    };
+    const double ratio = pull_at_tip(a) / pull_at_tip(0), exact = value("tip_over_disc_edge");
+    std::printf("spikes of %g um, l %g um: %.3f (%.3f)\n", a, l, ratio, exact);
+    EXPECT_NEAR(ratio, exact, std::max(0.01, value("relative_error")) * exact) << a << " " << l;
+  }
+}
+
+/// The tractions of a sheet on springs are tractions as any: the tensions must be those of the forward solution where
+/// Poisson's ratio is right, and those of the independent solution where it is not.
+TEST(Sheet, tensions_follow_from_tractions) {
+  const auto csv = test::chapter4("stress_from_traction");
+  for (int row = 0; row < csv.n_rows();) {
+    const std::string shape = csv.text(row, "shape");
+    const auto value = [&](const char* column) { return csv.number(row, column); };
+    Scene scene;
+    scene.region.rims.emplace_back(outline(shape));
+    scene.material = {value("E_kPa"), value("nu"), value("h_um")};
+    scene.contraction.nN_per_um = value("s_nN_per_um");
+    scene.adhesion_nN_per_um3 = value("kappa_nN_per_um3");
+    scene.size =
+        size_on_springs(scene.region, std::sqrt(scene.material.stiffness_nN_per_um() / value("kappa_nN_per_um3")));
+    const Solution forward = solve_on_springs(scene, 1);
+    while (row < csv.n_rows() && csv.text(row, "shape") == shape) {
+      const double nu = value("nu_assumed"), s = value("s_nN_per_um"), mean = value("mean_tension_nN_per_um");
+      const FromTraction found = tensions_from(forward.patches, scene.region, {1, nu, 1}, scene.size, 1);
+      EXPECT_NEAR(found.balance.mean_tension_nN_per_um, mean, 2e-3 * s) << shape;
+      EXPECT_NEAR(found.balance.virial_tension_nN_per_um, found.balance.mean_tension_nN_per_um, 1e-9 * s) << shape;
+      const Locator locator(*found.solution.elements);
+      Deviation S;
+      S.largest = s;
+      for (; row < csv.n_rows() && csv.text(row, "shape") == shape && value("nu_assumed") == nu; ++row) {
+        const auto place = locator.find({value("x_um"), value("y_um")}, 0.05);
+        if (!place) continue;
+        const Tensor at = value_of(found.solution.at_nodes, found.solution.elements->nodes(place->triangle),
+                                   found.solution.elements->shape(place->triangle, place->r, place->s));
+        for (const auto& [ours, column] :
+             {std::pair{at.xx, "Sxx_nN_per_um"}, {at.yy, "Syy_nN_per_um"}, {at.xy, "Sxy_nN_per_um"}})
+          S.difference = std::max(S.difference, std::abs(ours - value(column)));
+      }
+      std::printf("%s nu %.2f: S %.1e of s, mean %.5f (%.5f)\n", shape.c_str(), nu, S.difference / s,
+                  found.balance.mean_tension_nN_per_um, mean);
+      EXPECT_LE(S.difference, 0.01 * s) << shape << " " << nu;
+    }
+  }
+}
+
+TEST(Sheet, quadratic_elements_are_of_third_order_on_the_ellipse) {
+  const auto csv = test::chapter4("sheet_outline");
+  std::vector<double> errors, sizes;
+  for (const double finer : {0.5, 1.0, 2.0}) {
+    SolvedSheet made = sheet_of(csv, 0, finer / 2.5);
+    made.solve();
+    double sum = 0;
+    for (int row = 0; row < csv.n_rows() && csv.text(row, "shape") == "ellipse"; ++row) {
+      const auto at = made.at({csv.number(row, "x_um"), csv.number(row, "y_um")});
+      if (!at) continue;
+      sum += std::pow(at->u.x - csv.number(row, "ux_um"), 2) + std::pow(at->u.y - csv.number(row, "uy_um"), 2);
+    }
+    errors.push_back(std::sqrt(sum));
+    sizes.push_back(1 / std::sqrt(made.elements.n_nodes()));  // growth and bends keep the meshes from being alike
+    std::printf("finer %g: %d nodes, %.2e\n", finer, made.elements.n_nodes(), errors.back());
+  }
+  EXPECT_GE(std::log(errors.front() / errors.back()) / std::log(sizes.front() / sizes.back()), 2.7);
+}
+
+TEST(Sheet, large_strains_are_the_independent_solution) {
+  const auto csv = test::chapter4("sheet_nonlinear");
+  for (int row = 0; row < csv.n_rows();) {
+    const std::string shape = csv.text(row, "shape"), measure = csv.text(row, "contraction");
+    SolvedSheet made = sheet_of(csv, row);
+    made.u = on_springs_large(
+                 made.elements, made.sheet,
+                 measure == "cauchy" ? ContractionMeasure::surface_tension : ContractionMeasure::second_piola, 1)
+                 .u;
+    made.S.assign(static_cast<std::size_t>(made.elements.n_nodes()), {});
+    const double s = csv.number(row, "s_nN_per_um");
+    Deviation u;
+    for (; row < csv.n_rows() && csv.text(row, "shape") == shape && csv.text(row, "contraction") == measure &&
+           csv.number(row, "s_nN_per_um") == s;
+         ++row) {
+      const auto at = made.at({csv.number(row, "x_um"), csv.number(row, "y_um")});
+      if (!at) continue;
+      u.add(at->u.x, csv.number(row, "ux_um"));
+      u.add(at->u.y, csv.number(row, "uy_um"));
+    }
+    std::printf("%s %s: u %.1e\n", shape.c_str(), measure.c_str(), u.relative());
+    EXPECT_LE(u.relative(), 1e-3) << shape << " " << measure;
+  }
+}
+
+}  // namespace

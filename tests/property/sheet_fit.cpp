@@ -1,0 +1,173 @@
+/// The fit of a sheet to the beads under it: what it finds, and whether its error bars hold.
+#include <gtest/gtest.h>
+
+#include <random>
+
+#include "continuum/sheet/forward.h"
+#include "mbtfm/sheets/sheet_fit.h"
+#include "substrate/greens/models.h"
+#include "tests/support/sheets.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::sheets;
+using sheet::Elements;
+
+constexpr double kNoise_um = 0.02, kThickness_um = 4, kRatio = 0.5;
+
+/// A disc bonded to a gel, its table and its beads. The same mesh makes the data: what is asked is the statistics.
+struct FittedDisc {
+  double radius_um;
+  Gel gel{8.4, 0.49, 60};
+  std::unique_ptr<substrate::Substrate> model;
+  std::shared_ptr<const Elements> elements;
+  std::unique_ptr<sheet::OnGel> ground;
+  std::unique_ptr<StiffnessTable> table;
+  DisplacementField beads;
+
+  explicit FittedDisc(double radius, bool has_line = false) : radius_um(radius) {
+    substrate::SubstrateParameters parameters;
+    parameters.model = substrate::ModelKind::layer;
+    model = greens::make_greens(gel, parameters, 1);
+    sheet::Region region;
+    region.rims.emplace_back(test::circle(radius));
+    elements = std::make_shared<const Elements>(sheet::triangulated(
+        region, {.at_curves_um = radius / 8, .largest_um = radius / 3, .growth = 0.4, .most_turn_rad = 0.5}, 10000));
+    ground = std::make_unique<sheet::OnGel>(*elements, *model, std::nullopt, 1);
+    table = std::make_unique<StiffnessTable>(SheetShape{.elements = elements,
+                                                        .contraction = sheet::even(*elements, 1),
+                                                        .poisson_ratio = kRatio,
+                                                        .thickness_um = kThickness_um,
+                                                        .n_rims = 1,
+                                                        .has_line = has_line},
+                                             *ground, gel, radius, 1);
+    const double side = 3.5 * radius;
+    const int n = 28;
+    for (int i = 0; i < n; ++i)
+      for (int j = 0; j < n; ++j)
+        beads.push_back({.position_um = side * Vec2{(i + 0.5) / n - 0.5, (j + 0.5) / n - 0.5},
+                         .displacement_um = {},
+                         .sigma_um = kNoise_um,
+                         .flag = {}});
+  }
+
+  double stiffness(double E_kPa) const { return E_kPa * kThickness_um / (1 - kRatio * kRatio); }
+
+  /// Solved on its own, not by the table.
+  DisplacementField exact(double E_kPa, double s_nN_per_um, double line_nN = 0) const {
+    sheet::Sheet made;
+    made.material = {E_kPa, kRatio, kThickness_um};
+    made.contraction_nN_per_um = sheet::even(*elements, s_nN_per_um);
+    made.line_tension_nN = line_nN;
+    const auto solved = ground->solve(made.material, sheet::forces_of_contraction_nN(*elements, made));
+    std::vector<Vec2> places, forces;
+    for (const Bead& bead : beads) places.push_back(bead.position_um);
+    for (int t = 0; t < elements->n_triangles(); ++t) forces.push_back(sheet::at_node(solved.forces_nN, t));
+    const std::vector<Vec2> u = model->displacements_um(places, ground->patches(), forces);
+    DisplacementField field = beads;
+    for (std::size_t i = 0; i < field.size(); ++i) field[i].displacement_um = u[i];
+    return field;
+  }
+  tensions::LinearData data(const DisplacementField& field) const { return data_of(field, *table, *ground, *model, 1); }
+};
+
+DisplacementField with_noise(DisplacementField field, std::mt19937_64& random) {
+  std::normal_distribution<double> noise(0, kNoise_um);
+  for (Bead& bead : field) bead.displacement_um += Vec2{noise(random), noise(random)};
+  return field;
+}
+
+const SheetEstimate& of(const SheetFit& fit, Quantity quantity) {
+  return *std::ranges::find(fit.estimates, quantity, &SheetEstimate::quantity);
+}
+
+TEST(SheetFit, exact_displacements_give_contraction_stiffness_and_line_tension_back) {
+  const FittedDisc disc(25, true);
+  for (const double E : {0.5, 3.0, 20.0}) {
+    const SheetFit fit = fit_sheet(disc.data(disc.exact(E, 1, 2)), *disc.table, tensions::Loss::squares);
+    // The table's polynomial of log M follows the solutions to 1e-4 of them.
+    EXPECT_NEAR(of(fit, Quantity::contraction).value, 1, 2e-3) << E;
+    EXPECT_NEAR(of(fit, Quantity::stiffness).value / disc.stiffness(E), 1, 1e-2) << E;
+    EXPECT_NEAR(of(fit, Quantity::line_tension).value, 2, 4e-2) << E;
+    EXPECT_LE(fit.relative_l2, 1e-3) << E;
+  }
+}
+
+TEST(SheetFit, a_stiff_sheet_tells_contraction_over_stiffness_and_a_lower_limit) {
+  const FittedDisc disc(25);
+  std::mt19937_64 random(7);
+  const SheetFit fit =
+      fit_sheet(disc.data(with_noise(disc.exact(200, 20), random)), *disc.table, tensions::Loss::squares);
+  EXPECT_FALSE(of(fit, Quantity::stiffness).identifiable);
+  EXPECT_TRUE(of(fit, Quantity::stiffness).low.has_value());
+  EXPECT_FALSE(of(fit, Quantity::stiffness).high.has_value());
+  EXPECT_FALSE(of(fit, Quantity::contraction).high.has_value());
+  const SheetEstimate& ratio = of(fit, Quantity::contraction_over_stiffness);
+  EXPECT_TRUE(ratio.identifiable);
+  const double truth = 20 / disc.stiffness(200);
+  EXPECT_LT(*ratio.low, truth);
+  EXPECT_GT(*ratio.high, truth);
+  EXPECT_LT((*ratio.high - *ratio.low) / truth, 0.3);
+}
+
+TEST(SheetFit, a_known_stiffness_leaves_the_contraction_alone) {
+  const FittedDisc disc(25);
+  std::mt19937_64 random(8);
+  const auto data = disc.data(with_noise(disc.exact(10, 1), random));
+  const SheetFit free = fit_sheet(data, *disc.table, tensions::Loss::squares);
+  const SheetFit held = fit_sheet(data, *disc.table, tensions::Loss::squares, disc.stiffness(10));
+  EXPECT_DOUBLE_EQ(held.stiffness_nN_per_um, disc.stiffness(10));
+  EXPECT_LT(*of(held, Quantity::contraction).sigma, *of(free, Quantity::contraction).sigma);
+  EXPECT_NEAR(of(held, Quantity::contraction).value, 1, 4 * *of(held, Quantity::contraction).sigma);
+}
+
+TEST(SheetFit, stray_beads_do_not_move_a_robust_fit) {
+  const FittedDisc disc(25);
+  std::mt19937_64 random(9);
+  DisplacementField field = with_noise(disc.exact(1, 1), random);
+  for (std::size_t i = 0; i < field.size(); i += 40) field[i].displacement_um += Vec2{1.5, -1};
+  const SheetFit squares = fit_sheet(disc.data(field), *disc.table, tensions::Loss::squares);
+  const SheetFit tukey = fit_sheet(disc.data(field), *disc.table, tensions::Loss::tukey);
+  EXPECT_NEAR(of(tukey, Quantity::contraction).value, 1, 4 * *of(tukey, Quantity::contraction).sigma);
+  EXPECT_LT(*of(tukey, Quantity::contraction).sigma, 0.2 * *of(squares, Quantity::contraction).sigma);
+  EXPECT_GE(tukey.n_down_weighted, static_cast<int>(field.size() / 40));
+}
+
+TEST(SheetFit, intervals_hold_the_truth_and_standard_errors_are_the_scatter) {
+  constexpr int kRuns = 200;
+  const FittedDisc disc(25);
+  for (const double E : {1.0, 10.0}) {
+    const DisplacementField exact = disc.exact(E, 1);
+    const double M = disc.stiffness(E);
+    std::mt19937_64 random(11);
+    int s_held = 0, M_held = 0;
+    double s_sum = 0, s_squares = 0, s_sigma = 0, m_sum = 0, m_squares = 0, m_sigma = 0;
+    for (int run = 0; run < kRuns; ++run) {
+      const SheetFit fit = fit_sheet(disc.data(with_noise(exact, random)), *disc.table, tensions::Loss::squares);
+      const SheetEstimate &s = of(fit, Quantity::contraction), &stiffness = of(fit, Quantity::stiffness);
+      s_held += s.low.value_or(0) <= 1 && 1 <= s.high.value_or(1e300);
+      M_held += stiffness.low.value_or(0) <= M && M <= stiffness.high.value_or(1e300);
+      const double m = std::log(stiffness.value);
+      s_sum += s.value;
+      s_squares += s.value * s.value;
+      s_sigma += s.sigma.value_or(0) / kRuns;
+      m_sum += m;
+      m_squares += m * m;
+      m_sigma += stiffness.sigma.value_or(0) / stiffness.value / kRuns;
+    }
+    const double s_scatter = std::sqrt((s_squares - s_sum * s_sum / kRuns) / (kRuns - 1));
+    const double m_scatter = std::sqrt((m_squares - m_sum * m_sum / kRuns) / (kRuns - 1));
+    std::printf("E %g: held %d, %d of %d; s %.4f, error %.4f, scatter %.4f; log M error %.3f, scatter %.3f\n", E,
+                s_held, M_held, kRuns, s_sum / kRuns, s_sigma, s_scatter, m_sigma, m_scatter);
+    // 95 % of 200 are 190 ± 3.1: three standard deviations of the count
+    EXPECT_GE(s_held, 181) << E;
+    EXPECT_GE(M_held, 181) << E;
+    EXPECT_LE(s_held, 199) << E;
+    EXPECT_LE(M_held, 199) << E;
+    EXPECT_NEAR(s_sigma / s_scatter, 1, 0.15) << E;
+    EXPECT_NEAR(m_sigma / m_scatter, 1, 0.15) << E;
+  }
+}
+
+}  // namespace
