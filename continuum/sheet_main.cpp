@@ -16,6 +16,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/tables.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
@@ -32,6 +33,7 @@ struct Parameters {
   Gel gel;
   substrate::SubstrateParameters substrate;
   SheetParameters sheet;
+  std::optional<double> traction_sigma_kPa, traction_correlation_um;
   bool fit_line_tension = false;                  ///< most colonies have none
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
 };
@@ -48,6 +50,12 @@ void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.substrate);
   declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
   declare(list, p.sheet);
+  list.add("traction_sigma_kPa", p.traction_sigma_kPa, Range::between(0, 1e4),
+           "with --traction: standard error of a traction's component, for errors of the tensions (kPa); unset: none");
+  list.add(
+      "traction_correlation_um", p.traction_correlation_um, Range::size_um(),
+      "with --traction: distance over which neighbours share their error, the resolution of the reconstruction (um); "
+      "unset: each patch has its own");
   list.add("fit_line_tension", p.fit_line_tension, "with --displacement: fit line_tension_nN, too");
   list.add("loss", p.loss, "with --displacement: of the residuals; all but squares take beads less that stray");
 }
@@ -92,16 +100,21 @@ std::vector<Polygon> read_rings(const Path& file, const std::optional<double>& p
     if (!pixel_um) throw UsageError("pixel_size_um is missing: " + file.string() + " counts in pixels");
     rings = rings_of_picture(file, *pixel_um);
   }
-  for (Polygon& ring : rings) {
-    ring = distinct(ring);
-    if (ring.size() < 3 || signed_area_um2(ring) == 0)
-      throw InputError(file.string(), "an outline around an area", "one around none");
-  }
+  for (Polygon& ring : rings) ring = distinct(ring);
   const std::string crossing = crossing_of(rings);
   if (!crossing.empty())
     throw InputError(file.string(), "an outline that does not cross itself", crossing + " cross",
                      "a piece runs from a point to the next; remove the loop, or draw the outline again");
+  for (const Polygon& ring : rings)
+    if (ring.size() < 3 || signed_area_um2(ring) == 0)
+      throw InputError(file.string(), "an outline around an area", "one around none");
   return rings;
+}
+
+/// Whether a piece of it runs along the image's border: the sheet goes on beyond.
+bool has_cut(const Path& file) {
+  if (file.extension() != ".csv") return false;
+  return std::ranges::any_of(files::read(file, files::outline_table()), &files::OutlinePoint::is_cut);
 }
 
 Region region_of(const std::vector<Polygon>& rings) {
@@ -200,6 +213,23 @@ void notice_mesh(stage::StageContext& context, const Solution& solution) {
                          "Between the triangles the tensions jump by " + brief(error) + " of themselves."));
 }
 
+/// displacement.csv: what the patches' forces make of the gel's surface.
+void write_beads(stage::StageContext& context, const substrate::Substrate& model, const Solution& solution,
+                 const std::vector<Vec2>& points_um) {
+  std::vector<substrate::Ellipse> patches;
+  std::vector<Vec2> forces;
+  for (int t = 0; t < solution.elements->n_triangles(); ++t) {
+    patches.push_back(patch_of(*solution.elements, t));
+    const GroundPatch& patch = solution.patches[static_cast<std::size_t>(t)];
+    forces.push_back(patch.area_um2 * patch.traction_kPa);
+  }
+  const std::vector<Vec2> u = model.displacements_um(points_um, patches, forces);
+  DisplacementField field;
+  for (std::size_t i = 0; i < points_um.size(); ++i)
+    field.push_back({.position_um = points_um[i], .displacement_um = u[i], .sigma_um = 0, .flag = {}});
+  files::write_displacement(context.output("out", "displacement.csv"), field);
+}
+
 // --- the sheet under its own contraction
 
 Effect thickness_effect(const Material& material, const Region& region) {
@@ -253,6 +283,8 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
                     {"stiffness_nN_per_um", M},
                     {"contraction_nN_per_um", scene.contraction.nN_per_um},
                     {"free_contraction", x}};
+  if (ground == Ground::springs && context.has_input("beads"))
+    throw UsageError("--beads are moved by a gel: the sheet stands on springs (" + response.why + ")");
   if (ground == Ground::springs) {
     const double l_um = std::sqrt(M / *scene.adhesion_nN_per_um3);
     scene.size = size_on_springs(region, l_um);
@@ -268,6 +300,8 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
   } else {
     const auto model = choice::make_substrate(*gel, p.substrate, context.threads);
     result.solution = solve_on_gel(scene, *model, context.threads);
+    if (context.has_input("beads"))
+      write_beads(context, *model, result.solution, files::read_points(context.input("beads")));
     append(result.figures, model->figures());
     result.effects = model->effects();
   }
@@ -307,7 +341,10 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   TriangleSize size = size_for_tractions(area, tractions);
   if (p.sheet.mesh_um) size = with_edge(size, *p.sheet.mesh_um);
   context.progress(0.1, "solving for the tensions");
-  FromTraction found = tensions_from(tractions, area, material, size, context.threads);
+  std::optional<TractionNoise> noise;
+  if (p.traction_sigma_kPa)
+    noise = {*p.traction_sigma_kPa, p.traction_correlation_um.value_or(std::sqrt(tractions.front().area_um2))};
+  FromTraction found = tensions_from(tractions, area, material, size, context.threads, noise);
   const Polygon& outline = region.rims.front().points_um();
   const TensionFigures inside = figures_inside(found.solution, outline);
   Run result{.solution = std::move(found.solution), .figures = {}, .effects = {}};
@@ -320,6 +357,10 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
                     {"net_torque_share", found.unbalanced.net_torque_share},
                     {"outside_share", found.unbalanced.outside_share},
                     {"exact_virial_tension_nN_per_um", found.balance.virial_tension_nN_per_um}};
+  if (found.errors) {
+    result.figures.emplace_back("mean_tension_sigma_nN_per_um", found.errors->mean_nN_per_um);
+    result.solution.sigma_by_triangle = found.errors->by_triangle;
+  }
   // what Poisson's ratio, which nobody knows, makes of it
   for (const double nu : {0.0, 0.5}) {
     const Material other{material.youngs_modulus_kPa, nu, material.thickness_um};
@@ -353,12 +394,14 @@ DisplacementField read_beads(stage::StageContext& context) {
   return beads;
 }
 
-void write_model_displacement(const Path& file, DisplacementField beads, const std::vector<Vec2>& model_um) {
-  for (std::size_t i = 0; i < beads.size(); ++i) {
-    beads[i].displacement_um = model_um[i];
-    beads[i].sigma_um = 0;
-  }
-  files::write_displacement(file, beads);
+tensions::LinearData data_of_adhesions(const DisplacementField& beads, stage::StageContext& context,
+                                       const substrate::Substrate& model) {
+  std::vector<substrate::Ellipse> ellipses;
+  for (const Adhesion& a : files::read_adhesions(context.input("adhesions")))
+    ellipses.push_back(substrate::ellipse_of(a));
+  std::vector<Vec2> places;
+  for (const Bead& bead : beads) places.push_back(bead.position_um);
+  return tensions::reduce(beads, model.compliance_um_per_nN(places, ellipses));
 }
 
 std::string sentence_of(const sheets::SheetEstimate& e) {
@@ -404,17 +447,16 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   std::optional<double> known;
   if (p.sheet.youngs_modulus_kPa)
     known = Material{*p.sheet.youngs_modulus_kPa, nu, *p.sheet.thickness_um}.stiffness_nN_per_um();
-  const sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known);
+  sheets::SheetFit fit = fit_sheet(data_of(beads, table, ground, *model, context.threads), table, p.loss, known);
+  if (context.has_input("adhesions")) compare_with_adhesions(fit, data_of_adhesions(beads, context, *model));
 
   scene.material.youngs_modulus_kPa = fit.stiffness_nN_per_um * (1 - nu * nu) / *p.sheet.thickness_um;
   scene.contraction.nN_per_um = fit.loads(0);
   scene.line_tension_nN = p.fit_line_tension ? fit.loads(1) : 0;
   Run result{.solution = solve_on(ground, elements, scene), .figures = {}, .effects = model->effects()};
-  std::vector<Vec2> places, forces;
+  std::vector<Vec2> places;
   for (const Bead& bead : beads) places.push_back(bead.position_um);
-  for (const GroundPatch& patch : result.solution.patches) forces.push_back(patch.area_um2 * patch.traction_kPa);
-  write_model_displacement(context.output("out", "displacement.csv"), beads,
-                           model->displacements_um(places, ground.patches(), forces));
+  write_beads(context, *model, result.solution, places);
   write_estimates(context.output("out", "sheet_fit.csv"), fit);
   write_models(context.output("out", "sheet_models.csv"), fit);
   std::string told;
@@ -433,7 +475,7 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
                     {"expected_relative_l2", fit.expected_relative_l2},
                     {"n_beads", std::int64_t{fit.n_beads}},
                     {"n_down_weighted", std::int64_t{fit.n_down_weighted}},
-                    {"aic", fit.models.back().aic},
+                    {"aic", fit.models[1].aic},
                     {"aic_of_nothing", fit.models.front().aic}};
   const double x = free_contraction(scene.material, scene.contraction.nN_per_um);
   result.effects.push_back(stage::decided(EffectKind::gel_response, Switch::on, true, "the beads move with the gel"));
@@ -453,6 +495,8 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
     throw UsageError("ground = none needs the --traction under the sheet: nothing else holds it");
   const bool has_beads = context.has_input("displacement");
   if (has_beads && has_tractions) throw UsageError("expected --displacement or --traction, not both");
+  if (context.has_input("beads") && (has_beads || has_tractions))
+    throw UsageError("--beads is for a sheet of given contraction: leave out --displacement and --traction");
   Run done = has_tractions ? run_from_traction(p, context, region)
              : has_beads   ? run_fit(p, context, region)
                            : run_forward(p, context, region);
@@ -470,6 +514,8 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
                    brief(balance.mean_tension_nN_per_um) + " nN/um over " + brief(balance.area_um2) +
                    " um2, total force " + brief(balance.total_force_nN) + " nN; " + done.solution.report.reason;
   if (!done.told.empty()) report.summary += "; " + done.told;
+  if (has_cut(context.input("outline")))
+    report.summary += "; WARNING: the image cuts the sheet, whose edge there is taken for free";
   if (n_outside > 0) report.summary += "; " + std::to_string(n_outside) + " points lie outside of the sheet";
   report.figures = done.figures;
   report.effects = done.effects;

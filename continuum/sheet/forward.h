@@ -56,6 +56,7 @@ struct Solution {
   std::vector<Tensor> at_points, at_nodes;  ///< S
   std::vector<GroundPatch> patches;         ///< by triangle
   Report report;
+  std::vector<double> sigma_by_triangle = {};  ///< of the mean tension (nN/um); empty: not known
 };
 
 /// Contraction at each point of the elements.

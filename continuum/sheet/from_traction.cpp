@@ -3,6 +3,8 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <random>
 
 #include "continuum/sheet/stiffness.h"
 #include "pipeline/contract/errors.h"
@@ -113,10 +115,59 @@ Balance balance_of_parts(const Parts& parts, const Solution& solution) {
   return result;
 }
 
+NodeVectors load_of(const Parts& parts, const Elements& elements) {
+  NodeVectors load = NodeVectors::Zero(2 * elements.n_nodes());
+  for (const Part& part : parts.inside)
+    for (std::size_t i = 0; i < 6; ++i) {
+      const int node = elements.nodes(part.triangle)[i];
+      load(2 * node) -= part.shape.value[i] * part.force_nN.x;
+      load(2 * node + 1) -= part.shape.value[i] * part.force_nN.y;
+    }
+  return load;
+}
+
+/// Squares of the correlation's side each draw an error; net force and torque are taken off as of the tractions.
+TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution& solution, const Stiffness& stiffness) {
+  const Elements& elements = *solution.elements;
+  std::mt19937_64 random(1);
+  std::normal_distribution<double> normal(0, noise.sigma_kPa);
+  TensionErrors errors;
+  std::vector<double> squares(static_cast<std::size_t>(elements.n_triangles()));
+  Eigen::MatrixXd loads(2 * elements.n_nodes(), TensionErrors::kDraws);
+  for (int draw = 0; draw < TensionErrors::kDraws; ++draw) {
+    std::map<std::pair<long, long>, Vec2> by_square;
+    for (Part& part : parts.inside) {
+      const Vec2 at = 1 / noise.correlation_um * part.shape.place_um;
+      const auto [square, is_new] = by_square.try_emplace({std::lround(at.x), std::lround(at.y)});
+      if (is_new) {
+        square->second.x = normal(random);
+        square->second.y = normal(random);
+      }
+      part.force_nN = part.area_um2 * square->second;
+    }
+    balance(parts);
+    loads.col(draw) = load_of(parts, elements);
+  }
+  const Eigen::MatrixXd u = stiffness.solve(loads);
+  for (int draw = 0; draw < TensionErrors::kDraws; ++draw) {
+    const std::vector<Tensor> S = tension_at_points(elements, solution.sheet, u.col(draw));
+    errors.mean_nN_per_um += std::pow(mean_of(mean_over(elements, S)), 2) / TensionErrors::kDraws;
+    for (int t = 0; t < elements.n_triangles(); ++t) {
+      double mean = 0;
+      for (int p = 0; p < Elements::kPoints; ++p)
+        mean += mean_of(S[static_cast<std::size_t>(Elements::kPoints * t + p)]) / Elements::kPoints;
+      squares[static_cast<std::size_t>(t)] += mean * mean / TensionErrors::kDraws;
+    }
+  }
+  errors.mean_nN_per_um = std::sqrt(errors.mean_nN_per_um);
+  for (const double square : squares) errors.by_triangle.push_back(std::sqrt(square));
+  return errors;
+}
+
 }  // namespace
 
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
-                           const TriangleSize& size, int threads) {
+                           const TriangleSize& size, int threads, const std::optional<TractionNoise>& noise) {
   constexpr std::size_t kMostTriangles = 200000;
   FromTraction result;
   Solution& solution = result.solution;
@@ -137,22 +188,16 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
   solution.sheet.material = material;
   solution.sheet.contraction_nN_per_um = even(elements, 0);
   solution.sheet.n_rims = static_cast<int>(region.rims.size());
-  NodeVectors load = NodeVectors::Zero(2 * elements.n_nodes());
-  for (const Part& part : parts.inside)
-    for (int i = 0; i < 6; ++i) {
-      const auto node = elements.nodes(part.triangle)[i];
-      load(2 * node) -= part.shape.value[i] * part.force_nN.x;
-      load(2 * node + 1) -= part.shape.value[i] * part.force_nN.y;
-    }
   Stiffness stiffness(elements, pins(elements));
   for (int t = 0; t < elements.n_triangles(); ++t) stiffness.add(t, elastic_stiffness(elements, t, material));
   MBTFM_ASSERT(stiffness.factorise(0, threads));
-  solution.u = stiffness.solve(load);
+  solution.u = stiffness.solve(load_of(parts, elements));
   solution.report = {.converged = true, .iterations = 1, .last_change = 0, .reason = "one linear solve"};
   solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
   solution.at_nodes = recovered(elements, solution.at_points);
   solution.patches = patches_of(parts, elements);
   result.balance = balance_of_parts(parts, solution);
+  if (noise) result.errors = errors_by(*noise, parts, solution, stiffness);
   return result;
 }
 

@@ -1,6 +1,7 @@
 /// Tensions of a sheet from the tractions under it ("monolayer stress microscopy").
 #pragma once
 
+#include <optional>
 #include <vector>
 
 #include "continuum/sheet/forward.h"
@@ -14,10 +15,24 @@ struct Unbalanced {
   double outside_share = 0;     ///< of Σ |F|: outside of the area
 };
 
+/// Errors of the tractions. Neighbours share theirs over a distance, as smoothing makes them.
+struct TractionNoise {
+  double sigma_kPa = 0;       ///< of a component
+  double correlation_um = 0;  ///< within squares of this side errors are the same
+};
+
+/// Standard errors that follow from those of the tractions, by drawing them.
+struct TensionErrors {
+  static constexpr int kDraws = 48;  ///< an error of an error of a tenth
+  double mean_nN_per_um = 0;         ///< of the mean tension over the area
+  std::vector<double> by_triangle;   ///< of the mean tension there
+};
+
 struct FromTraction {
   Solution solution;      ///< u is of a sheet with the material's stiffness, up to a motion as a whole
   Unbalanced unbalanced;  ///< before it was taken off
   Balance balance;
+  std::optional<TensionErrors> errors;
 };
 
 /// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
@@ -25,7 +40,7 @@ struct FromTraction {
 /// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T).
 /// @throws InputError where more than kMostUnbalanced is out of balance
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
-                           const TriangleSize& size, int threads);
+                           const TriangleSize& size, int threads, const std::optional<TractionNoise>& noise = {});
 
 inline constexpr double kMostUnbalanced = 0.2;
 

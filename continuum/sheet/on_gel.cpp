@@ -94,31 +94,33 @@ substrate::Ellipse ellipse_of(Vec2 a, Vec2 b, Vec2 c) {
   return {centre, semi_major, std::min(semi_major, product / semi_major), std::atan2(major.y(), major.x())};
 }
 
+substrate::Ellipse patch_of(const Elements& elements, int triangle) {
+  const auto corner = [&](std::size_t i) {
+    return elements.triangles().nodes_um[static_cast<std::size_t>(elements.nodes(triangle)[i])];
+  };
+  substrate::Ellipse ellipse = ellipse_of(corner(0), corner(1), corner(2));
+  const double area = elements.area_um2(triangle);  // of the curved triangle
+  const double scale = std::sqrt(area / (std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um));
+  ellipse.semi_major_um *= scale;
+  ellipse.semi_minor_um *= scale;
+  ellipse.centre_um = {};
+  for (int p = 0; p < Elements::kPoints; ++p)
+    ellipse.centre_um += elements.at(triangle, p).weight_um2 / area * elements.at(triangle, p).place_um;
+  return ellipse;
+}
+
 OnGel::OnGel(const Elements& elements, const substrate::Substrate& gel, std::optional<double> adhesion_nN_per_um3,
              int threads)
     : elements_(elements), threads_(threads), adhesion_(adhesion_nN_per_um3) {
   std::vector<Vec2> centres;
   for (int t = 0; t < elements.n_triangles(); ++t) {
-    const auto corner = [&](int i) {
-      return elements.triangles().nodes_um[static_cast<std::size_t>(elements.nodes(t)[i])];
-    };
-    substrate::Ellipse ellipse = ellipse_of(corner(0), corner(1), corner(2));
-    const double area = elements.area_um2(t);  // of the curved triangle
-    const double scale = std::sqrt(area / (std::numbers::pi * ellipse.semi_major_um * ellipse.semi_minor_um));
-    ellipse.semi_major_um *= scale;
-    ellipse.semi_minor_um *= scale;
-    std::array<double, 6> weights{};
-    Vec2 centre;
-    for (int p = 0; p < Elements::kPoints; ++p) {
-      const Shape& shape = elements.at(t, p);
-      for (int i = 0; i < 6; ++i) weights[i] += shape.weight_um2 / area * shape.value[i];
-      centre += shape.weight_um2 / area * shape.place_um;
-    }
-    ellipse.centre_um = centre;
-    centres.push_back(centre);
-    ellipses_.push_back(ellipse);
-    areas_um2_.push_back(area);
-    weights_.push_back(weights);
+    ellipses_.push_back(patch_of(elements, t));
+    centres.push_back(ellipses_.back().centre_um);
+    areas_um2_.push_back(elements.area_um2(t));
+    std::array<double, 6>& weights = weights_.emplace_back();
+    for (int p = 0; p < Elements::kPoints; ++p)
+      for (std::size_t i = 0; i < 6; ++i)
+        weights[i] += elements.at(t, p).weight_um2 / areas_um2_.back() * elements.at(t, p).value[i];
   }
   compliance_ = gel.compliance_um_per_nN(centres, ellipses_);
   average_near(gel, centres);

@@ -55,6 +55,9 @@ class OnGel {
   Eigen::MatrixXd compliance_;                  ///< lower half
 };
 
+/// The ellipse that stands for a triangle of the mesh: of its area and centre.
+substrate::Ellipse patch_of(const Elements& elements, int triangle);
+
 /// The ellipse of a triangle: of its centre, area and the ratio and direction of its axes of inertia.
 substrate::Ellipse ellipse_of(Vec2 a, Vec2 b, Vec2 c);
 

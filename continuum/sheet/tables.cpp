@@ -1,5 +1,6 @@
 #include "continuum/sheet/tables.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "pipeline/files/columns.h"
@@ -24,21 +25,31 @@ const files::Table<SheetPoint>& sheet_table() {
           {"sxy_nN_per_um", "shear", [](const Row& row) { return row.sxy_nN_per_um; }},
           {"mean_tension_nN_per_um", "half of sxx + syy", [](const Row& row) { return row.mean_tension_nN_per_um; }},
           {"max_shear_nN_per_um", "half the difference of the principal tensions",
-           [](const Row& row) { return row.max_shear_nN_per_um; }}}};
+           [](const Row& row) { return row.max_shear_nN_per_um; }},
+          {"mean_tension_sigma_nN_per_um",
+           "its standard error by the tractions' (`traction_sigma_kPa`); empty: not known",
+           [](const Row& row) { return row.mean_tension_sigma_nN_per_um; }}}};
   return table;
 }
 
 SheetPoint row_of(Vec2 place, Vec2 u, const Tensor& S) {
-  return {place, u.x, u.y, S.xx, S.yy, S.xy, mean_of(S), largest_shear(S)};
+  return {place, u.x, u.y, S.xx, S.yy, S.xy, mean_of(S), largest_shear(S), std::nullopt};
 }
 
 }  // namespace
 
 std::vector<SheetPoint> at_nodes_of(const Solution& solution) {
+  const Elements& elements = *solution.elements;
   std::vector<SheetPoint> rows;
-  for (int i = 0; i < solution.elements->n_nodes(); ++i)
-    rows.push_back(row_of(solution.elements->triangles().nodes_um[static_cast<std::size_t>(i)], at_node(solution.u, i),
+  for (int i = 0; i < elements.n_nodes(); ++i)
+    rows.push_back(row_of(elements.triangles().nodes_um[static_cast<std::size_t>(i)], at_node(solution.u, i),
                           solution.at_nodes[static_cast<std::size_t>(i)]));
+  if (solution.sigma_by_triangle.empty()) return rows;
+  for (int t = 0; t < elements.n_triangles(); ++t)
+    for (const int node : elements.nodes(t)) {
+      std::optional<double>& sigma = rows[static_cast<std::size_t>(node)].mean_tension_sigma_nN_per_um;
+      sigma = std::max(sigma.value_or(0), solution.sigma_by_triangle[static_cast<std::size_t>(t)]);
+    }
   return rows;
 }
 
@@ -54,6 +65,8 @@ std::vector<SheetPoint> at_points_of(const Solution& solution, const std::vector
     const Shape shape = solution.elements->shape(place->triangle, place->r, place->s);
     const auto& nodes = solution.elements->nodes(place->triangle);
     rows.push_back(row_of(p, value_of(solution.u, nodes, shape), value_of(solution.at_nodes, nodes, shape)));
+    if (!solution.sigma_by_triangle.empty())
+      rows.back().mean_tension_sigma_nN_per_um = solution.sigma_by_triangle[static_cast<std::size_t>(place->triangle)];
   }
   return rows;
 }

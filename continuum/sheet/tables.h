@@ -16,6 +16,7 @@ struct SheetPoint {
   std::optional<double> ux_um{}, uy_um{};
   std::optional<double> sxx_nN_per_um{}, syy_nN_per_um{}, sxy_nN_per_um{};
   std::optional<double> mean_tension_nN_per_um{}, max_shear_nN_per_um{};
+  std::optional<double> mean_tension_sigma_nN_per_um{};
 };
 std::vector<SheetPoint> at_nodes_of(const Solution& solution);
 std::vector<SheetPoint> at_points_of(const Solution& solution, const std::vector<Vec2>& points_um);

@@ -244,4 +244,17 @@ SheetFit fit_sheet(LinearData data, const StiffnessTable& table, tensions::Loss 
   return fit;
 }
 
+void compare_with_adhesions(SheetFit& fit, const LinearData& adhesions) {
+  const double noise = tensions::noise_variance(adhesions), old_noise = fit.variance;
+  const auto n_used = static_cast<double>(adhesions.n_used);
+  fit.models.push_back({"adhesion-forces", static_cast<int>(adhesions.reduced.n_felt),
+                        adhesions.reduced.floor_squared / old_noise,
+                        tensions::relative_l2(adhesions, tensions::free_forces_nN(adhesions.reduced)), 0, 0});
+  for (SheetModel& model : fit.models) {
+    model.chi_squared *= old_noise / noise;
+    model.aic = model.chi_squared + 2 * model.n_parameters;
+    model.bic = model.chi_squared + model.n_parameters * std::log(n_used);
+  }
+}
+
 }  // namespace mbtfm::sheets

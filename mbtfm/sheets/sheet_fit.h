@@ -43,6 +43,11 @@ struct SheetFit {
   Report report;
 };
 
+/// One more model: forces of the adhesions, each for itself. chi² of all models is then in units of the noise that
+/// these leave, or of the stated errors where these are larger.
+/// @param adhesions  the beads' data in terms of the adhesions' forces
+void compare_with_adhesions(SheetFit& fit, const tensions::LinearData& adhesions);
+
 /// The beads' data in terms of the table. @param ground  whose patches carry the table's forces
 tensions::LinearData data_of(const DisplacementField& beads, const StiffnessTable& table, const sheet::OnGel& ground,
                              const substrate::Substrate& gel, int threads);

@@ -29,7 +29,7 @@ const files::Table<SheetModel>& model_table() {
   static const files::Table<Row> table{
       .file = "sheet_models.csv",
       .row = "each model of what moves the beads under a sheet",
-      .columns = {{"model", "nothing, or the sheet", &Row::name},
+      .columns = {{"model", "nothing, the sheet, or each adhesion for itself", &Row::name},
                   {"n_parameters", "that were fitted", &Row::n_parameters},
                   {"chi_squared", "of the misfit, in units of the noise", &Row::chi_squared, {.digits = kForPeople}},
                   {"relative_l2", "of the misfit", &Row::relative_l2, {.digits = kForPeople}},

@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
@@ -62,6 +63,35 @@ TEST_F(Sheet, a_bonded_sheet_pulls_on_its_gel_without_net_force) {
   ASSERT_EQ(outcome.code, 0) << outcome.output;
   EXPECT_LE(figure("net_force_nN"), 1e-9 * figure("total_force_nN"));
   EXPECT_GT(figure("total_force_nN"), 0);
+}
+
+/// Beads of a computed gel, with noise, are fitted: the sheet that moved them comes back within its errors.
+TEST_F(Sheet, contraction_and_stiffness_come_back_from_beads) {
+  std::string points = "x_um,y_um\n";
+  for (int i = -20; i <= 20; ++i)
+    for (int j = -20; j <= 20; ++j) points += std::to_string(2 * i) + "," + std::to_string(2 * j) + "\n";
+  files::write_text(folder_ / "beads.csv", points);
+  const std::string gel = "[gel]\nyoungs_modulus_kPa = 1\npoisson_ratio = 0.49\nthickness_um = 60\n";
+  const std::string sheet = "[sheet]\npoisson_ratio = 0.3\nthickness_um = 0.4\nmesh_um = 2\n";
+  const auto made = run(gel + sheet + "youngs_modulus_kPa = 30\ncontraction_nN_per_um = 0.5\n",
+                        "--beads " + (folder_ / "beads.csv").string());
+  ASSERT_EQ(made.code, 0) << made.output;
+  DisplacementField beads = files::read_displacement(folder_ / "out" / "displacement.csv");
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> noise(0, 0.01);
+  for (Bead& bead : beads) {
+    bead.displacement_um += Vec2{noise(random), noise(random)};
+    bead.sigma_um = 0.01;
+  }
+  files::write_displacement(folder_ / "displacement.csv", beads);
+  const auto outcome = run(gel + sheet, "--displacement " + (folder_ / "displacement.csv").string());
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  const files::CsvTable fit(folder_ / "out" / "sheet_fit.csv");
+  EXPECT_EQ(fit.text(0, "quantity"), "contraction_nN_per_um");
+  EXPECT_NEAR(fit.number(0, "value"), 0.5, 4 * fit.number(0, "sigma"));
+  EXPECT_EQ(fit.text(1, "quantity"), "stiffness_nN_per_um");
+  EXPECT_NEAR(fit.number(1, "value"), 30 * 0.4 / (1 - 0.09), 4 * fit.number(1, "sigma"));
+  EXPECT_LT(figure("aic"), figure("aic_of_nothing") - 1000);
 }
 
 struct Refused {
