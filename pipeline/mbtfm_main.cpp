@@ -180,16 +180,22 @@ int repeat(const CommandLine& line) {
   return tell(runner::repeat_run(run_json, inputs, line.out, run_options(line), say), line.out.string());
 }
 
-/// Become mbtfm-stats.
+/// Become another program of ours.
+int become(const std::string& name, std::vector<std::string> arguments) {
+  const std::string program = (runner::executable_folder() / name).string();
+  arguments.insert(arguments.begin(), program);
+  std::vector<char*> pointers;
+  for (std::string& argument : arguments) pointers.push_back(argument.data());
+  pointers.push_back(nullptr);
+  execv(pointers[0], pointers.data());
+  throw OutputError("cannot start " + program);
+}
+
 int stats(const CommandLine& line, const std::vector<std::string>& further) {
-  const std::string program = (runner::executable_folder() / "mbtfm-stats").string();
-  std::vector<std::string> arguments = {program,
-                                        "--cells",
-                                        line.folder.string(),
-                                        "--out",
-                                        files::inside(line.folder, "statistics", line.folder.string()).string(),
-                                        "--threads",
-                                        std::to_string(line.threads)};
+  std::vector<std::string> arguments = {
+      "--cells",   line.folder.string(),
+      "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
+      "--threads", std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
   for (const std::string& argument : further) {
     // the one flag that people write with a dash
@@ -197,11 +203,21 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
     const bool is_dashed = argument.starts_with(kDashed);
     arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
   }
-  std::vector<char*> pointers;
-  for (std::string& argument : arguments) pointers.push_back(argument.data());
-  pointers.push_back(nullptr);
-  execv(pointers[0], pointers.data());
-  throw OutputError("cannot start " + program);
+  return become("mbtfm-stats", std::move(arguments));
+}
+
+/// @param arguments  as given, in their order
+int plan(std::vector<std::string> arguments) {
+  const auto is_out = [](const std::string& a) { return a == "--out" || a.starts_with("--out="); };
+  if (std::ranges::none_of(arguments, is_out)) arguments.insert(arguments.end(), {"--out", "plan"});
+  return become("mbtfm-plan", std::move(arguments));
+}
+
+int noise(const std::vector<std::string>& pictures, const std::vector<std::string>& further) {
+  std::vector<std::string> arguments;
+  if (pictures.size() == 2) arguments = {"--first", pictures[0], "--second", pictures[1]};
+  arguments.insert(arguments.end(), further.begin(), further.end());
+  return become("mbtfm-noise", std::move(arguments));
 }
 
 int cost_study(const CommandLine& line) {
@@ -323,6 +339,17 @@ int start(int argc, char** argv) {
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
   cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
       ->capture_default_str();
+  // what follows is for the program that they become, --help included
+  CLI::App* plan_command = app.add_subcommand(
+      "plan", "how many beads, which gel, how little noise and how many cells a question takes: mbtfm plan --help");
+  plan_command->set_help_flag();
+  plan_command->allow_extras();
+  std::vector<std::string> pictures;
+  CLI::App* noise_command = app.add_subcommand("noise",
+                                               "noise and density of beads from two pictures of a place where "
+                                               "no cell pulls: mbtfm noise A.tif B.tif");
+  noise_command->set_help_flag();
+  noise_command->allow_extras()->add_option("PICTURES", pictures, "the two pictures")->expected(0, 2);
   add_command(app, line, "compare", "print the tensions of a simulated cell beside the truth", kCell);
   try {
     app.parse(argc, argv);
@@ -337,6 +364,8 @@ int start(int argc, char** argv) {
   if (cost_command->parsed()) return cost_study(line);
   if (verify_command->parsed()) return verify(line);
   if (repeat_command->parsed()) return repeat(line);
+  if (plan_command->parsed()) return plan(plan_command->remaining());
+  if (noise_command->parsed()) return noise(pictures, noise_command->remaining());
   if (stats_command->parsed()) return stats(line, stats_command->remaining());
   return compare(line);
 }

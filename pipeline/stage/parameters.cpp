@@ -21,7 +21,7 @@ namespace {
 
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
 constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network",  "cables", "effects",
-                                "substrate", "fit",    "stats",   "scenario", "traction", "checks"};
+                                "substrate", "fit",    "stats",   "scenario", "traction", "checks", "plan"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
