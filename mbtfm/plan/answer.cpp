@@ -41,7 +41,7 @@ std::string of_other_gels(const Plan& plan, double own_kPa, double noise_um) {
     text += text.empty() ? "; a gel of " : ", one of ";
     text += brief(E) + " kPa ";
     text += can_be_had(n, plan.most_beads_per_um2) ? "needs " + about(*n.beads_per_um2)
-                                                   : std::string("needs more than can be told apart");
+                                                   : std::string("needs more beads than can be told apart");
   }
   return text;
 }
@@ -49,13 +49,13 @@ std::string of_other_gels(const Plan& plan, double own_kPa, double noise_um) {
 std::string about_adhesions(const Plan& plan, const Point& p) {
   const Expected& with = expected_of(plan.grid, p, Quantity::adhesion_force);
   const Expected& alone = expected_of(plan.grid, p, Quantity::free_force);
-  std::string text = "With " + about(p.beads_per_um2) +
-                     " beads per um² the force of the middle adhesion has a standard "
+  std::string text = "At " + about(p.beads_per_um2) +
+                     " per µm² the force of the middle adhesion has a standard "
                      "error of " +
                      about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
                      " nN without it; the smallest force seen is three times that. ";
   text += alone.least_distance_um ? "Without the network two adhesions of " + brief(plan.parameters.tension_nN) +
-                                        " nN each are told apart from " + about(*alone.least_distance_um) + " um on."
+                                        " nN each are told apart from " + about(*alone.least_distance_um) + " µm on."
                                   : "Without the network two adhesions of " + brief(plan.parameters.tension_nN) +
                                         " nN each are not told apart at any distance in a cell.";
   return text;
@@ -76,17 +76,17 @@ std::string about_cells(const Plan& plan) {
 
 std::string about_drawn(const Drawn& d) {
   if (d.tensions.empty()) return "";
-  const bool holds = std::abs(d.error_over_predicted - 1) < 3 * d.by_chance + 0.1;
+  constexpr double kMargin = 0.1;  // of what such plans are off by anyway (docs/planning.md)
+  const bool holds = std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kMargin;
   return "Checked with " + std::to_string(d.n_experiments) +
          (d.n_experiments == 1 ? " simulated experiment" : " simulated experiments") + " at " +
-         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um2) + " beads per um² and " +
-         brief(d.point.noise_um) + " um: the errors of " + std::to_string(d.tensions.size()) + " tensions were " +
-         about(d.error_over_predicted) +
-         " times those predicted (root mean square; by chance "
-         "within " +
-         about(2 * d.by_chance) + " of 1). The errors that the fits state were " + about(d.stated_over_predicted) +
-         " times those predicted. " +
-         (holds ? "The plan holds." : "The plan does not hold well here: allow for that factor.");
+         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um2) + " beads per µm² and " +
+         brief(d.point.noise_um) + " µm: the errors of " + std::to_string(d.tensions.size()) + " tensions were " +
+         about(d.error_over_predicted) + " times those predicted (root mean square; by chance within " +
+         about(2 * d.by_chance) + " of 1). " +
+         (holds ? "The plan holds. " : "The plan does not hold well here: allow for that factor. ") +
+         "Single adhesions' forces were off by " + about(d.forces.with_network_nN) + " nN with the network, by " +
+         about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) + " nN with FTTC.";
 }
 
 }  // namespace
@@ -114,15 +114,15 @@ std::string answer_sentence(const Plan& plan) {
   const std::string asked_for =
       "to see " + brief(plan.parameters.tension_nN) + " nN per fibre to " + percent(plan.asked.within);
   const std::string with = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
-                           " kPa and a noise of " + brief(noise_um) + " um ";
+                           " kPa and a noise of " + brief(noise_um) + " µm ";
   const Needed& n = needed_of(plan.grid, gel_kPa, noise_um);
   if (!n.beads_per_um2)
     return with + "no number of beads suffices " + asked_for + ": networks and segmentation alone make an error of " +
            about(plan.grid.model_error_nN) + " nN.";
   if (!can_be_had(n, plan.most_beads_per_um2))
-    return with + "you would need " + about(*n.beads_per_um2) + " beads per um² " + asked_for + ", more than the " +
+    return with + "you would need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + ", more than the " +
            about(plan.most_beads_per_um2) + " that can be told apart" + of_other_gels(plan, gel_kPa, noise_um) + ".";
-  return with + "you need " + about(*n.beads_per_um2) + " beads per um² " + asked_for +
+  return with + "you need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for +
          of_other_gels(plan, gel_kPa, noise_um) + ".";
 }
 
@@ -136,8 +136,10 @@ std::vector<std::string> further_sentences(const Plan& plan) {
     const Needed& n = needed_of(plan.grid, point.youngs_modulus_kPa, point.noise_um);
     add(std::string("That holds for half of the fibres. ") +
         (n.of_most <= plan.most_beads_per_um2
-             ? "Nine in ten need " + about(n.of_most) + " beads per um²."
-             : std::string("Nine in ten are not reached: short ones, and neighbours side by side, are harder.")));
+             ? "Nine in ten need " + about(n.of_most) + " beads per µm²."
+             : std::string(
+                   "Nine in ten do not reach it with any number of beads: for some of them mesh and segmentation "
+                   "alone make a larger error.")));
   }
   add(about_adhesions(plan, point));
   add(about_cells(plan));

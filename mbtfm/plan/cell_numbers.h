@@ -18,7 +18,7 @@ struct Scatter {
   double within_nN = 0;         ///< of the fibres of a cell about it
   double error_nN = 0;          ///< root mean square standard error of a fibre's tension
   double fibres_per_cell = 0;
-  std::string source;  ///< of the scatter
+  std::string source = {};  ///< of the scatter
 };
 
 /// Of the scene: its own fibres' scatter, and between cells what the parameters say.

@@ -134,28 +134,24 @@ std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Com
   return all;
 }
 
-/// Standard errors of all fibres at the densest, by the noise of 1 um on 1 kPa, and what is left without noise.
-struct FibreErrors {
-  std::vector<double> unit, other_nN;
-};
-FibreErrors fibre_errors(const Computed& c) {
-  FibreErrors e;
-  for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i) {
-    e.unit.push_back(c.densities.precision.back().tensions[static_cast<Eigen::Index>(i)]);
-    e.other_nN.push_back(c.model.tensions[i].total_nN());
+/// Density at which a tension's standard error is the target; infinite where what is left without noise is more.
+double needed_beads_per_um2(const Computed& c, std::size_t label, double target_nN, double scale) {
+  const double other_nN = c.model.tensions[label].total_nN();
+  if (other_nN >= target_nN) return std::numeric_limits<double>::infinity();
+  const double wanted = std::sqrt(target_nN * target_nN - other_nN * other_nN) / scale;
+  double low = 1e-6, high = 1e6;  // errors fall as the density rises
+  while (high / low > 1 + 1e-6) {
+    const double middle = std::sqrt(low * high);
+    (unit_error(c.densities, label, middle) > wanted ? low : high) = middle;
   }
-  return e;
+  return high;
 }
 
-/// Density at which this share of the fibres has a standard error of the target, as the covariance falls with it.
-double needed_beads_per_um2(const Computed& c, double share, double target_nN, double scale) {
-  const FibreErrors e = fibre_errors(c);
+/// At which this share of the fibres has it.
+double needed_by_share(const Computed& c, double share, double target_nN, double scale) {
   std::vector<double> needed;
-  for (std::size_t i = 0; i < e.unit.size(); ++i) {
-    const double room = target_nN * target_nN - e.other_nN[i] * e.other_nN[i];
-    needed.push_back(room > 0 ? c.densities.beads_per_um2.back() * std::pow(scale * e.unit[i], 2) / room
-                              : std::numeric_limits<double>::infinity());
-  }
+  for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i)
+    needed.push_back(needed_beads_per_um2(c, i, target_nN, scale));
   const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
   return numerics::of_rank_in(needed, rank);
 }
@@ -170,8 +166,8 @@ std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, cons
     for (const double noise_um : asked.noise_um)
       if (largest_um < kOfNoise * noise_um)
         warnings.push_back("On " + brief(E) + " kPa no bead moves by more than " + brief(largest_um) +
-                           " um, less than three times the noise of " + brief(noise_um) +
-                           " um: the cell is hardly seen. Take a softer gel.");
+                           " µm, less than three times the noise of " + brief(noise_um) +
+                           " µm: the cell is hardly seen. Take a softer gel.");
     const double left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
     if (left_out > kBeyondLinear)
       warnings.push_back("On " + brief(E) + " kPa linear elasticity leaves out some " + brief(100 * left_out) +
@@ -190,25 +186,28 @@ double most_beads_per_um2(const Scene& scene) {
   return kJammed * 4 / (3.141592653589793 * distance_um * distance_um);
 }
 
+double unit_error(const Densities& d, std::size_t label, double beads_per_um2) {
+  const auto error = [&](std::size_t k) { return d.precision[k].tensions[static_cast<Eigen::Index>(label)]; };
+  const auto by_law = [&](std::size_t k) { return error(k) * std::sqrt(d.beads_per_um2[k] / beads_per_um2); };
+  const auto above = std::ranges::lower_bound(d.beads_per_um2, beads_per_um2);
+  if (above == d.beads_per_um2.begin()) return by_law(0);
+  if (above == d.beads_per_um2.end()) return by_law(d.beads_per_um2.size() - 1);
+  const auto k = static_cast<std::size_t>(above - d.beads_per_um2.begin());
+  const double share =
+      std::log(beads_per_um2 / d.beads_per_um2[k - 1]) / std::log(d.beads_per_um2[k] / d.beads_per_um2[k - 1]);
+  return std::pow(error(k - 1), 1 - share) * std::pow(error(k), share);
+}
+
 double standard_error_nN(const Computed& c, std::size_t label, const Point& point) {
-  const double thinner = std::sqrt(c.densest_per_um2 / point.beads_per_um2);
-  const double beads_nN =
-      scale_of(point) * thinner * c.densities.precision.back().tensions[static_cast<Eigen::Index>(label)];
-  return std::hypot(beads_nN, c.model.tensions[label].total_nN());
+  return std::hypot(scale_of(point) * unit_error(c.densities, label, point.beads_per_um2),
+                    c.model.tensions[label].total_nN());
 }
 
 Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
-  Computed c{.cell = known_cell(scene, work), .densest = {}, .densities = {}, .model = {}};
-  work.tell(0.2, "the gel's answer at the beads");
-  c.densest_per_um2 = asked.beads_per_um2.back();
-  c.densest = beads_on_gel(scene, c.cell, c.densest_per_um2, 0, work.threads);
-  c.densities.beads_per_um2 = asked.beads_per_um2;
-  for (std::size_t k = 0; k < asked.beads_per_um2.size(); ++k) {
-    work.tell(0.3 + 0.2 * double(k) / double(asked.beads_per_um2.size()), "what beads tell");
-    c.densities.precision.push_back(
-        precision_at_share(scene, c.cell, c.densest, asked.beads_per_um2[k] / c.densest_per_um2, work.threads));
-  }
+  Computed c{.cell = known_cell(scene, work.part(0, 0.2)), .densest = {}, .densities = {}, .model = {}};
+  c.densities = precision_at(scene, c.cell, asked.beads_per_um2, work.part(0.2, 0.3));
   work.tell(0.5, "the model's own error");
+  c.densest = beads_on_gel(scene, c.cell, asked.beads_per_um2.back(), 0, work.threads);
   c.model = model_errors(
       scene, c.cell, exact_beads(c.densest.places_um, *c.densest.response, c.cell.forces_nN, asked.noise_um.front()),
       c.densest.response, work);
@@ -238,15 +237,16 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c) {
     for (const double E : asked.youngs_modulus_kPa) {
       for (const double noise_um : asked.noise_um) {
         constexpr double kMost = 0.9;
-        const double middle = needed_beads_per_um2(c, 0.5, asked.target_nN, noise_um * E);
+        const double middle = needed_by_share(c, 0.5, asked.target_nN, noise_um * E);
         grid.needed.push_back({.youngs_modulus_kPa = E,
                                .noise_um = noise_um,
                                .beads_per_um2 = std::isfinite(middle) ? std::optional(middle) : std::nullopt,
-                               .of_most = needed_beads_per_um2(c, kMost, asked.target_nN, noise_um * E)});
+                               .of_most = needed_by_share(c, kMost, asked.target_nN, noise_um * E)});
       }
     }
-    std::vector<double> other = fibre_errors(c).other_nN;
-    grid.model_error_nN = numerics::median_in(other);
+    std::vector<double> other_nN;
+    for (std::size_t i = 1; i < c.model.tensions.size(); ++i) other_nN.push_back(c.model.tensions[i].total_nN());
+    grid.model_error_nN = numerics::median_in(other_nN);
   }
   grid.warnings = warnings_of(asked, c, scene);
   return grid;

@@ -55,16 +55,10 @@ struct Grid {
 /// No more beads can be told apart: their images melt together.
 double most_beads_per_um2(const Scene& scene);
 
-struct Densities {
-  std::vector<double> beads_per_um2;
-  std::vector<Precision> precision;  ///< by density
-};
-
-/// One compliance for all gels, densities and noises: a random part of the densest beads for each density.
+/// One gel stands for all: its answer falls with the modulus. @see Precision
 struct Computed {
   KnownCell cell;
   BeadsOnGel densest;
-  double densest_per_um2 = 0;
   Densities densities;
   ModelErrors model;
 };
@@ -72,6 +66,9 @@ Computed compute(const Scene& scene, const Asked& asked, const tensions::Work& w
 
 Grid grid_of(const Scene& scene, const Asked& asked, const Computed& computed);
 
+/// By the beads' noise alone, for a noise of 1 um on 1 kPa: between the densities computed on the line of logarithms,
+/// beyond them as the law has it, with the root of the density.
+double unit_error(const Densities& densities, std::size_t label, double beads_per_um2);
 /// Standard error of a tension by everything, at a point.
 double standard_error_nN(const Computed& computed, std::size_t label, const Point& point);
 

@@ -82,9 +82,15 @@ BeadsOnGel beads_on_gel(const Scene& scene, const KnownCell& cell, double beads_
   return beads;
 }
 
-BeadsOnGel some_of(const BeadsOnGel& beads, const std::vector<Eigen::Index>& which) {
-  BeadsOnGel some{.places_um = {}, .response = beads.response->at_points(which), .modulus_kPa = beads.modulus_kPa};
-  for (const Eigen::Index i : which) some.places_um.push_back(beads.places_um[static_cast<std::size_t>(i)]);
+BeadsOnGel some_of(const BeadsOnGel& beads, double share, drawing::Random& random) {
+  std::vector<Eigen::Index> order(beads.places_um.size());
+  std::iota(order.begin(), order.end(), 0);
+  for (std::size_t i = order.size(); i > 1; --i)
+    std::swap(order[i - 1], order[static_cast<std::size_t>(random.below(static_cast<int>(i)))]);
+  order.resize(static_cast<std::size_t>(std::round(share * static_cast<double>(order.size()))));
+  std::ranges::sort(order);
+  BeadsOnGel some{.places_um = {}, .response = beads.response->at_points(order), .modulus_kPa = beads.modulus_kPa};
+  for (const Eigen::Index i : order) some.places_um.push_back(beads.places_um[static_cast<std::size_t>(i)]);
   return some;
 }
 
@@ -114,28 +120,24 @@ Precision precision_of(const Scene& scene, const KnownCell& cell, const BeadsOnG
   return sum({}, mean, 1 / beads.modulus_kPa);
 }
 
-Precision precision_at_share(const Scene& scene, const KnownCell& cell, const BeadsOnGel& beads, double share,
-                             int threads) {
-  constexpr int kMostSamples = 4;
-  const auto n = beads.places_um.size();
-  const auto n_taken = static_cast<std::size_t>(std::round(share * static_cast<double>(n)));
-  if (n_taken >= n) return precision_of(scene, cell, beads, threads);
-  std::vector<Eigen::Index> order(n);
-  std::iota(order.begin(), order.end(), 0);
-  drawing::Random random(scene.experiment.seed, drawing::Stream::beads, n_taken);
-  for (std::size_t i = n - 1; i > 0; --i)
-    std::swap(order[i], order[static_cast<std::size_t>(random.below(static_cast<int>(i) + 1))]);
-  // samples that share no bead
-  const int n_samples = std::clamp(static_cast<int>(n / std::max<std::size_t>(1, n_taken)), 1, kMostSamples);
-  Precision squares;
-  for (int s = 0; s < n_samples; ++s) {
-    const auto first = order.begin() + static_cast<std::ptrdiff_t>(s * n_taken);
-    std::vector<Eigen::Index> taken(first, first + static_cast<std::ptrdiff_t>(n_taken));
-    std::ranges::sort(taken);
-    squares =
-        sum(std::move(squares), powers(precision_of(scene, cell, some_of(beads, taken), threads), 2), 1.0 / n_samples);
+Densities precision_at(const Scene& scene, const KnownCell& cell, const std::vector<double>& beads_per_um2,
+                       const Work& work) {
+  constexpr int kDraws = 3;  // medians of one differ by a tenth
+  Densities result{.beads_per_um2 = beads_per_um2, .precision = std::vector<Precision>(beads_per_um2.size())};
+  for (int draw = 0; draw < kDraws; ++draw) {
+    work.tell(double(draw) / kDraws, "what beads tell");
+    const auto index = static_cast<std::uint64_t>(draw);
+    const BeadsOnGel densest = beads_on_gel(scene, cell, beads_per_um2.back(), index, work.threads);
+    drawing::Random random(scene.experiment.seed, drawing::Stream::beads, index);
+    for (std::size_t k = 0; k < beads_per_um2.size(); ++k) {
+      const double share = beads_per_um2[k] / beads_per_um2.back();
+      const Precision of_draw =
+          precision_of(scene, cell, share < 1 ? some_of(densest, share, random) : densest, work.threads);
+      result.precision[k] = sum(std::move(result.precision[k]), powers(of_draw, 2), 1.0 / kDraws);
+    }
   }
-  return powers(std::move(squares), 0.5);
+  for (Precision& p : result.precision) p = powers(std::move(p), 0.5);
+  return result;
 }
 
 }  // namespace mbtfm::plan

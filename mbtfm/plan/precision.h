@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "mbtfm/plan/known_cell.h"
+#include "samples/drawing/random.h"
 
 namespace mbtfm::plan {
 
@@ -32,15 +33,19 @@ struct BeadsOnGel {
 /// @throws UsageError where so many beads do not fit
 BeadsOnGel beads_on_gel(const Scene& scene, const KnownCell& cell, double beads_per_um2, std::uint64_t draw,
                         int threads);
-/// Those of some of them.
-BeadsOnGel some_of(const BeadsOnGel& beads, const std::vector<Eigen::Index>& which);
+/// A random part of them. @param share  0 … 1
+BeadsOnGel some_of(const BeadsOnGel& beads, double share, drawing::Random& random);
 
 Precision precision_of(const Scene& scene, const KnownCell& cell, const BeadsOnGel& beads, int threads);
 
-/// At a lower density: random sub-samples of the beads, root mean square over them, as one draw of few beads is not
-/// another.
-/// @param share  0 … 1, of the beads
-Precision precision_at_share(const Scene& scene, const KnownCell& cell, const BeadsOnGel& beads, double share,
-                             int threads);
+/// At these densities: parts of the beads of several draws, root mean square over the draws, as one draw of beads is
+/// not another.
+/// @param beads_per_um2  ascending
+struct Densities {
+  std::vector<double> beads_per_um2;
+  std::vector<Precision> precision;  ///< by density
+};
+Densities precision_at(const Scene& scene, const KnownCell& cell, const std::vector<double>& beads_per_um2,
+                       const tensions::Work& work);
 
 }  // namespace mbtfm::plan
