@@ -208,8 +208,9 @@ int stats(const CommandLine& line, const std::vector<std::string>& further) {
 
 /// @param arguments  as given, in their order
 int plan(std::vector<std::string> arguments) {
-  const auto is_out = [](const std::string& a) { return a == "--out" || a.starts_with("--out="); };
-  if (std::ranges::none_of(arguments, is_out)) arguments.insert(arguments.end(), {"--out", "plan"});
+  const std::string out = "--out";
+  const auto is_out = [&](const std::string& a) { return a == out || a.starts_with(out + "="); };
+  if (std::ranges::none_of(arguments, is_out)) arguments.insert(arguments.end(), {out, "plan"});
   return become("mbtfm-plan", std::move(arguments));
 }
 

@@ -68,8 +68,8 @@ double squares_left_um4(const Gel& given, double area_um2, double distance_um) {
   gel.youngs_modulus_kPa = 1;
   const double radius_um = std::sqrt(area_um2 / std::numbers::pi);
   const std::vector<Vec2> places = {{-0.5 * distance_um, 0}, {0.5 * distance_um, 0}};
-  // what the two leave falls with the fourth power of the distance in squares: beyond eight distances lies a
-  // thousandth
+  // far away the two less the best one are a quadrupole, whose squares beyond a radius fall with its fourth power:
+  // beyond eight distances lies a thousandth
   const double side_um = 2 * (8 * distance_um + 12 * radius_um);
   std::vector<Patch> patches;
   divide({0, 0}, side_um, places, radius_um, patches);
@@ -92,7 +92,7 @@ double needed_squares() {
 
 PairResolution::PairResolution(const Gel& gel, double area_um2, int threads) {
   constexpr int kDistances = 16;
-  const double least_um = 0.2 * std::sqrt(area_um2 / std::numbers::pi);
+  const double least_um = 2 * std::sqrt(area_um2 / std::numbers::pi);
   squares_um4_.resize(kDistances);
   for (int k = 0; k < kDistances; ++k)
     distance_um_.push_back(least_um * std::pow(kFarthest_um / least_um, double(k) / (kDistances - 1)));
@@ -108,7 +108,7 @@ std::optional<double> PairResolution::least_distance_um(double force_nN, double 
   const double wanted = needed_squares() / (beads_per_um2 * size * size);
   for (std::size_t i = 0; i < distance_um_.size(); ++i) {
     if (squares_um4_[i] < wanted) continue;
-    if (i == 0) return distance_um_[0] * std::pow(wanted / squares_um4_[0], 0.25);  // as a quadrupole: d⁴ in squares
+    if (i == 0) return touching_um();
     const double share = std::log(wanted / squares_um4_[i - 1]) / std::log(squares_um4_[i] / squares_um4_[i - 1]);
     return distance_um_[i - 1] * std::pow(distance_um_[i] / distance_um_[i - 1], share);
   }

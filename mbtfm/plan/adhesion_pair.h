@@ -21,6 +21,7 @@ inline constexpr double kTold = 9, kChance = 0.8;
 ///
 /// for two forces of 1 nN on a gel of 1 kPa, mean over forces along the line and across it. chi² grows by density /
 /// noise² (force/modulus)² of that on average. Half-space: the base is much further than adhesions are from each other.
+/// @param distance_um  two radii or more: nearer ones are one
 double squares_left_um4(const Gel& gel, double area_um2, double distance_um);
 
 /// That at which chi² passes: with lambda' = density (force / (modulus noise))² lambda, chi² of one less chi² of two
@@ -32,10 +33,11 @@ double needed_squares();
 class PairResolution {
  public:
   PairResolution(const Gel& gel, double area_um2, int threads);
-  /// None where not even kFarthest_um is enough.
+  /// At least the distance at which they touch. None where not even kFarthest_um is enough.
   std::optional<double> least_distance_um(double force_nN, double youngs_modulus_kPa, double beads_per_um2,
                                           double noise_um) const;
   static constexpr double kFarthest_um = 30;
+  double touching_um() const { return distance_um_.front(); }
 
  private:
   std::vector<double> distance_um_, squares_um4_;

@@ -54,11 +54,13 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
                      "error of " +
                      about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
                      " nN without it; the smallest force seen is three times that. ";
-  text += alone.least_distance_um ? "Without the network two adhesions of " + brief(plan.parameters.tension_nN) +
-                                        " nN each are told apart from " + about(*alone.least_distance_um) + " µm on."
-                                  : "Without the network two adhesions of " + brief(plan.parameters.tension_nN) +
-                                        " nN each are not told apart at any distance in a cell.";
-  return text;
+  const std::string pair =
+      "Without the network two adhesions of " + brief(plan.parameters.tension_nN) + " nN each are ";
+  if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
+  const std::string distance = about(*alone.least_distance_um) + " µm";
+  return text + pair +
+         (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on."
+                                                           : "told apart even where they touch, at " + distance + ".");
 }
 
 std::string about_cells(const Plan& plan) {

@@ -218,6 +218,7 @@ Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c) {
   Grid grid;
   const OnOwnGel own = on_own_gel(c);
   const PairResolution pairs(scene.fit.gel, median_area_um2(scene), 1);
+  grid.touching_um = pairs.touching_um();
   const double force_nN = asked.target_nN / asked.within;
   for (const double E : asked.youngs_modulus_kPa) {
     for (std::size_t k = 0; k < asked.beads_per_um2.size(); ++k) {

@@ -47,6 +47,7 @@ struct Grid {
   std::vector<Expected> expected;
   std::vector<Needed> needed;  ///< by gel, then noise
   std::vector<std::string> warnings;
+  double touching_um = 0;     ///< distance of two adhesions of the median size that touch
   double model_error_nN = 0;  ///< of the middle fibre, however many beads there are
   /// Of three standard errors is the smallest force seen: chance passes it once in 700 times.
   static constexpr double kSeen = 3;

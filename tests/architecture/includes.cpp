@@ -66,8 +66,8 @@ const Graph kMayInclude = {
       "substrate", "substrate/choice", "substrate/greens"}},
     {"mbtfm/plan",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "pipeline/charts",
-      "pipeline/report", "network/cables", "substrate", "substrate/greens", "substrate/choice", "mbtfm/tensions",
-      "mbtfm/fit", "mbtfm/tractions", "samples/drawing", "samples/experiment"}},
+      "pipeline/report", "network/cables", "substrate/greens", "substrate/choice", "mbtfm/tensions", "mbtfm/fit",
+      "mbtfm/tractions", "samples/drawing", "samples/experiment"}},
 };
 
 /// Third-party headers and the nodes that may see them, by the beginning of the include.
