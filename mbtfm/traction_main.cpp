@@ -23,16 +23,6 @@ void declare(stage::ParameterList& list, TractionStageParameters& p) {
   declare(list, p.traction);
 }
 
-/// Where not all beads state their errors, all get the one that their neighbours tell of.
-/// @returns it; none where they do, or where there are too few beads to tell: then the misfit will
-std::optional<double> assume_noise(DisplacementField& beads) {
-  if (std::ranges::all_of(beads, [](const Bead& b) { return b.sigma_um > 0; })) return std::nullopt;
-  const std::optional<double> sigma_um = noise_from_neighbours_um(beads);
-  const bool is_found = sigma_um && *sigma_um > 0;  // a computed field has none
-  for (Bead& b : beads) b.sigma_um = is_found ? *sigma_um : 0;
-  return is_found ? sigma_um : std::nullopt;
-}
-
 /// Of one cell: a whole field may hold many. @throws InputError where no cell pulls like that
 void expect_plausible(stage::StageContext& context, const TractionInputs& inputs, const Reconstruction& r,
                       const TractionSums& sums) {
@@ -50,7 +40,7 @@ StageReport run(const TractionStageParameters& p, stage::StageContext& context) 
   if (context.has_input("adhesions")) inputs.adhesions = files::read_adhesions(context.input("adhesions"));
   if (context.has_input("outline")) inputs.outline_um = files::read_outline(context.input("outline")).front();
   context.expect_plausible("beads_per_um2", beads_per_um2(inputs.beads));
-  const std::optional<double> assumed_um = assume_noise(inputs.beads);
+  const std::optional<double> assumed_um = assume_noise_um(inputs.beads);
   if (assumed_um) context.assumed.push_back(stage::assumed_noise(*assumed_um));
   context.progress(0.1, "reconstructing tractions");
   Reconstruction r = reconstruct(inputs, p.traction, context.threads);

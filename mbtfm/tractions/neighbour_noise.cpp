@@ -122,4 +122,12 @@ std::optional<double> noise_from_neighbours_um(const DisplacementField& beads) {
   return 1.4826 * numerics::median_in(magnitudes);  // the median's of a Gaussian
 }
 
+std::optional<double> assume_noise_um(DisplacementField& beads) {
+  if (std::ranges::all_of(beads, [](const Bead& b) { return b.sigma_um > 0; })) return std::nullopt;
+  const std::optional<double> sigma_um = noise_from_neighbours_um(beads);
+  const bool is_found = sigma_um && *sigma_um > 0;  // a computed field has none
+  for (Bead& b : beads) b.sigma_um = is_found ? *sigma_um : 0;
+  return is_found ? sigma_um : std::nullopt;
+}
+
 }  // namespace mbtfm::tractions

@@ -14,4 +14,8 @@ namespace mbtfm::tractions {
 /// @returns none for fewer than 40 beads, or where they lie so that no polynomial is determined
 std::optional<double> noise_from_neighbours_um(const DisplacementField& beads);
 
+/// Where not all beads state their errors, all get the one that their neighbours tell of.
+/// @returns it; none where they do, or where there are too few beads to tell: then the misfit will
+std::optional<double> assume_noise_um(DisplacementField& beads);
+
 }  // namespace mbtfm::tractions

@@ -180,6 +180,21 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 where gel.youngs_modulus_sigma_kPa is not given",
        0, "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
+      {contraction_beyond_linear, "contraction-beyond-linear", "indent", caution,
+       "contraction of the cell if nothing held it, (1 - 2 nu) stress / Young's modulus", 0.05,
+       "beyond it large strains change the depth by more than the best stated errors",
+       "Compare with indent.strain = large."},
+      {registration_ambiguous, "registration-ambiguous", "mean", caution,
+       "cells that lie on the reference in more than one way", 0,
+       "the second-best way fits within the error of the best: which side of such a cell is which was decided by "
+       "chance",
+       "If the shape is symmetric, set mean.symmetry to its group: the mean is then the same for all ways. If it is "
+       "not, "
+       "give outlines with more detail, or register by images (mean.register_by = images)."},
+      {cells_left_out, "cells-left-out", "mean", caution, "cells that are not in the mean", 0,
+       "a mean over those that fit is a mean over a selection", "registration.csv has the reason for each."},
+      {few_cells, "few-cells", "mean", caution, "five over the number of cells", 1,
+       "the standard error of four and fewer cells is itself off by 40 % and more", "Take more cells."},
   };
   return kinds;
 }

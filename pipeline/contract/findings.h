@@ -67,7 +67,13 @@ enum class FindingKind {
   surface_level,
   surface_off_zero,
   // fit: the gel
-  modulus_error_unknown
+  modulus_error_unknown,
+  // indent
+  contraction_beyond_linear,
+  // mean
+  registration_ambiguous,
+  cells_left_out,
+  few_cells
 };
 
 struct KindOfFinding {

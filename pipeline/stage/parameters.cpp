@@ -20,8 +20,11 @@ namespace mbtfm::stage {
 namespace {
 
 /// The tables of cell.toml. Each stage reads its own and leaves the others' keys to them.
-constexpr std::array kTables = {"gel",       "images", "segment", "track",    "network",  "cables", "effects",
-                                "substrate", "fit",    "stats",   "scenario", "traction", "checks", "plan"};
+constexpr std::array kTables = {"gel",     "images",    "segment", "track", "network",  "cables",
+                                "effects", "substrate", "fit",     "stats", "scenario", "traction",
+                                "checks",  "cell",      "indent",  "mean",  "plan"};
+/// Keys of [gel] that not every program has.
+const std::vector<std::string> kMoreOfGel = {"radius_um"};
 /// The keys above the first table.
 constexpr std::array kRootKeys = {"pixel_size_um"};
 
@@ -164,7 +167,9 @@ std::string unknown_key_hint(const std::vector<std::string>& known, std::string_
 void ParameterList::add(Parameter parameter) {
   parameter.table = table_;
   parameter.default_value = to_text(parameter);
-  for (const Parameter& other : parameters_) MBTFM_ASSERT(other.name != parameter.name);
+  const auto is_namesake = [&](const Parameter& other) { return other.name == parameter.name; };
+  parameter.flag = std::ranges::any_of(parameters_, is_namesake) ? table_ + "." + parameter.name : parameter.name;
+  for (const Parameter& other : parameters_) MBTFM_ASSERT(other.flag != parameter.flag);
   parameters_.push_back(std::move(parameter));
 }
 
@@ -235,7 +240,8 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
         for (const auto& [inner_key, inner] : *table) {
           if (set(key_name, inner_key.str(), inner)) continue;
           const std::vector<std::string> others = key_name == "effects" ? effect_keys() : std::vector<std::string>();
-          if (std::ranges::find(others, std::string(inner_key.str())) != others.end()) continue;  // another stage's
+          const std::vector<std::string>& of_other_stages = key_name == "gel" ? kMoreOfGel : others;
+          if (std::ranges::find(of_other_stages, std::string(inner_key.str())) != of_other_stages.end()) continue;
           throw InputError(place(name, inner), "a known key of [" + key_name + "]",
                            "'" + std::string(inner_key.str()) + "'",
                            unknown_key_hint(others.empty() ? keys_of[key_name] : others, inner_key.str()));
@@ -255,7 +261,7 @@ void read_toml(ParameterList& list, std::string_view text, const std::string& na
 void set_from_text(Parameter& p, const std::string& text) {
   if (!try_set(p, text)) {
     const std::string slip = likely_slip(p, text);
-    throw UsageError("--" + p.name + ": expected " + expectation(p) + ", found '" + text + "'" +
+    throw UsageError("--" + p.flag + ": expected " + expectation(p) + ", found '" + text + "'" +
                      (slip.empty() ? "" : "; " + slip));
   }
   p.is_set = true;
@@ -276,8 +282,8 @@ std::string to_text(const Parameter& p) {
 Parameter& parameter_named(ParameterList& list, const std::string& name) {
   std::vector<std::string> known;
   for (Parameter& p : list.all()) {
-    if (p.name == name) return p;
-    known.push_back(p.name);
+    if (p.flag == name) return p;
+    known.push_back(p.flag);
   }
   throw UsageError("no parameter is called '" + name + "': " + unknown_key_hint(known, name));
 }
@@ -285,7 +291,7 @@ Parameter& parameter_named(ParameterList& list, const std::string& name) {
 void check_complete(const ParameterList& list) {
   for (const Parameter& p : list.all()) {
     if (p.is_required && !p.is_set) {
-      throw UsageError(in_table(p) + " is missing: give it in cell.toml or as --" + p.name + " (" + p.meaning + ")");
+      throw UsageError(in_table(p) + " is missing: give it in cell.toml or as --" + p.flag + " (" + p.meaning + ")");
     }
   }
 }

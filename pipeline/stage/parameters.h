@@ -26,7 +26,8 @@ struct Choice {
 
 struct Parameter {
   std::string table;  ///< of cell.toml; empty: above the first table
-  std::string name;   ///< key in the table, and the flag --name
+  std::string name;   ///< key in the table
+  std::string flag;   ///< without dashes: the name, or table.name where another table has a key of that name before
   std::variant<double*, std::optional<double>*, int*, std::optional<int>*, std::uint64_t*, bool*, std::string*, Choice>
       member;
   Range range;

@@ -213,8 +213,8 @@ std::vector<Doubt> doubts_about(const ParameterList& list, const std::vector<std
   std::vector<Doubt> doubts;
   for (const Parameter& p : list.all()) {
     const std::optional<double> value = value_of(p);
-    if (!value || !find(p.name)) continue;
-    const std::optional<Doubt> doubt = doubt_about(p.name, *value);
+    if (!value || !find(p.flag)) continue;
+    const std::optional<Doubt> doubt = doubt_about(p.flag, *value);
     if (!doubt) continue;
     require_possible(*doubt, allowed, (p.table.empty() ? "" : "[" + p.table + "] ") + p.name);
     doubts.push_back(*doubt);
@@ -223,7 +223,7 @@ std::vector<Doubt> doubts_about(const ParameterList& list, const std::vector<std
 }
 
 bool has_plausible_quantity(const ParameterList& list) {
-  return std::ranges::any_of(list.all(), [](const Parameter& p) { return find(p.name) != nullptr; });
+  return std::ranges::any_of(list.all(), [](const Parameter& p) { return find(p.flag) != nullptr; });
 }
 
 std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um) {
@@ -283,7 +283,7 @@ std::vector<AssumedInput> assumed_inputs(const ParameterList& list) {
   std::vector<AssumedInput> assumed;
   for (const Parameter& p : list.all()) {
     if (p.is_set) continue;
-    const auto known = std::ranges::find(physical, p.name, &AssumedInput::id);
+    const auto known = std::ranges::find(physical, p.flag, &AssumedInput::id);
     const std::optional<double> value = value_of(p);
     if (known == physical.end() || !value) continue;
     assumed.push_back(*known);

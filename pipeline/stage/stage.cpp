@@ -48,7 +48,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
     const bool is_output = file.kind == FileArgument::Kind::output || file.kind == FileArgument::Kind::output_folder;
     std::string meaning = file.meaning;
     if (file.kind == FileArgument::Kind::optional_input) meaning += " (optional)";
-    app.add_option("--" + file.name, line.files[file.name], meaning)
+    app.add_option((file.is_positional ? file.name + "," : "") + "--" + file.name, line.files[file.name], meaning)
         ->type_name(file.kind == FileArgument::Kind::output_folder ? "FOLDER" : "FILE")
         ->group(is_output ? "Outputs" : "Inputs");
   }
@@ -66,9 +66,9 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
     if (!p.default_value.empty() && !p.is_required) meaning += " [" + p.default_value + "]";
     const std::string group = p.table.empty() ? "Parameters of the image" : "Parameters [" + p.table + "]";
     if (std::holds_alternative<bool*>(p.member)) {
-      app.add_flag("--" + p.name + "{true}", line.values[p.name], meaning)->group(group);
+      app.add_flag("--" + p.flag + "{true}", line.values[p.flag], meaning)->group(group);
     } else {
-      app.add_option("--" + p.name, line.values[p.name], meaning)->type_name("")->group(group);
+      app.add_option("--" + p.flag, line.values[p.flag], meaning)->type_name("")->group(group);
     }
   }
 }
@@ -76,7 +76,7 @@ void add_options(CLI::App& app, CommandLine& line, const StageDescription& descr
 void set_parameters(ParameterList& list, const CommandLine& line, const CLI::App& app) {
   if (!line.config.empty()) read_toml(list, fs::path(line.config));
   for (Parameter& p : list.all()) {
-    if (app.count("--" + p.name) > 0) set_from_text(p, line.values.at(p.name));
+    if (app.count("--" + p.flag) > 0) set_from_text(p, line.values.at(p.flag));
   }
   check_complete(list);
 }

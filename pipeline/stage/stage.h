@@ -20,6 +20,7 @@ struct FileArgument {
   std::string name;  ///< the flag --name
   Kind kind = Kind::input;
   std::string meaning;
+  bool is_positional = false;  ///< may be given without its flag
 };
 
 struct StageDescription {

@@ -5,6 +5,8 @@
 #include <regex>
 #include <sstream>
 
+#include "continuum/mean/outputs.h"
+#include "continuum/solids/outputs.h"
 #include "mbtfm/plan/tables.h"
 #include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"
@@ -45,7 +47,7 @@ std::string parameter_page() {
       "and a "
       "flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file.\n";
   for (const char* stage :
-       {"segment", "track", "network", "contract", "fit", "traction", "plan", "simulate", "stats"}) {
+       {"segment", "track", "network", "contract", "fit", "traction", "plan", "indent", "mean", "simulate", "stats"}) {
     const auto outcome = test::run_program("mbtfm-" + std::string(stage) + " --parameters");
     EXPECT_EQ(outcome.code, 0) << outcome.output;
     page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outcome.output;
@@ -65,7 +67,8 @@ std::string column_page() {
          "[formats.md](formats.md). *May lack*: older files, or files made elsewhere, need not have this column.\n"
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
-         runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables() + plan::pages_of_tables();
+         solids::pages_of_tables() + mean::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() +
+         statistics::pages_of_tables() + plan::pages_of_tables();
 }
 
 TEST(Documents, the_page_of_columns_is_what_the_tables_declare) {

@@ -220,9 +220,9 @@ void study_pairs() {
   const PairResolution pairs(gel, kArea_um2, kThreads);
   std::printf("beads_per_um2,noise_um,predicted_um,drawn_um,ratio\n");
   for (const double density : {0.25, 1.0}) {
-    for (const double noise_um : {0.005, 0.02, 0.03}) {
+    for (const double noise_um : {0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06}) {
       const auto predicted = pairs.least_distance_um(1, gel.youngs_modulus_kPa, density, noise_um);
-      if (!predicted || *predicted > 8) continue;
+      if (!predicted || *predicted > 6 || *predicted <= pairs.touching_um()) continue;
       constexpr int kExperiments = 100;
       // the distance that kChance of the experiments tell, between two that bracket it
       double low = 0.4 * *predicted, high = 2.5 * *predicted;

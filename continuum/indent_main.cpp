@@ -1,0 +1,180 @@
+/// mbtfm-indent: how deep a contracting cell presses into its gel.
+#include <algorithm>
+#include <cmath>
+
+#include "continuum/solids/outputs.h"
+#include "continuum/solids/sweep.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/text.h"
+#include "pipeline/stage/stage.h"
+
+namespace mbtfm::solids {
+namespace {
+
+struct Parameters {
+  Gel gel;
+  double radius_um = 100;  ///< of the gel: twice and more what the optimum depends on
+  double volume_um3 = 5000;
+  double height_um = 0;
+  double youngs_modulus_kPa = 10;
+  double poisson_ratio = 0.49;
+  double contraction_kPa = 30;
+  Strain strain = Strain::small;
+  std::string depths_um = "0, 5";
+  std::string sweep = {};
+  int order = Fineness{}.order;
+  int towards_rim = Fineness{}.towards_rim;
+};
+
+void declare(stage::ParameterList& list, Parameters& p) {
+  declare(list, p.gel);
+  list.add("radius_um", p.radius_um, Range::thickness_um(),
+           "radius of the gel around the cell (um); its side is free, its base held");
+  list.table("cell");
+  list.add("volume_um3", p.volume_um3, Range::between(1, 1e7), "volume of the cell (um3)");
+  list.add("height_um", p.height_um, Range::zero_or_size_um(),
+           "height of the cell, a section of a sphere (um); must be given, here or in the sweep");
+  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa(), "Young's modulus of the cell (kPa)");
+  list.add("poisson_ratio", p.poisson_ratio, Range{.low = 0, .high = 0.5, .excludes_high = true},
+           "Poisson's ratio of the cell; the answer is nearly proportional to 1 - 2 nu, so this number sets its size");
+  list.add("contraction_kPa", p.contraction_kPa, Range::between(0, 1e6),
+           "contractile stress of the cell, the same in all directions (kPa)");
+  list.table("indent");
+  list.add("strain", p.strain,
+           "small: linear elasticity; large: the strain of Green and Lagrange with the law of St Venant and Kirchhoff, "
+           "the contraction added to the second stress of Piola and Kirchhoff");
+  list.add("depths_um", p.depths_um, "depths below the surface at which the displacement is read (um)");
+  list.add("sweep", p.sweep,
+           "cases, as 'height_um=5.3..15.8:11 modulus_ratio=0.1,0.5,1,2': each height with each ratio of the gel's "
+           "modulus to the cell's; empty: one case");
+  list.add("order", p.order, Range::between(3, 8), "order of the elements");
+  list.add("towards_rim", p.towards_rim, Range::between(2, 12),
+           "elements between the rim of the contact and half its radius, each a fifth of the next");
+}
+
+Setting setting_of(const Parameters& p) {
+  return {.volume_um3 = p.volume_um3,
+          .cell = {p.youngs_modulus_kPa, p.poisson_ratio, p.contraction_kPa},
+          .slab = {p.gel.thickness_um, p.radius_um},
+          .gel_poisson_ratio = p.gel.poisson_ratio,
+          .depths_um = values_in(p.depths_um, "depths_um", Zero::is_allowed),
+          .strain = p.strain,
+          .fineness = {p.order, p.towards_rim}};
+}
+
+/// @throws UsageError where a value leaves the model
+void expect_sense(const Parameters& p, const Setting& setting, const std::vector<Case>& cases) {
+  constexpr double kIncompressible = 0.49999;  // 1 - 2 nu = 2e-5: of 16 digits rounding takes ten
+  for (const auto& [who, ratio] : {std::pair{"cell", p.poisson_ratio}, std::pair{"gel", p.gel.poisson_ratio}}) {
+    if (ratio > kIncompressible)
+      throw UsageError(std::string("[") + who + "] poisson_ratio: expected at most 0.49999, found " +
+                       significant(ratio, 9) +
+                       ". A cell of 1/2 keeps its volume and does not move at all under the same contraction in all "
+                       "directions");
+  }
+  constexpr double kMostContraction = 0.4;  // beyond it the law of St Venant and Kirchhoff softens in compression
+  const double free = setting.cell.free_contraction();
+  if (free > kMostContraction)
+    throw UsageError(
+        "[cell] contraction_kPa: expected a contraction without hindrance, (1 - 2 nu) stress / modulus, of "
+        "at most 0.4, found " +
+        brief(free));
+  for (const Case& one : cases) {
+    if (one.height_um == 0)
+      throw UsageError("[cell] height_um is missing: give it in cell.toml, as --height_um or in the sweep");
+  }
+}
+
+void notice_large_contraction(stage::StageContext& context, const Setting& setting) {
+  if (setting.strain == Strain::large) return;
+  const double free = setting.cell.free_contraction();
+  context.notice(noticed(FindingKind::contraction_beyond_linear, free,
+                         "The cell would shorten by " + brief(100 * free) +
+                             " % if nothing held it: small strains are a rough picture of that."));
+}
+
+Figures figures_of(const Setting& setting, const std::vector<Indentation>& solved) {
+  double error = 0, imbalance = 0;
+  int iterations = 0;
+  for (const Indentation& one : solved) {
+    error = std::max(error, one.error_um / one.reading.largest_u_um);
+    imbalance = std::max(imbalance, one.imbalance);
+    iterations = std::max(iterations, one.iterations);
+  }
+  Figures figures = {{"n_cases", static_cast<std::int64_t>(solved.size())},
+                     {"strain", std::string(name_of(setting.strain))},
+                     {"free_contraction", setting.cell.free_contraction()},
+                     {"sphere_height_um", sphere_height_um(setting.volume_um3)},
+                     {"hemisphere_height_um", hemisphere_height_um(setting.volume_um3)},
+                     {"largest_relative_error", error},
+                     {"net_force_over_sum", imbalance},
+                     {"newton_iterations", std::int64_t{iterations}}};
+  if (solved.size() > 1) return figures;
+  const Indentation& one = solved.front();
+  for (std::size_t k = 0; k < setting.depths_um.size(); ++k)
+    figures.emplace_back("depth_" + shortest(setting.depths_um[k]) + "_um", one.reading.depth_um[k]);
+  figures.emplace_back("lift_um", one.reading.lift_um);
+  figures.emplace_back("largest_u_um", one.reading.largest_u_um);
+  figures.emplace_back("error_um", one.error_um);
+  figures.emplace_back("energy_fJ", one.energy_fJ);
+  return figures;
+}
+
+std::string summary_of(const Setting& setting, const std::vector<Indentation>& solved,
+                       const std::vector<Optimum>& optima) {
+  if (solved.size() == 1) {
+    const Reading& r = solved.front().reading;
+    return "presses " + brief(r.depth_um.back()) + " um deep (" + brief(setting.depths_um.back()) +
+           " um below the surface), moves by " + brief(r.largest_u_um) + " um at most; error " +
+           brief(solved.front().error_um) + " um";
+  }
+  return std::to_string(solved.size()) + " cases, " + std::to_string(optima.size()) + " best heights";
+}
+
+std::vector<Indentation> solved_cases(const Setting& setting, const std::vector<Case>& cases,
+                                      stage::StageContext& context) {
+  try {
+    return indentations(setting, cases, context.threads, context.progress);
+  } catch (const InvalidData& error) {
+    throw UsageError(error.what());  // of the parameters: no file has them alone
+  }
+}
+
+StageReport run(const Parameters& p, stage::StageContext& context) {
+  const Setting setting = setting_of(p);
+  const std::vector<Case> cases = cases_of(p.sweep, {p.height_um, p.gel.youngs_modulus_kPa / p.youngs_modulus_kPa});
+  expect_sense(p, setting, cases);
+  const std::vector<Indentation> solved = solved_cases(setting, cases, context);
+  const std::vector<Optimum> best = optima(setting, solved, context.threads);
+  write_indentations(context.output("out", "indent.csv"), solved, setting.depths_um);
+  const auto deepest =
+      std::ranges::max_element(solved, {}, [](const Indentation& i) { return i.reading.depth_um.back(); });
+  write_deformed_vtu(context.output("out", "indent.vtu"), deformed_section(setting, deepest->of));
+  StageReport report;
+  report.figures = figures_of(setting, solved);
+  if (solved.size() > 1) {
+    write_optima(context.output("out", "optima.csv"), best);
+    files::write_text(context.output("out", "indent.svg"), picture_of(setting, solved, best));
+  }
+  files::write_figures(context.output("out", "indent.json"), report.figures);
+  report.summary = summary_of(setting, solved, best);
+  notice_large_contraction(context, setting);
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::solids
+
+int main(int argc, char** argv) {
+  using Kind = mbtfm::stage::FileArgument::Kind;
+  using namespace mbtfm::solids;
+  return mbtfm::stage::run_stage<Parameters>(
+      {.name = "indent",
+       .purpose = "find how deep a contracting cell presses into its gel",
+       .files = {{"out", Kind::output_folder,
+                  "indent.csv, indent.json, indent.vtu (of the deepest case); of a sweep optima.csv and the "
+                  "map, indent.svg"}}},
+      argc, argv, run);
+}

@@ -1,0 +1,78 @@
+/// Fields of registered cells on common nodes, their mean and its error.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "continuum/mean/registration.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/beads.h"
+
+namespace mbtfm::mean {
+
+/// Displacement and traction of the gel's surface at a place.
+struct Sample {
+  Vec2 displacement_um, traction_kPa;
+};
+
+/// Beads carried along with their cell: places and vectors.
+DisplacementField moved(const DisplacementField& beads, const Motion& motion);
+
+/// A cell's fields in the frame of the reference: on a lattice of their own, cubic between its nodes (Keys 1981).
+class CellField {
+ public:
+  /// @param patches   of a lattice, rows first
+  /// @param seen_low_um, seen_high_um  the rectangle of the beads in the cell's own frame
+  CellField(const std::vector<tractions::Patch>& patches, const Motion& motion, Vec2 seen_low_um, Vec2 seen_high_um);
+  /// None where the beads do not reach.
+  std::optional<Sample> at(Vec2 place_um) const;
+  /// The mean over the motions of a symmetric shape: at each place of what stands at all its equivalents.
+  std::optional<Sample> at(Vec2 place_um, const std::vector<Motion>& motions) const;
+
+ private:
+  Motion motion_;
+  Vec2 seen_low_um_, seen_high_um_, origin_um_;
+  double spacing_um_ = 0;
+  int n_columns_ = 0, n_rows_ = 0;
+  std::vector<Sample> nodes_;
+};
+
+/// Mean over cells, and its standard error: from the scatter of the cells, so that it holds all that differs between
+/// them: noise of beads, registration, biology.
+struct NodeMean {
+  Vec2 position_um;
+  bool is_inside = false;  ///< of the reference
+  int n_cells = 0;
+  Sample mean;
+  std::optional<Sample> sigma = {};  ///< of each component; none for fewer than two cells
+};
+
+/// @param samples  by cell, then by node
+std::vector<NodeMean> mean_of(const std::vector<Vec2>& nodes_um,
+                              const std::vector<std::vector<std::optional<Sample>>>& samples,
+                              const Polygon& reference_um);
+
+/// Nodes of a lattice over the reference and some margin.
+std::vector<Vec2> lattice_over(const Polygon& reference_um, double margin_um, double spacing_um);
+
+/// Where an outline reaches out: its points that are farthest from the centroid, each by a tenth more than the mean.
+std::vector<Vec2> tips_of(const Polygon& reference_um);
+
+/// By node: which part of the edge it belongs to.
+enum class EdgePart { none, tip, edge };
+std::vector<EdgePart> edge_parts(const std::vector<Vec2>& nodes_um, const Polygon& reference_um, double band_um,
+                                 double tip_um);
+
+/// Traction towards the centroid at the tips over that at the rest of the edge: both are linear in the tractions, so
+/// that noise does not add to them as it does to magnitudes.
+struct Ratio {
+  double tip_kPa = 0, edge_kPa = 0, ratio = 0;
+  double low = 0, high = 0;  ///< 95 % by resampling the cells
+  int n_cells = 0;
+};
+std::optional<Ratio> tip_over_edge(const std::vector<Vec2>& nodes_um,
+                                   const std::vector<std::vector<std::optional<Sample>>>& samples,
+                                   const std::vector<EdgePart>& parts, Vec2 centre_um, std::uint64_t seed);
+
+}  // namespace mbtfm::mean

@@ -1,0 +1,438 @@
+/// mbtfm-mean: the mean displacement and traction of cells of one shape.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <numbers>
+#include <random>
+#include <set>
+
+#include "continuum/mean/align.h"
+#include "mbtfm/tractions/neighbour_noise.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/text.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/parallel.h"
+#include "pipeline/stage/stage.h"
+#include "segment/images/image.h"
+
+namespace mbtfm::mean {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Others { refused, left_out };
+constexpr auto words(Others) { return std::array{"refused", "left-out"}; }
+
+/// What cells are laid onto each other by.
+enum class By { outlines, images };
+constexpr auto words(By) { return std::array{"outlines", "images"}; }
+
+enum class LambdaFor { all, each };
+constexpr auto words(LambdaFor) { return std::array{"all", "each"}; }
+
+struct Parameters {
+  Gel gel;
+  std::string reference = {};
+  By register_by = By::outlines;
+  std::string image = "phase.tif";
+  std::string symmetry = "C1";
+  Switch mirror = Switch::automatic;
+  double largest_misfit = Alignment{}.largest_misfit;
+  Others others = Others::refused;
+  GelModel gel_model = GelModel::layer;
+  std::optional<double> lambda_um_per_kPa;
+  LambdaFor lambda_for = LambdaFor::all;
+  std::optional<double> spacing_um;
+  std::optional<double> margin_um;
+  std::optional<double> band_um;
+  std::uint64_t seed = 1;
+};
+
+void declare(stage::ParameterList& list, Parameters& p) {
+  declare(list, p.gel);
+  for (stage::Parameter& of_gel : list.all()) of_gel.is_required = false;  // a cell's own cell.toml has it, too
+  list.table("mean");
+  list.add("reference", p.reference,
+           "name of the cell whose outline is the reference; empty: the pattern, or the most typical outline");
+  list.add("register_by", p.register_by, "what cells are laid onto each other by: their outlines, or images of them");
+  list.add("image", p.image, "name of the image in each cell's folder, with register_by = images");
+  list.add(
+      "symmetry", p.symmetry,
+      "motions that leave the shape as it is: C1 none, C4 turns by a quarter, C4v with mirrors, Cinfv a circle; the "
+      "mean is taken over them, too");
+  list.add("mirror", p.mirror, "whether a cell may be mirrored; auto: if the reference is not its own mirror image");
+  list.add("largest_misfit", p.largest_misfit, Range::between(1e-3, 1),
+           "largest distance of an outline from the reference (root mean square), over the reference's radius");
+  list.add("others", p.others, "what becomes of cells of another shape");
+  list.add("gel_model", p.gel_model, "layer on a rigid base, or half-space");
+  list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::positive(),
+           "regularisation of the tractions (um/kPa); unset: that of the least expected error");
+  list.add("lambda_for", p.lambda_for,
+           "whether all cells have one regularisation, the median of theirs, or each its own");
+  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
+           "distance of the nodes (um); unset: half the mean distance of the first cell's beads");
+  list.add("margin_um", p.margin_um, Range::zero_or_size_um(),
+           "margin of the mean around the reference (um); unset: a fifth of its radius");
+  list.add("band_um", p.band_um, Range::size_um(),
+           "width of the edge within the outline (um); unset: a tenth of the reference's radius");
+  list.add("seed", p.seed, "of the resampling of cells and of the model's errors of registration");
+}
+
+/// The first of some names that a folder has; empty: none.
+Path first_of(const Path& folder, std::initializer_list<const char*> names) {
+  for (const char* name : names) {
+    if (fs::is_regular_file(folder / name)) return name;
+  }
+  return {};
+}
+
+Path outline_in(const Path& folder) { return first_of(folder, {"1_segment/outline.csv", "outline.csv"}); }
+Path displacement_in(const Path& folder) { return first_of(folder, {"2_track/displacement.csv", "displacement.csv"}); }
+
+/// Folders that hold an outline and a displacement, by name.
+std::vector<Path> folders_of_cells(const Path& top) {
+  if (!fs::is_directory(top)) throw InputError(top.string(), "a folder of cell folders", "none of that name");
+  std::set<Path> found;
+  for (auto entry = fs::recursive_directory_iterator(top); entry != fs::recursive_directory_iterator(); ++entry) {
+    if (!entry->is_directory()) continue;
+    if (outline_in(entry->path()).empty() || displacement_in(entry->path()).empty()) continue;
+    found.insert(fs::proximate(entry->path(), top));
+    entry.disable_recursion_pending();
+  }
+  return {found.begin(), found.end()};
+}
+
+Gel gel_of(const Path& cell, const Gel& otherwise) {
+  Gel gel = otherwise;
+  if (!fs::is_regular_file(cell / "cell.toml")) return gel;
+  stage::ParameterList list;
+  declare(list, gel);
+  read_toml(list, cell / "cell.toml");
+  return gel;
+}
+
+/// @throws InputError where the image has no calibration: that of beads and outline is not known here
+Brightness read_brightness(const Path& file) {
+  images::Image image = images::read_image(file);
+  if (!image.pixel_size_um)
+    throw InputError(file.string(), "an image with its pixel size", "none in the file",
+                     "set its scale in ImageJ (Image > Properties) and save it as TIFF");
+  return {image.width, image.height, *image.pixel_size_um, std::move(image.pixels)};
+}
+
+std::vector<Cell> read_cells(stage::StageContext& context, const Parameters& p) {
+  const Path top = context.input("cells", {});
+  std::vector<std::string> read;
+  std::vector<Cell> cells;
+  for (const Path& name : folders_of_cells(top)) {
+    const Path folder = top / name;
+    Cell cell{.name = name.generic_string(),
+              .outline_file = folder / outline_in(folder),
+              .outline_um = {},
+              .beads = {},
+              .gel = gel_of(folder, p.gel)};
+    cell.outline_um = files::read_outline(cell.outline_file).front();
+    cell.beads = files::read_displacement(folder / displacement_in(folder));
+    std::erase_if(cell.beads, [](const Bead& bead) { return !bead.flag.empty(); });
+    tractions::assume_noise_um(cell.beads);
+    if (!(cell.gel.youngs_modulus_kPa > 0))
+      throw InputError((folder / "cell.toml").string(), "[gel] youngs_modulus_kPa", "none",
+                       "give it there, or for all cells in --config or as --youngs_modulus_kPa");
+    if (p.register_by == By::images) {
+      cell.image = read_brightness(folder / p.image);
+      read.push_back((name / p.image).generic_string());
+    }
+    read.push_back((name / outline_in(folder)).generic_string());
+    read.push_back((name / displacement_in(folder)).generic_string());
+    cells.push_back(std::move(cell));
+  }
+  if (cells.size() < 2)
+    throw InputError(top.string(),
+                     "two cells or more, each a folder with outline.csv (or 1_segment/outline.csv) and "
+                     "displacement.csv (or 2_track/displacement.csv)",
+                     std::to_string(cells.size()));
+  context.input("cells", read);
+  return cells;
+}
+
+/// An outline, and the cell that it is of; none: that of a pattern.
+struct Reference {
+  Polygon outline_um;
+  const Cell* cell = nullptr;
+};
+Reference reference_of(stage::StageContext& context, const Parameters& p, const std::vector<Cell>& cells) {
+  if (context.has_input("pattern")) {
+    if (!p.reference.empty()) throw UsageError("expected --pattern or --reference, found both");
+    if (p.register_by == By::images)
+      throw UsageError("expected --reference with register_by = images: a pattern has no image");
+    return {files::read_outline(context.input("pattern")).front()};
+  }
+  if (!p.reference.empty()) {
+    const auto named = std::ranges::find(cells, p.reference, &Cell::name);
+    if (named == cells.end())
+      throw UsageError("--reference: expected one of the cells, found '" + p.reference + "' (the first is '" +
+                       cells.front().name + "')");
+    return {named->outline_um, &*named};
+  }
+  std::vector<Polygon> outlines;
+  for (const Cell& cell : cells) outlines.push_back(cell.outline_um);
+  const Mirrors mirrors = p.mirror == Switch::on ? Mirrors::tried : Mirrors::not_tried;
+  const Cell& typical = cells[most_typical(outlines, mirrors, context.threads)];
+  return {typical.outline_um, &typical};
+}
+
+/// @throws InputError at the first cell of another shape, where those are refused
+std::vector<CellRow> rows_of(stage::StageContext& context, const Parameters& p, const std::vector<Cell>& cells,
+                             const Reference& reference, const Alignment& alignment) {
+  std::vector<CellRow> rows = p.register_by == By::images
+                                  ? aligned_by_images(cells, reference.cell->image, alignment, context.threads)
+                                  : aligned(cells, alignment, context.threads);
+  int n_left_out = 0, n_ambiguous = 0;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    n_ambiguous += rows[k].is_kept && rows[k].is_ambiguous && !symmetry_of(p.symmetry).is_circle ? 1 : 0;
+    if (rows[k].is_kept) continue;
+    ++n_left_out;
+    if (p.others == Others::refused)
+      throw InputError(
+          cells[k].outline_file.string(),
+          "an outline of the reference's shape: cell '" + rows[k].cell + "' is in one mean with the others",
+          rows[k].reason,
+          "take the cell out, leave out all such cells (mean.others = left-out), or raise "
+          "mean.largest_misfit");
+  }
+  const int n_kept = static_cast<int>(rows.size()) - n_left_out;
+  if (n_kept < 2)
+    throw InputError(context.inputs_.at("cells").string(), "two cells of the reference's shape",
+                     std::to_string(n_kept));
+  context.notice(noticed(FindingKind::cells_left_out, n_left_out,
+                         std::to_string(n_left_out) + " of " + std::to_string(rows.size()) +
+                             " cells are not in the mean: their outlines do not fit the reference."));
+  context.notice(noticed(FindingKind::registration_ambiguous, n_ambiguous,
+                         std::to_string(n_ambiguous) + " of " + std::to_string(n_kept) +
+                             " cells fit the reference in more than one way."));
+  context.notice(
+      noticed(FindingKind::few_cells, 5.0 / n_kept, "The mean is over " + std::to_string(n_kept) + " cells."));
+  return rows;
+}
+
+Registered registered(const Cell& cell, const Way& way) {
+  Registered there{.beads = moved(cell.beads, way.motion),
+                   .gel = cell.gel,
+                   .motion = way.motion,
+                   .seen_low_um = cell.beads.front().position_um,
+                   .seen_high_um = cell.beads.front().position_um,
+                   .shift_error_um = way.shift_error_um,
+                   .angle_error_rad = way.angle_error_rad};
+  for (const Bead& bead : cell.beads) {
+    there.seen_low_um.x = std::min(there.seen_low_um.x, bead.position_um.x);
+    there.seen_low_um.y = std::min(there.seen_low_um.y, bead.position_um.y);
+    there.seen_high_um.x = std::max(there.seen_high_um.x, bead.position_um.x);
+    there.seen_high_um.y = std::max(there.seen_high_um.y, bead.position_um.y);
+  }
+  return there;
+}
+
+/// By cell that is kept.
+std::vector<double> lambdas_of(const std::vector<Registered>& cells, const Parameters& p,
+                               const tractions::TractionParameters& fttc, int threads) {
+  if (p.lambda_um_per_kPa) return std::vector<double>(cells.size(), *p.lambda_um_per_kPa);
+  std::vector<double> lambdas(cells.size());
+  numerics::parallel_for(static_cast<int>(cells.size()), threads,
+                         [&](int k) { lambdas[k] = lambda_by_risk_um_per_kPa(cells[k], fttc); });
+  if (p.lambda_for == LambdaFor::each) return lambdas;
+  // gels differ: a length, lambda E, is the same for all
+  std::vector<double> lengths;
+  for (std::size_t k = 0; k < cells.size(); ++k) lengths.push_back(lambdas[k] * cells[k].gel.youngs_modulus_kPa);
+  const double length = numerics::quantile(lengths, 0.5);
+  for (std::size_t k = 0; k < cells.size(); ++k) lambdas[k] = length / cells[k].gel.youngs_modulus_kPa;
+  return lambdas;
+}
+
+using Samples = std::vector<std::vector<std::optional<Sample>>>;
+
+/// A field made of each cell, at all nodes.
+template <class FieldOf>
+Samples samples_of(std::size_t n_cells, const std::vector<Vec2>& nodes, const std::vector<Motion>& motions, int threads,
+                   const FieldOf& field_of_cell) {
+  Samples samples(n_cells);
+  numerics::parallel_for(static_cast<int>(n_cells), threads, [&](int k) {
+    const CellField field = field_of_cell(k);
+    for (const Vec2 node : nodes) samples[k].push_back(field.at(node, motions));
+  });
+  return samples;
+}
+
+/// Tractions of a table, each as that of the nearest row; beyond the outermost ones none.
+std::function<Vec2(Vec2)> model_in(const Path& file) {
+  const files::CsvTable table(file);
+  table.require({"x_um", "y_um", "tx_kPa", "ty_kPa"});
+  std::vector<tractions::Patch> patches;
+  std::set<double> columns;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    patches.push_back({.position_um = {table.number(row, "x_um"), table.number(row, "y_um")},
+                       .traction_kPa = {table.number(row, "tx_kPa"), table.number(row, "ty_kPa")},
+                       .displacement_um = {}});
+    columns.insert(patches.back().position_um.x);
+  }
+  const std::size_t n_columns = columns.size(), n_rows = patches.size() / std::max<std::size_t>(1, n_columns);
+  if (n_columns < 2 || n_rows < 2 || n_columns * n_rows != patches.size())
+    throw InputError(file.string(), "tractions on a whole lattice of at least two columns and rows",
+                     std::to_string(patches.size()) + " rows, " + std::to_string(n_columns) + " columns");
+  std::ranges::sort(patches, [](const tractions::Patch& a, const tractions::Patch& b) {
+    return std::pair(a.position_um.y, a.position_um.x) < std::pair(b.position_um.y, b.position_um.x);
+  });
+  const Vec2 low = patches.front().position_um, high = patches.back().position_um;
+  const double spacing = (high.x - low.x) / static_cast<double>(n_columns - 1);
+  for (tractions::Patch& patch : patches) patch.area_um2 = spacing * spacing;
+  const CellField field(patches, {}, low, high);
+  return [field](Vec2 place) { return field.at(place).value_or(Sample{}).traction_kPa; };
+}
+
+/// The model as the mean of these cells would show it.
+std::vector<Vec2> blurred_model(const std::function<Vec2(Vec2)>& model, const std::vector<Registered>& cells,
+                                const std::vector<double>& lambdas, const tractions::TractionParameters& fttc,
+                                const std::vector<Vec2>& nodes, const Alignment& alignment, std::uint64_t seed,
+                                int threads) {
+  const Vec2 centre = centroid_um(alignment.reference_um);
+  std::vector<Motion> errors;
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  for (const Registered& cell : cells) {
+    const double x = normal(random), y = normal(random), angle = normal(random);
+    errors.push_back({centre, centre + cell.shift_error_um * Vec2{x, y}, cell.angle_error_rad * angle, false});
+  }
+  const Samples samples = samples_of(cells.size(), nodes, alignment.motions, threads, [&](int k) {
+    const auto off = [&](Vec2 place) { return errors[k].vector(model(errors[k].back_um(place))); };
+    return blurred(off, cells[k], fttc, lambdas[k]);
+  });
+  std::vector<Vec2> means;
+  for (const NodeMean& node : mean_of(nodes, samples, alignment.reference_um)) means.push_back(node.mean.traction_kPa);
+  return means;
+}
+
+struct Blur {
+  std::vector<WaveShare> shares;
+  double fttc_um = 0, registration_um = 0;
+};
+
+Figures figures_of(const Parameters& p, const std::vector<CellRow>& rows, const std::vector<NodeMean>& nodes,
+                   const std::optional<Ratio>& ratio, const Blur& blur, double size) {
+  std::int64_t n_kept = 0, n_ambiguous = 0;
+  double misfit = 0, angle = 0;
+  for (const CellRow& row : rows) {
+    if (!row.is_kept) continue;
+    n_kept += 1;
+    n_ambiguous += row.is_ambiguous ? 1 : 0;
+    misfit += row.way.misfit_um * row.way.misfit_um;
+    angle += row.way.angle_error_rad * row.way.angle_error_rad;
+  }
+  double largest = 0;
+  for (const NodeMean& node : nodes) largest = std::max(largest, norm(node.mean.traction_kPa));
+  Figures figures = {{"n_cells", n_kept},
+                     {"n_left_out", static_cast<std::int64_t>(rows.size()) - n_kept},
+                     {"n_ambiguous", n_ambiguous},
+                     {"symmetry", p.symmetry},
+                     {"n_nodes", static_cast<std::int64_t>(nodes.size())},
+                     {"reference_radius_um", size},
+                     {"misfit_um", std::sqrt(misfit / static_cast<double>(n_kept))},
+                     {"angle_error_deg", 180 / std::numbers::pi * std::sqrt(angle / static_cast<double>(n_kept))},
+                     {"largest_mean_traction_kPa", largest},
+                     {"blur_fttc_um", blur.fttc_um},
+                     {"blur_registration_um", blur.registration_um}};
+  if (!ratio) return figures;
+  figures.emplace_back("tip_kPa", ratio->tip_kPa);
+  figures.emplace_back("edge_kPa", ratio->edge_kPa);
+  figures.emplace_back("tip_over_edge", ratio->ratio);
+  figures.emplace_back("tip_over_edge_low", ratio->low);
+  figures.emplace_back("tip_over_edge_high", ratio->high);
+  return figures;
+}
+
+StageReport run(const Parameters& p, stage::StageContext& context) {
+  const std::vector<Cell> cells = read_cells(context, p);
+  context.progress(0.1, "laying outlines onto the reference");
+  const Reference reference = reference_of(context, p, cells);
+  Alignment alignment{.reference_um = reference.outline_um, .motions = {}, .largest_misfit = p.largest_misfit};
+  const Symmetry symmetry = symmetry_of(p.symmetry);
+  alignment.motions = motions_of(symmetry, alignment.reference_um);
+  expect_symmetric(alignment, p.symmetry);
+  alignment.mirrors = mirrors_for(p.mirror, alignment.reference_um);
+  std::vector<CellRow> rows = rows_of(context, p, cells, reference, alignment);
+  std::vector<Registered> kept;
+  std::vector<Polygon> outlines;
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    if (!rows[k].is_kept) continue;
+    kept.push_back(registered(cells[k], rows[k].way));
+    outlines.push_back(moved(cells[k].outline_um, rows[k].way.motion));
+  }
+
+  context.progress(0.2, "reconstructing tractions");
+  const double size = size_um(alignment.reference_um);
+  const double spacing = p.spacing_um.value_or(0.5 / std::sqrt(beads_per_um2(kept.front().beads)));
+  tractions::TractionParameters fttc;
+  fttc.gel_model = p.gel_model;
+  fttc.spacing_um = spacing;
+  const std::vector<double> lambdas = lambdas_of(kept, p, fttc, context.threads);
+  for (std::size_t k = 0, of_kept = 0; k < rows.size(); ++k) {
+    if (rows[k].is_kept) rows[k].lambda_um_per_kPa = lambdas[of_kept++];
+  }
+  const std::vector<Vec2> nodes = lattice_over(alignment.reference_um, p.margin_um.value_or(size / 5), spacing);
+  const Samples samples = samples_of(kept.size(), nodes, alignment.motions, context.threads,
+                                     [&](int k) { return field_of(kept[k], fttc, lambdas[k]); });
+  const std::vector<NodeMean> means = mean_of(nodes, samples, alignment.reference_um);
+  context.progress(0.8, "means");
+  const double band = p.band_um.value_or(size / 10);
+  const std::optional<Ratio> ratio =
+      tip_over_edge(nodes, samples, edge_parts(nodes, alignment.reference_um, band, 2 * band),
+                    centroid_um(alignment.reference_um), p.seed);
+  std::vector<Vec2> model;
+  if (context.has_input("model"))
+    model =
+        blurred_model(model_in(context.input("model")), kept, lambdas, fttc, nodes, alignment, p.seed, context.threads);
+  Blur blur{.shares = wave_shares(kept, lambdas, p.gel_model, size)};
+  blur.fttc_um = gaussian_um(blur.shares, [](const WaveShare& s) { return 0.5 * (s.along + s.across); });
+  blur.registration_um = gaussian_um(blur.shares, [](const WaveShare& s) { return s.registration; });
+
+  write_registration(context.output("out", "registration.csv"), rows);
+  write_mean(context.output("out", "mean.csv"), context.output("out", "mean.vtp"), means, model);
+  write_blur(context.output("out", "blur.csv"), blur.shares);
+  files::write_outline(context.output("out", "reference.csv"), alignment.reference_um);
+  files::write_text(context.output("out", "mean.svg"), picture_of({.reference_um = alignment.reference_um,
+                                                                   .outlines_um = std::move(outlines),
+                                                                   .nodes = means,
+                                                                   .spacing_um = spacing,
+                                                                   .band_um = band}));
+  StageReport report;
+  report.figures = figures_of(p, rows, means, ratio, blur, size);
+  files::write_figures(context.output("out", "mean.json"), report.figures);
+  report.summary = "mean of " + std::to_string(kept.size()) + " cells at " + std::to_string(means.size()) +
+                   " nodes; blurred by " + brief(blur.fttc_um) + " um (tractions) and " + brief(blur.registration_um) +
+                   " um (registration)";
+  if (ratio)
+    report.summary += "; tips over the rest of the edge " + brief(ratio->ratio) + " (" + brief(ratio->low) + " to " +
+                      brief(ratio->high) + ")";
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::mean
+
+int main(int argc, char** argv) {
+  using Kind = mbtfm::stage::FileArgument::Kind;
+  using namespace mbtfm::mean;
+  return mbtfm::stage::run_stage<Parameters>(
+      {.name = "mean",
+       .purpose = "average displacements and tractions over cells of one shape",
+       .files = {{"cells", Kind::input, "folder of cell folders, each with outline.csv and displacement.csv", true},
+                 {"pattern", Kind::optional_input, "outline.csv of the reference shape"},
+                 {"model", Kind::optional_input,
+                  "traction.csv of a model on a lattice in the frame of the reference: it is blurred as the cells are"},
+                 {"out", Kind::output_folder,
+                  "mean.csv, mean.vtp, mean.json, mean.svg, registration.csv, blur.csv, reference.csv"}}},
+      argc, argv, run);
+}

@@ -1,0 +1,100 @@
+#include "continuum/solids/outputs.h"
+
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/columns.h"
+#include "pipeline/files/vtk_files.h"
+
+namespace mbtfm::solids {
+namespace {
+
+using files::kForPeople;
+
+files::Table<Indentation> table_of_cases(const std::vector<double>& depths_um) {
+  files::Table<Indentation> table{
+      .file = "indent.csv",
+      .row = "each cell on each gel",
+      .columns = {{"height_um", "height of the cell", [](const Indentation& i) { return i.of.height_um; }},
+                  {"modulus_ratio", "Young's modulus of the gel over the cell's",
+                   [](const Indentation& i) { return i.of.modulus_ratio; }}}};
+  for (std::size_t k = 0; k < depths_um.size(); ++k) {
+    table.columns.push_back({"depth_" + shortest(depths_um[k]) + "_um",
+                             "largest displacement into the gel, " + shortest(depths_um[k]) + " um below its surface",
+                             [k](const Indentation& i) { return i.reading.depth_um[k]; },
+                             {.digits = kForPeople}});
+  }
+  const auto add = [&](const char* name, const char* meaning, auto get) {
+    table.columns.push_back({name, meaning, get, {.digits = kForPeople}});
+  };
+  add("largest_u_um", "largest displacement anywhere", [](const Indentation& i) { return i.reading.largest_u_um; });
+  add("error_um", "largest change of the depths and displacements of the row on a coarser mesh",
+      [](const Indentation& i) { return i.error_um; });
+  add("contact_radius_um", "radius of the contact", [](const Indentation& i) { return i.contact_radius_um; });
+  add("contact_area_um2", "area of the contact", [](const Indentation& i) { return i.contact_area_um2; });
+  add("lift_um", "largest displacement of the gel's surface out of it, near the rim of the contact",
+      [](const Indentation& i) { return i.reading.lift_um; });
+  add("largest_u_gel_um", "largest displacement in the gel",
+      [](const Indentation& i) { return i.reading.largest_u_gel_um; });
+  add("top_down_um", "displacement of the cell's top towards the gel",
+      [](const Indentation& i) { return i.reading.top_down_um; });
+  return table;
+}
+
+const files::Table<Optimum>& table_of_optima() {
+  static const files::Table<Optimum> table{
+      .file = "optima.csv",
+      .row = "the best height on each gel, for each depth of reading",
+      .columns = {
+          {"modulus_ratio", "Young's modulus of the gel over the cell's", &Optimum::modulus_ratio},
+          {"read_at_um", "depth of reading below the surface", &Optimum::read_at_um},
+          {"height_um", "height of the cell that presses deepest", &Optimum::height_um, {.digits = kForPeople}},
+          {"height_error_um",
+           "by which the meshes and the search may be off",
+           &Optimum::height_error_um,
+           {.digits = kForPeople}},
+          {"depth_um", "displacement into the gel there", &Optimum::depth_um, {.digits = kForPeople}},
+          {"contact_area_um2", "area of the contact there", &Optimum::contact_area_um2, {.digits = kForPeople}}}};
+  return table;
+}
+
+}  // namespace
+
+void write_indentations(const Path& file, const std::vector<Indentation>& solved,
+                        const std::vector<double>& depths_um) {
+  files::write(file, table_of_cases(depths_um), solved);
+}
+
+void write_optima(const Path& file, const std::vector<Optimum>& optima) {
+  files::write(file, table_of_optima(), optima);
+}
+
+void write_deformed_vtu(const Path& file, const Deformed& deformed) {
+  const Mesh& mesh = *deformed.body.mesh;
+  files::Grid grid{.points_um = {}, .cells = {}, .point_arrays = {}, .cell_arrays = {}};
+  grid.point_arrays = {{"displacement_um", 3, {}}};
+  for (std::size_t k = 0; k < mesh.position_um.size(); ++k) {
+    grid.points_um.push_back({mesh.position_um[k].x, 0, mesh.position_um[k].y});
+    const Vec2 u = deformed.displacement_um[k];
+    for (const double value : {u.x, 0.0, u.y}) grid.point_arrays[0].values.push_back(value);
+  }
+  grid.cell_arrays = {{"part", 1, {}}, {"stress_kPa", 4, {}}};
+  const int order = mesh.square.order();
+  const std::vector<double>& nodes = mesh.square.nodes();
+  for (int e = 0; e < mesh.n_elements(); ++e) {
+    for (int j = 0; j < order; ++j) {
+      for (int i = 0; i < order; ++i) {
+        for (const int k :
+             {j * (order + 1) + i, j * (order + 1) + i + 1, (j + 1) * (order + 1) + i + 1, (j + 1) * (order + 1) + i})
+          grid.cells.push_back(mesh.nodes_of(e)[k]);
+        grid.cell_arrays[0].values.push_back(mesh.part[e]);
+        const Eigen::Vector4d stress =
+            deformed.stress_kPa_at({e, {0.5 * (nodes[i] + nodes[i + 1]), 0.5 * (nodes[j] + nodes[j + 1])}});
+        for (const double value : stress) grid.cell_arrays[1].values.push_back(value);
+      }
+    }
+  }
+  files::write_grid_vtu(file, grid);
+}
+
+std::string pages_of_tables() { return files::page_of(table_of_cases({0, 5})) + files::page_of(table_of_optima()); }
+
+}  // namespace mbtfm::solids

@@ -1,0 +1,80 @@
+#include "continuum/solids/sweep.h"
+
+#include <charconv>
+#include <cmath>
+#include <sstream>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::solids {
+namespace {
+
+constexpr int kMostValues = 1000;  // of a list: a map of a million cases is a slip
+
+std::vector<std::string> parts_of(const std::string& text, char at) {
+  std::vector<std::string> parts;
+  std::istringstream stream(text);
+  for (std::string part; std::getline(stream, part, at);) {
+    const auto first = part.find_first_not_of(' '), last = part.find_last_not_of(' ');
+    parts.push_back(first == part.npos ? std::string() : part.substr(first, last - first + 1));
+  }
+  return parts;
+}
+
+template <class Number>
+bool reads(const std::string& text, Number& number) {
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return error == std::errc() && end == text.data() + text.size();
+}
+
+[[noreturn]] void refuse(const std::string& name, const std::string& found) {
+  throw UsageError(name +
+                   ": expected numbers as in 0.1, 0.5, 1 or a range as in 5.3..15.8:11 (from, to, how many), found '" +
+                   found + "'");
+}
+
+}  // namespace
+
+std::vector<double> values_in(const std::string& text, const std::string& name, Zero zero) {
+  std::vector<double> values;
+  if (const auto dots = text.find(".."); dots != text.npos) {
+    const auto colon = text.find(':', dots);
+    double low = 0, high = 0;
+    int n = 0;
+    if (colon == text.npos || !reads(text.substr(0, dots), low) ||
+        !reads(text.substr(dots + 2, colon - dots - 2), high) || !reads(text.substr(colon + 1), n) || !(high > low) ||
+        n < 2 || n > kMostValues)
+      refuse(name, text);
+    for (int k = 0; k < n; ++k) values.push_back(low + (high - low) * k / (n - 1));
+  } else {
+    for (const std::string& part : parts_of(text, ',')) {
+      double value = 0;
+      if (!reads(part, value) || std::ssize(values) == kMostValues) refuse(name, text);
+      values.push_back(value);
+    }
+  }
+  if (values.empty()) refuse(name, text);
+  for (const double value : values) {
+    if (!std::isfinite(value) || value < 0 || (value == 0 && zero == Zero::is_refused)) refuse(name, text);
+  }
+  return values;
+}
+
+std::vector<Case> cases_of(const std::string& sweep, const Case& otherwise) {
+  std::vector<double> heights = {otherwise.height_um}, ratios = {otherwise.modulus_ratio};
+  std::istringstream stream(sweep);
+  for (std::string word; stream >> word;) {
+    const auto equals = word.find('=');
+    const std::string name = word.substr(0, equals);
+    if (equals == word.npos || (name != "height_um" && name != "modulus_ratio"))
+      throw UsageError("sweep: expected height_um=... and modulus_ratio=..., found '" + word + "'");
+    (name == "height_um" ? heights : ratios) = values_in(word.substr(equals + 1), "sweep of " + name, Zero::is_refused);
+  }
+  std::vector<Case> cases;
+  for (const double ratio : ratios) {
+    for (const double height : heights) cases.push_back({height, ratio});
+  }
+  return cases;
+}
+
+}  // namespace mbtfm::solids

@@ -1,0 +1,138 @@
+/// mbtfm-indent and mbtfm-mean as a person runs them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "pipeline/contract/beads.h"
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/text.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+class Continuum : public testing::Test {
+ protected:
+  std::string file(const std::string& name) const { return (folder_.path() / name).string(); }
+  std::string settings(const std::string& cell) const {
+    files::write_text(
+        file("cell.toml"),
+        "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.49\nthickness_um = 60\nradius_um = 100\n[cell]\n" + cell);
+    return file("cell.toml");
+  }
+  test::TemporaryFolder folder_;
+};
+
+constexpr const char* kCell =
+    "volume_um3 = 5000\nheight_um = 7.5\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.49\ncontraction_kPa = 30\n";
+
+TEST_F(Continuum, a_cell_on_a_gel_gives_the_table_that_the_formats_promise) {
+  const auto outcome = test::run_program("mbtfm-indent --config " + settings(kCell) + " --out " + file("out"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("contraction-beyond-linear"), std::string::npos) << outcome.output;
+  const files::CsvTable table(file("out/indent.csv"));
+  ASSERT_EQ(table.n_rows(), 1);
+  // notes of an independent program: half a percent
+  for (const auto& [column, value] : {std::pair{"depth_0_um", 0.1593}, std::pair{"depth_5_um", 0.2649},
+                                      std::pair{"largest_u_um", 0.9592}, std::pair{"lift_um", 0.1027}})
+    EXPECT_NEAR(table.number(0, column), value, 0.005 * value) << column;
+  EXPECT_EQ(table.number(0, "height_um"), 7.5);
+  EXPECT_EQ(table.number(0, "modulus_ratio"), 1);
+  EXPECT_LT(table.number(0, "error_um"), 0.002);
+  for (const char* name : {"indent.json", "indent.vtu"}) EXPECT_FALSE(files::read_text(file("out/") + name).empty());
+}
+
+TEST_F(Continuum, a_sweep_finds_the_height_that_presses_deepest) {
+  const auto outcome =
+      test::run_program("mbtfm-indent --config " + settings(kCell) + " --order 4 --towards_rim 4 --out " + file("out") +
+                        " --sweep 'height_um=5.3..11.3:4 modulus_ratio=0.5,1'");
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_EQ(files::CsvTable(file("out/indent.csv")).n_rows(), 8);
+  const files::CsvTable optima(file("out/optima.csv"));
+  ASSERT_EQ(optima.n_rows(), 4);
+  const std::vector<double> heights = {8.11, 7.81, 8.71, 8.40};  // at the surface and 5 um below, as published
+  for (int row = 0; row < 4; ++row) {
+    EXPECT_NEAR(optima.number(row, "height_um"), heights[row], 0.1) << row;
+    EXPECT_LT(optima.number(row, "height_error_um"), 0.1);
+  }
+  EXPECT_NE(files::read_text(file("out/indent.svg")).find("<svg"), std::string::npos);
+}
+
+TEST_F(Continuum, what_is_no_cell_or_no_gel_for_it_is_refused) {
+  const auto refused = [&](const std::string& cell, const std::string& words) {
+    const auto outcome = test::run_program("mbtfm-indent --config " + settings(cell) + " --out " + file("out"));
+    EXPECT_EQ(outcome.code, 2) << outcome.output;
+    EXPECT_NE(outcome.output.find(words), std::string::npos) << outcome.output;
+    EXPECT_FALSE(std::filesystem::exists(file("out/indent.csv")));
+  };
+  refused("height_um = 22\n", "whole sphere");
+  refused("height_um = 7.5\npoisson_ratio = 0.4999999\n", "keeps its volume");
+  refused("height_um = 7.5\npoisson_ratio = 0.3\n", "at most 0.4");
+  refused("volume_um3 = 5000\n", "height_um is missing");
+  refused("height_um = 0.3\n", "radius_um");
+}
+
+/// A cell folder: a spiked outline, turned, with beads that its tips and its edge pull.
+void write_cell(const Path& folder, double angle, std::uint64_t seed, double spike_um) {
+  std::filesystem::create_directories(folder);
+  const auto turned = [&](double r, double t) {
+    return Vec2{60 + r * std::cos(t + angle), 60 + r * std::sin(t + angle)};
+  };
+  const auto radius = [&](double t) { return 25 + spike_um * std::exp((std::cos(4 * t) - 1) / 0.2); };
+  Polygon outline;
+  for (int k = 0; k < 200; ++k) {
+    const double t = 2 * std::numbers::pi * k / 200;
+    outline.push_back(turned(radius(t), t));
+  }
+  files::write_outline(folder / "outline.csv", outline);
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> across(5, 115);
+  std::normal_distribution<double> noise(0, 0.01);
+  DisplacementField beads;
+  for (int k = 0; k < 1500; ++k) {
+    const Vec2 at = {across(random), across(random)}, arm = at - Vec2{60, 60};
+    const double pull = 0.4 * std::exp(-std::pow((norm(arm) - 25) / 8, 2));
+    beads.push_back({.position_um = at,
+                     .displacement_um = Vec2{noise(random), noise(random)} - (pull / norm(arm)) * arm,
+                     .sigma_um = 0.01,
+                     .flag = {}});
+  }
+  files::write_displacement(folder / "displacement.csv", beads);
+}
+
+TEST_F(Continuum, cells_of_one_shape_have_a_mean_and_others_are_refused_by_name) {
+  for (int k = 0; k < 5; ++k) write_cell(folder_ / ("cells/cell_" + std::to_string(k)), 0.4 * k, k, 12);
+  const std::string settings_file = settings("");
+  const std::string mean =
+      "mbtfm-mean " + file("cells") + " --config " + settings_file + " --symmetry C4v --spacing_um 3";
+  const auto outcome = test::run_program(mean + " --out " + file("mean"));
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  const files::CsvTable registration(file("mean/registration.csv"));
+  ASSERT_EQ(registration.n_rows(), 5);
+  for (int row = 0; row < 5; ++row) {
+    EXPECT_FALSE(registration.truth(row, "ambiguous"));
+    EXPECT_LT(registration.number(row, "misfit_um"), 0.3);  // one polygon on another: a pitch of 1 um
+  }
+  const files::CsvTable table(file("mean/mean.csv"));
+  table.require({"x_um", "y_um", "ux_um", "uy_um", "tx_kPa", "ty_kPa", "tx_sigma_kPa", "ty_sigma_kPa", "n_cells"});
+  for (const char* name : {"mean.vtp", "mean.json", "mean.svg", "blur.csv", "reference.csv"})
+    EXPECT_FALSE(files::read_text(file("mean/") + name).empty()) << name;
+  // its own mean as a model is blurred once more
+  const auto again = test::run_program(mean + " --pattern " + file("mean/reference.csv") + " --out " + file("again"));
+  EXPECT_EQ(again.code, 0) << again.output;
+
+  write_cell(folder_ / "cells/round", 0, 9, 0);
+  const auto refused = test::run_program(mean + " --pattern " + file("mean/reference.csv") + " --out " + file("no"));
+  EXPECT_EQ(refused.code, 3) << refused.output;
+  EXPECT_NE(refused.output.find("cell 'round'"), std::string::npos) << refused.output;
+  EXPECT_FALSE(std::filesystem::exists(file("no/mean.csv")));
+  const auto left = test::run_program(mean + " --others left-out --out " + file("left"));
+  EXPECT_EQ(left.code, 0) << left.output;
+  EXPECT_NE(left.output.find("cells-left-out"), std::string::npos) << left.output;
+}
+
+}  // namespace
+}  // namespace mbtfm
