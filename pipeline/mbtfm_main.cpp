@@ -254,6 +254,21 @@ int repeat(const CommandLine& line) {
   become("mbtfm-init", {"--cell", line.folder.string(), "--out", (line.folder / "cell.toml").string()});
 }
 
+/// @param arguments  as given, in their order
+[[noreturn]] void plan(std::vector<std::string> arguments) {
+  const std::string out = "--out";
+  const auto is_out = [&](const std::string& a) { return a == out || a.starts_with(out + "="); };
+  if (std::ranges::none_of(arguments, is_out)) arguments.insert(arguments.end(), {out, "plan"});
+  become("mbtfm-plan", std::move(arguments));
+}
+
+[[noreturn]] void noise(const std::vector<std::string>& pictures, const std::vector<std::string>& further) {
+  std::vector<std::string> arguments;
+  if (pictures.size() == 2) arguments = {"--first", pictures[0], "--second", pictures[1]};
+  arguments.insert(arguments.end(), further.begin(), further.end());
+  become("mbtfm-noise", std::move(arguments));
+}
+
 int cost_study(const CommandLine& line) {
   if (!line.more_cells.empty() && line.out.empty())
     throw UsageError("--out: is needed for the study of several cells: a folder of its own");
@@ -414,6 +429,17 @@ int start(int argc, char** argv) {
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
   cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
       ->capture_default_str();
+  // what follows is for the program that they become, --help included
+  CLI::App* plan_command = app.add_subcommand(
+      "plan", "how many beads, which gel, how little noise and how many cells a question takes: mbtfm plan --help");
+  plan_command->set_help_flag();
+  plan_command->allow_extras();
+  std::vector<std::string> pictures;
+  CLI::App* noise_command = app.add_subcommand("noise",
+                                               "noise and density of beads from two pictures of a place where "
+                                               "no cell pulls: mbtfm noise A.tif B.tif");
+  noise_command->set_help_flag();
+  noise_command->allow_extras()->add_option("PICTURES", pictures, "the two pictures")->expected(0, 2);
   fs::path manuals;
   app.add_option("--manuals", manuals, "write manual page and completions below this folder")->group("");
   app.require_subcommand(0, 1);
@@ -443,6 +469,8 @@ int start(int argc, char** argv) {
   if (cost_command->parsed()) return cost_study(line);
   if (verify_command->parsed()) return verify(line);
   if (repeat_command->parsed()) return repeat(line);
+  if (plan_command->parsed()) plan(plan_command->remaining());
+  if (noise_command->parsed()) noise(pictures, noise_command->remaining());
   if (stats_command->parsed()) stats(line, stats_command->remaining());
   if (check_command->parsed()) check(line);
   if (init_command->parsed()) init(line);

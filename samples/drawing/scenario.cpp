@@ -11,6 +11,8 @@ namespace fs = std::filesystem;
 
 namespace {
 
+constexpr int kMostBeads = 10'000'000;
+
 void declare_cell(stage::ParameterList& list, CellParameters& p) {
   list.add("layout", p.layout, "spread: a cell at random; dense: with bundles of fibres; ring, line: regular ones");
   list.add("diameter_um", p.diameter_um, Range::size_um(), "diameter of the cell (um)");
@@ -146,7 +148,11 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("seed", p.seed, "of all that is random");
   list.add("noise", p.noise, Range::zero_or_factor(),
            "standard deviation of the bead displacements over the largest displacement");
-  list.add("beads", p.beads, Range::between(1, 10000000), "beads in the field");
+  list.add("noise_um", p.noise_um, Range::zero_or_size_um(),
+           "the same standard deviation as a length (um), in place of `noise`; unset: by `noise`");
+  list.add("beads", p.beads, Range::between(1, kMostBeads), "beads in the field");
+  list.add("beads_per_um2", p.beads_per_um2, Range::between(1e-6, 25),
+           "beads by area of the field (1/um²), in place of `beads`; unset: by `beads`");
   list.add("images", p.images, "render images in place of the segmentation and the displacement");
   list.add("bead_distance_um", p.bead_distance_um, Range::zero_or_size_um(), "least distance of two beads (um)");
   list.add("lost_bead_fraction", p.lost_bead_fraction, Range::between(0, 1), "share of beads in one image only");
@@ -162,6 +168,12 @@ void declare(stage::ParameterList& list, ScenarioParameters& p) {
   list.add("simulation_material", p.mechanics.simulation_material,
            "law of the gel in the simulation: linear, or neo-hooke, whatever the strains are");
   declare_microscope(list, p.microscope);
+}
+
+int n_beads(const ScenarioParameters& p) {
+  if (!p.beads_per_um2) return p.beads;
+  const double side_um = field_um(p.microscope);
+  return static_cast<int>(std::clamp(std::round(*p.beads_per_um2 * side_um * side_um), 1.0, double(kMostBeads)));
 }
 
 fs::path scenario_file(const std::string& name) {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -129,8 +130,10 @@ struct MicroscopeParameters {
 struct ScenarioParameters {
   std::string scenario = "u2os";
   std::uint64_t seed = 1;
-  double noise = 0.07;  ///< thesis 3.2.4: experiments have 5 to 10 %
-  int beads = 10000;    ///< one for each um² of the default field
+  double noise = 0.07;                       ///< thesis 3.2.4: experiments have 5 to 10 %
+  std::optional<double> noise_um = {};       ///< a microscope's noise is in um, whatever the gel; unset: by `noise`
+  int beads = 10000;                         ///< one for each um² of the default field
+  std::optional<double> beads_per_um2 = {};  ///< unset: by `beads`
   bool images = false;
   double bead_distance_um = 0.4;      ///< least: the images of nearer ones would melt together
   double lost_bead_fraction = 0.015;  ///< of the beads are in one of the two images only
@@ -147,6 +150,9 @@ void declare(stage::ParameterList& list, ScenarioParameters& parameters);
 
 /// Side of the square field of view.
 inline double field_um(const MicroscopeParameters& m) { return m.pixel_size_um * m.image_size_px; }
+
+/// Beads in the field, however that was asked for.
+int n_beads(const ScenarioParameters& parameters);
 
 /// The file of a scenario: a name of those that come with the program, or a path.
 /// @throws UsageError listing what there is

@@ -124,8 +124,9 @@ DisplacementField with_noise(DisplacementField field, double noise_um, std::uint
 
 std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
   constexpr double kBytes = 300;  // of a bead: its place in the grid, its displacement, its spots in two images
+  const int n_beads = drawing::n_beads(p);
   numerics::expect_room_for({.what = "the field of beads",
-                             .count = static_cast<double>(p.beads),
+                             .count = static_cast<double>(n_beads),
                              .parts = "beads",
                              .bytes_each = kBytes,
                              .remedy = "choose fewer beads"});
@@ -148,7 +149,7 @@ std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
   drawing::Random random(p.seed, drawing::Stream::beads);
   std::vector<Vec2> beads;
   constexpr int kMaxMisses = 10000;  // in a row: beyond that less than 1e-4 of the field is free
-  for (int misses = 0; static_cast<int>(beads.size()) < p.beads;) {
+  for (int misses = 0; static_cast<int>(beads.size()) < n_beads;) {
     const double x = random.uniform(0, field);
     const Vec2 bead{x, random.uniform(0, field)};
     const int column = static_cast<int>(bead.x / cell_um), row = static_cast<int>(bead.y / cell_um);
@@ -157,7 +158,7 @@ std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
       grid[static_cast<std::size_t>(row) * n_cells + column].push_back(bead);
       misses = 0;
     } else if (++misses > kMaxMisses) {
-      throw UsageError("only " + std::to_string(beads.size()) + " of " + std::to_string(p.beads) + " beads fit at a " +
+      throw UsageError("only " + std::to_string(beads.size()) + " of " + std::to_string(n_beads) + " beads fit at a " +
                        "bead_distance_um of " + std::to_string(p.bead_distance_um));
     }
   }
@@ -165,9 +166,12 @@ std::vector<Vec2> place_beads(const drawing::ScenarioParameters& p) {
 }
 
 Experiment simulate(const drawing::ScenarioParameters& p, const Work& work) {
-  Experiment e;
   work.tell(0, "drawing the cell");
-  drawing::DrawnCell drawn = drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), p.seed);
+  return simulate(drawing::draw_cell(p.cell, p.tension, drawing::field_um(p.microscope), p.seed), p, work);
+}
+
+Experiment simulate(drawing::DrawnCell drawn, const drawing::ScenarioParameters& p, const Work& work) {
+  Experiment e;
   e.tensions = tensions_of(drawn, p.tension);
   e.cell = std::move(drawn.cell);
   work.tell(0.1, "spanning the network");
@@ -180,7 +184,7 @@ Experiment simulate(const drawing::ScenarioParameters& p, const Work& work) {
   for (const Bead& bead : e.displacement) {
     e.largest_displacement_um = std::max(e.largest_displacement_um, norm(bead.displacement_um));
   }
-  e.noise_um = p.noise * e.largest_displacement_um;
+  e.noise_um = p.noise_um.value_or(p.noise * e.largest_displacement_um);
   e.measured = with_noise(e.displacement, e.noise_um, p.seed);
   return e;
 }

@@ -34,6 +34,9 @@ inline constexpr double kReferenceEdge_um = 1.5;
 /// @throws UsageError where the scenario leaves no room, NotSolved where the cables find no equilibrium
 Experiment simulate(const drawing::ScenarioParameters& parameters, const Work& work = {});
 
+/// The same of a cell that is given, with its tensions.
+Experiment simulate(drawing::DrawnCell drawn, const drawing::ScenarioParameters& parameters, const Work& work = {});
+
 /// Random positions on the field, no two nearer than the scenario's bead distance.
 /// @throws UsageError where they do not fit
 std::vector<Vec2> place_beads(const drawing::ScenarioParameters& parameters);

@@ -9,6 +9,7 @@
 #include "continuum/sheet/borders.h"
 #include "continuum/sheet/tables.h"
 #include "continuum/solids/outputs.h"
+#include "mbtfm/plan/tables.h"
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"
@@ -49,8 +50,8 @@ std::string parameter_page() {
       "# Parameters\n\nMade by the programs themselves (`mbtfm-<stage> --parameters`). Each is a key of `cell.toml` "
       "and a "
       "flag of its\nprogram; flags win. `mbtfm-simulate` reads its tables from a scenario file.\n";
-  for (const char* stage :
-       {"segment", "track", "network", "contract", "fit", "traction", "sheet", "indent", "mean", "simulate", "stats"}) {
+  for (const char* stage : {"segment", "track", "network", "contract", "fit", "traction", "plan", "sheet", "indent",
+                            "mean", "simulate", "stats"}) {
     const auto outcome = test::run_program("mbtfm-" + std::string(stage) + " --parameters");
     EXPECT_EQ(outcome.code, 0) << outcome.output;
     page += "\n## `mbtfm-" + std::string(stage) + "`\n" + outcome.output;
@@ -71,7 +72,8 @@ std::string column_page() {
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
          sheet::pages_of_tables() + sheet::pages_of_cells() + sheets::pages_of_tables() + solids::pages_of_tables() +
-         mean::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables();
+         mean::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables() +
+         plan::pages_of_tables();
 }
 
 TEST(Documents, the_page_of_columns_is_what_the_tables_declare) {

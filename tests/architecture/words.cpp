@@ -22,6 +22,7 @@ const std::map<std::string, std::string> kReaders = {
     {"pipeline/files/vtu_data.cpp", "VTU's names of compressors"},
     {"pipeline/files/triangle_mesh.cpp", "extensions and words of STL and OBJ"},
     {"pipeline/files/ply.cpp", "words of PLY's header"},
+    {"mbtfm/plan/study_scatter.cpp", "rows of a study's tables"},
     {"substrate/surface_main.cpp", "the extension of a height map"},
     {"pipeline/files/csv.cpp", "true and false in CSV"},
     {"pipeline/files/fit_summary.cpp", "keys of fit.json"},

@@ -1,0 +1,152 @@
+#include "mbtfm/plan/answer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/listed.h"
+#include "pipeline/contract/numbers.h"
+
+namespace mbtfm::plan {
+
+namespace {
+
+std::string percent(double share) { return brief(100 * share) + " %"; }
+
+/// Two digits: no plan is better than that.
+std::string about(double value) { return significant(value, 2); }
+
+const Needed& needed_of(const Grid& grid, double youngs_modulus_kPa, double noise_um) {
+  return *std::ranges::find_if(grid.needed, [&](const Needed& n) {
+    return n.youngs_modulus_kPa == youngs_modulus_kPa && n.noise_um == noise_um;
+  });
+}
+
+bool can_be_had(const Needed& n, double most_beads_per_um2) {
+  return n.beads_per_um2 && *n.beads_per_um2 <= most_beads_per_um2;
+}
+
+const Expected& expected_of(const Grid& grid, const Point& p, Quantity quantity) {
+  return *std::ranges::find_if(grid.expected, [&](const Expected& e) {
+    return e.quantity == quantity && e.point.youngs_modulus_kPa == p.youngs_modulus_kPa &&
+           e.point.beads_per_um2 == p.beads_per_um2 && e.point.noise_um == p.noise_um;
+  });
+}
+
+/// "a gel of 4 kPa needs 0.15", of all others.
+std::string of_other_gels(const Plan& plan, double own_kPa, double noise_um) {
+  std::string text;
+  for (const double E : plan.asked.youngs_modulus_kPa) {
+    if (E == own_kPa) continue;
+    const Needed& n = needed_of(plan.grid, E, noise_um);
+    text += text.empty() ? "; a gel of " : ", one of ";
+    text += brief(E) + " kPa ";
+    text += can_be_had(n, plan.most_beads_per_um2) ? "needs " + about(*n.beads_per_um2)
+                                                   : std::string("needs more beads than can be told apart");
+  }
+  return text;
+}
+
+std::string about_adhesions(const Plan& plan, const Point& p) {
+  const Expected& with = expected_of(plan.grid, p, Quantity::adhesion_force);
+  const Expected& alone = expected_of(plan.grid, p, Quantity::free_force);
+  std::string text = "At " + about(p.beads_per_um2) +
+                     " per µm² the force of the middle adhesion has a standard "
+                     "error of " +
+                     about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
+                     " nN without it; the smallest force seen is three times that. ";
+  const std::string pair =
+      "Without the network two adhesions of " + brief(plan.parameters.tension_nN) + " nN each are ";
+  if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
+  const std::string distance = about(*alone.least_distance_um) + " µm";
+  return text + pair +
+         (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on."
+                                                           : "told apart even where they touch, at " + distance + ".");
+}
+
+std::string about_cells(const Plan& plan) {
+  std::string text;
+  for (const CellNumbers& n : plan.cells) {
+    if (n.difference != plan.parameters.difference) continue;
+    if (n.fibres_per_cell != std::max(1.0, std::round(n.scatter.fibres_per_cell))) continue;
+    text += (text.empty() ? "" : ", ") + std::string(n.cells ? std::to_string(*n.cells) : "more than 10000") +
+            " for the " + name_of(n.scatter.type) + "s (" + brief(n.fibres_per_cell) + " a cell)";
+  }
+  if (text.empty()) return text;
+  return "To see a difference of " + percent(plan.parameters.difference) + " between two conditions with a chance of " +
+         percent(plan.parameters.power) + " takes so many cells of each: " + text + ".";
+}
+
+std::string about_drawn(const Drawn& d) {
+  if (d.tensions.empty()) return "";
+  constexpr double kMargin = 0.1;  // of what such plans are off by anyway (docs/planning.md)
+  const bool holds = std::abs(d.error_over_predicted - 1) < 2 * d.by_chance + kMargin;
+  return "Checked with " + std::to_string(d.n_experiments) +
+         (d.n_experiments == 1 ? " simulated experiment" : " simulated experiments") + " at " +
+         brief(d.point.youngs_modulus_kPa) + " kPa, " + brief(d.point.beads_per_um2) + " beads per µm² and " +
+         brief(d.point.noise_um) + " µm: the errors of " + std::to_string(d.tensions.size()) + " tensions were " +
+         about(d.error_over_predicted) + " times those predicted (root mean square; by chance within " +
+         about(2 * d.by_chance) + " of 1). " +
+         (holds ? "The plan holds. " : "The plan does not hold well here: allow for that factor. ") +
+         "Single adhesions' forces were off by " + about(d.forces.with_network_nN) + " nN with the network, by " +
+         about(d.forces.alone_nN) + " nN without it, and by " + about(d.forces.fttc_nN) + " nN with FTTC.";
+}
+
+}  // namespace
+
+double answered_gel_kPa(const Asked& asked, double own_kPa) {
+  return *std::ranges::min_element(asked.youngs_modulus_kPa, {},
+                                   [&](double E) { return std::abs(std::log(E / own_kPa)); });
+}
+
+Point answered_point(const Asked& asked, const Grid& grid, double own_kPa) {
+  Point point{answered_gel_kPa(asked, own_kPa), asked.beads_per_um2.back(), asked.noise_um.front()};
+  if (grid.needed.empty()) return point;
+  const Needed& n = needed_of(grid, point.youngs_modulus_kPa, point.noise_um);
+  for (const double density : asked.beads_per_um2) {
+    if (!n.beads_per_um2 || density < *n.beads_per_um2) continue;
+    point.beads_per_um2 = density;
+    break;
+  }
+  return point;
+}
+
+std::string answer_sentence(const Plan& plan) {
+  if (plan.grid.needed.empty()) return "The cell has no stress fibre whose tension could be seen.";
+  const double gel_kPa = answered_gel_kPa(plan.asked, plan.own_kPa), noise_um = plan.asked.noise_um.front();
+  const std::string asked_for =
+      "to see " + brief(plan.parameters.tension_nN) + " nN per fibre to " + percent(plan.asked.within);
+  const std::string with = "With " + std::string(gel_kPa == plan.own_kPa ? "your" : "a") + " gel of " + brief(gel_kPa) +
+                           " kPa and a noise of " + brief(noise_um) + " µm ";
+  const Needed& n = needed_of(plan.grid, gel_kPa, noise_um);
+  if (!n.beads_per_um2)
+    return with + "no number of beads suffices " + asked_for + ": networks and segmentation alone make an error of " +
+           about(plan.grid.model_error_nN) + " nN.";
+  if (!can_be_had(n, plan.most_beads_per_um2))
+    return with + "you would need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for + ", more than the " +
+           about(plan.most_beads_per_um2) + " that can be told apart" + of_other_gels(plan, gel_kPa, noise_um) + ".";
+  return with + "you need " + about(*n.beads_per_um2) + " beads per µm² " + asked_for +
+         of_other_gels(plan, gel_kPa, noise_um) + ".";
+}
+
+std::vector<std::string> further_sentences(const Plan& plan) {
+  std::vector<std::string> sentences;
+  const auto add = [&](const std::string& text) {
+    if (!text.empty()) sentences.push_back(text);
+  };
+  const Point point = answered_point(plan.asked, plan.grid, plan.own_kPa);
+  if (!plan.grid.needed.empty()) {
+    const Needed& n = needed_of(plan.grid, point.youngs_modulus_kPa, point.noise_um);
+    add(std::string("That holds for half of the fibres. ") +
+        (n.of_most <= plan.most_beads_per_um2
+             ? "Nine in ten need " + about(n.of_most) + " beads per µm²."
+             : std::string(
+                   "Nine in ten do not reach it with any number of beads: for some of them mesh and segmentation "
+                   "alone make a larger error.")));
+  }
+  add(about_adhesions(plan, point));
+  add(about_cells(plan));
+  if (plan.drawn) add(about_drawn(*plan.drawn));
+  return sentences;
+}
+
+}  // namespace mbtfm::plan

@@ -1,0 +1,256 @@
+#include "mbtfm/plan/grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mbtfm/tensions/linear_data.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "substrate/choice/large_strain.h"
+
+namespace mbtfm::plan {
+
+using namespace tensions;
+
+namespace {
+
+/// Of one estimate: what the beads make, and what the rest makes.
+struct Errors {
+  double beads_nN = 0;
+  OtherParts other;
+  double total_nN() const { return std::hypot(beads_nN, other.total_nN()); }
+};
+
+double scale_of(const Point& p) { return p.noise_um * p.youngs_modulus_kPa; }
+
+std::vector<Errors> errors_of_tensions(const Computed& c, const Precision& unit, double scale,
+                                       const std::vector<std::size_t>& labels) {
+  std::vector<Errors> errors;
+  for (const std::size_t i : labels)
+    errors.push_back({scale * unit.tensions[static_cast<Eigen::Index>(i)], c.model.tensions[i]});
+  return errors;
+}
+
+std::vector<Errors> errors_of_forces(const Eigen::VectorXd& unit, double scale, const Eigen::VectorXd& model_nN) {
+  std::vector<Errors> errors;
+  for (Eigen::Index a = 0; a < unit.size(); ++a)
+    errors.push_back({scale * unit[a], {.other_nN = model_nN.size() > 0 ? model_nN[a] : 0}});
+  return errors;
+}
+
+std::vector<std::size_t> labels_of(const Scene& scene, const KnownCell& cell, std::optional<FibreType> type) {
+  std::vector<std::size_t> labels;
+  for (std::size_t i = 1; i < cell.fibre_ids.size(); ++i) {
+    const auto fibre = std::ranges::find(scene.cell.cell.fibres, cell.fibre_ids[i], &Fibre::fibre_id);
+    if (!type || fibre->type == *type) labels.push_back(i);
+  }
+  return labels;
+}
+
+Quantity quantity_of(FibreType type) {
+  switch (type) {
+    case FibreType::dorsal:
+      return Quantity::dorsal;
+    case FibreType::arc:
+      return Quantity::arc;
+    case FibreType::ventral:
+      return Quantity::ventral;
+    case FibreType::edge:
+      break;
+  }
+  return Quantity::edge;
+}
+
+template <class Of>
+double median_of(const std::vector<Errors>& errors, const Of& of) {
+  std::vector<double> values;
+  for (const Errors& e : errors) values.push_back(of(e));
+  return numerics::median_in(values);
+}
+
+Expected expected_of(const Point& point, Quantity quantity, const std::vector<Errors>& errors, double target_nN) {
+  const auto is_within = [&](const Errors& e) { return e.total_nN() <= target_nN; };
+  return {.point = point,
+          .quantity = quantity,
+          .n = static_cast<int>(errors.size()),
+          .standard_error_nN = median_of(errors, [](const Errors& e) { return e.total_nN(); }),
+          .from_beads_nN = median_of(errors, [](const Errors& e) { return e.beads_nN; }),
+          .from_mesh_nN = median_of(errors, [](const Errors& e) { return e.other.mesh_nN; }),
+          .from_segmentation_nN = median_of(errors, [](const Errors& e) { return e.other.segmentation_nN; }),
+          .from_other_nN = median_of(errors, [](const Errors& e) { return e.other.other_nN; }),
+          .target_nN = target_nN,
+          .share_within =
+              static_cast<double>(std::ranges::count_if(errors, is_within)) / static_cast<double>(errors.size()),
+          .smallest_seen_nN = Grid::kSeen * median_of(errors, [](const Errors& e) { return e.total_nN(); }),
+          .least_distance_um = {}};
+}
+
+double median_area_um2(const Scene& scene) {
+  std::vector<double> areas;
+  for (const Adhesion& a : scene.cell.cell.adhesions) areas.push_back(a.area_um2);
+  return numerics::median_in(areas);
+}
+
+/// Of the cell on its own gel; it falls with the modulus.
+struct OnOwnGel {
+  double largest_displacement_um = 0, traction_kPa = 0;
+};
+OnOwnGel on_own_gel(const Computed& c) {
+  const Eigen::VectorXd u_um = c.densest.response->displace(c.cell.forces_nN);
+  OnOwnGel own{.traction_kPa = choice::mean_traction_kPa(c.cell.ellipses, c.cell.forces_nN)};
+  for (Eigen::Index row = 0; row < u_um.size(); row += 2)
+    own.largest_displacement_um = std::max(own.largest_displacement_um, u_um.segment<2>(row).norm());
+  return own;
+}
+
+Gel of_modulus(Gel gel, double youngs_modulus_kPa) {
+  gel.youngs_modulus_kPa = youngs_modulus_kPa;
+  return gel;
+}
+
+/// All quantities at a point.
+std::vector<Expected> at_point(const Scene& scene, const Asked& asked, const Computed& c, const Precision& unit,
+                               const Point& point) {
+  const double scale = scale_of(point);
+  std::vector<Expected> all;
+  const auto add_fibres = [&](Quantity quantity, std::optional<FibreType> type) {
+    const std::vector<std::size_t> labels = labels_of(scene, c.cell, type);
+    if (!labels.empty())
+      all.push_back(expected_of(point, quantity, errors_of_tensions(c, unit, scale, labels), asked.target_nN));
+  };
+  add_fibres(Quantity::fibres, {});
+  for (const FibreType type : kFibreTypes) add_fibres(quantity_of(type), type);
+  const double network_nN = scale * unit.tensions[0] * c.model.network_force_nN / c.cell.tensions_nN[0];
+  all.push_back(expected_of(point, Quantity::network_force, {{network_nN, c.model.network_force}},
+                            asked.within * c.model.network_force_nN));
+  all.push_back(expected_of(point, Quantity::total_force, {{scale * unit.total_force, c.model.total_force}},
+                            asked.within * c.model.total_force_nN));
+  all.push_back(expected_of(point, Quantity::adhesion_force,
+                            errors_of_forces(unit.adhesion_forces, scale, c.model.adhesion_forces_nN),
+                            asked.target_nN));
+  all.push_back(
+      expected_of(point, Quantity::free_force, errors_of_forces(unit.free_forces, scale, {}), asked.target_nN));
+  return all;
+}
+
+/// Density at which a tension's standard error is the target; infinite where what is left without noise is more.
+double needed_beads_per_um2(const Computed& c, std::size_t label, double target_nN, double scale) {
+  const double other_nN = c.model.tensions[label].total_nN();
+  if (other_nN >= target_nN) return std::numeric_limits<double>::infinity();
+  const double wanted = std::sqrt(target_nN * target_nN - other_nN * other_nN) / scale;
+  double low = 1e-6, high = 1e6;  // errors fall as the density rises
+  while (high / low > 1 + 1e-6) {
+    const double middle = std::sqrt(low * high);
+    (unit_error(c.densities, label, middle) > wanted ? low : high) = middle;
+  }
+  return high;
+}
+
+/// At which this share of the fibres has it.
+double needed_by_share(const Computed& c, double share, double target_nN, double scale) {
+  std::vector<double> needed;
+  for (std::size_t i = 1; i < c.cell.fibre_ids.size(); ++i)
+    needed.push_back(needed_beads_per_um2(c, i, target_nN, scale));
+  const auto rank = std::min(needed.size() - 1, static_cast<std::size_t>(share * static_cast<double>(needed.size())));
+  return numerics::of_rank_in(needed, rank);
+}
+
+std::vector<std::string> warnings_of(const Asked& asked, const Computed& c, const Scene& scene) {
+  constexpr double kOfNoise = 3;          // less is not told from noise bead by bead
+  constexpr double kBeyondLinear = 0.05;  // the caution strain-beyond-linear of the fit
+  const OnOwnGel own = on_own_gel(c);
+  std::vector<std::string> warnings;
+  for (const double E : asked.youngs_modulus_kPa) {
+    const double largest_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
+    for (const double noise_um : asked.noise_um)
+      if (largest_um < kOfNoise * noise_um)
+        warnings.push_back("On " + brief(E) + " kPa no bead moves by more than " + brief(largest_um) +
+                           " µm, less than three times the noise of " + brief(noise_um) +
+                           " µm: the cell is hardly seen. Take a softer gel.");
+    const double left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
+    if (left_out > kBeyondLinear)
+      warnings.push_back("On " + brief(E) + " kPa linear elasticity leaves out some " + brief(100 * left_out) +
+                         " % of the displacement, which is strained beyond its range: evaluate with "
+                         "substrate.material = neo-hooke, or take a stiffer gel.");
+  }
+  return warnings;
+}
+
+}  // namespace
+
+double most_beads_per_um2(const Scene& scene) {
+  // of discs at random that keep this distance: they jam at 0.547 of the area (Feder, J. Theor. Biol. 87, 237 (1980))
+  constexpr double kJammed = 0.547;
+  const double distance_um = scene.experiment.bead_distance_um;
+  return kJammed * 4 / (3.141592653589793 * distance_um * distance_um);
+}
+
+double unit_error(const Densities& d, std::size_t label, double beads_per_um2) {
+  const auto error = [&](std::size_t k) { return d.precision[k].tensions[static_cast<Eigen::Index>(label)]; };
+  const auto by_law = [&](std::size_t k) { return error(k) * std::sqrt(d.beads_per_um2[k] / beads_per_um2); };
+  const auto above = std::ranges::lower_bound(d.beads_per_um2, beads_per_um2);
+  if (above == d.beads_per_um2.begin()) return by_law(0);
+  if (above == d.beads_per_um2.end()) return by_law(d.beads_per_um2.size() - 1);
+  const auto k = static_cast<std::size_t>(above - d.beads_per_um2.begin());
+  const double share =
+      std::log(beads_per_um2 / d.beads_per_um2[k - 1]) / std::log(d.beads_per_um2[k] / d.beads_per_um2[k - 1]);
+  return std::pow(error(k - 1), 1 - share) * std::pow(error(k), share);
+}
+
+double standard_error_nN(const Computed& c, std::size_t label, const Point& point) {
+  return std::hypot(scale_of(point) * unit_error(c.densities, label, point.beads_per_um2),
+                    c.model.tensions[label].total_nN());
+}
+
+Computed compute(const Scene& scene, const Asked& asked, const Work& work) {
+  Computed c{.cell = known_cell(scene, work.part(0, 0.2)), .densest = {}, .densities = {}, .model = {}};
+  c.densities = precision_at(scene, c.cell, asked.beads_per_um2, work.part(0.2, 0.3));
+  work.tell(0.5, "the model's own error");
+  c.densest = beads_on_gel(scene, c.cell, asked.beads_per_um2.back(), 0, work.threads);
+  c.model = model_errors(
+      scene, c.cell, exact_beads(c.densest.places_um, *c.densest.response, c.cell.forces_nN, asked.noise_um.front()),
+      c.densest.response, work);
+  return c;
+}
+
+Grid grid_of(const Scene& scene, const Asked& asked, const Computed& c) {
+  Grid grid;
+  const OnOwnGel own = on_own_gel(c);
+  const PairResolution pairs(scene.fit.gel, median_area_um2(scene), 1);
+  grid.touching_um = pairs.touching_um();
+  const double force_nN = asked.target_nN / asked.within;
+  for (const double E : asked.youngs_modulus_kPa) {
+    for (std::size_t k = 0; k < asked.beads_per_um2.size(); ++k) {
+      for (const double noise_um : asked.noise_um) {
+        const Point point{E, asked.beads_per_um2[k], noise_um};
+        for (Expected e : at_point(scene, asked, c, c.densities.precision[k], point)) {
+          e.largest_displacement_um = own.largest_displacement_um * c.densest.modulus_kPa / E;
+          e.left_out = choice::left_out_at_beads(of_modulus(scene.fit.gel, E), own.traction_kPa);
+          if (e.quantity == Quantity::free_force)
+            e.least_distance_um = pairs.least_distance_um(force_nN, E, point.beads_per_um2, noise_um);
+          grid.expected.push_back(e);
+        }
+      }
+    }
+  }
+  if (c.cell.fibre_ids.size() > 1) {
+    for (const double E : asked.youngs_modulus_kPa) {
+      for (const double noise_um : asked.noise_um) {
+        constexpr double kMost = 0.9;
+        const double middle = needed_by_share(c, 0.5, asked.target_nN, noise_um * E);
+        grid.needed.push_back({.youngs_modulus_kPa = E,
+                               .noise_um = noise_um,
+                               .beads_per_um2 = std::isfinite(middle) ? std::optional(middle) : std::nullopt,
+                               .of_most = needed_by_share(c, kMost, asked.target_nN, noise_um * E)});
+      }
+    }
+    std::vector<double> other_nN;
+    for (std::size_t i = 1; i < c.model.tensions.size(); ++i) other_nN.push_back(c.model.tensions[i].total_nN());
+    grid.model_error_nN = numerics::median_in(other_nN);
+  }
+  grid.warnings = warnings_of(asked, c, scene);
+  return grid;
+}
+
+}  // namespace mbtfm::plan

@@ -1,0 +1,85 @@
+#include "mbtfm/plan/parameters.h"
+
+#include <algorithm>
+#include <charconv>
+#include <sstream>
+
+#include "pipeline/contract/errors.h"
+
+namespace mbtfm::plan {
+
+namespace {
+
+constexpr std::size_t kMostNumbers = 12;  // of a list: curves of more cannot be told apart
+
+double number_in(const std::string& name, const std::string& text, const Range& range) {
+  double value = 0;
+  const char* end = text.data() + text.size();
+  const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
+  if (error != std::errc() || stop != end || !is_inside(range, value))
+    throw UsageError(name + ": expected " + describe("numbers", range) + " with commas between them, found '" + text +
+                     "'");
+  return value;
+}
+
+/// Ascending, each once.
+std::vector<double> numbers_in(const std::string& name, const std::string& list, const Range& range) {
+  std::vector<double> numbers;
+  std::istringstream texts(list);
+  for (std::string text; std::getline(texts, text, ',');) {
+    std::erase(text, ' ');
+    const double value = number_in(name, text, range);
+    if (std::ranges::find(numbers, value) == numbers.end()) numbers.push_back(value);
+  }
+  if (numbers.empty()) throw UsageError(name + ": expected at least one number, found none");
+  if (numbers.size() > kMostNumbers)
+    throw UsageError(name + ": expected at most " + std::to_string(kMostNumbers) + " numbers, found " +
+                     std::to_string(numbers.size()));
+  return numbers;
+}
+
+double share_in(const std::string& name, std::string text) {
+  std::erase(text, ' ');
+  const bool is_percent = text.ends_with('%');
+  if (is_percent) text.pop_back();
+  const Range range = Range::between(is_percent ? 0.1 : 0.001, is_percent ? 1000 : 10);
+  return number_in(name, text, range) / (is_percent ? 100 : 1);
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, Parameters& p) {
+  list.table("plan");
+  list.add("scenario", p.scenario, "simulated cell to plan with: name of a scenario, or path of a scenario file");
+  list.add("seed", p.seed, "of the simulated cell and of the drawn experiments");
+  list.add("noise_um", p.noise_um,
+           "standard deviations of a displacement component (um), with commas; the answer speaks of the first");
+  list.add("beads_per_um2", p.beads_per_um2, "beads by area (1/um²), with commas");
+  list.add("youngs_modulus_kPa", p.youngs_modulus_kPa,
+           "Young's moduli of the gel (kPa), with commas; empty: half, once and twice the cell's own");
+  list.add("tension_nN", p.tension_nN, Range::force_nN(), "tension, or force of an adhesion, that is to be seen (nN)");
+  list.add("within", p.within, "standard error that it may have, as 20% or 0.2");
+  list.add("drawn", p.drawn, Range::between(0, 100), "experiments that are simulated and fitted to check the answer");
+  list.add("between_cells", p.between_cells, Range::between(0, 10),
+           "number of cells: standard deviation of a type's mean tension from cell to cell, over that mean");
+  list.add("difference", p.difference, Range::between(0.01, 100),
+           "number of cells: difference of two conditions that is to be seen, over the mean tension");
+  list.add("power", p.power, Range::between(0.06, 0.999),
+           "number of cells: chance to see that difference at a level of 5 %");
+}
+
+Asked asked_by(const Parameters& p, double own_kPa) {
+  Asked asked;
+  asked.noise_um = numbers_in("noise_um", p.noise_um, Range::between(1e-5, 10));
+  asked.beads_per_um2 = numbers_in("beads_per_um2", p.beads_per_um2, Range::between(1e-4, 25));
+  asked.youngs_modulus_kPa = p.youngs_modulus_kPa.empty()
+                                 ? std::vector<double>{0.5 * own_kPa, own_kPa, 2 * own_kPa}
+                                 : numbers_in("youngs_modulus_kPa", p.youngs_modulus_kPa, Range::modulus_kPa());
+  std::ranges::sort(asked.beads_per_um2);
+  std::ranges::sort(asked.youngs_modulus_kPa);
+  asked.within = share_in("within", p.within);
+  asked.target_nN = asked.within * p.tension_nN;
+  return asked;
+}
+
+}  // namespace mbtfm::plan

@@ -1,0 +1,92 @@
+/// mbtfm-plan: how many beads, which gel, how little noise and how many cells a question takes.
+#include "mbtfm/plan/answer.h"
+#include "mbtfm/plan/page.h"
+#include "mbtfm/plan/tables.h"
+#include "pipeline/files/text.h"
+#include "pipeline/stage/console.h"
+#include "pipeline/stage/stage.h"
+#include "pipeline/statistics/png.h"
+
+namespace mbtfm::plan {
+namespace {
+
+Scene scene_of(const Parameters& parameters, stage::StageContext& context) {
+  if (!context.has_input("cell")) return simulated_scene(parameters);
+  return measured_scene(context.input("cell", kFilesOfCell), parameters);
+}
+
+std::vector<CellNumbers> cells_of(const Scene& scene, const Computed& computed, const Point& point,
+                                  const Parameters& parameters, stage::StageContext& context) {
+  std::vector<Scatter> scatter = scatter_of(scene, computed, point, parameters.between_cells);
+  if (context.has_input("study"))
+    scatter = scatter_of_study(context.input("study", {"types.csv", "variances.csv"}), std::move(scatter));
+  return cell_numbers(scatter, parameters.difference, parameters.power);
+}
+
+Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
+  const Work work(context.threads, context.progress);
+  const Scene scene = scene_of(parameters, context);
+  const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
+  const Asked asked = asked_by(parameters, own_kPa);
+  const Computed computed = compute(scene, asked, work);
+  Plan plan{.name = scene.name,
+            .own_kPa = own_kPa,
+            .parameters = parameters,
+            .asked = asked,
+            .grid = grid_of(scene, asked, computed),
+            .most_beads_per_um2 = most_beads_per_um2(scene),
+            .drawn = {},
+            .cells = {}};
+  const Point point = answered_point(asked, plan.grid, own_kPa);
+  plan.cells = cells_of(scene, computed, point, parameters, context);
+  if (parameters.drawn > 0) plan.drawn = draw_experiments(scene, computed, point, parameters.drawn, work);
+  return plan;
+}
+
+void write(const Plan& plan, stage::StageContext& context) {
+  const auto out = [&](const char* file) { return context.output("out", file); };
+  files::write(out("plan.csv"), expected_table(), plan.grid.expected);
+  files::write(out("plan_needed.csv"), needed_table(), plan.grid.needed);
+  files::write(out("plan_cells.csv"), cell_table(), plan.cells);
+  if (plan.drawn) files::write(out("plan_drawn.csv"), drawn_table(), plan.drawn->tensions);
+  const std::string svg = svg_of(plan);
+  files::write_text(out("plan.svg"), svg);
+  constexpr double kScale = 2;  // sharp on a screen of many pixels
+  statistics::write_png(out("plan.png"), svg, kScale);
+  files::write_text(out("plan.html"), html_of(plan));
+}
+
+StageReport run(const Parameters& parameters, stage::StageContext& context) {
+  const Plan plan = plan_of(parameters, context);
+  write(plan, context);
+  context.progress(1, "done");
+  stage::print(answer_sentence(plan) + "\n");
+  for (const std::string& sentence : further_sentences(plan)) stage::print(sentence + "\n");
+  for (const std::string& warning : plan.grid.warnings) stage::print("Mind: " + warning + "\n");
+  StageReport report;
+  report.summary = plan.name + ": " + std::to_string(plan.asked.youngs_modulus_kPa.size()) + " gels, " +
+                   std::to_string(plan.asked.beads_per_um2.size()) + " densities, " +
+                   std::to_string(plan.asked.noise_um.size()) + " noises; plan.html in " +
+                   context.outputs_.at("out").string();
+  report.figures = {{"target_nN", plan.asked.target_nN}, {"model_error_nN", plan.grid.model_error_nN}};
+  if (plan.drawn) report.figures.emplace_back("error_over_predicted", plan.drawn->error_over_predicted);
+  return report;
+}
+
+}  // namespace
+}  // namespace mbtfm::plan
+
+int main(int argc, char** argv) {
+  using mbtfm::stage::FileArgument;
+  using Kind = FileArgument::Kind;
+  return mbtfm::stage::run_stage<mbtfm::plan::Parameters>(
+      {.name = "plan",
+       .purpose = "how many beads, which gel, how little noise and how many cells a question takes",
+       .files =
+           {{"cell", Kind::optional_input, "a cell folder that mbtfm run has finished, in place of a scenario"},
+            {"study", Kind::optional_input,
+             "statistics folder of a finished study: its scatter within and between cells is planned with"},
+            {"out", Kind::output_folder,
+             "folder for plan.html, plan.csv, plan_needed.csv, plan_cells.csv, plan_drawn.csv, plan.svg, plan.png"}}},
+      argc, argv, mbtfm::plan::run);
+}

@@ -1,0 +1,148 @@
+/// mbtfm plan and mbtfm noise as a person runs them.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "pipeline/files/csv.h"
+#include "pipeline/files/csv_files.h"
+#include "tests/support/program.h"
+
+namespace mbtfm {
+namespace {
+
+namespace fs = std::filesystem;
+using test::Outcome;
+using test::run_program;
+
+const std::string kSmall =
+    "mbtfm plan --scenario two-adhesions --noise_um 0.02,0.05 --beads_per_um2 0.5,1 --youngs_modulus_kPa 4,8 ";
+
+TEST(Plan, a_question_is_answered_with_a_sentence_tables_a_picture_and_a_page) {
+  const test::TemporaryFolder folder;
+  const fs::path out = folder / "plan";
+  const Outcome outcome = run_program(kSmall + "--drawn 1 --out " + out.string());
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("beads per µm² to see 1 nN per fibre to 20 %"), std::string::npos) << outcome.output;
+  EXPECT_NE(outcome.output.find("Checked with 1 simulated experiment"), std::string::npos) << outcome.output;
+  for (const char* file :
+       {"plan.html", "plan.csv", "plan_needed.csv", "plan_cells.csv", "plan_drawn.csv", "plan.svg", "plan.png"}) {
+    EXPECT_GT(fs::file_size(out / file), 100u) << file;
+  }
+  const files::CsvTable table(out / "plan.csv");
+  // 2 gels, 2 densities, 2 noises; fibres, ventral fibres, network, total, adhesions twice
+  EXPECT_EQ(table.n_rows(), 8 * 6);
+  const std::string page = files::read_text(out / "plan.html");
+  EXPECT_EQ(page.find("http://localhost"), page.npos);
+  EXPECT_NE(page.find("How many cells"), page.npos);
+}
+
+TEST(Plan, the_same_question_has_the_same_answer_for_any_number_of_threads) {
+  const test::TemporaryFolder folder;
+  for (const char* threads : {"1", "2"}) {
+    const Outcome outcome =
+        run_program(kSmall + "--drawn 1 --threads " + threads + " --out " + (folder / threads).string());
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+  }
+  for (const char* file : {"plan.csv", "plan_drawn.csv", "plan.html"})
+    EXPECT_EQ(files::read_text(folder / "1" / file), files::read_text(folder / "2" / file)) << file;
+}
+
+TEST(Plan, a_finished_cell_is_planned_with_by_its_own_tensions_beads_and_gel) {
+  const test::TemporaryFolder folder;
+  const fs::path cell = folder / "cell", out = folder / "plan";
+  ASSERT_EQ(
+      run_program("mbtfm-simulate --quiet --scenario two-adhesions --beads 2500 --noise_um 0.02 --out " + cell.string())
+          .code,
+      0);
+  const std::string ask = "mbtfm plan --cell " + cell.string() + " --drawn 0 --beads_per_um2 1 --out " + out.string();
+  EXPECT_EQ(run_program(ask).code, 3) << "its fit is missing";
+  EXPECT_FALSE(fs::exists(out));
+  ASSERT_EQ(run_program("mbtfm run --quiet " + cell.string()).code, 0);
+  const Outcome outcome = run_program(ask);
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("your gel of 8.4 kPa"), std::string::npos) << outcome.output;
+}
+
+TEST(Plan, what_is_no_plan_is_refused_and_leaves_nothing_behind) {
+  const test::TemporaryFolder folder;
+  const std::string out = " --out " + (folder / "plan").string();
+  for (const char* bad : {"--noise_um 0", "--noise_um a,b", "--beads_per_um2 1,-2", "--youngs_modulus_kPa 8400000000",
+                          "--within never", "--scenario no-such", "--beads_per_um2 20", "--power 2"}) {
+    const Outcome outcome = run_program("mbtfm plan --scenario two-adhesions " + std::string(bad) + out);
+    EXPECT_EQ(outcome.code, 2) << bad << ": " << outcome.output;
+  }
+  EXPECT_EQ(run_program("mbtfm plan --cell " + (folder / "nowhere").string() + out).code, 3);
+  EXPECT_FALSE(fs::exists(folder / "plan"));
+}
+
+/// A cell that hardly pulls, so that the two bead images differ by the noise alone.
+class Unloaded : public ::testing::Test {
+ protected:
+  static constexpr double kNoise_um = 0.05;
+  static constexpr double kDensity = 0.3;
+  void SetUp() override {
+    const Outcome made = run_program(
+        "mbtfm-simulate --quiet --scenario two-adhesions --images --ventral_median_nN 1e-5 --smallest_tension_nN 1e-6 "
+        "--surface_tension_nN_per_um 0 --drift_x_um 0.31 --lost_bead_fraction 0.05 --noise_um " +
+        std::to_string(kNoise_um) + " --beads_per_um2 " + std::to_string(kDensity) + " --out " + cell().string());
+    ASSERT_EQ(made.code, 0) << made.output;
+  }
+  fs::path cell() const { return folder_ / "cell"; }
+  std::string picture(const char* name) const { return (cell() / name).string(); }
+
+ private:
+  test::TemporaryFolder folder_;
+};
+
+double number_after(const std::string& text, const std::string& words) {
+  const auto at = text.find(words);
+  return at == text.npos ? std::nan("") : std::stod(text.substr(text.find_first_not_of(' ', at + words.size())));
+}
+
+TEST_F(Unloaded, noise_density_drift_and_share_lost_are_found) {
+  const Outcome found =
+      run_program("mbtfm noise " + picture("beads_relaxed.tif") + " " + picture("beads_stressed.tif"));
+  ASSERT_EQ(found.code, 0) << found.output;
+  // the camera adds some nm to the beads' own; what neighbours tell takes some away; 800 beads tell it to 3 %
+  EXPECT_NEAR(number_after(found.output, "noise of a displacement component"), kNoise_um, 0.15 * kNoise_um)
+      << found.output;
+  EXPECT_NEAR(number_after(found.output, "drift "), 0.31, 4 * kNoise_um / std::sqrt(kDensity * 51.2 * 51.2));
+  // beads that melt together or lie on the rim are not followed
+  EXPECT_NEAR(number_after(found.output, "beads followed"), kDensity, 0.2 * kDensity) << found.output;
+  const double lost = number_after(found.output, "share lost");
+  EXPECT_GT(lost, 1) << found.output;
+  EXPECT_LT(lost, 15) << found.output;
+  EXPECT_EQ(found.output.find("WARNING"), std::string::npos) << found.output;
+}
+
+TEST_F(Unloaded, one_picture_twice_or_one_alone_is_refused) {
+  const std::string one = picture("beads_relaxed.tif");
+  EXPECT_EQ(run_program("mbtfm noise " + one + " " + one).code, 3);
+  EXPECT_EQ(run_program("mbtfm noise " + one).code, 2);
+}
+
+/// The noise that a simulation is asked for is the noise it has, whatever the gel.
+TEST(Simulate, noise_in_um_and_beads_by_area_hold_on_every_gel) {
+  const test::TemporaryFolder folder;
+  for (const char* gel : {"1", "16"}) {
+    const fs::path cell = folder / gel;
+    const Outcome made = run_program(
+        "mbtfm-simulate --quiet --scenario two-adhesions --noise_um 0.03 --beads_per_um2 0.5 --youngs_modulus_kPa " +
+        std::string(gel) + " --out " + cell.string());
+    ASSERT_EQ(made.code, 0) << made.output;
+    const auto truth = files::read_displacement(cell / "truth/displacement.csv"),
+               measured = files::read_displacement(cell / "2_track/displacement.csv");
+    ASSERT_EQ(measured.size(), static_cast<std::size_t>(std::lround(0.5 * 51.2 * 51.2)));
+    double squares = 0;
+    for (std::size_t i = 0; i < truth.size(); ++i) {
+      const Vec2 d = measured[i].displacement_um - truth[i].displacement_um;
+      squares += dot(d, d);
+      EXPECT_DOUBLE_EQ(measured[i].sigma_um, 0.03);
+    }
+    // of 2622 components: three standard deviations of their root mean square are 4 %
+    EXPECT_NEAR(std::sqrt(squares / (2.0 * static_cast<double>(truth.size()))), 0.03, 0.04 * 0.03);
+  }
+}
+
+}  // namespace
+}  // namespace mbtfm

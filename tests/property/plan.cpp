@@ -1,0 +1,225 @@
+/// Laws of a plan: how its errors scale, and that they are those of the fit.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "mbtfm/plan/cell_numbers.h"
+#include "mbtfm/plan/drawn.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/order_statistics.h"
+
+namespace mbtfm::plan {
+namespace {
+
+constexpr int kThreads = 2;
+
+/// A small cell, quick to plan with.
+Scene small_scene(double youngs_modulus_kPa = 8) {
+  Parameters parameters;
+  Scene scene = simulated_scene(parameters);
+  drawing::ScenarioParameters& p = scene.experiment;
+  p.cell.diameter_um = 30;
+  p.cell.n_adhesions = 40;
+  p.cell.n_ventral = 2;
+  p.cell.n_dorsal = 2;
+  p.cell.n_arc = 0;
+  p.microscope.image_size_px = 512;
+  p.gel.youngs_modulus_kPa = scene.fit.gel.youngs_modulus_kPa = youngs_modulus_kPa;
+  const double side_um = drawing::field_um(p.microscope);
+  scene.cell = drawing::draw_cell(p.cell, p.tension, side_um, p.seed);
+  scene.field = {{0, 0}, {side_um, side_um}};
+  return scene;
+}
+
+struct Small {
+  Scene scene = small_scene();
+  KnownCell cell = known_cell(scene, {.threads = kThreads});
+};
+const Small& small() {
+  static const Small small;
+  return small;
+}
+
+double median_of(const Eigen::VectorXd& v) { return numerics::median(std::vector<double>(v.begin(), v.end())); }
+
+/// The fit states for its own beads what the plan says of them: two ways to the same bound.
+TEST(Plan, its_error_by_beads_is_that_which_a_fit_states) {
+  const auto& [scene, cell] = small();
+  constexpr double kNoise_um = 1e-3;  // so that the fit ends where the plan stands
+  const BeadsOnGel beads = beads_on_gel(scene, cell, 1, 0, kThreads);
+  const Precision unit = precision_of(scene, cell, beads, kThreads);
+  // forces of a network of the fit's own: no other error than noise
+  tensions::ReducedData none;  // none are needed for forces
+  none.compliance =
+      std::make_shared<const Eigen::MatrixXd>(Eigen::MatrixXd::Zero(cell.forces_nN.size(), cell.forces_nN.size()));
+  none.target = Eigen::VectorXd::Zero(cell.forces_nN.size());
+  const tensions::TensionProblem problem(cell.networks.front(), none, cell.adhesion_ids);
+  const tensions::Trial truth = problem.evaluate(cell.tensions_nN);
+  const DisplacementField field = exact_beads(beads.places_um, *beads.response, truth.forces_nN, kNoise_um);
+  const std::vector<cables::CableNetwork> one = {cell.networks.front()};
+  const tensions::EnsembleFit fit = tensions::fit_ensemble(
+      one, tensions::reduce(field, beads.response, {}, kThreads, tensions::affine_motions(field)), cell.adhesion_ids,
+      scene.fit.fit, kThreads, {}, {}, &truth);
+  for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
+    const double planned = kNoise_um * scene.fit.gel.youngs_modulus_kPa * unit.tensions[static_cast<Eigen::Index>(i)];
+    // the plan takes the mean of two meshes, of which the fit has the first: tensions differ by some per cent
+    EXPECT_NEAR(fit.tensions_nN[i].noise, planned, 0.2 * planned) << "tension " << i;
+  }
+}
+
+TEST(Plan, twice_the_modulus_is_twice_the_error) {
+  const auto& [scene, cell] = small();
+  const Scene stiff = small_scene(16);
+  const Precision soft = precision_of(scene, cell, beads_on_gel(scene, cell, 1, 0, kThreads), kThreads),
+                  hard = precision_of(stiff, cell, beads_on_gel(stiff, cell, 1, 0, kThreads), kThreads);
+  // unit errors are those on 1 kPa: the same from either gel, to rounding of the normal matrix (1e-13 of its trace)
+  EXPECT_LT((soft.tensions - hard.tensions).norm(), 1e-7 * soft.tensions.norm());
+  EXPECT_NEAR(soft.total_force, hard.total_force, 1e-7 * soft.total_force);
+}
+
+TEST(Plan, four_times_the_beads_halve_the_error) {
+  const auto& [scene, cell] = small();
+  const Densities d = precision_at(scene, cell, {0.5, 2}, {.threads = kThreads});
+  const double thin = median_of(d.precision[0].tensions), dense = median_of(d.precision[1].tensions);
+  // But for which places few beads have by chance: of a tension the beads near its two adhesions tell half, and of
+  // some six of these the number scatters by 40 %, the error by 20 %, the median of five over three draws by 10 %.
+  EXPECT_NEAR(thin / dense, 2, 0.5);
+  EXPECT_NEAR(d.precision[0].total_force / d.precision[1].total_force, 2, 0.4);
+}
+
+TEST(Plan, between_densities_the_error_lies_between_and_beyond_them_it_follows_the_law) {
+  const auto& [scene, cell] = small();
+  const Densities d = precision_at(scene, cell, {0.5, 2}, {.threads = kThreads});
+  const double thin = unit_error(d, 1, 0.5), dense = unit_error(d, 1, 2);
+  EXPECT_DOUBLE_EQ(thin, d.precision[0].tensions[1]);
+  EXPECT_NEAR(dense, d.precision[1].tensions[1], 1e-12 * dense);
+  EXPECT_NEAR(unit_error(d, 1, 1), std::sqrt(thin * dense), 1e-12 * thin);
+  EXPECT_NEAR(unit_error(d, 1, 8), dense / 2, 1e-12 * dense);
+  EXPECT_NEAR(unit_error(d, 1, 0.125), 2 * thin, 1e-12 * thin);
+}
+
+TEST(Plan, at_the_density_that_is_needed_half_of_the_fibres_meet_the_target) {
+  const Scene& scene = small().scene;
+  Parameters p;
+  p.noise_um = "0.02";
+  p.beads_per_um2 = "0.5,1,2";
+  p.youngs_modulus_kPa = "4,8";
+  p.within = "50%";
+  const Asked asked = asked_by(p, 8);
+  const Computed computed = compute(scene, asked, {.threads = kThreads});
+  const Grid grid = grid_of(scene, asked, computed);
+  ASSERT_EQ(grid.needed.size(), 2u);
+  for (const Needed& n : grid.needed) {
+    ASSERT_TRUE(n.beads_per_um2) << n.youngs_modulus_kPa;
+    int n_within = 0;
+    const auto n_fibres = static_cast<int>(computed.cell.fibre_ids.size()) - 1;
+    for (int i = 1; i <= n_fibres; ++i) {
+      // a millionth beyond, where the search for it ends
+      const Point point{n.youngs_modulus_kPa, *n.beads_per_um2 * (1 + 1e-5), n.noise_um};
+      n_within += standard_error_nN(computed, static_cast<std::size_t>(i), point) <= asked.target_nN;
+    }
+    EXPECT_GE(2 * n_within, n_fibres);
+    EXPECT_LT(2 * (n_within - 1), n_fibres + 1);
+  }
+  // the model's part is that of every gel: half the modulus needs a quarter of the beads where the law holds
+  EXPECT_LT(*grid.needed[0].beads_per_um2, *grid.needed[1].beads_per_um2);
+}
+
+TEST(Plan, a_list_that_is_none_is_refused) {
+  Parameters p;
+  for (const char* bad : {"", "0.1,", "a", "0.1;0.2", "-1", "0", "1e9", "0.1 0.2", ",", "nan"}) {
+    p.noise_um = bad;
+    if (std::string(bad) == "0.1,") continue;  // a comma at the end ends the list
+    EXPECT_THROW(asked_by(p, 8), UsageError) << bad;
+  }
+  p.noise_um = "0.05, 0.02,0.05";
+  EXPECT_EQ(asked_by(p, 8).noise_um, (std::vector<double>{0.05, 0.02})) << "the first stays the first";
+  p.within = "20 %";
+  EXPECT_DOUBLE_EQ(asked_by(p, 8).target_nN, 0.2 * p.tension_nN);
+  p.within = "often";
+  EXPECT_THROW(asked_by(p, 8), UsageError);
+}
+
+// --- pairs
+
+const Gel kGel{.youngs_modulus_kPa = 5, .poisson_ratio = 0.49, .thickness_um = 60};
+
+/// Squares of 1/r over an area have no length in them.
+TEST(AdhesionPair, the_squares_left_do_not_change_where_all_lengths_grow) {
+  for (const double distance_um : {0.8, 2.0, 10.0}) {
+    const double small = squares_left_um4(kGel, 0.4, distance_um), large = squares_left_um4(kGel, 1.6, 2 * distance_um);
+    EXPECT_NEAR(large, small, 1e-9 * small) << distance_um;
+  }
+}
+
+/// One of two far apart is missed altogether, and its field is 1/r between its radius and their distance.
+TEST(AdhesionPair, the_squares_left_rise_with_the_distance_and_far_off_with_its_logarithm) {
+  double before = 0;
+  for (const double distance_um : {1.2, 2.0, 4.0, 8.0}) {
+    const double squares = squares_left_um4(kGel, 1, distance_um);
+    EXPECT_GT(squares, before);
+    before = squares;
+  }
+  const auto step = [](double from_um) {
+    return squares_left_um4(kGel, 1, 2 * from_um) - squares_left_um4(kGel, 1, from_um);
+  };
+  // 2 pi <|u|² r²> ln 2 for each doubling, but for what the free place and force of the one still explain of the other
+  EXPECT_NEAR(step(16) / step(8), 1, 0.1);
+}
+
+TEST(AdhesionPair, the_least_distance_asks_for_force_over_noise_and_modulus_and_for_the_root_of_the_density) {
+  const PairResolution pairs(kGel, 0.46, kThreads);
+  const auto base = pairs.least_distance_um(1, 8, 1, 0.04);
+  ASSERT_TRUE(base);
+  EXPECT_GT(*base, pairs.touching_um());
+  EXPECT_NEAR(*pairs.least_distance_um(2, 8, 1, 0.08), *base, 1e-12 * *base);
+  EXPECT_NEAR(*pairs.least_distance_um(1, 4, 1, 0.08), *base, 1e-12 * *base);
+  EXPECT_NEAR(*pairs.least_distance_um(1, 8, 4, 0.08), *base, 1e-12 * *base);
+  EXPECT_GT(*pairs.least_distance_um(1, 8, 1, 0.05), *base);
+  EXPECT_DOUBLE_EQ(*pairs.least_distance_um(1, 8, 1, 1e-4), pairs.touching_um());
+  EXPECT_FALSE(pairs.least_distance_um(0.01, 8, 0.1, 0.1)) << "nothing is seen of such forces";
+}
+
+// --- how many cells
+
+TEST(CellNumbers, the_power_is_the_share_of_drawn_studies_that_see_the_difference) {
+  const Scatter scatter{.mean_nN = 4, .between_cells_nN = 1, .within_nN = 2, .error_nN = 1, .fibres_per_cell = 5};
+  constexpr int kStudies = 4000, kPerGroup = 10, kFibres = 5;
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  const double t_limit = 2.1009220402409601;  // Student's t of 18 degrees at 0.975
+  int n_seen = 0;
+  for (int s = 0; s < kStudies; ++s) {
+    double mean[2] = {}, squares[2] = {};
+    for (int g = 0; g < 2; ++g) {
+      for (int c = 0; c < kPerGroup; ++c) {
+        double cell = 1.5 * g + scatter.between_cells_nN * normal(random);
+        for (int f = 0; f < kFibres; ++f)
+          cell += (scatter.within_nN * normal(random) + scatter.error_nN * normal(random)) / kFibres;
+        mean[g] += cell / kPerGroup;
+        squares[g] += cell * cell;
+      }
+      squares[g] -= kPerGroup * mean[g] * mean[g];
+    }
+    const double variance = (squares[0] + squares[1]) / (2 * kPerGroup - 2);
+    n_seen += std::abs(mean[1] - mean[0]) > t_limit * std::sqrt(2 * variance / kPerGroup);
+  }
+  const double power = power_of(scatter, 1.5, kFibres, kPerGroup);
+  // binomial: three standard deviations of 4000
+  EXPECT_NEAR(double(n_seen) / kStudies, power, 3 * std::sqrt(power * (1 - power) / kStudies));
+}
+
+TEST(CellNumbers, without_a_difference_the_power_is_the_level_and_enough_cells_reach_any) {
+  const Scatter scatter{.mean_nN = 4, .between_cells_nN = 1, .within_nN = 2, .error_nN = 1, .fibres_per_cell = 5};
+  EXPECT_NEAR(power_of(scatter, 0, 5, 10), 0.05, 1e-9);
+  const std::optional<int> cells = cells_for(scatter, 1, 5, 0.9);
+  ASSERT_TRUE(cells);
+  EXPECT_GE(power_of(scatter, 1, 5, *cells), 0.9);
+  EXPECT_LT(power_of(scatter, 1, 5, *cells - 1), 0.9);
+  EXPECT_FALSE(cells_for(scatter, 1e-4, 5, 0.9));
+}
+
+}  // namespace
+}  // namespace mbtfm::plan

@@ -1,0 +1,273 @@
+/// plan_accuracy STUDY [scene]: how well plans hold. A table (CSV) on stdout.
+///   errors    standard errors predicted over the scatter of 100 drawn experiments, six scenes (or one of them, from
+///   1),
+///             three noises
+///   pairs     least distance of two adhesions, predicted and drawn
+///   scaling   of the standard errors with noise, modulus and density
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <cstring>
+#include <random>
+
+#include "mbtfm/plan/grid.h"
+#include "mbtfm/tensions/common_motion.h"
+#include "mbtfm/tensions/tension_fit.h"
+#include "pipeline/numerics/dense.h"
+#include "pipeline/numerics/order_statistics.h"
+#include "pipeline/numerics/parallel.h"
+#include "substrate/greens/half_space.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::plan;
+
+constexpr int kThreads = 2, kDraws = 100;
+
+/// u of the cell's own network with noise, reduced: C⁻ᵀ Gᵀ W² P u.
+Eigen::VectorXd reduced_target(const tensions::LinearData& data, const Eigen::VectorXd& u_um) {
+  Eigen::MatrixXd target = data.response->pull_back(tensions::squared_weights(data).asDiagonal() *
+                                                    tensions::less_motion(data, Eigen::MatrixXd(u_um)));
+  numerics::solve_upper_transposed(*data.reduced.compliance, target);
+  return target;
+}
+
+Eigen::VectorXd noise_of(Eigen::Index n, std::uint64_t seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal(0, 1);
+  Eigen::VectorXd noise(n);
+  for (double& component : noise) component = normal(random);
+  return noise;
+}
+
+/// Beads whose noise is 1 um.
+tensions::LinearData unit_data(const KnownCell& cell, const BeadsOnGel& beads) {
+  const DisplacementField exact = exact_beads(beads.places_um, *beads.response, cell.forces_nN, 1);
+  return tensions::reduce(exact, beads.response, {}, 1, tensions::affine_motions(exact));
+}
+
+/// The fit of one experiment, on a network that is not the cell's.
+Eigen::VectorXd fitted(const KnownCell& cell, const tensions::LinearData& unit, double noise_um, std::uint64_t seed) {
+  tensions::ReducedData drawn = unit.reduced;
+  drawn.target =
+      reduced_target(unit, unit.displacement_um + noise_um * noise_of(unit.displacement_um.size(), seed)) / noise_um;
+  drawn.compliance = std::make_shared<const Eigen::MatrixXd>(*unit.reduced.compliance / noise_um);
+  drawn.floor_squared = static_cast<double>(unit.n_used);
+  const tensions::TensionProblem problem(cell.networks.front(), drawn, cell.adhesion_ids);
+  return tensions::fit_gauss_newton(problem, {}, problem.evaluate(cell.tensions_nN)).trial.tensions_nN;
+}
+
+struct Scatters {
+  std::vector<double> ratios;  ///< predicted over scatter, of tensions away from their bound
+  int n_at_bound = 0;
+};
+
+/// @param found  a column an experiment
+Scatters scatters_of(const Eigen::MatrixXd& found, const Eigen::VectorXd& predicted_nN) {
+  Scatters scatters;
+  for (Eigen::Index i = 0; i < found.rows(); ++i) {
+    const double mean = found.row(i).mean();
+    const double sd = std::sqrt((found.row(i).array() - mean).square().sum() / static_cast<double>(found.cols() - 1));
+    const bool is_at_bound = mean < 2 * predicted_nN[i];
+    if (is_at_bound) ++scatters.n_at_bound;
+    if (!is_at_bound) scatters.ratios.push_back(predicted_nN[i] / sd);
+  }
+  return scatters;
+}
+
+void print(const char* what, const char* name, int seed, double noise_percent, double noise_um, const Scatters& s) {
+  const auto [low, high] = std::ranges::minmax(s.ratios);
+  const auto n_within = std::ranges::count_if(s.ratios, [](double r) { return r >= 0.8 && r <= 1.25; });
+  std::printf("%s,%s,%d,%g,%.4f,%zu,%d,%.3f,%.3f,%.3f,%.3f\n", what, name, seed, noise_percent, noise_um,
+              s.ratios.size(), s.n_at_bound, numerics::median(s.ratios), low, high,
+              double(n_within) / double(s.ratios.size()));
+  std::fflush(stdout);
+}
+
+void add(Scatters& all, const Scatters& some) {
+  all.ratios.insert(all.ratios.end(), some.ratios.begin(), some.ratios.end());
+  all.n_at_bound += some.n_at_bound;
+}
+
+/// Beads at the same places in all experiments, and the bound of these beads; or at others in each, and the plan's.
+/// @param only  a scene, from 1; 0: all
+void study_errors(int only) {
+  std::printf("beads,scenario,seed,noise_percent,noise_um,n,at_bound,median,lowest,highest,share_0.8_to_1.25\n");
+  const std::pair<const char*, int> scenes[] = {{"u2os", 1},  {"u2os", 2},    {"u2os", 3},
+                                                {"dense", 1}, {"crowded", 1}, {"parallel-fibres", 1}};
+  constexpr double kDensity = 1, kPool = 2.5;
+  Scatters all_same, all_other;
+  int number = 0;
+  for (const auto& [name, seed] : scenes) {
+    if (++number != only && only > 0) continue;
+    Parameters p;
+    p.scenario = name;
+    p.seed = static_cast<std::uint64_t>(seed);
+    const Scene scene = simulated_scene(p);
+    const KnownCell cell = known_cell(scene, {.threads = kThreads});
+    const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
+    const Precision plan = precision_at(scene, cell, {kDensity}, {.threads = kThreads}).precision.front();
+    const BeadsOnGel same = beads_on_gel(scene, cell, kDensity, 10, kThreads),
+                     pool = beads_on_gel(scene, cell, kPool, 11, kThreads);
+    const Precision of_same = precision_of(scene, cell, same, kThreads);
+    const Eigen::VectorXd u_um = pool.response->displace(cell.forces_nN);
+    double largest_um = 0;
+    for (Eigen::Index row = 0; row < u_um.size(); row += 2)
+      largest_um = std::max(largest_um, u_um.segment<2>(row).norm());
+    const double shares[] = {0.02, 0.05, 0.1};
+    std::vector<Eigen::MatrixXd> with_same(3, Eigen::MatrixXd(cell.tensions_nN.size(), kDraws)), with_other = with_same;
+    const tensions::LinearData data_of_same = unit_data(cell, same);
+    numerics::parallel_for(kDraws, kThreads, [&](int d) {
+      const auto draw = static_cast<std::uint64_t>(d) + 1;
+      drawing::Random random(draw, drawing::Stream::beads);
+      const tensions::LinearData data_of_other = unit_data(cell, some_of(pool, kDensity / kPool, random));
+      for (std::size_t k = 0; k < 3; ++k) {
+        with_same[k].col(d) = fitted(cell, data_of_same, shares[k] * largest_um, draw);
+        with_other[k].col(d) = fitted(cell, data_of_other, shares[k] * largest_um, draw);
+      }
+    });
+    for (std::size_t k = 0; k < 3; ++k) {
+      const double noise_um = shares[k] * largest_um, scale = noise_um * own_kPa;
+      const Scatters s = scatters_of(with_same[k], scale * of_same.tensions),
+                     o = scatters_of(with_other[k], scale * plan.tensions);
+      print("same", name, seed, 100 * shares[k], noise_um, s);
+      print("others", name, seed, 100 * shares[k], noise_um, o);
+      add(all_same, s);
+      add(all_other, o);
+    }
+  }
+  print("same", "all", 0, 0, 0, all_same);
+  print("others", "all", 0, 0, 0, all_other);
+}
+
+// --- pairs
+
+constexpr double kFieldHalf_um = 20;
+
+Eigen::MatrixXd field_of(const Gel& gel, Vec2 centre_um, double radius_um, const std::vector<Vec2>& beads_um) {
+  substrate::Ellipse e;
+  e.centre_um = centre_um;
+  e.semi_major_um = e.semi_minor_um = radius_um;
+  const greens::HalfSpaceEllipse disc(gel, e);
+  Eigen::MatrixXd G(2 * static_cast<Eigen::Index>(beads_um.size()), 2);
+  for (std::size_t i = 0; i < beads_um.size(); ++i) {
+    const bool is_far = norm(beads_um[i] - centre_um) > 8 * radius_um;
+    const greens::Sym2 g = is_far ? disc.far_compliance_um_per_nN(beads_um[i]) : disc.compliance_um_per_nN(beads_um[i]);
+    G.middleRows<2>(2 * static_cast<Eigen::Index>(i)) << g.xx, g.xy, g.xy, g.yy;
+  }
+  return G;
+}
+
+double misfit(const Eigen::MatrixXd& G, const Eigen::VectorXd& u) {
+  return (u - G * (G.transpose() * G).ldlt().solve(G.transpose() * u)).squaredNorm();
+}
+
+/// The best place of one adhesion, by a pattern of steps that halve, from the middle and from both places.
+double misfit_of_one(const Gel& gel, double radius_um, const std::vector<Vec2>& beads_um, const Eigen::VectorXd& u,
+                     double distance_um) {
+  double best = 1e300;
+  for (const double start : {0.0, -0.5, 0.5}) {
+    Vec2 at{start * distance_um, 0};
+    double here = misfit(field_of(gel, at, radius_um, beads_um), u);
+    for (double step = 0.25 * distance_um; step > 0.02 * radius_um;) {
+      bool has_moved = false;
+      for (const Vec2 way : {Vec2{1, 0}, Vec2{-1, 0}, Vec2{0, 1}, Vec2{0, -1}}) {
+        const double there = misfit(field_of(gel, at + step * way, radius_um, beads_um), u);
+        if (there >= here) continue;
+        here = there;
+        at += step * way;
+        has_moved = true;
+        break;
+      }
+      if (!has_moved) step /= 2;
+    }
+    best = std::min(best, here);
+  }
+  return best;
+}
+
+/// Whether one drawn experiment tells the two apart.
+bool is_told(const Gel& gel, double radius_um, double distance_um, double beads_per_um2, double noise_um, int draw) {
+  std::mt19937_64 random(static_cast<std::uint64_t>(draw) + 77);
+  std::uniform_real_distribution<double> place(-kFieldHalf_um, kFieldHalf_um);
+  std::normal_distribution<double> normal(0, noise_um);
+  const auto n = static_cast<int>(beads_per_um2 * 4 * kFieldHalf_um * kFieldHalf_um);
+  std::vector<Vec2> beads_um;
+  for (int i = 0; i < n; ++i) {
+    const double x = place(random);
+    beads_um.push_back({x, place(random)});
+  }
+  Eigen::MatrixXd both(2 * n, 4);
+  both.leftCols<2>() = field_of(gel, {-0.5 * distance_um, 0}, radius_um, beads_um);
+  both.rightCols<2>() = field_of(gel, {0.5 * distance_um, 0}, radius_um, beads_um);
+  const bool is_along = draw % 2 == 0;
+  const Eigen::Vector2d one = is_along ? Eigen::Vector2d(1, 0) : Eigen::Vector2d(0, 1);
+  Eigen::Vector4d forces;
+  forces << one, one;
+  Eigen::VectorXd u = both * forces;
+  for (double& component : u) component += normal(random);
+  const double two = misfit(both, u);
+  return misfit_of_one(gel, radius_um, beads_um, u, distance_um) - two > kTold * noise_um * noise_um;
+}
+
+void study_pairs() {
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60};
+  constexpr double kArea_um2 = 0.46;
+  const double radius_um = std::sqrt(kArea_um2 / 3.141592653589793);
+  const PairResolution pairs(gel, kArea_um2, kThreads);
+  std::printf("beads_per_um2,noise_um,predicted_um,drawn_um,ratio\n");
+  for (const double density : {0.25, 1.0}) {
+    for (const double noise_um : {0.01, 0.015, 0.02, 0.03, 0.04, 0.05, 0.06}) {
+      const auto predicted = pairs.least_distance_um(1, gel.youngs_modulus_kPa, density, noise_um);
+      if (!predicted || *predicted > 6 || *predicted <= pairs.touching_um()) continue;
+      constexpr int kExperiments = 100;
+      // the distance that kChance of the experiments tell, between two that bracket it
+      double low = 0.4 * *predicted, high = 2.5 * *predicted;
+      for (int k = 0; k < 5; ++k) {
+        const double middle = std::sqrt(low * high);
+        std::vector<char> told(kExperiments);
+        numerics::parallel_for(kExperiments, kThreads, [&](int draw) {
+          told[static_cast<std::size_t>(draw)] = is_told(gel, radius_um, middle, density, noise_um, draw);
+        });
+        (std::ranges::count(told, 1) < kChance * kExperiments ? low : high) = middle;
+      }
+      const double drawn = std::sqrt(low * high);
+      std::printf("%g,%g,%.3f,%.3f,%.3f\n", density, noise_um, *predicted, drawn, *predicted / drawn);
+      std::fflush(stdout);
+    }
+  }
+}
+
+// --- scaling
+
+void study_scaling() {
+  Parameters p;
+  const Scene scene = simulated_scene(p);
+  const KnownCell cell = known_cell(scene, {.threads = kThreads});
+  std::printf("beads_per_um2,draw,median_tension_error,total_force_error,median_force_error,median_free_error\n");
+  for (const double density : {0.125, 0.25, 0.5, 1.0, 2.0}) {
+    for (const std::uint64_t draw : {1, 2, 3}) {
+      const Precision q = precision_of(scene, cell, beads_on_gel(scene, cell, density, draw, kThreads), kThreads);
+      const double root = std::sqrt(density);
+      const auto median = [&](const Eigen::VectorXd& v) {
+        return root * numerics::median(std::vector<double>(v.begin(), v.end()));
+      };
+      std::printf("%g,%d,%.4f,%.4f,%.4f,%.4f\n", density, static_cast<int>(draw), median(q.tensions),
+                  root * q.total_force, median(q.adhesion_forces), median(q.free_forces));
+      std::fflush(stdout);
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const auto asks = [&](const char* study) { return argc >= 2 && std::strcmp(argv[1], study) == 0; };
+  if (asks("errors")) return study_errors(argc > 2 ? std::atoi(argv[2]) : 0), 0;
+  if (asks("pairs")) return study_pairs(), 0;
+  if (asks("scaling")) return study_scaling(), 0;
+  return std::fprintf(stderr, "plan_accuracy errors [scene] | pairs | scaling\n"), 2;
+}
