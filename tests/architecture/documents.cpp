@@ -6,6 +6,7 @@
 #include <sstream>
 
 #include "mbtfm/tensions/tables.h"
+#include "mbtfm/spatial/files.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/findings.h"
 #include "pipeline/cost/study_report.h"
@@ -63,6 +64,7 @@ std::string column_page() {
          "[formats.md](formats.md). *May lack*: older files, or files made elsewhere, need not have this column.\n"
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
+         spatial::pages_of_tables() +
          runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables();
 }
 
