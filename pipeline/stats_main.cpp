@@ -2,10 +2,13 @@
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/text.h"
 #include "pipeline/stage/stage.h"
-#include "pipeline/statistics/png.h"
+#include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/study_files.h"
 
 namespace mbtfm::statistics {
+
+extern const std::string_view kStudyScript;  // study.R, made into C++ by the build
+
 namespace {
 
 /// The study read, its files entered into the record.
@@ -23,19 +26,30 @@ Study read_study(const StudyParameters& parameters, stage::StageContext& context
   return study;
 }
 
+constexpr double kDotsPerInch = 600;  // what journals ask of drawings with text
+
+/// One or two columns of a page, as most journals have them.
+double width_mm(const Figure& figure) {
+  constexpr double kColumn_mm = 85, kPage_mm = 178;
+  return std::min<int>(figure.n_columns, static_cast<int>(figure.charts.size())) > 1 ? kPage_mm : kColumn_mm;
+}
+
 StageReport statistics(const StudyParameters& parameters, stage::StageContext& context) {
   const Study study = read_study(parameters, context);
   const Analysis analysis = analyse(study, parameters);
   for (const auto& [name, text] : tables_of(study, analysis)) files::write_text(context.output("out", name), text);
   const std::vector<Figure> figures = figures_of(study, analysis, parameters);
-  constexpr double kPixels = 2;  // by unit of the drawing: sharp in print at 8 cm for each chart (300 dpi)
   for (const Figure& figure : figures) {
     if (figure.charts.empty()) continue;  // its caption in the report says why
     const std::string svg = svg_of(figure);
-    files::write_text(context.output("out", "figures/" + figure.name + ".svg"), svg);
-    write_png(context.output("out", "figures/" + figure.name + ".png"), svg, kPixels);
+    const auto file = [&](const char* ending) { return context.output("out", "figures/" + figure.name + ending); };
+    files::write_text(file(".svg"), svg);
+    write_pdf(file(".pdf"), svg, width_mm(figure));
+    write_png(file(".png"), svg, width_mm(figure), kDotsPerInch);
   }
-  files::write_text(context.output("out", "report.html"), study_html(study, analysis, figures, parameters));
+  files::write_text(context.output("out", "report.html"),
+                    study_html(study, analysis, figures, parameters, context.outputs_.at("out")));
+  files::write_text(context.output("out", "study.R"), std::string(kStudyScript));
   StageReport report;
   report.summary = std::to_string(study.cells.size()) + " cells, " +
                    std::to_string(analysis.tensions.sample.values.size()) + " tensions; " +
@@ -56,6 +70,7 @@ int main(int argc, char** argv) {
        .files = {{"cells", stage::FileArgument::Kind::input, "folder with cell folders"},
                  {"table", stage::FileArgument::Kind::optional_input,
                   "CSV with a row for each cell: column cell, columns of conditions, column exclude with the reason"},
-                 {"out", stage::FileArgument::Kind::output_folder, "tables, figures/ (SVG and PNG), report.html"}}},
+                 {"out", stage::FileArgument::Kind::output_folder,
+                  "tables, figures/ (SVG, PDF and PNG), report.html, study.R"}}},
       argc, argv, statistics::statistics);
 }

@@ -206,16 +206,31 @@ StageReport report_of(const std::vector<Segmentation>& cells) {
           .findings = {}};
 }
 
+/// For the eye, for the cell's page, for the study's.
+struct CellPictures {
+  images::Picture overlay;
+  Ground ground;
+  images::Picture thumbnail;
+};
+
+CellPictures pictures_of(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
+                         const Segmentation& s) {
+  constexpr int kThumbnail_px = 280;
+  return {draw_overlay(adhesion, actin, s), draw_ground(adhesion, actin, s),
+          picture_of(draw_thumbnail(adhesion, actin, s, view_of(s), kThumbnail_px))};
+}
+
 void write_cell(stage::StageContext& context, const std::string& folder, const Segmentation& s,
-                const images::Picture& overlay, const Ground& ground, int binning) {
+                const CellPictures& pictures, int binning) {
   const auto out = [&](const char* file) { return context.output("out", folder + file); };
   files::write_adhesions(out("adhesions.csv"), s.cell.adhesions);
   files::write_fibres(out("fibres.csv"), out("fibre_points.csv"), s.cell.fibres);
   files::write_outline(out("outline.csv"), s.cell.outline_um, s.cell.holes_um, s.cell.is_cut);
   files::write_cell_vtp(out("cell.vtp"), s.cell);
-  images::write_png(out("overlay.png"), overlay);
-  images::write_jpeg(out("images.jpg"), ground.picture);
-  files::write(out("images.csv"), files::image_place_table(), {{ground.low_um, ground.size_um}});
+  images::write_png(out("overlay.png"), pictures.overlay);
+  images::write_jpeg(out("images.jpg"), pictures.ground.picture);
+  images::write_jpeg(out("thumbnail.jpg"), pictures.thumbnail);
+  files::write(out("images.csv"), files::image_place_table(), {{pictures.ground.low_um, pictures.ground.size_um}});
   if (s.second) {
     files::write_adhesions(out("adhesions_2.csv"), s.second->adhesions);
     files::write_fibres(out("fibres_2.csv"), out("fibre_points_2.csv"), s.second->fibres);
@@ -266,8 +281,7 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
   for (const Segmentation& s : cells) expect_plausible(context, s);
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const std::string folder = parameters.cell == 0 ? "cell_" + std::to_string(i + 1) + "/" : "";
-    write_cell(context, folder, cells[i], draw_overlay(adhesion, actin, cells[i]),
-               draw_ground(adhesion, actin, cells[i]), binning);
+    write_cell(context, folder, cells[i], pictures_of(adhesion, actin, cells[i]), binning);
   }
   if (!parameters.contact_sheet.empty())
     images::write_png(context.output("out", "contact_sheet.png"),
@@ -301,6 +315,6 @@ int main(int argc, char** argv) {
                   "mask or label image used as adhesions, or of the adhesive pattern (TIFF or PNG)"},
                  {"out", FileArgument::Kind::output_folder,
                   "folder for adhesions.csv, fibres.csv, fibre_points.csv, outline.csv, cell.vtp, overlay.png, "
-                  "images.jpg, images.csv, RoiSet.zip"}}},
+                  "images.jpg, thumbnail.jpg, images.csv, RoiSet.zip"}}},
       argc, argv, mbtfm::cells::run);
 }

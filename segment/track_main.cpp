@@ -13,6 +13,7 @@
 #include "pipeline/stage/effects.h"
 #include "pipeline/stage/stage.h"
 #include "segment/beads/given_field.h"
+#include "segment/beads/picture.h"
 #include "segment/beads/track.h"
 #include "segment/images/channels.h"
 
@@ -220,6 +221,7 @@ auto with_names(const std::string& names, const Body& body) {
 struct TrackedFrame {
   Tracking tracking;
   double pixel_size_um = 0;
+  images::Picture picture;  ///< of both images
 };
 
 TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, const Frame& frame,
@@ -236,9 +238,19 @@ TrackedFrame tracked(const images::Channel& relaxed, const RelaxedBeads& beads, 
   if (stressed.image.pixels == relaxed.image.pixels) {
     throw InputError(relaxed.name + ", " + stressed.name, "two images", "the same pixels in both");
   }
-  return {with_names(relaxed.name + ", " + stressed.name,
-                     [&] { return beads.track(stressed.image, pixel_size_um, progress); }),
-          pixel_size_um};
+  Tracking tracking = with_names(relaxed.name + ", " + stressed.name,
+                                 [&] { return beads.track(stressed.image, pixel_size_um, progress); });
+  images::Picture picture =
+      picture_of_beads(relaxed.image, stressed.image, (1 / pixel_size_um) * tracking.common.drift_um);
+  return {std::move(tracking), pixel_size_um, std::move(picture)};
+}
+
+/// What the page of the cell shows of the images: they lie from (0, 0) on.
+void write_picture(stage::StageContext& context, const images::Picture& picture, const images::Image& relaxed,
+                   double pixel_size_um) {
+  images::write_jpeg(context.output("out", "beads.jpg"), picture);
+  files::write(context.output("out", "beads_picture.csv"), files::image_place_table(),
+               {{{0, 0}, pixel_size_um * Vec2{double(relaxed.width), double(relaxed.height)}}});
 }
 
 files::FrameRow row_of(int frame, const std::string& image, const Tracking& t) {
@@ -265,7 +277,7 @@ StageReport track_series(const std::vector<Frame>& frames, stage::StageContext& 
       context.progress((static_cast<double>(k) + fraction) / n, what);
     };
     try {
-      const auto [tracking, pixel_size_um] = tracked_frame(frames[k], progress);
+      const auto [tracking, pixel_size_um, picture] = tracked_frame(frames[k], progress);
       const fs::path name = files::displacement_of_frame(number);
       write_field(context, tracking.field, name.stem().string());
       list.push_back(row_of(number, frames[k].name(), tracking));
@@ -347,9 +359,10 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
     return complete_series(frames, context, *earlier, tracked_frame);
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
-  const auto [tracking, pixel_size_um] = tracked_frame(frames.front(), context.progress);
+  const auto [tracking, pixel_size_um, picture] = tracked_frame(frames.front(), context.progress);
   if (!tracking.windows.is_on) context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
   write_field(context, tracking.field, "displacement");
+  write_picture(context, picture, relaxed.image, pixel_size_um);
   return report_of(tracking, pixel_size_um);
 }
 
@@ -415,6 +428,6 @@ int main(int argc, char** argv) {
             {"displacement", Kind::optional_input, "instead of images: displacements of another program (CSV)"},
             {"kept", Kind::optional_input,
              "output folder of an earlier run with the same images and parameters: frames that are there are kept"},
-            {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp"}}},
+            {"out", Kind::output_folder, "folder for displacement.csv, displacement.vtp, beads.jpg"}}},
       argc, argv, mbtfm::beads::run);
 }

@@ -2,6 +2,7 @@
 
 #include "mbtfm/fit/effects.h"
 #include "mbtfm/fit/strained_gel.h"
+#include "mbtfm/tensions/energy.h"
 #include "mbtfm/tensions/error_budget.h"
 #include "mbtfm/tensions/second_placement.h"
 #include "mbtfm/tensions/solved_misfit.h"
@@ -181,6 +182,8 @@ FittedCell fit_cell(const Inputs& inputs, const Parameters& given, const Work& w
   Found found = found_by(ready, fit, inputs.second_placement, p, work);
   FoundMotions motions = motions_found(ready, fit, p.effects);
   ModelChecks checks = check_model(ready, fit, p, work.threads);
+  append(found.summary.more,
+         energy_and_moments(fit, ready.scene.cell, p.gel, p.substrate.modulus_profile.empty(), work.threads));
   append(found.summary.more, figures_of(motions));
   append(found.summary.more, figures_of(checks, fit));
   ModelFields fields = fields_of(ready, fit, checks, inputs.beads);

@@ -135,6 +135,30 @@ std::string quality(const FitSummary& fit) {
   return text;
 }
 
+std::string with_error(double value, double sigma, const char* unit) {
+  const auto decimals = sigma > 0 ? std::optional(decimals_for(sigma)) : std::nullopt;
+  return fmt::format("{} ± {} {}", rounded(value, decimals), rounded(sigma, decimals), unit);
+}
+
+/// Empty for results of a version that did not compute them.
+std::string energy_and_moment(const FitSummary& fit) {
+  std::string text;
+  const auto energy = figure_of(fit, "strain_energy_fJ"), energy_sigma = figure_of(fit, "strain_energy_sigma_fJ");
+  if (energy && energy_sigma)
+    text += "The forces have put " + with_error(*energy, *energy_sigma, "fJ") + " of strain energy into the gel. ";
+  const auto moment = figure_of(fit, "contractile_moment_nN_um"),
+             moment_sigma = figure_of(fit, "contractile_moment_sigma_nN_um"),
+             major = figure_of(fit, "contractile_moment_major_nN_um"),
+             minor = figure_of(fit, "contractile_moment_minor_nN_um"),
+             axis = figure_of(fit, "contractile_moment_axis_deg");
+  if (moment && moment_sigma && major && minor && axis) {
+    text += fmt::format(
+        "Contractile moment: {}, of which {} along the main axis ({:.0f}° from x towards y) and {} across it.",
+        with_error(*moment, *moment_sigma, "nN µm"), charts::readable(*major), *axis, charts::readable(*minor));
+  }
+  return text;
+}
+
 /// Sentences on outputs that are not what a stage made of its inputs.
 std::vector<std::string> on_outputs(const Provenance& provenance) {
   std::vector<std::string> sentences;
@@ -190,6 +214,7 @@ bool was_asked(const Provenance& provenance) {
 
 std::vector<std::string> facts_of(const CellResults& results) {
   std::vector<std::string> facts = {what(results)};
+  if (const std::string text = energy_and_moment(results.fit); !text.empty()) facts.push_back(text);
   if (results.comparison) facts.push_back(truth(results));
   facts.push_back(quality(results.fit));
   return facts;

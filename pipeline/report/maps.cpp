@@ -260,6 +260,27 @@ Figure segmentation_map(const CellResults& results) {
           legend(types + adhesion_keys(results.cell) + missing)};
 }
 
+Figure bead_map(const CellResults& results) {
+  const Images& images = results.bead_images.value();
+  charts::Chart map = empty_map({images.low_um, images.high_um}, "Beads");
+  map.picture(images.low_um, images.high_um, "data:image/jpeg;base64," + files::base64(files::read_text(images.file)));
+  draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#ddd");
+  int n_flagged = 0;
+  for (const Bead& bead : results.displacement) {
+    if (bead.flag.empty()) continue;
+    ++n_flagged;
+    map.dot(bead.position_um, 3.5, "fill:#fff;fill-opacity:0.01;stroke-width:1.2;stroke:#ffe14d",
+            "left out: " + bead.flag);
+  }
+  return {
+      map,
+      fmt::format("Relaxed image green, stressed image purple, without their drift; white: beads that did not move. "
+                  "Yellow rings: {} beads that were left out, with the reason.",
+                  n_flagged) +
+          caption_of_cut(results.cell),
+      ""};
+}
+
 Figure adhesion_map(const CellResults& results) {
   charts::Chart map = new_map(results, "Forces on the substrate");
   const auto by_id = adhesions_by_id(results.cell);

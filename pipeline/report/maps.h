@@ -18,6 +18,8 @@ struct Figure {
 
 /// Outline, adhesions and fibres over the images that they were found in, where there are any.
 Figure segmentation_map(const CellResults& results);
+/// Both bead images on each other, with the beads that were left out; only where results.bead_images is known.
+Figure bead_map(const CellResults& results);
 /// Ellipses coloured by traction, with the force on the substrate as arrows.
 Figure adhesion_map(const CellResults& results);
 /// Measured displacement, and where results.residual is known also the fitted one and the difference: means over the

@@ -24,6 +24,11 @@ std::string inside_script(std::string text) {
   return text;
 }
 
+/// Heard, not seen: a heading above the table says the same.
+std::string caption_of(const std::string& text) {
+  return text.empty() ? "" : "<caption class=\"heard\">" + charts::html_escaped(text) + "</caption>";
+}
+
 std::string script(std::string_view text) { return "<script>" + std::string(text) + "</script>\n"; }
 
 /// Links to the sections of a body.
@@ -43,7 +48,7 @@ std::string contents(const std::string& body) {
 
 std::string html_of(const Table& table) {
   // no <button>: browsers leave these out of the titles that they repeat on each printed page
-  std::string html = "<div class=\"scroll\"><table><thead><tr>";
+  std::string html = "<div class=\"scroll\"><table>" + caption_of(table.caption) + "<thead><tr>";
   for (const Table::Column& column : table.columns) {
     html += std::string("<th") + (column.is_number ? " class=\"n\"" : "") +
             "><span role=\"button\" tabindex=\"0\" title=\"click to sort\">" + charts::html_escaped(column.title) +
@@ -70,7 +75,7 @@ std::string html_of(const Table& table, const Download& csv) {
 std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs) {
   std::string html = "<div class=\"scroll\"><table><tbody>\n";
   for (const auto& [name, value] : pairs) {
-    html += "<tr><td>" + charts::html_escaped(name) + "</td><td class=\"long\">" + charts::html_escaped(value) +
+    html += "<tr><th scope=\"row\">" + charts::html_escaped(name) + "</th><td class=\"long\">" + charts::html_escaped(value) +
             "</td></tr>\n";
   }
   return html + "</tbody></table></div>\n";

@@ -19,6 +19,7 @@ struct Table {
   };
   std::vector<Column> columns;
   std::vector<std::vector<std::string>> rows;
+  std::string caption = {};  ///< what it lists, for those who hear the page
 };
 
 /// A file that a reader can take out of the page.

@@ -102,6 +102,11 @@ function draw(box) {
   const fit = function () { fitTo(box.clientWidth); };
   fit();
   view.run();
+  const caption = box.parentNode.querySelector('figcaption');
+  if (caption) {
+    caption.id = caption.id || 'caption-' + Array.from(document.querySelectorAll('figcaption')).indexOf(caption);
+    box.firstElementChild.setAttribute('aria-describedby', caption.id);
+  }
   update();
   new ResizeObserver(function () { requestAnimationFrame(fit); }).observe(box);
 
@@ -144,15 +149,21 @@ function draw(box) {
   add('+', 'zoom in (or Ctrl and wheel)', function () { zoom(1.6, 0.5, 0.5); });
   add('\u2212', 'zoom out', function () { zoom(1 / 1.6, 0.5, 0.5); });
   add('1:1', 'show all (or double click)', whole);
+  const save = function (address, ending) {
+    const link = document.createElement('a');
+    link.href = address;
+    link.download = spec.description + ending;
+    link.click();
+  };
   add('SVG', 'save as a drawing', function () {
     view.toSVG().then(function (svg) {
-      const link = document.createElement('a');
-      link.href = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }));
-      link.download = spec.description + '.svg';
-      link.click();
-      setTimeout(function () { URL.revokeObjectURL(link.href); }, 1000);
+      const address = URL.createObjectURL(new Blob([svg], { type: 'image/svg+xml' }));
+      save(address, '.svg');
+      setTimeout(function () { URL.revokeObjectURL(address); }, 1000);
     });
   });
+  // 4 times the screen's 96 dots per inch
+  add('PNG', 'save as a picture', function () { view.toImageURL('png', 4).then(function (url) { save(url, '.png'); }); });
   box.parentNode.appendChild(buttons);
 }
 document.querySelectorAll('.chart').forEach(draw);

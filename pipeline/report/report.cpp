@@ -12,6 +12,7 @@
 #include "pipeline/report/error_budget.h"
 #include "pipeline/report/findings.h"
 #include "pipeline/report/maps.h"
+#include "pipeline/report/methods.h"
 #include "pipeline/report/numbers.h"
 #include "pipeline/report/page.h"
 #include "pipeline/report/provenance.h"
@@ -33,6 +34,12 @@ Download file_of(const CellResults& results, const std::string& file) {
   return {results.name + "_" + path.filename().string(), files::read_text(path)};
 }
 
+std::string by_type(const CellResults& results) {
+  const auto chart = tensions_by_type(results);
+  if (!chart) return {};
+  return figure(*chart, "Each mark is a fibre; the line is the mean of its type. Hollow: not identifiable.");
+}
+
 std::string tension_section(const CellResults& results) {
   return section("Tensions",
                  "<div class=\"grid\">\n" +
@@ -40,7 +47,7 @@ std::string tension_section(const CellResults& results) {
                             "By type, the strongest first. The interval holds the bead noise and, where several meshes "
                             "were fitted, the spread between them.",
                             tension_plot_legend(results)) +
-                     html_of(network_map(results, NetworkForm::original)) + "</div>\n" +
+                     by_type(results) + html_of(network_map(results, NetworkForm::original)) + "</div>\n" +
                      html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) + tension_notes(results));
 }
 
@@ -49,6 +56,7 @@ std::string map_section(const CellResults& results) {
       "<p class=\"sub screen\">The mouse tells what it rests on. Ctrl and wheel, or the buttons, zoom; dragging moves; "
       "a double click shows all again.</p><div class=\"grid\">\n" +
       html_of(segmentation_map(results)) + html_of(adhesion_map(results));
+  if (results.bead_images) html += html_of(bead_map(results));
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
   html += html_of(network_map(results, NetworkForm::contracted));
   return section("Maps", html +
@@ -71,7 +79,8 @@ std::string adhesion_section(const CellResults& results) {
              {"x (µm)", true},
              {"y (µm)", true},
              {"fibre ends on it"}},
-            {}};
+            {},
+            "Forces of the adhesions"};
   const bool has_assumed = std::ranges::any_of(by_id, [](const auto& a) { return is_assumed(a.second->origin); });
   const bool are_candidates =
       std::ranges::any_of(by_id, [](const auto& a) { return a.second->origin == AdhesionOrigin::candidate; });
@@ -90,7 +99,9 @@ std::string adhesion_section(const CellResults& results) {
       all.rows.back().push_back(is_assumed(adhesion.origin) ? "no: " + std::string(name_of(adhesion.origin)) : "yes");
   }
   constexpr std::size_t kTop = 12;  // fits a screen
-  Table top{all.columns, {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())}};
+  Table top{all.columns,
+            {all.rows.begin(), all.rows.begin() + std::min(kTop, all.rows.size())},
+            "The strongest of the adhesions"};
   const Balance balance = balance_of(results);
   std::string html = fmt::format(
       "<p>The {} strongest of {}. Balance: the sum of all forces is {} of the sum of their magnitudes, that of their "
@@ -139,7 +150,7 @@ std::string figure_pairs(const CellResults& results) {
 std::string effects_table(const Provenance& provenance) {
   const bool are_timed = std::any_of(provenance.effects.begin(), provenance.effects.end(),
                                      [](const EffectLine& effect) { return !effect.seconds.empty(); });
-  Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}}, {}};
+  Table table{{{"effect"}, {"stage"}, {"on"}, {"why"}}, {}, "Effects, and why they are on or off"};
   if (are_timed) table.columns.push_back({"seconds", true});
   for (const EffectLine& effect : provenance.effects) {
     std::vector<std::string> row = {charts::html_escaped(effect.name), charts::html_escaped(effect.stage),
@@ -151,7 +162,7 @@ std::string effects_table(const Provenance& provenance) {
 }
 
 std::string provenance_section(const CellResults& results, const Provenance& provenance) {
-  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}};
+  Table stages{{{"stage"}, {"state"}, {"result"}, {"seconds", true}, {"memory (MB)", true}, {"version"}}, {}, "Stages"};
   for (const StageLine& stage : provenance.stages) {
     stages.rows.push_back({charts::html_escaped(stage.name), charts::html_escaped(stage.state),
                            charts::html_escaped(stage.summary.empty() ? stage.why : stage.summary), stage.seconds,
@@ -208,7 +219,8 @@ std::string report_html(const std::filesystem::path& cell) {
   body += map_section(results) + adhesion_section(results);
   if (const auto budget = read_error_budget(cell / "run.json"); !budget.empty())
     body += section("Error budget", error_budget_html(budget, results.name));
-  body += provenance_section(results, provenance);
+  body += section("For your methods section", methods_paragraph(results, provenance)) +
+          provenance_section(results, provenance);
   return page(results.name + " – mbtfm", head, body);
 }
 

@@ -32,8 +32,8 @@ std::optional<Residual> residual_of(const DisplacementField& measured, const Pat
   return residual;
 }
 
-std::optional<Images> images_of(const Path& segmentation) {
-  const Path file = segmentation / "images.jpg", place = segmentation / "images.csv";
+/// A picture and the file that says where it lies.
+std::optional<Images> images_of(const Path& file, const Path& place) {
   if (!files::is_own_file(file) || !files::is_own_file(place)) return {};
   const std::vector<files::ImagePlace> rows = files::read(place, files::image_place_table());
   if (rows.size() != 1) throw InputError(place.string(), "one row", std::to_string(rows.size()));
@@ -79,7 +79,8 @@ CellResults read_results(const Path& cell) {
   results.fit = files::read_fit_summary(cell / "4_fit/fit.json");
   results.residual = residual_of(results.displacement, cell / "4_fit/fitted_displacement.csv");
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
-  results.images = images_of(cell / "1_segment");
+  results.images = images_of(cell / "1_segment/images.jpg", cell / "1_segment/images.csv");
+  results.bead_images = images_of(cell / "2_track/beads.jpg", cell / "2_track/beads_picture.csv");
   results.missing_fibres = missing_fibres_in(cell / "4_fit/missing_fibres.csv", results.cell);
   results.missing_adhesions = rows_in(cell / "4_fit/missing_adhesions.csv", files::missing_adhesion_table());
   return results;
@@ -91,14 +92,22 @@ std::map<int, const Adhesion*> adhesions_by_id(const Cell& cell) {
   return by_id;
 }
 
+std::optional<double> figure_of(const FitSummary& fit, std::string_view name) {
+  for (const auto& [known, value] : fit.more) {
+    if (known != name) continue;
+    if (const auto* number = std::get_if<double>(&value)) return *number;
+    if (const auto* count = std::get_if<std::int64_t>(&value)) return static_cast<double>(*count);
+  }
+  return {};
+}
+
 std::optional<CutForce> cut_force_of(const FitSummary& fit) {
   std::optional<CutForce> cut;
   const auto read = [&](const char* name, double CutForce::*member) {
-    for (const auto& [known, value] : fit.more) {
-      if (known != name || !std::holds_alternative<double>(value)) continue;
-      if (!cut) cut.emplace();
-      (*cut).*member = std::get<double>(value);
-    }
+    const auto value = figure_of(fit, name);
+    if (!value) return;
+    if (!cut) cut.emplace();
+    (*cut).*member = *value;
   };
   read("cut_force_x_nN", &CutForce::x_nN);
   read("cut_force_x_sigma_nN", &CutForce::x_sigma_nN);

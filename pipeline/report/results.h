@@ -39,7 +39,8 @@ struct CellResults {
   FitSummary fit;
   std::optional<Residual> residual;
   std::optional<Comparison> comparison;  ///< of a simulated cell
-  std::optional<Images> images;
+  std::optional<Images> images;          ///< of the cell
+  std::optional<Images> bead_images;     ///< both on each other
   std::vector<MissingFibre> missing_fibres;
   std::vector<MissingAdhesion> missing_adhesions;
 };
@@ -56,6 +57,9 @@ struct Balance {
   bool has_moments = false;  ///< those of single adhesions are in the table, and counted
 };
 Balance balance_of(const CellResults& results);
+
+/// A number of fit.json; none where it is not there or is no number.
+std::optional<double> figure_of(const FitSummary& fit, std::string_view name);
 
 /// What passes through the image's cut, of fit.json.
 struct CutForce {

@@ -10,7 +10,10 @@
 namespace mbtfm::report {
 namespace {
 
+using charts::Axis;
 using charts::Chart;
+
+constexpr double kColumnWidth = 0.6;  // of the marks of one type, as a share of the distance to the next
 
 /// Largest value to show.
 double largest_nN(const std::vector<FibreRow>& rows) {
@@ -123,6 +126,48 @@ charts::Chart tension_plot(const CellResults& results) {
   constexpr double kRow_px = 20;
   chart.frame_height(kRow_px * static_cast<double>(rows.size()));
   for (std::size_t i = 0; i < rows.size(); ++i) draw_row(chart, rows[i], static_cast<double>(i), results);
+  return chart;
+}
+
+std::optional<charts::Chart> tensions_by_type(const CellResults& results) {
+  const std::vector<FibreRow> rows = fibre_rows(results);
+  std::vector<std::vector<const FibreRow*>> columns;  // those of a type follow each other
+  for (const FibreRow& row : rows) {
+    if (columns.empty() || columns.back().front()->fibre->type != row.fibre->type) columns.emplace_back();
+    columns.back().push_back(&row);
+  }
+  if (std::ranges::none_of(columns, [](const auto& column) { return column.size() > 1; })) return {};
+  Axis types{.label = "", .low = -0.6, .high = static_cast<double>(columns.size()) - 0.4};
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto& column = columns[i];
+    types.names.emplace_back(static_cast<double>(i),
+                             fmt::format("{} ({})", full_name_of(column.front()->fibre->type), column.size()));
+  }
+  const double largest = largest_nN(rows);
+  charts::Chart chart("Tensions by type", types, {"tension (nN)", -0.02 * largest, largest});
+  for (std::size_t i = 0; i < columns.size(); ++i) {
+    const auto& column = columns[i];
+    const FibreType type = column.front()->fibre->type;
+    const std::string colour = colour_of(type);
+    double sum = 0;
+    for (std::size_t k = 0; k < column.size(); ++k) {
+      const Tension& t = column[k]->tension;
+      sum += t.tension_nN;
+      // side by side in the order of size: no mark hides another one
+      const double share = column.size() > 1 ? static_cast<double>(k) / static_cast<double>(column.size() - 1) : 0.5;
+      const Vec2 at{static_cast<double>(i) + kColumnWidth * (share - 0.5), t.tension_nN};
+      const std::string style = "stroke-width:2;stroke:" + colour + ";fill:" + (t.identifiable ? colour : "#fff");
+      const std::string hover = hover_of(*column[k]->fibre, results);
+      if (type == FibreType::edge) {
+        chart.diamond(at, 5, style, hover);
+      } else {
+        chart.dot(at, 4.5, style, hover);
+      }
+    }
+    const double mean = sum / static_cast<double>(column.size()), x = static_cast<double>(i);
+    chart.pieces({{{x - 0.5 * kColumnWidth, mean}, {x + 0.5 * kColumnWidth, mean}}}, "stroke:#333;stroke-width:1.6",
+                 fmt::format("mean of the {} fibres: {} nN", full_name_of(type), charts::readable(mean)));
+  }
   return chart;
 }
 

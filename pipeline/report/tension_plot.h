@@ -1,6 +1,7 @@
 /// Every fibre's tension with its interval, beside the truth where it is known.
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "pipeline/charts/chart.h"
@@ -10,6 +11,8 @@ namespace mbtfm::report {
 
 /// One row a fibre, by type, the strongest first.
 charts::Chart tension_plot(const CellResults& results);
+/// One column a type, a mark a fibre, with the mean of each type; none where no type has two fibres.
+std::optional<charts::Chart> tensions_by_type(const CellResults& results);
 /// Its marks explained, as HTML.
 std::string tension_plot_legend(const CellResults& results);
 

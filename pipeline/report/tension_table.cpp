@@ -96,7 +96,8 @@ std::string missed_fibres(const Comparison& comparison) {
 }  // namespace
 
 Table tension_table(const CellResults& results) {
-  Table table{{{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % interval (nN)", true}}, {}};
+  Table table{
+      {{"fibre", true}, {"type"}, {"tension (nN)", true}, {"95 % interval (nN)", true}}, {}, "Tension of each fibre"};
   const bool has_truth = results.comparison.has_value();
   if (has_truth) {
     for (const char* title : {"truth (nN)", "error (%)", "error / half interval", "true fibre"}) {

@@ -165,7 +165,7 @@ Figure force_by_area(const Analysis& analysis) {
   }
   return {.name = "adhesion_force_by_area",
           .title = "Force and area of the adhesions",
-          .caption = "Means of bins of as many adhesions each; bars: 95 % interval, cells drawn anew.",
+          .caption = "Means of bins of as many adhesions each; bars: 95 % interval, cells resampled.",
           .charts = {chart}};
 }
 
@@ -174,7 +174,7 @@ Figure directions(const Analysis& analysis) {
                 .title = "Directions",
                 .caption =
                     "Angles at the adhesions. Broken line: what chance would give. In brackets: 95 % interval "
-                    "of the mean angle, cells drawn anew.",
+                    "of the mean angle, cells resampled.",
                 .charts = {},
                 .n_columns = 2};
   const std::vector<std::string>& conditions = analysis.tensions.sample.conditions;

@@ -146,6 +146,8 @@ Analysis analyse(const Study& study, const StudyParameters& parameters) {
   a.adhesion_forces = measure(sample_adhesion_forces(study), draws);
   a.adhesion_areas = measure(sample_adhesion_areas(study), draws);
   for (Sample& sample : sample_cells(study)) a.cells.push_back(measure(std::move(sample), draws));
+  const Measure& primary = parameters.primary == PrimaryMeasure::tension ? a.tensions : a.cells.front();
+  a.primary = primary_of(study, primary.sample, primary.model, primary.comparisons, parameters);
   a.correlations = correlate_forces(study, draws);
   a.area_bins = bin_by_area(study, draws);
   a.directions = summarise_directions(study, draws);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "pipeline/statistics/comparisons.h"
+#include "pipeline/statistics/primary.h"
 #include "pipeline/statistics/relations.h"
 #include "pipeline/statistics/summaries.h"
 
@@ -20,6 +21,7 @@ struct Measure {
 };
 
 struct Analysis {
+  Primary primary;
   Measure tensions;
   std::vector<Summary> tensions_by_cell;
   std::vector<ShareAbove> shares;

@@ -1,4 +1,4 @@
-/// Intervals that take the cell for the unit: whole cells are drawn anew, with all that was measured in them.
+/// Intervals that take the cell for the unit: whole cells are resampled, with all that was measured in them.
 #pragma once
 
 #include <cstdint>

@@ -43,31 +43,58 @@ std::size_t index_of_cell(const std::vector<std::string>& names, const files::Cs
   return matches.front();
 }
 
+/// Where a word about each cell comes from: a folder above it, a column of the table, or nowhere.
+struct Source {
+  int level = 0;            ///< of the folder; 0: none
+  std::string column = {};  ///< empty: none
+};
+
+/// @param usual  columns that count without being asked for
+Source source_of(const std::string& asked, const char* flag, const std::vector<std::string>& usual,
+                 const std::optional<files::CsvTable>& table) {
+  if (const int level = folder_level(asked); level > 0) return {.level = level};
+  if (!asked.empty()) {
+    if (!table)
+      throw UsageError("--" + std::string(flag) + " " + asked +
+                       ": expected `folder`, or a column of a table given by --table");
+    table->require({asked});
+    return {.column = asked};
+  }
+  for (const std::string& column : usual) {
+    if (table && table->has(column)) return {.column = column};
+  }
+  return {};
+}
+
 }  // namespace
 
 std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std::string& condition_from,
-                               const std::optional<Path>& table) {
-  const int level = folder_level(condition_from);
-  const bool is_column = !condition_from.empty() && level == 0;
-  if (is_column && !table) {
-    throw UsageError("--condition-from " + condition_from +
-                     ": expected `folder`, or a column of a table given by --table");
-  }
+                               const std::string& replicate_from, const std::optional<Path>& table) {
+  std::optional<files::CsvTable> rows;
+  if (table) rows.emplace(*table);
+  if (rows) rows->require({"cell"});
+  const Source condition = source_of(condition_from, "condition-from", {"condition"}, rows);
+  const Source replicate = source_of(replicate_from, "replicate-from", {"replicate", "day"}, rows);
   std::vector<CellNote> notes(names.size());
-  for (std::size_t i = 0; level > 0 && i < names.size(); ++i) notes[i].condition = folder_of(names[i], level);
-  if (!table) return notes;
-  const files::CsvTable rows(*table);
-  rows.require(is_column ? std::vector<std::string>{"cell", condition_from} : std::vector<std::string>{"cell"});
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    if (condition.level > 0) notes[i].condition = folder_of(names[i], condition.level);
+    if (replicate.level > 0) notes[i].replicate = folder_of(names[i], replicate.level);
+  }
+  if (!rows) return notes;
   std::vector<bool> is_named(names.size(), false);
-  for (int row = 0; row < rows.n_rows(); ++row) {
-    const std::size_t i = index_of_cell(names, rows, row);
-    if (is_named[i]) rows.fail(row, "cell", "each cell once");
+  for (int row = 0; row < rows->n_rows(); ++row) {
+    const std::size_t i = index_of_cell(names, *rows, row);
+    if (is_named[i]) rows->fail(row, "cell", "each cell once");
     is_named[i] = true;
-    if (rows.has("exclude")) notes[i].reason_to_exclude = rows.text(row, "exclude");
-    if (!is_column) continue;
-    notes[i].condition = rows.text(row, condition_from);
-    if (notes[i].condition.empty() && notes[i].reason_to_exclude.empty())
-      notes[i].reason_to_exclude = "no " + condition_from + " in the table";
+    if (rows->has("exclude")) notes[i].reason_to_exclude = rows->text(row, "exclude");
+    const auto take = [&](const std::string& column, std::string CellNote::*member) {
+      if (column.empty()) return;
+      notes[i].*member = rows->text(row, column);
+      if ((notes[i].*member).empty() && notes[i].reason_to_exclude.empty())
+        notes[i].reason_to_exclude = "no " + column + " in the table";
+    };
+    take(condition.column, &CellNote::condition);
+    take(replicate.column, &CellNote::replicate);
   }
   for (std::size_t i = 0; i < names.size(); ++i) {
     if (!is_named[i]) notes[i].reason_to_exclude = "not in the table";

@@ -10,15 +10,17 @@
 namespace mbtfm::statistics {
 
 struct CellNote {
-  std::string condition;          ///< empty where none are asked for
-  std::string reason_to_exclude;  ///< empty: it enters
+  std::string condition = {};          ///< empty where none are asked for
+  std::string replicate = {};          ///< day, dish or animal; empty where none are told
+  std::string reason_to_exclude = {};  ///< empty: it enters
 };
 
-/// By cell. A cell that the table lacks does not enter.
+/// By cell. A cell that is not in the table does not enter.
 /// @param names  folders of the cells, relative to the study's
-/// @param condition_from  see StudyParameters
+/// @param condition_from, replicate_from  see StudyParameters; empty: the table's column `condition`; `replicate`, else
+///                                        `day`, where it has one
 /// @throws InputError where a cell has no such folder above it, the table no such column, or a row no cell
 std::vector<CellNote> notes_of(const std::vector<std::string>& names, const std::string& condition_from,
-                               const std::optional<Path>& table);
+                               const std::string& replicate_from, const std::optional<Path>& table);
 
 }  // namespace mbtfm::statistics

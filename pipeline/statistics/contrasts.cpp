@@ -27,11 +27,8 @@ double satterthwaite_degrees(const MixedFit& fit, const VectorXd& weights) {
 
 }  // namespace
 
-Contrast contrast_of(const MixedFit& fit, const VectorXd& weights) {
-  Contrast c;
-  c.estimate = weights.dot(fit.mean);
-  c.standard_error = std::sqrt(weights.dot(fit.covariance * weights));
-  c.degrees = satterthwaite_degrees(fit, weights);
+Contrast by_students_t(double estimate, double standard_error, double degrees) {
+  Contrast c{.estimate = estimate, .standard_error = standard_error, .degrees = degrees};
   c.t = c.estimate / c.standard_error;
   const boost::math::students_t t(c.degrees);
   c.p_value = std::min(1.0, 2 * cdf(complement(t, std::abs(c.t))));
@@ -39,6 +36,11 @@ Contrast contrast_of(const MixedFit& fit, const VectorXd& weights) {
   c.low = c.estimate - half;
   c.high = c.estimate + half;
   return c;
+}
+
+Contrast contrast_of(const MixedFit& fit, const VectorXd& weights) {
+  return by_students_t(weights.dot(fit.mean), std::sqrt(weights.dot(fit.covariance * weights)),
+                       satterthwaite_degrees(fit, weights));
 }
 
 FTest test_all_zero(const MixedFit& fit, const MatrixXd& contrasts) {

@@ -1,6 +1,7 @@
 /// What the figures of a study share.
 #pragma once
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,8 @@ int n_bins_of(const std::vector<Histogram>& histograms);
 charts::Chart histogram_chart(const std::string& title, const std::string& x_label, const std::string& y_label,
                               const std::vector<Histogram>& histograms, double low, double high, charts::Scale scale);
 
+/// The primary comparison as a SuperPlot, and its differences; none of one condition.
+std::optional<Figure> primary_figure(const Study& study, const Analysis& analysis, const StudyParameters& parameters);
 std::vector<Figure> adhesion_figures_of(const Analysis& analysis);
 
 }  // namespace mbtfm::statistics

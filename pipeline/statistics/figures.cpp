@@ -238,7 +238,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
                 .title = "Forces and size of the cell",
                 .caption =
                     "One dot a cell. Lines through the origin by least squares: slope ± standard error, and "
-                    "Pearson’s correlation r.",
+                    "Pearson’s correlation r, from five cells on.",
                 .charts = {},
                 .n_columns = 3};
   std::map<std::pair<std::string, std::string>, std::vector<const Correlation*>> panels;
@@ -264,6 +264,10 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
       for (std::size_t i = 0; i < c->x.size(); ++i)
         chart.dot({c->x[i], c->y[i]}, 3.2, "fill:" + colour + ";fill-opacity:.7",
                   study.cells[static_cast<std::size_t>(c->cells[i])].name);
+      if (c->line.n < kFewestForALine) {
+        chart.key(prefix_of(c->condition) + fmt::format("n = {}: too few for a line", c->line.n), colour);
+        continue;
+      }
       chart.curve({{0, 0}, {x_end, c->line.slope * x_end}}, "stroke:" + colour + ";stroke-width:1.6");
       std::string text = prefix_of(c->condition) + charts::readable(c->line.slope);
       if (c->line.slope_error) text += fmt::format(" ± {:.2g}", *c->line.slope_error);
@@ -279,6 +283,7 @@ Figure force_correlations(const Study& study, const Analysis& analysis) {
 
 std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
   std::vector<Figure> figures;
+  if (auto primary = primary_figure(study, analysis, parameters)) figures.push_back(std::move(*primary));
   if (analysis.tensions.sample.values.empty()) {
     figures.push_back({.name = "tensions_by_type",
                        .title = "Tension of each fibre",

@@ -48,6 +48,8 @@ struct Contrast {
   double t = 0, p_value = 1;
   double low = 0, high = 0;  ///< 95 %
 };
+/// @param degrees  of freedom of the standard error
+Contrast by_students_t(double estimate, double standard_error, double degrees);
 /// Source of the degrees: Giesbrecht & Burns, Biometrics 41, 477 (1985).
 Contrast contrast_of(const MixedFit& fit, const Eigen::VectorXd& weights);
 

@@ -22,6 +22,8 @@ struct Correlation {
   LineThroughOrigin line;
   std::optional<Interval> slope_interval;  ///< 95 %, by the bootstrap of cells
 };
+/// Below five points a slope and a correlation say next to nothing: the points alone are shown.
+inline constexpr int kFewestForALine = 5;
 std::vector<Correlation> correlate_forces(const Study& study, const std::vector<CellWeights>& draws);
 
 /// Mean force of the adhesions whose area lies between two values (thesis fig. 3.13).

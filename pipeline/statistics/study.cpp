@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <map>
 #include <set>
+#include <sstream>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/findings.h"
+#include "pipeline/contract/listed.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/hash.h"
 #include "pipeline/files/json.h"
@@ -93,12 +96,52 @@ void leave_out_copies(const std::vector<Path>& folders, const std::vector<std::s
   }
 }
 
-void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell) {
-  const std::set<std::string> names(condition_of_cell.begin(), condition_of_cell.end());
-  study.conditions.assign(names.begin(), names.end());
-  for (std::size_t i = 0; i < study.cells.size(); ++i) {
-    study.cells[i].condition = static_cast<int>(std::distance(names.begin(), names.find(condition_of_cell[i])));
+/// The parts between commas, without spaces around them.
+std::vector<std::string> parts_of(const std::string& list) {
+  std::vector<std::string> parts;
+  std::istringstream stream(list);
+  for (std::string part; std::getline(stream, part, ',');) {
+    const auto first = part.find_first_not_of(' '), last = part.find_last_not_of(' ');
+    if (first != part.npos) parts.push_back(part.substr(first, last - first + 1));
   }
+  return parts;
+}
+
+/// Those that are asked for come first, in that order.
+/// @throws UsageError where one is asked for that no cell has
+void number_conditions(Study& study, const std::vector<std::string>& condition_of_cell, const std::string& order) {
+  std::set<std::string> names(condition_of_cell.begin(), condition_of_cell.end());
+  for (const std::string& name : parts_of(order)) {
+    if (!names.contains(name))
+      throw UsageError("stats.conditions: no cell that enters is of the condition '" + name + "'; there are " +
+                       listed(std::vector<std::string>(names.begin(), names.end())));
+    names.erase(name);
+    study.conditions.push_back(name);
+  }
+  study.conditions.insert(study.conditions.end(), names.begin(), names.end());
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    const auto at = std::find(study.conditions.begin(), study.conditions.end(), condition_of_cell[i]);
+    study.cells[i].condition = static_cast<int>(at - study.conditions.begin());
+  }
+}
+
+/// Why the findings of a cell keep it out; empty: they do not.
+std::string excluded_by_finding(const StudyCell& cell, const std::vector<std::string>& ids) {
+  for (const Finding& finding : cell.findings) {
+    if (is_open(finding) && std::ranges::find(ids, finding.id) != ids.end())
+      return "the finding " + finding.id + " is open (stats.exclude_findings)";
+  }
+  return {};
+}
+
+/// @throws UsageError where an id is none
+std::vector<std::string> excluding_findings(const StudyParameters& parameters) {
+  const std::vector<std::string> ids = parts_of(parameters.exclude_findings);
+  for (const std::string& id : ids) {
+    if (std::ranges::none_of(kinds_of_findings(), [&](const KindOfFinding& kind) { return kind.id == id; }))
+      throw UsageError("stats.exclude_findings: there is no finding '" + id + "': docs/findings.md lists them");
+  }
+  return ids;
 }
 
 /// A file may call identifiable what its interval does not know at all; its square must stay a number.
@@ -120,7 +163,20 @@ void declare(stage::ParameterList& list, StudyParameters& parameters) {
   list.table("stats");
   list.add("condition_from", parameters.condition_from,
            "where a cell's condition is told: `folder` (the first folder below the study's), `folder2` (the one below "
-           "that), or the name of a column of --table; empty: one condition");
+           "that), or the name of a column of --table; empty: the column `condition` where the table has one");
+  list.add("conditions", parameters.conditions,
+           "order of the conditions, with commas between them; the first is the reference that the others are "
+           "compared with; empty: by the alphabet. Example: \"control, blebbistatin\"");
+  list.add("replicate_from", parameters.replicate_from,
+           "where a cell's replicate (day, dish, animal) is told: `folder`, `folder2`, … or the name of a column of "
+           "--table; empty: the column `replicate` or `day` where the table has one");
+  list.add("exclude_findings", parameters.exclude_findings,
+           "cells with one of these open findings do not enter; identities with commas between them. Example: "
+           "\"explains-little, cell-cut\"");
+  list.add("primary", parameters.primary,
+           "what the study compares first between conditions: the tension of the fibres of primary_type, or the total "
+           "force of the cells");
+  list.add("primary_type", parameters.primary_type, "type of the fibres whose tension the study compares first");
   list.add("with_not_converged", parameters.with_not_converged, "cells whose fit did not converge enter, too");
   list.add("weak_tension_nN", parameters.weak_tension_nN, Range::force_nN(),
            "the share of fibres above this tension is given (nN)");
@@ -163,7 +219,8 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
     const std::string name = cell.lexically_relative(folder).generic_string();
     names.push_back(name == "." ? fs::weakly_canonical(cell).filename().string() : name);
   }
-  const std::vector<CellNote> notes = notes_of(names, parameters.condition_from, table);
+  const std::vector<CellNote> notes = notes_of(names, parameters.condition_from, parameters.replicate_from, table);
+  const std::vector<std::string> excluding = excluding_findings(parameters);
   std::vector<std::optional<StudyCell>> read(folders.size());
   std::vector<std::string> reasons(folders.size());
   numerics::parallel_for(static_cast<int>(folders.size()), threads, [&](int index) {
@@ -178,10 +235,13 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
       reasons[i] = error.what();  // that cell's matter, not the study's
     }
     if (!reasons[i].empty()) return;
+    read[i]->replicate = notes[i].replicate;
     if (!read[i]->fit.converged && !parameters.with_not_converged) reasons[i] = "the fit did not converge";
+    if (reasons[i].empty()) reasons[i] = excluded_by_finding(*read[i], excluding);
   });
   leave_out_copies(folders, names, read, reasons);
   Study study;
+  study.folder = folder;
   study.n_fibre_types = parameters.fibre_types;
   std::vector<std::string> condition_of_cell;
   for (std::size_t i = 0; i < folders.size(); ++i) {
@@ -195,7 +255,7 @@ Study read_study(const Path& folder, const StudyParameters& parameters, const st
   for (const runner::SkippedFolder& s : found.skipped)
     study.left_out.push_back({s.folder.lexically_relative(folder).generic_string(), "", "cannot be read: " + s.why});
   if (study.cells.empty()) no_cell_left(folder, study.left_out);
-  number_conditions(study, condition_of_cell);
+  number_conditions(study, condition_of_cell, parameters.conditions);
   return study;
 }
 

@@ -12,13 +12,25 @@
 
 namespace mbtfm::statistics {
 
+/// What the study was made to compare between conditions.
+enum class PrimaryMeasure {
+  tension,     ///< of the fibres of one type
+  total_force  ///< of the cells
+};
+constexpr auto words(PrimaryMeasure) { return std::array{"tension", "total-force"}; }
+
 struct StudyParameters {
-  std::string condition_from{};     ///< empty: all cells are of one condition
-  bool with_not_converged = false;  ///< a fit that did not converge is no measurement
-  double weak_tension_nN = 1;       ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
-  double strong_tension_nN = 5;     ///< a third of the ventral ones are above it
-  double near_adhesion_um = 1.5;    ///< beads lie some 1 um apart: about seven of them around an adhesion
-  int bootstrap_draws = 2000;       ///< ends of the intervals then repeat to some 5 % of their half width
+  std::string condition_from{};    ///< empty: the table's column `condition`, else all cells are of one condition
+  std::string conditions{};        ///< their order, with commas between them: the first is the reference
+  std::string replicate_from{};    ///< empty: the table's column `replicate` or `day`, else none
+  std::string exclude_findings{};  ///< cells with these open findings do not enter: ids with commas between them
+  PrimaryMeasure primary = PrimaryMeasure::tension;
+  FibreType primary_type = FibreType::ventral;  ///< the strongest, and those that most experiments are about
+  bool with_not_converged = false;              ///< a fit that did not converge is no measurement
+  double weak_tension_nN = 1;                   ///< most dorsal fibres of U2OS cells are below it (thesis 3.5)
+  double strong_tension_nN = 5;                 ///< a third of the ventral ones are above it
+  double near_adhesion_um = 1.5;                ///< beads lie some 1 um apart: about seven of them around an adhesion
+  int bootstrap_draws = 2000;                   ///< ends of the intervals then repeat to some 5 % of their half width
   std::uint64_t bootstrap_seed = 1;
   int fibre_types = 3;  ///< an edge fibre is held at both ends as a ventral one is, and few cells have enough of them
 };
@@ -28,8 +40,9 @@ std::vector<double> thresholds_nN(const StudyParameters& parameters);
 
 /// A finished cell.
 struct StudyCell {
-  std::string name;   ///< its folder, relative to the study's
-  int condition = 0;  ///< index into Study::conditions
+  std::string name;            ///< its folder, relative to the study's
+  int condition = 0;           ///< index into Study::conditions
+  std::string replicate = {};  ///< day, dish or animal; empty: not told
   Cell cell;
   std::vector<AdhesionForce> forces;
   std::vector<Tension> tensions;
@@ -44,9 +57,12 @@ struct LeftOutCell {
 };
 
 struct Study {
-  std::vector<std::string> conditions;  ///< in the order of the alphabet; one without a name where none were asked for
-  std::vector<StudyCell> cells;         ///< those that enter
+  /// As the parameters order them, the others by the alphabet; the first is the reference. One without a name where
+  /// none were asked for.
+  std::vector<std::string> conditions;
+  std::vector<StudyCell> cells;  ///< those that enter
   std::vector<LeftOutCell> left_out;
+  Path folder = {};       ///< names are relative to it
   int n_fibre_types = 3;  ///< 4: edge fibres are a type of their own; 3: they count as ventral
 };
 /// The type as which a fibre counts.

@@ -34,7 +34,8 @@ struct Findings {
 };
 std::vector<Findings> findings_of(const Analysis& analysis, const StudyParameters& parameters);
 
+/// @param page_folder  where the page will lie: the cells' pages are linked from there
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
-                       const StudyParameters& parameters);
+                       const StudyParameters& parameters, const Path& page_folder);
 
 }  // namespace mbtfm::statistics

@@ -4,6 +4,9 @@
 #include <map>
 
 #include "pipeline/contract/version.h"
+#include "pipeline/files/base64.h"
+#include "pipeline/files/own_files.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/page.h"
 #include "pipeline/statistics/study_files.h"
 
@@ -24,14 +27,18 @@ std::string interval_text(const std::optional<Interval>& interval) {
 
 bool has_conditions(const Study& study) { return study.conditions.size() > 1 || !study.conditions.front().empty(); }
 
-/// The one place where a figure enters the page.
+/// The charts and what they show, without the title.
+std::string charts_of(const Figure& figure) {
+  std::string html = "<div class=\"grid\">\n";
+  for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
+  return html + "</div>\n<p class=\"sub\">" + charts::html_escaped(figure.caption) + "</p>\n";
+}
+
 std::string embedded(const Figure& figure) {
   if (figure.charts.empty())
     return "<h3>" + charts::html_escaped(figure.title) +
            "</h3>\n<p class=\"sub\">Not drawn: " + charts::html_escaped(figure.caption) + "</p>\n";
-  std::string html = "<h3>" + charts::html_escaped(figure.title) + "</h3>\n<div class=\"grid\">\n";
-  for (const charts::Chart& chart : figure.charts) html += report::figure(chart, {});
-  return html + "</div>\n<p class=\"sub\">" + charts::html_escaped(figure.caption) + "</p>\n";
+  return "<h3>" + charts::html_escaped(figure.title) + "</h3>\n" + charts_of(figure);
 }
 
 report::Table types_table(const Study& study, const Analysis& analysis) {
@@ -42,11 +49,12 @@ report::Table types_table(const Study& study, const Analysis& analysis) {
                        {"mean, mixed model (nN)", true},
                        {"95 %", true},
                        {"plain mean (nN)", true},
-                       {"95 %, cells drawn anew", true},
+                       {"95 %, cells resampled", true},
                        {"median (nN)", true},
                        {"SD (nN)", true},
                        {"SD without error (nN)", true}},
-                      {}};
+                      {},
+                      "Tension by fibre type"};
   for (const Summary& s : analysis.tensions.summaries) {
     table.rows.push_back(
         {charts::html_escaped(s.condition), kind_for_people(s.kind), std::to_string(s.n_cells), std::to_string(s.n),
@@ -77,7 +85,8 @@ report::Table tests_table(const Measure& m) {
                        {"effect", true},
                        {"95 %"},
                        {"effect is"}},
-                      {}};
+                      {},
+                      "Tests of the " + m.sample.name};
   for (const Comparison& t : m.comparisons) {
     const bool is_pair = !t.group_b.empty();
     table.rows.push_back({charts::html_escaped(t.within), name_of(t.test), name_of(t.unit),
@@ -103,7 +112,8 @@ report::Table cells_table(const Study& study) {
                        {"relative L2", true},
                        {"expected", true},
                        {"enters"}},
-                      {}};
+                      {},
+                      "Cells"};
   for (const StudyCell& c : study.cells) {
     table.rows.push_back(
         {charts::html_escaped(c.name), charts::html_escaped(study.conditions[static_cast<std::size_t>(c.condition)]),
@@ -129,7 +139,7 @@ std::string first_of(const std::vector<std::string>& names) {
 
 /// Open findings, each with the cells that have it.
 report::Table findings_table(const Study& study) {
-  report::Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}};
+  report::Table table{{{"finding"}, {"severity"}, {"cells", true}, {"of them"}, {"what to do"}}, {}, "Open findings"};
   std::map<std::string, std::pair<const Finding*, std::vector<std::string>>> by_id;
   for (const StudyCell& c : study.cells) {
     for (const Finding& f : c.findings) {
@@ -157,6 +167,28 @@ std::string findings_text(const Study& study, const std::string& table_html) {
          table_html;
 }
 
+/// Every cell that enters, as its segmentation looks, linked to its page where the study lies beside the cells.
+std::string gallery(const Study& study, const Path& page_folder) {
+  std::string html = "<div class=\"cells\">\n";
+  for (const StudyCell& c : study.cells) {
+    const Path folder = study.folder / c.name, picture = folder / "1_segment/thumbnail.jpg";
+    const std::string link = (folder / "report.html").lexically_relative(page_folder).generic_string();
+    const std::string& condition = study.conditions[static_cast<std::size_t>(c.condition)];
+    const std::string text =
+        fmt::format("{}{}{}: {} nN", c.name, condition.empty() ? "" : ", ", condition, readable(c.fit.total_force_nN));
+    html += fmt::format("<a href=\"{}\">{}<span>{}{}</span></a>\n", html_escaped(link),
+                        files::is_own_file(picture) ? fmt::format("<img alt=\"\" src=\"data:image/jpeg;base64,{}\">",
+                                                                  files::base64(files::read_text(picture)))
+                                                    : "",
+                        html_escaped(text), has_open(c.findings) ? " <b>!</b>" : "");
+  }
+  return html +
+         "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
+         "leave cells out by a rule: <code>--exclude-findings</code>; one by one: a column <code>exclude</code> with "
+         "the "
+         "reason in <code>--table</code>.</p>\n";
+}
+
 std::string list_of(const std::vector<std::string>& sentences) {
   std::string html = "<ul>\n";
   for (const std::string& s : sentences) html += "<li>" + charts::html_escaped(s) + "</li>\n";
@@ -176,6 +208,33 @@ std::string overview(const Study& study, const Analysis& analysis) {
       study.cells.size(), has_conditions(study) ? fmt::format(" under {} conditions", study.conditions.size()) : "",
       n_adhesions, n_fibres, analysis.tensions.sample.values.size(), study.left_out.size());
   if (!analysis.warnings.empty()) html += "<h3>What to distrust</h3>\n" + list_of(analysis.warnings);
+  return html;
+}
+
+/// What the study was made for, before anything else.
+std::string primary_section(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures) {
+  const Primary& primary = analysis.primary;
+  std::string html;
+  if (study.conditions.size() < 2) {
+    html =
+        "<p>The study has one condition: there is nothing to compare. Give each cell a condition: a column "
+        "<code>condition</code> in <code>--table</code>, or <code>--condition-from folder</code>.</p>\n";
+  } else if (primary.differences.empty()) {
+    html = "<p>The " + html_escaped(primary.measure) + " cannot be compared: " + html_escaped(primary.obstacle) +
+           ".</p>\n";
+  }
+  for (const PrimaryDifference& d : primary.differences) {
+    std::string text = sentence_of(primary, d);
+    text[0] = static_cast<char>(std::toupper(static_cast<unsigned char>(text[0])));
+    html += "<p class=\"what\"><b>" + html_escaped(text) + ".</b></p>\n";
+  }
+  for (const Figure& figure : figures) {
+    if (figure.name == "primary") html += charts_of(figure);
+  }
+  if (!primary.differences.empty())
+    html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
+            ", two-sided; p by Holm over the conditions. It was chosen by the parameters <code>primary</code> and "
+            "<code>primary_type</code>, not by its result. All other tests of this page are exploratory.</p>\n";
   return html;
 }
 
@@ -204,10 +263,11 @@ std::string on_edge_fibres(const Study& study) {
 }  // namespace
 
 std::string study_html(const Study& study, const Analysis& analysis, const std::vector<Figure>& figures,
-                       const StudyParameters& parameters) {
+                       const StudyParameters& parameters, const Path& page_folder) {
   const std::string head = fmt::format("<h1>Stress-fibre tensions of {} cells</h1><p class=\"sub\">mbtfm {}</p>\n",
                                        study.cells.size(), kVersion);
-  std::string body = report::section("In short", overview(study, analysis));
+  std::string body = report::section("Primary comparison", primary_section(study, analysis, figures)) +
+                     report::section("In short", overview(study, analysis));
   std::string found;
   for (const Findings& f : findings_of(analysis, parameters)) {
     if (!f.sentences.empty()) found += "<h3>" + f.title + "</h3>\n" + list_of(f.sentences);
@@ -215,9 +275,11 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
     found += fmt::format("<details><summary>{} pairs that do not demonstrably differ</summary>\n{}</details>\n",
                          f.unclear.size(), list_of(f.unclear));
   }
-  body += report::section("What was found", found);
+  body += report::section("What was found, exploratory", found);
   std::string pictures;
-  for (const Figure& figure : figures) pictures += embedded(figure);
+  for (const Figure& figure : figures) {
+    if (figure.name != "primary") pictures += embedded(figure);
+  }
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const report::Table& table, const std::string& name) {
     const auto file = std::find_if(files.begin(), files.end(), [&](const auto& f) { return f.first == name; });
@@ -234,8 +296,8 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
       tests += report::folded("Tests of the " + m->sample.name + " of " + name_of(m->sample.each),
                               report::html_of(tests_table(*m)));
   }
-  body += report::section("Tests", tests + kHowToRead);
-  body += report::section("Cells", with_file(cells_table(study), "cells.csv"));
+  body += report::section("Exploratory tests", tests + kHowToRead);
+  body += report::section("Cells", gallery(study, page_folder) + with_file(cells_table(study), "cells.csv"));
   return report::page("Stress-fibre tensions – mbtfm", head, body);
 }
 

@@ -207,13 +207,13 @@ std::vector<Column<Row>> summary_columns(const std::string& counted, const std::
       {{{"n_cells", "cells", of([](const Summary& s) { return s.n_cells; })},
         {"n_" + counted, counted, of([](const Summary& s) { return s.n; })},
         {"mean" + unit, "each counts the same", of([](const Summary& s) { return s.plain.mean; }), kResult}},
-       ends_of<Row>("mean_low" + unit, "mean_high" + unit, "the mean, cells drawn anew",
+       ends_of<Row>("mean_low" + unit, "mean_high" + unit, "the mean, cells resampled",
                     of([](const Summary& s) { return s.mean_interval; })),
        {{"model_mean" + unit, "mean of the mixed model",
          of([](const Summary& s) { return s.model ? Number(s.model->estimate) : Number(); }), kResult}},
        ends_of<Row>("model_low" + unit, "model_high" + unit, "that mean", of(model)),
        {{"median" + unit, "each counts the same", of([](const Summary& s) { return s.plain.median; }), kResult}},
-       ends_of<Row>("median_low" + unit, "median_high" + unit, "the median, cells drawn anew",
+       ends_of<Row>("median_low" + unit, "median_high" + unit, "the median, cells resampled",
                     of([](const Summary& s) { return s.median_interval; })),
        {{"sd" + unit, "standard deviation", of([](const Summary& s) { return s.plain.standard_deviation; }), kResult},
         {"typical_error" + unit, "root mean square of the standard errors",
@@ -399,7 +399,7 @@ const Table<Correlation>& correlation_table() {
             {"n_cells", "cells", [](const Row& c) { return c.line.n; }},
             {"slope", "of the line through the origin", [](const Row& c) { return c.line.slope; }, kResult},
             {"slope_error", "its standard error", [](const Row& c) { return c.line.slope_error; }, kResult}},
-           ends_of<Row>("slope_low", "slope_high", "the slope, cells drawn anew", &Row::slope_interval),
+           ends_of<Row>("slope_low", "slope_high", "the slope, cells resampled", &Row::slope_interval),
            {{"r", "Pearson's correlation", [](const Row& c) { return c.line.correlation; }, kResult}}})};
   return table;
 }
@@ -418,7 +418,7 @@ const Table<AreaBin>& area_bin_table() {
             {"n_adhesions", "adhesions", &Row::n_adhesions},
             {"mean_area_um2", "of the adhesions", &Row::mean_area_um2, kResult},
             {"mean_force_nN", "of the adhesions", &Row::mean_force_nN, kResult}},
-           ends_of<Row>("low_nN", "high_nN", "the mean force, cells drawn anew", &Row::interval_nN)})};
+           ends_of<Row>("low_nN", "high_nN", "the mean force, cells resampled", &Row::interval_nN)})};
   return table;
 }
 
@@ -447,11 +447,11 @@ const Table<DirectionSummary>& direction_mean_table() {
             {"n_cells", "cells", &Row::n_cells},
             {"n", "angles", &Row::n},
             {"mean_angle_deg", "their mean", &Row::mean_angle_deg, kResult}},
-           ends_of<Row>("low_deg", "high_deg", "the mean, cells drawn anew", &Row::angle_interval_deg),
+           ends_of<Row>("low_deg", "high_deg", "the mean, cells resampled", &Row::angle_interval_deg),
            {{"chance_deg", "what chance would give", [](const Row& row) { return largest_angle_deg(row.relation) / 2; },
              kResult},
             {"mean_cosine", "the same of the cosines", &Row::mean_cosine, kResult}},
-           ends_of<Row>("cosine_low", "cosine_high", "that mean, cells drawn anew", &Row::cosine_interval)})};
+           ends_of<Row>("cosine_low", "cosine_high", "that mean, cells resampled", &Row::cosine_interval)})};
   return table;
 }
 

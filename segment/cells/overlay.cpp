@@ -273,11 +273,11 @@ void draw_marks(Canvas& canvas, const Cell& cell, int thickness) {
   }
 }
 
+}  // namespace
+
 images::Picture picture_of(const cv::Mat& rgb) {
   return {rgb.cols, rgb.rows, std::vector<std::uint8_t>(rgb.data, rgb.data + rgb.total() * 3)};
 }
-
-}  // namespace
 
 View view_of(const Segmentation& s) {
   Polyline points = s.cell.outline_um;

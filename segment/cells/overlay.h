@@ -32,6 +32,8 @@ struct View {
 /// The cell and a margin around it.
 View view_of(const Segmentation& segmentation);
 
+/// @param rgb  8-bit red, green, blue
+images::Picture picture_of(const cv::Mat& rgb);
 /// The same in small, without text: outline, ellipses and fibres (8-bit red, green, blue).
 cv::Mat draw_thumbnail(const std::optional<images::Channel>& adhesion, const std::optional<images::Channel>& actin,
                        const Segmentation& segmentation, const View& view, int long_side_px);

@@ -97,6 +97,7 @@ const std::vector<std::pair<std::string, std::set<std::string>>> kThirdParty = {
     {"openssl/", {"pipeline/files"}},
     {"librsvg/", {"pipeline/statistics"}},
     {"cairo/", {"pipeline/statistics"}},
+    {"zlib", {"pipeline/statistics"}},
 };
 
 /// Headers that show a third party's names to the pipeline's other folders, each told so in its first lines.

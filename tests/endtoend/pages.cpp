@@ -31,7 +31,7 @@ class Pages : public testing::Test {
     const auto analysis = statistics::analyse(study, parameters);
     files::write_text(
         study_page(),
-        statistics::study_html(study, analysis, statistics::figures_of(study, analysis, parameters), parameters));
+        statistics::study_html(study, analysis, statistics::figures_of(study, analysis, parameters), parameters, "statistics"));
   }
   /// One for all tests: it takes seconds to start.
   static Browser& opened(const std::filesystem::path& page) {

@@ -3,6 +3,11 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+
+#include <numbers>
+
+#include "mbtfm/tensions/energy.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::tensions {
@@ -42,6 +47,74 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
   }
   EXPECT_LT(stated / n, 1 + 4 * std::sqrt(2.0 / n));  // as if each told of itself
   EXPECT_GT(by_beads / n, 2) << "the beads' noise alone must not explain it for this to tell anything";
+}
+
+double figure(const Figures& figures, const std::string& name) {
+  for (const auto& [known, value] : figures) {
+    if (known == name) return std::get<double>(value);
+  }
+  return std::numeric_limits<double>::quiet_NaN();
+}
+
+/// Discs far apart on a gel that is much thicker than they are large: the mean displacement under an even tangential
+/// traction is 16 (1+ν)(1−ν/2) F / (3π² a E) (Johnson, Contact Mechanics, 3.7: as under a pressure, with (1+ν)(1−ν/2)
+/// for 1−ν²). What one disc does to another, r away, is a·3π/(8r)-fold smaller.
+TEST(StrainEnergy, of_discs_far_apart_is_that_of_each_by_itself) {
+  constexpr double kRadius_um = 0.5, kDistance_um = 400, kForce_nN = 3;
+  const Gel gel{.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.4, .thickness_um = 2000};
+  Cell cell;
+  for (const double x : {-0.5 * kDistance_um, 0.5 * kDistance_um}) {
+    cell.adhesions.push_back({.adhesion_id = static_cast<int>(cell.adhesions.size()) + 1,
+                              .position_um = {x, 0},
+                              .area_um2 = std::numbers::pi * kRadius_um * kRadius_um,
+                              .major_axis_um = 2 * kRadius_um,
+                              .minor_axis_um = 2 * kRadius_um});
+  }
+  EnsembleFit fit;
+  fit.forces_nN = Eigen::Vector4d(kForce_nN, 0, -kForce_nN, 0);
+  fit.meshes.emplace_back();
+  fit.meshes[0].force_derivatives = Eigen::Vector4d(1, 0, -1, 0);  // one fibre between them
+  fit.meshes[0].noise_covariance_nN2 = Eigen::MatrixXd::Constant(1, 1, 0.01);
+  const Figures found = energy_and_moments(fit, cell, gel, true, 1);
+  const double mean_um = 16 * (1 + gel.poisson_ratio) * (1 - gel.poisson_ratio / 2) * kForce_nN /
+                         (3 * std::numbers::pi * std::numbers::pi * kRadius_um * gel.youngs_modulus_kPa);
+  // the rule is exact to the fifth degree, the displacement under a disc is an elliptic integral of the radius: 1 %
+  EXPECT_NEAR(figure(found, "strain_energy_fJ"), kForce_nN * mean_um, 0.01 * kForce_nN * mean_um);
+  // the energy grows as the square of the tension, which is known to 0.1 nN
+  EXPECT_NEAR(figure(found, "strain_energy_sigma_fJ"), 2 * mean_um * 0.1, 0.01 * 2 * mean_um * 0.1);
+  EXPECT_NEAR(figure(found, "contractile_moment_nN_um"), kForce_nN * kDistance_um, 1e-9);
+  EXPECT_NEAR(figure(found, "contractile_moment_sigma_nN_um"), 0.1 * kDistance_um, 1e-9);
+  EXPECT_NEAR(figure(found, "contractile_moment_major_nN_um"), kForce_nN * kDistance_um, 1e-9);
+  EXPECT_NEAR(figure(found, "contractile_moment_minor_nN_um"), 0, 1e-9);
+  EXPECT_NEAR(std::remainder(figure(found, "contractile_moment_axis_deg"), 180), 0, 1e-9);
+}
+
+TEST(ContractileMoment, follows_a_cell_that_is_turned) {
+  constexpr double kAngle = 0.4;
+  const Eigen::Rotation2Dd turn(kAngle);
+  Cell cell;
+  EnsembleFit fit;
+  fit.forces_nN.resize(6);
+  const Eigen::Vector2d places[] = {{-20, 3}, {18, -5}, {2, 9}}, forces[] = {{5, -1}, {-6, 2}, {1, -1}};
+  for (int a = 0; a < 3; ++a) {
+    const Eigen::Vector2d at = turn * places[a];
+    cell.adhesions.push_back({.adhesion_id = a + 1,
+                              .position_um = {at.x(), at.y()},
+                              .area_um2 = 1,
+                              .major_axis_um = 1.2,
+                              .minor_axis_um = 1});
+    fit.forces_nN.segment<2>(2 * a) = turn * forces[a];
+  }
+  fit.meshes.emplace_back();
+  fit.meshes[0].force_derivatives = Eigen::MatrixXd::Zero(6, 1);
+  fit.meshes[0].noise_covariance_nN2 = Eigen::MatrixXd::Zero(1, 1);
+  Eigen::Matrix2d moment = Eigen::Matrix2d::Zero();  // the forces balance: about any point
+  for (int a = 0; a < 3; ++a) moment -= places[a] * forces[a].transpose();
+  const double angle = 0.5 * std::atan2(moment(0, 1) + moment(1, 0), moment(0, 0) - moment(1, 1));
+  const Figures found = energy_and_moments(fit, cell, {.youngs_modulus_kPa = 8.4}, false, 1);
+  EXPECT_NEAR(figure(found, "contractile_moment_nN_um"), moment.trace(), 1e-9);
+  EXPECT_NEAR(figure(found, "contractile_moment_axis_deg"), (angle + kAngle) * 180 / std::numbers::pi, 1e-9);
+  EXPECT_TRUE(std::isnan(figure(found, "strain_energy_fJ"))) << "the gel is not the same at all depths";
 }
 
 /// A hexagon of so many edges a side on a regular triangulation, each edge a link of share 1.

@@ -124,7 +124,7 @@ void expect_whole(const Study& study, Page page) {
   }
   for (const std::string& warning : analysis.warnings) EXPECT_FALSE(says_nan(warning)) << warning;
   if (page == Page::left_out) return;
-  EXPECT_FALSE(study_html(study, analysis, figures, kFewDraws).empty());
+  EXPECT_FALSE(study_html(study, analysis, figures, kFewDraws, "statistics").empty());
 }
 
 TEST(SmallStudies, whatever_lacks_every_number_is_finite_or_its_field_empty) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "segment/beads/picture.h"
 #include "segment/beads/track.h"
 #include "tests/support/bead_pair.h"
 
@@ -116,6 +117,32 @@ TEST(TrackProperty, any_number_of_threads_gives_the_same_numbers) {
       EXPECT_EQ(one.field[k].flag, more.field[k].flag);
     }
   }
+}
+
+images::Image point_at(int column, int row) {
+  images::Image image;
+  image.width = 60;
+  image.height = 40;
+  image.pixels.assign(60 * 40, 100);
+  image.at(column, row) = 900;
+  return image;
+}
+
+/// red, green and blue of a pixel.
+std::array<int, 3> colour_at(const images::Picture& picture, int column, int row) {
+  const std::size_t at = 3 * (static_cast<std::size_t>(row) * picture.width + column);
+  return {picture.rgb[at], picture.rgb[at + 1], picture.rgb[at + 2]};
+}
+
+TEST(PictureOfBeads, relaxed_beads_are_green_stressed_ones_purple_and_those_that_only_drifted_white) {
+  using Colour = std::array<int, 3>;
+  const images::Picture apart = picture_of_beads(point_at(20, 10), point_at(25, 12), {0, 0});
+  ASSERT_EQ(apart.width, 60);
+  EXPECT_EQ(colour_at(apart, 20, 10), (Colour{0, 255, 0}));
+  EXPECT_EQ(colour_at(apart, 25, 12), (Colour{255, 0, 255}));
+  EXPECT_EQ(colour_at(apart, 5, 5), (Colour{0, 0, 0}));
+  const images::Picture drifted = picture_of_beads(point_at(20, 10), point_at(25, 12), {5.2, 1.8});
+  EXPECT_EQ(colour_at(drifted, 20, 10), (Colour{255, 255, 255}));
 }
 
 }  // namespace

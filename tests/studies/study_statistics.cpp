@@ -1,6 +1,6 @@
 /// How far the tests and intervals of a study are to be trusted: p-values where nothing differs, coverage of intervals,
 /// power, time. Prints tables; figures go to a folder.
-/// study_statistics null|power|time [SIMULATIONS] [FOLDER]
+/// study_statistics null|power|primary|time [SIMULATIONS] [FOLDER]
 #include <chrono>
 #include <cmath>
 #include <cstdio>
@@ -159,11 +159,32 @@ void study_time() {
     const statistics::Analysis analysis = statistics::analyse(study, parameters);
     const auto analysed = std::chrono::steady_clock::now();
     const auto figures = statistics::figures_of(study, analysis, parameters);
-    const std::string html = statistics::study_html(study, analysis, figures, parameters);
+    const std::string html = statistics::study_html(study, analysis, figures, parameters, "statistics");
     const std::chrono::duration<double> first = analysed - start, second = std::chrono::steady_clock::now() - analysed;
     std::printf("%d cells, %zu fibres, %zu adhesions: analysis %.1f s, figures and page %.1f s (%zu kB)\n", n_cells,
                 analysis.tensions.sample.values.size(), analysis.adhesion_forces.sample.values.size(), first.count(),
                 second.count(), html.size() / 1000);
+  }
+}
+
+/// How often the primary test finds a difference where there is none.
+void study_primary(int n_simulations) {
+  std::printf("cells,replicates,simulations,p_below_0.05\n");
+  for (const int n_cells : {8, 12, 24}) {
+    for (const bool has_days : {false, true}) {
+      int n = 0, n_found = 0;
+      for (int k = 0; k < n_simulations; ++k) {
+        Study study = test::simulated_study(strong_cell_effects(n_cells, 7000 + static_cast<std::uint64_t>(k)));
+        for (std::size_t i = 0; has_days && i < study.cells.size(); ++i)
+          study.cells[i].replicate = std::to_string(i % 4);
+        const Sample sample = sample_tensions(study);
+        const ModelResult model = model_of(sample);
+        const Primary primary = primary_of(study, sample, model.model, compare(sample, model.model), {});
+        for (const PrimaryDifference& d : primary.differences) ++n, n_found += d.p_holm < 0.05 ? 1 : 0;
+      }
+      std::printf("%d,%s,%d,%.4f\n", n_cells, has_days ? "4" : "none", n, static_cast<double>(n_found) / n);
+      std::fflush(stdout);
+    }
   }
 }
 
@@ -176,10 +197,12 @@ int main(int argc, char** argv) {
     study_null(n_simulations, argc > 3 ? argv[3] : "");
   } else if (what == "power") {
     study_power(n_simulations);
+  } else if (what == "primary") {
+    study_primary(n_simulations);
   } else if (what == "time") {
     study_time();
   } else {
-    std::fprintf(stderr, "study_statistics null|power|time [SIMULATIONS] [FOLDER]\n");
+    std::fprintf(stderr, "study_statistics null|power|primary|time [SIMULATIONS] [FOLDER]\n");
     return 2;
   }
 }

@@ -7,6 +7,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/base64.h"
+#include "pipeline/files/text.h"
 #include "pipeline/report/arrows.h"
 #include "pipeline/report/colours.h"
 #include "pipeline/report/compare.h"
@@ -70,6 +71,39 @@ TEST(Report, is_written_again_only_where_something_has_changed) {
   const std::string before = files::read_text(file);
   update_report(cell.folder.path());
   EXPECT_NE(files::read_text(file), before);
+}
+
+TEST(Report, each_table_and_chart_has_a_name_for_those_who_hear_the_page) {
+  const FakeCell cell;
+  const std::string html = report_html(cell.folder.path());
+  const auto count = [&](const std::string& what) {
+    int n = 0;
+    for (std::size_t at = html.find(what); at != html.npos; at = html.find(what, at + 1)) ++n;
+    return n;
+  };
+  EXPECT_GE(count("<caption"), 3);
+  EXPECT_EQ(count("<table><thead>"), 0) << "tables with titles of columns have a caption";
+}
+
+TEST(Report, the_methods_paragraph_has_the_numbers_of_this_cell) {
+  const FakeCell cell;
+  const std::string html = report_html(cell.folder.path());
+  const std::size_t at = html.find("For-your-methods-section");
+  ASSERT_NE(at, html.npos);
+  const std::string paragraph = html.substr(html.find("<p class=\"cite\">", at));
+  for (const char* part : {"8.4 kPa", "12 adhesions", "4 stress fibres"}) {
+    EXPECT_LT(paragraph.find(part), paragraph.find("</p>")) << part;
+  }
+}
+
+TEST(Report, shows_the_bead_images_where_tracking_has_left_them) {
+  const FakeCell cell;
+  EXPECT_EQ(report_html(cell.folder.path()).find("<h3>Beads</h3>"), std::string::npos);
+  files::write_text(cell.folder / "2_track/beads.jpg", "a picture");
+  files::write_text(cell.folder / "2_track/beads_picture.csv", "x_um,y_um,width_um,height_um\n0,0,80,80\n");
+  const std::string html = report_html(cell.folder.path());
+  EXPECT_NE(html.find("<h3>Beads</h3>"), std::string::npos);
+  EXPECT_NE(html.find(files::base64("a picture")), std::string::npos);
 }
 
 TEST(Report, rejects_a_fitted_field_of_other_beads) {

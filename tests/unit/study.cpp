@@ -10,7 +10,7 @@
 #include "pipeline/files/csv.h"
 #include "pipeline/files/text.h"
 #include "pipeline/statistics/conditions.h"
-#include "pipeline/statistics/png.h"
+#include "pipeline/statistics/picture.h"
 #include "pipeline/statistics/relations.h"
 #include "pipeline/statistics/study_files.h"
 #include "pipeline/statistics/summaries.h"
@@ -96,6 +96,33 @@ TEST(Study, conditions_come_from_a_folder_or_a_table) {
   EXPECT_EQ(reason_of(by_table, "treated/cell_4"), "not in the table");
 }
 
+TEST(Study, a_column_called_condition_counts_without_being_asked_for) {
+  const FakeStudy fake;
+  files::write_text(
+      fake.folder / "study.csv",
+      "cell,condition,day\ncell_1,untreated,mon\ncell_2,drug,mon\ncell_3,untreated,tue\ncell_4,drug,tue\n");
+  const Study study = fake.read({}, fake.folder / "study.csv");
+  EXPECT_EQ(study.conditions, (std::vector<std::string>{"drug", "untreated"}));
+  EXPECT_EQ(study.cells[0].replicate, "mon");
+  EXPECT_EQ(study.cells[1].replicate, "tue");
+  const Study ordered = fake.read({.conditions = "untreated , drug"}, fake.folder / "study.csv");
+  EXPECT_EQ(ordered.conditions, (std::vector<std::string>{"untreated", "drug"}));
+  EXPECT_EQ(ordered.cells[0].condition, 0);
+  EXPECT_THROW(fake.read({.conditions = "control"}, fake.folder / "study.csv"), UsageError);
+}
+
+TEST(Study, cells_with_a_finding_that_excludes_are_left_out_with_it_as_the_reason) {
+  const FakeStudy fake;
+  files::write_text(fake.folder / "control/cell_1/run.json",
+                    R"({"findings":[{"id":"cell-cut","severity":"caution","text":"cut"},)"
+                    R"({"id":"saturated","severity":"note","text":"a little"}]})");
+  EXPECT_EQ(fake.read({.exclude_findings = "saturated"}).cells.size(), 4u) << "a note is not open";
+  const Study study = fake.read({.exclude_findings = "explains-little, cell-cut"});
+  EXPECT_EQ(study.cells.size(), 3u);
+  EXPECT_EQ(reason_of(study, "control/cell_1"), "the finding cell-cut is open (stats.exclude_findings)");
+  EXPECT_THROW(fake.read({.exclude_findings = "cell-cutt"}), UsageError);
+}
+
 TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   const FakeStudy fake;
   EXPECT_THROW(fake.read({.condition_from = "drug"}), UsageError);
@@ -107,7 +134,7 @@ TEST(Study, what_cannot_be_assigned_is_an_error_that_says_so) {
   EXPECT_THROW(fake.read({.condition_from = "drug"}, table("cell,dose\ncell_1,2\n")), InputError);
   EXPECT_THROW(fake.read({}, table("cell\ncell_77\n")), InputError);
   EXPECT_THROW(fake.read({}, table("cell\ncell_1\ncontrol/cell_1\n")), InputError);
-  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", table("cell\nx\n")), InputError);
+  EXPECT_THROW(notes_of({"a/x", "b/x"}, "", "", table("cell\nx\n")), InputError);
 }
 
 TEST(Study, a_folder_without_a_finished_cell_is_an_error) {
@@ -146,7 +173,8 @@ TEST(Study, edge_fibres_count_as_ventral_ones_or_as_a_type_of_their_own) {
     EXPECT_EQ(cells.integer(0, "n_edge", 0), 1);
     const StudyParameters parameters{.fibre_types = n_types};
     const Analysis analysis = analyse(study, parameters);
-    const std::string page = study_html(study, analysis, figures_of(study, analysis, parameters), parameters);
+    const std::string page =
+        study_html(study, analysis, figures_of(study, analysis, parameters), parameters, "statistics");
     EXPECT_NE(page.find("1 edge fibre runs along"), std::string::npos);
   }
 }
@@ -360,7 +388,7 @@ void expect_whole(const Study& study) {
     if (figure.charts.empty()) continue;
     EXPECT_EQ(svg_of(figure).find("nan"), std::string::npos) << figure.name;
   }
-  const std::string html = study_html(study, analysis, figures, parameters);
+  const std::string html = study_html(study, analysis, figures, parameters, "statistics");
   EXPECT_EQ(html.find("nan "), html.npos);
 }
 
@@ -395,20 +423,76 @@ TEST(Analysis, a_single_cell_of_a_condition_is_warned_of) {
   EXPECT_EQ(warnings.front().substr(0, 16), "a: a single cell");
 }
 
+TEST(Primary, compares_each_condition_with_the_reference_by_the_test_that_was_named) {
+  const Study study = test::simulated_study({.n_cells = 24, .n_conditions = 3, .condition_effect_nN = 3, .seed = 4});
+  StudyParameters parameters{.bootstrap_draws = 100};
+  const Analysis analysis = analyse(study, parameters);
+  const Primary& primary = analysis.primary;
+  ASSERT_EQ(primary.differences.size(), 2u);
+  EXPECT_EQ(primary.reference, "a");
+  EXPECT_EQ(primary.differences[1].condition, "c");
+  EXPECT_GT(primary.differences[0].difference.low, 0);
+  EXPECT_NEAR(primary.differences[1].difference.estimate, 6, 3 * primary.differences[1].difference.standard_error);
+  // the same numbers as among all tests, but for the sign
+  for (const Comparison& c : analysis.tensions.comparisons) {
+    if (c.test != statistics::Test::mixed_model || c.within != "ventral" || c.group_a != "a" || c.group_b != "b")
+      continue;
+    EXPECT_NEAR(primary.differences[0].difference.estimate, -c.effect, 1e-12);
+    EXPECT_NEAR(primary.differences[0].difference.low, -c.interval->high, 1e-9);
+    EXPECT_NEAR(primary.differences[0].difference.p_value, c.p_value, 1e-9);
+  }
+  parameters.primary = PrimaryMeasure::total_force;
+  EXPECT_EQ(analyse(study, parameters).primary.measure, "total force of cells");
+}
+
+TEST(Primary, with_replicates_compares_their_means_in_pairs) {
+  Study study = test::simulated_study({.n_cells = 12, .n_conditions = 2, .seed = 9});
+  for (std::size_t i = 0; i < study.cells.size(); ++i) study.cells[i].replicate = std::string(1, "xyz"[i % 3]);
+  const Analysis analysis = analyse(study, {.bootstrap_draws = 100});
+  ASSERT_EQ(analysis.primary.differences.size(), 1u);
+  const PrimaryDifference& d = analysis.primary.differences[0];
+  EXPECT_EQ(d.replicates, 3);
+  EXPECT_EQ(d.difference.degrees, 2);
+  // by hand: means of cells, of replicates, of their differences
+  const Sample& sample = analysis.tensions.sample;
+  std::map<std::pair<int, std::string>, std::vector<double>> cells_of;
+  for (std::size_t i = 0; i < study.cells.size(); ++i) {
+    std::vector<double> own;
+    for (const Observation& o : sample.values) {
+      if (o.cell == static_cast<int>(i) && o.kind == 2) own.push_back(o.value);
+    }
+    if (!own.empty()) cells_of[{study.cells[i].condition, study.cells[i].replicate}].push_back(describe(own).mean);
+  }
+  double sum = 0;
+  for (const char* replicate : {"x", "y", "z"})
+    sum += describe(cells_of.at({1, replicate})).mean - describe(cells_of.at({0, replicate})).mean;
+  EXPECT_NEAR(d.difference.estimate, sum / 3, 1e-12);
+  for (StudyCell& cell : study.cells) cell.replicate = "one day";
+  EXPECT_FALSE(analyse(study, {.bootstrap_draws = 100}).primary.obstacle.empty());
+}
+
 TEST(Figures, are_drawn_into_pixels) {
   const test::TemporaryFolder folder;
   const Study study = test::simulated_study({.n_cells = 6});
   const StudyParameters parameters{.bootstrap_draws = 100};
   const Figure figure = figures_of(study, analyse(study, parameters), parameters).front();
-  write_png(folder / "figure.png", svg_of(figure), 2);
+  write_png(folder / "figure.png", svg_of(figure), 85, 300);
   const std::string bytes = files::read_text(folder / "figure.png");
   EXPECT_EQ(bytes.substr(1, 3), "PNG");
   const auto big_endian = [&](std::size_t at) {
     return (static_cast<unsigned char>(bytes[at + 2]) << 8) + static_cast<unsigned char>(bytes[at + 3]);
   };
-  EXPECT_EQ(big_endian(16), 2 * static_cast<int>(charts::Chart::kWidth_px));
+  EXPECT_EQ(big_endian(16), std::lround(85 / 25.4 * 300));
+  const std::size_t at = bytes.find("pHYs");
+  ASSERT_NE(at, bytes.npos);
+  EXPECT_EQ(big_endian(at + 4), std::lround(300 / 0.0254)) << "pixels in a metre";
   EXPECT_GT(bytes.size(), 10000u);  // an empty page of this size has some 4 kB
-  EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 2), OutputError);
+  EXPECT_THROW(write_png(folder / "nowhere/figure.png", svg_of(figure), 85, 300), OutputError);
+  write_pdf(folder / "figure.pdf", svg_of(figure), 85);
+  write_pdf(folder / "again.pdf", svg_of(figure), 85);
+  const std::string pdf = files::read_text(folder / "figure.pdf");
+  EXPECT_EQ(pdf.substr(0, 5), "%PDF-");
+  EXPECT_EQ(pdf, files::read_text(folder / "again.pdf"));
 }
 
 }  // namespace

@@ -1,0 +1,144 @@
+#include "pipeline/statistics/primary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include "pipeline/charts/chart.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/statistics/analysis.h"
+#include "pipeline/statistics/rank_tests.h"
+
+namespace mbtfm::statistics {
+
+using charts::readable;
+
+namespace {
+
+struct Mean {
+  double sum = 0;
+  int n = 0;
+  void add(double value) { sum += value, ++n; }
+  double value() const { return sum / n; }
+};
+
+/// Of one kind, by condition and replicate: the mean of the cells' means.
+std::map<std::pair<int, std::string>, double> means_of_replicates(const Study& study, const Sample& sample, int kind) {
+  std::map<int, Mean> by_cell;
+  for (const Observation& o : sample.values) {
+    if (o.kind == kind) by_cell[o.cell].add(o.value);
+  }
+  std::map<std::pair<int, std::string>, Mean> by_replicate;
+  for (const auto& [index, mean] : by_cell) {
+    const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
+    by_replicate[{cell.condition, cell.replicate}].add(mean.value());
+  }
+  std::map<std::pair<int, std::string>, double> means;
+  for (const auto& [key, mean] : by_replicate) means[key] = mean.value();
+  return means;
+}
+
+int n_cells_of(const Sample& sample, int condition, int kind) { return n_cells_of(sample.of_group(condition, kind)); }
+
+bool has_replicates(const Study& study) {
+  return std::ranges::any_of(study.cells, [](const StudyCell& cell) { return !cell.replicate.empty(); });
+}
+
+void compare_replicates(const Study& study, const Sample& sample, int kind, Primary& primary) {
+  primary.test = "means of the replicates, compared in pairs (Student’s t)";
+  const auto means = means_of_replicates(study, sample, kind);
+  Mean reference;
+  for (const auto& [key, mean] : means) {
+    if (key.first == 0) reference.add(mean);
+  }
+  primary.reference_mean = reference.n > 0 ? reference.value() : 0;
+  for (int condition = 1; condition < sample.n_conditions(); ++condition) {
+    std::vector<double> differences;
+    for (const auto& [key, mean] : means) {
+      const auto before = means.find({0, key.second});
+      if (key.first == condition && before != means.end()) differences.push_back(mean - before->second);
+    }
+    const double n = static_cast<double>(differences.size());
+    if (n < 2) continue;
+    const Description d = describe(differences);
+    if (!(*d.standard_deviation > 0)) continue;
+    primary.differences.push_back({.condition = sample.conditions[static_cast<std::size_t>(condition)],
+                                   .difference = by_students_t(d.mean, *d.standard_deviation / std::sqrt(n), n - 1),
+                                   .cells = n_cells_of(sample, condition, kind),
+                                   .cells_before = n_cells_of(sample, 0, kind),
+                                   .replicates = static_cast<int>(n)});
+  }
+  if (primary.differences.empty())
+    primary.obstacle = "each condition needs two replicates that have cells of the reference, too";
+}
+
+/// Of two groups with two cells each at least.
+void compare_cells(const Sample& sample, int kind, const std::optional<SampleModel>& model,
+                   const std::vector<Comparison>& comparisons, Primary& primary) {
+  primary.test = "mixed model with the cell as the unit (Student’s t)";
+  if (const int group = sample.group_of(0, kind); model && model->index[static_cast<std::size_t>(group)] >= 0)
+    primary.reference_mean = model->fit.mean[model->index[static_cast<std::size_t>(group)]];
+  for (const Comparison& c : comparisons) {
+    if (c.test != Test::mixed_model || c.question != Question::between_conditions || c.group_b.empty()) continue;
+    if (c.within != sample.kinds[static_cast<std::size_t>(kind)]) continue;
+    // conditions are in their order: the reference can only be the first of a pair
+    if (c.group_a != primary.reference || !c.interval) continue;
+    const double error = c.statistic != 0 ? std::abs(c.effect / c.statistic) : 0;
+    if (!(error > 0)) continue;
+    primary.differences.push_back({.condition = c.group_b,
+                                   .difference = by_students_t(-c.effect, error, *c.degrees),
+                                   .cells = c.cells_b,
+                                   .cells_before = c.cells_a});
+  }
+  if (primary.differences.empty())
+    primary.obstacle = "the reference and one other condition need two cells each with a known value";
+}
+
+}  // namespace
+
+std::string sentence_of(const Primary& primary, const PrimaryDifference& d) {
+  const Contrast& c = d.difference;
+  const double sign = c.estimate < 0 ? -1 : 1;
+  const double low = sign > 0 ? c.low : -c.high, high = sign > 0 ? c.high : -c.low;
+  std::string text =
+      fmt::format("{} under {}: {} {} {} than under {}", primary.measure, d.condition, readable(std::abs(c.estimate)),
+                  primary.unit, sign > 0 ? "more" : "less", primary.reference);
+  if (primary.reference_mean > 0)
+    text += fmt::format(" ({:.0f} %)", 100 * std::abs(c.estimate) / primary.reference_mean);
+  text += fmt::format(" [95 % CI {} to {} {}], {}; ", readable(low), readable(high), primary.unit,
+                      d.p_holm < 1e-4 ? "p < 0.0001" : fmt::format("p = {:.2g}", d.p_holm));
+  if (d.replicates > 0) text += fmt::format("{} replicates, ", d.replicates);
+  return text + fmt::format("{} and {} cells", d.cells, d.cells_before);
+}
+
+Primary primary_of(const Study& study, const Sample& sample, const std::optional<SampleModel>& model,
+                   const std::vector<Comparison>& comparisons, const StudyParameters& parameters) {
+  const bool is_tension = parameters.primary == PrimaryMeasure::tension;
+  Primary primary{.measure = is_tension ? "tension of " + kind_for_people(name_of(parameters.primary_type)) + " fibres"
+                                        : "total force of cells",
+                  .unit = sample.unit,
+                  .reference = study.conditions.front(),
+                  .test = {},
+                  .differences = {}};
+  if (study.conditions.size() < 2) {
+    primary.obstacle = "the study has one condition";
+    return primary;
+  }
+  const std::string kind_name = is_tension ? name_of(counted_type(study, parameters.primary_type)) : sample.kinds[0];
+  const auto kind = std::ranges::find(sample.kinds, kind_name) - sample.kinds.begin();
+  MBTFM_ASSERT(kind < std::ssize(sample.kinds));
+  if (has_replicates(study)) {
+    compare_replicates(study, sample, static_cast<int>(kind), primary);
+  } else {
+    compare_cells(sample, static_cast<int>(kind), model, comparisons, primary);
+  }
+  std::vector<double> p_values;
+  for (const PrimaryDifference& d : primary.differences) p_values.push_back(d.difference.p_value);
+  const std::vector<double> corrected = holm(p_values);
+  for (std::size_t i = 0; i < corrected.size(); ++i) primary.differences[i].p_holm = corrected[i];
+  return primary;
+}
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,141 @@
+/// The pictures of a study's primary comparison.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <set>
+
+#include "pipeline/statistics/drawing.h"
+
+namespace mbtfm::statistics {
+
+namespace {
+
+using charts::readable;
+
+/// Numbers from −1/2 to 1/2 that fill the place evenly.
+double place_in_column(int i) {
+  constexpr double kGolden = 0.61803398874989485;
+  return std::fmod((i + 1) * kGolden, 1.0) - 0.5;
+}
+
+/// The measure's kind in the sample: of cells the only one.
+int kind_of(const Study& study, const Sample& sample, const StudyParameters& parameters) {
+  if (parameters.primary == PrimaryMeasure::total_force) return 0;
+  return index_of(sample.kinds, name_of(counted_type(study, parameters.primary_type)));
+}
+
+/// By replicate, in the order of the alphabet; one without a name where none are told.
+std::vector<std::string> replicates_of(const Study& study) {
+  std::set<std::string> names;
+  for (const StudyCell& cell : study.cells) names.insert(cell.replicate);
+  return {names.begin(), names.end()};
+}
+
+charts::Axis condition_axis(const Sample& sample) {
+  charts::Axis axis{.label = {}, .low = -0.5, .high = sample.n_conditions() - 0.5};
+  for (int c = 0; c < sample.n_conditions(); ++c)
+    axis.names.emplace_back(c, sample.conditions[static_cast<std::size_t>(c)]);
+  return axis;
+}
+
+/// What lies in one condition's column.
+void draw_column(charts::Chart& chart, const Study& study, const Sample& sample, int condition, int kind,
+                 const std::vector<std::string>& replicates) {
+  constexpr double kWidth = 0.6;
+  const auto colour = [&](const StudyCell& cell) {
+    return replicates.size() > 1 ? condition_colour(index_of(replicates, cell.replicate)) : condition_colour(condition);
+  };
+  std::map<int, std::vector<double>> by_cell;
+  for (const Observation& o : sample.of_group(condition, kind)) by_cell[o.cell].push_back(o.value);
+  int n = 0;
+  for (const auto& [index, values] : by_cell) {
+    const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
+    if (values.size() < 2 && sample.each == Observed::cells) continue;  // its mean says it all
+    for (const double value : values)
+      chart.dot({condition + kWidth * place_in_column(n++), value}, 2, "fill:" + colour(cell) + ";fill-opacity:.35",
+                cell.name + ": " + readable(value) + " " + sample.unit);
+  }
+  n = 0;
+  for (const auto& [index, values] : by_cell) {
+    const StudyCell& cell = study.cells[static_cast<std::size_t>(index)];
+    const double mean = describe(values).mean;
+    chart.dot({condition + kWidth * place_in_column(n++), mean}, 5.5,
+              "stroke:#1a1d21;stroke-width:1;fill:" + colour(cell),
+              fmt::format("{}{}{}: {} {}", cell.name, cell.replicate.empty() ? "" : ", ", cell.replicate,
+                          readable(mean), sample.unit));
+  }
+}
+
+charts::Chart super_plot(const Study& study, const Measure& m, int kind, const Primary& primary) {
+  const Sample& sample = m.sample;
+  const std::vector<std::string> replicates = replicates_of(study);
+  double largest = 0;
+  for (const Observation& o : sample.values) {
+    if (o.kind == kind) largest = std::max(largest, o.value);
+  }
+  const std::size_t n_keys = replicates.size() > 1 ? replicates.size() : 0;
+  charts::Chart chart(
+      primary.measure, condition_axis(sample),
+      charts::Axis{
+          .label = sample.name + " (" + primary.unit + ")", .low = 0, .high = end_below_keys(largest, n_keys)});
+  for (int c = 0; c < sample.n_conditions(); ++c) draw_column(chart, study, sample, c, kind, replicates);
+  for (const Summary& s : m.summaries) {
+    if (s.kind != sample.kinds[static_cast<std::size_t>(kind)] || !s.model) continue;
+    const double x = index_of(sample.conditions, s.condition);
+    chart.error({x + 0.4, s.model->low}, {x + 0.4, s.model->high}, "stroke:#1a1d21;stroke-width:2");
+    chart.pieces({{{x + 0.34, s.model->estimate}, {x + 0.46, s.model->estimate}}}, "stroke:#1a1d21;stroke-width:2.4",
+                 "mean " + readable(s.model->estimate) + " " + sample.unit);
+  }
+  for (std::size_t r = 0; r < n_keys; ++r)
+    chart.key(replicates[r].empty() ? "no replicate told" : replicates[r], condition_colour(static_cast<int>(r)));
+  return chart;
+}
+
+charts::Chart effect_plot(const Primary& primary) {
+  std::vector<std::string> names;
+  std::vector<double> ends = {0};
+  for (const PrimaryDifference& d : primary.differences) {
+    names.push_back(d.condition);
+    ends.insert(ends.end(), {d.difference.low, d.difference.high});
+  }
+  charts::Chart chart("Difference from " + primary.reference,
+                      charts::axis_over("difference of means (" + primary.unit + ")", ends, charts::Scale::linear),
+                      charts::row_axis(names));
+  constexpr double kRow_px = 40;
+  chart.frame_height(kRow_px * static_cast<double>(std::max<std::size_t>(2, names.size())));
+  chart.upright(0, "stroke:#555;stroke-dasharray:4 3");
+  for (std::size_t i = 0; i < primary.differences.size(); ++i) {
+    const PrimaryDifference& d = primary.differences[i];
+    const std::string colour = condition_colour(static_cast<int>(i) + 1), text = sentence_of(primary, d);
+    const double y = static_cast<double>(i);
+    chart.error({d.difference.low, y}, {d.difference.high, y}, "stroke-width:2;stroke:" + colour, text);
+    chart.dot({d.difference.estimate, y}, 5, "fill:" + colour, text);
+  }
+  return chart;
+}
+
+}  // namespace
+
+std::optional<Figure> primary_figure(const Study& study, const Analysis& analysis, const StudyParameters& parameters) {
+  if (study.conditions.size() < 2) return {};
+  const Measure& m = parameters.primary == PrimaryMeasure::tension ? analysis.tensions : analysis.cells.front();
+  if (m.sample.values.empty()) return {};
+  const int kind = kind_of(study, m.sample, parameters);
+  Figure figure{.name = "primary",
+                .title = "Primary comparison",
+                .caption = std::string(m.sample.each == Observed::cells ? "A dot is a cell"
+                                                                        : "Small dots: fibres; large dots: cells") +
+                           (replicates_of(study).size() > 1 ? ", coloured by replicate" : "") +
+                           ". Line and bar: mean of the mixed model with its 95 % interval." +
+                           (analysis.primary.differences.empty()
+                                ? ""
+                                : " Right: difference of means from the reference, with its 95 % interval."),
+                .charts = {super_plot(study, m, kind, analysis.primary)},
+                .n_columns = 2};
+  if (!analysis.primary.differences.empty()) figure.charts.push_back(effect_plot(analysis.primary));
+  return figure;
+}
+
+}  // namespace mbtfm::statistics

@@ -1,0 +1,67 @@
+/// A gel under a wave, as large as a scene of chapter 2 gets: its factor, and a hundred right-hand sides by it.
+#include <benchmark/benchmark.h>
+
+#include <cmath>
+#include <numeric>
+
+#include "substrate/curved/linear.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::curved;
+
+const numerics::FactorOptions kFactor{.threads = 2, .memory_limit_GB = 16};
+const Gel kGel{.youngs_modulus_kPa = 10, .poisson_ratio = 0.49, .thickness_um = 60};
+
+/// 120 um wide, free at its sides, of n × n × layers cells.
+Block wavy_block(int n, int layers) {
+  boxes::GridLines lines;
+  for (int k = 0; k <= n; ++k) lines.x_um.push_back(-60 + 120.0 * k / n);
+  lines.y_um = lines.x_um;
+  lines.z_um = layers_um(kGel.thickness_um, layers);
+  return {{[](Vec2 p) { return -8 * std::cos(0.09 * p.x); }, kGel.thickness_um},
+          lines,
+          [](const boxes::Box&) { return false; },
+          Sides::free,
+          100000,
+          kFactor.threads};
+}
+
+struct Factored {
+  int n_nodes;  ///< three unknowns each
+  numerics::SparseCholesky factor;
+};
+
+Factored factored(const benchmark::State& state) {
+  const Block block = wavy_block(static_cast<int>(state.range(0)), static_cast<int>(state.range(1)));
+  const Space space(block.mesh(), kFactor.threads);
+  return {space.nodes().size(), {space.assemble(linear_stiffness_of(kGel, block.mesh())), kFactor}};
+}
+
+void curved_factor(benchmark::State& state) {
+  for (auto _ : state) {
+    const Factored of = factored(state);
+    state.counters["factor_GB"] = of.factor.factor_GB();
+    state.counters["unknowns"] = 3 * of.n_nodes;
+  }
+}
+
+void curved_solve(benchmark::State& state) {
+  constexpr int kColumns = 100;
+  const Factored of = factored(state);
+  std::vector<int> all(static_cast<std::size_t>(of.n_nodes));
+  std::iota(all.begin(), all.end(), 0);
+  std::vector<double> found(kColumns);
+  for (auto _ : state) {
+    of.factor.solve(
+        kColumns, all, [&](int column, const numerics::NodalColumn& b) { b(of.n_nodes / kColumns * column, 0) = 1; },
+        [&](int column, const numerics::NodalColumn& u) { found[column] = u(0, 0); });
+    benchmark::DoNotOptimize(found.data());
+  }
+}
+
+BENCHMARK(curved_factor)->Args({18, 4})->Args({36, 8})->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(1);
+BENCHMARK(curved_solve)->Args({18, 4})->Args({36, 8})->Unit(benchmark::kMillisecond)->UseRealTime()->Iterations(3);
+
+}  // namespace
