@@ -1,10 +1,12 @@
 /// mbtfm-traction: the standard traction reconstructions, beside the model-based one.
 #include <algorithm>
 
+#include "mbtfm/spatial/stage.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/stage/effects.h"
@@ -12,16 +14,6 @@
 
 namespace mbtfm::tractions {
 namespace {
-
-struct TractionStageParameters {
-  Gel gel;
-  TractionParameters traction;
-};
-
-void declare(stage::ParameterList& list, TractionStageParameters& p) {
-  declare(list, p.gel);
-  declare(list, p.traction);
-}
 
 /// Of one cell: a whole field may hold many. @throws InputError where no cell pulls like that
 void expect_plausible(stage::StageContext& context, const TractionInputs& inputs, const Reconstruction& r,
@@ -32,7 +24,13 @@ void expect_plausible(stage::StageContext& context, const TractionInputs& inputs
     context.expect_plausible("traction_kPa", stage::traction_of_half_the_force_kPa(r.forces, inputs.adhesions));
 }
 
-StageReport run(const TractionStageParameters& p, stage::StageContext& context) {
+/// Of beads in the gel's volume, or of a surface that is not flat.
+bool is_in_space(stage::StageContext& context) {
+  return context.has_input("surface") || files::CsvTable(context.input("displacement")).has("uz_um");
+}
+
+StageReport run(const spatial::StageParameters& p, stage::StageContext& context) {
+  if (is_in_space(context)) return spatial::run_in_space(p, context);
   context.progress(0, "reading");
   TractionInputs inputs{.beads = {}, .gel = p.gel, .adhesions = {}, .outline_um = {}};
   inputs.beads = files::read_displacement(context.input("displacement"));
@@ -64,9 +62,9 @@ StageReport run(const TractionStageParameters& p, stage::StageContext& context) 
   context.progress(1, "done");
 
   StageReport report;
-  report.summary = name_of(p.traction.method) + std::string(": total force ") + brief(sums.total_force_nN) +
-                   " nN, strain energy " + brief(sums.strain_energy_fJ) + " fJ over " + sums.where + ", relative L2 " +
-                   brief(r.relative_l2);
+  report.summary = name_of(p.traction.method.value_or(TractionMethod::fttc)) + std::string(": total force ") +
+                   brief(sums.total_force_nN) + " nN, strain energy " + brief(sums.strain_energy_fJ) + " fJ over " +
+                   sums.where + ", relative L2 " + brief(r.relative_l2);
   if (r.length_um) report.summary += ", lambda E " + brief(*r.length_um) + " um";
   if (assumed_um) {
     report.summary +=
@@ -93,15 +91,19 @@ StageReport run(const TractionStageParameters& p, stage::StageContext& context) 
 int main(int argc, char** argv) {
   using mbtfm::stage::FileArgument;
   using namespace mbtfm::tractions;
-  return mbtfm::stage::run_stage<TractionStageParameters>(
+  return mbtfm::stage::run_stage<mbtfm::spatial::StageParameters>(
       {.name = "traction",
        .purpose = "reconstruct tractions from bead displacements by a standard method",
-       .files = {{"displacement", FileArgument::Kind::input,
-                  "displacement.csv of the beads; without the column sigma_um their errors are told from neighbours"},
-                 {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
-                 {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
-                 {"out", FileArgument::Kind::output,
-                  "traction.csv; traction.vtp, traction.json, traction_lambda.csv and .svg, and "
-                  "traction_adhesion_forces.csv come beside it"}}},
+       .files =
+           {{"displacement", FileArgument::Kind::input,
+             "displacement.csv of the beads, without the column sigma_um their errors are told from neighbours; or "
+             "displacement_3d.csv of beads in space"},
+            {"surface", FileArgument::Kind::optional_input,
+             "surface.vtp of mbtfm-surface, where the gel is not flat; its z = 0 is thickness_um above the base"},
+            {"adhesions", FileArgument::Kind::optional_input, "adhesions.csv: forces are summed up by adhesion"},
+            {"outline", FileArgument::Kind::optional_input, "outline.csv: sums are taken over the cell"},
+            {"out", FileArgument::Kind::output,
+             "traction.csv; traction.vtp, traction.json, traction_lambda.csv and .svg, and "
+             "traction_adhesion_forces.csv come beside it"}}},
       argc, argv, run);
 }

@@ -36,8 +36,7 @@ TractionMesh make_traction_mesh(const Ground& ground, const Rectangle& over, dou
   std::map<std::array<int, 2>, int> vertex_at;
   const auto vertex = [&](int column, int row) {
     const auto [found, is_new] = vertex_at.emplace(std::array{column, row}, mesh.n_vertices());
-    if (is_new)
-      mesh.quads.points_um.push_back(over.low_um + Vec2{column * mesh.spacing_um.x, row * mesh.spacing_um.y});
+    if (is_new) mesh.quads.points_um.push_back(over.low_um + Vec2{column * mesh.spacing_um.x, row * mesh.spacing_um.y});
     return found->second;
   };
   for (int row = 0; row < n_y; ++row) {
@@ -59,7 +58,8 @@ TractionMesh make_traction_mesh(const Ground& ground, const Rectangle& over, dou
              [&](Vec2, const std::array<int, 4>& vertices, const std::array<double, 4>& shares, double area_um2) {
                for (int i = 0; i < 4; ++i) {
                  mesh.areas_um2[vertices[i]] += shares[i] * area_um2;
-                 for (int j = 0; j < 4; ++j) mass.emplace_back(vertices[i], vertices[j], shares[i] * shares[j] * area_um2);
+                 for (int j = 0; j < 4; ++j)
+                   mass.emplace_back(vertices[i], vertices[j], shares[i] * shares[j] * area_um2);
                }
              });
   mesh.mass_um2.resize(mesh.n_vertices(), mesh.n_vertices());
@@ -94,18 +94,6 @@ void over_faces(const TractionMesh& mesh, const Ground& ground, int n, Places pl
       }
     }
   }
-}
-
-Eigen::VectorXd area_weights_um2(const TractionMesh& mesh, const Ground& ground,
-                                 const std::function<bool(Vec2)>& is_part) {
-  constexpr int kParts = 12;  // of a side: a rim is met to a twelfth of it
-  Eigen::VectorXd weights = Eigen::VectorXd::Zero(mesh.n_vertices());
-  over_faces(mesh, ground, kParts, Places::even,
-             [&](Vec2 at, const std::array<int, 4>& vertices, const std::array<double, 4>& shares, double area_um2) {
-               if (!is_part(at)) return;
-               for (int i = 0; i < 4; ++i) weights[vertices[i]] += shares[i] * area_um2;
-             });
-  return weights;
 }
 
 }  // namespace mbtfm::spatial

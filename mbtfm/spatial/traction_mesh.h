@@ -34,9 +34,9 @@ struct Rectangle {
 
 struct TractionMesh {
   substrate::SurfaceMesh quads;
-  std::vector<double> areas_um2;           ///< by vertex: the integral of its shape function over the curved surface
-  Eigen::SparseMatrix<double> mass_um2;    ///< integrals of the products of two
-  std::vector<Vec2> low_corners_um;        ///< by face
+  std::vector<double> areas_um2;         ///< by vertex: the integral of its shape function over the curved surface
+  Eigen::SparseMatrix<double> mass_um2;  ///< integrals of the products of two
+  std::vector<Vec2> low_corners_um;      ///< by face
   Vec2 spacing_um;
 
   int n_vertices() const { return static_cast<int>(quads.points_um.size()); }
@@ -47,11 +47,6 @@ struct TractionMesh {
 /// @throws InvalidData where no face does
 TractionMesh make_traction_mesh(const Ground& ground, const Rectangle& over, double spacing_um,
                                 const std::function<bool(Vec2)>& carries);
-
-/// By vertex: the integral of its shape function over the part of the curved surface where `is_part` holds. Times the
-/// tractions at the vertices it is the force there.
-Eigen::VectorXd area_weights_um2(const TractionMesh& mesh, const Ground& ground,
-                                 const std::function<bool(Vec2)>& is_part);
 
 /// Calls use(place, shares of the four vertices of the face, area) at n × n places of each face: the midpoints of even
 /// parts, or Gauss points.

@@ -52,6 +52,18 @@ std::vector<double> over_points(const std::vector<ScanPoint>& points,
 // Logarithms of quantities that vanish only where the data do; rounding may leave less than nothing of a misfit.
 double log_of(double value) { return std::log(std::max(value, 1e-300)); }
 
+/// The lambda with this misfit, between the points; none where all fit worse. (Morozov, Sov. Math. Dokl. 7 (1966) 414)
+std::optional<double> lambda_of_misfit(const std::vector<ScanPoint>& points, double misfit) {
+  if (points.front().misfit <= misfit) return points.front().lambda;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    if (points[i].misfit > misfit) continue;
+    const double above = log_of(points[i - 1].misfit), below = log_of(points[i].misfit);
+    const double share = above > below ? (above - log_of(misfit)) / (above - below) : 0;
+    return points[i - 1].lambda * std::pow(points[i].lambda / points[i - 1].lambda, share);
+  }
+  return std::nullopt;
+}
+
 }  // namespace
 
 std::vector<double> lambdas_between(double largest, double smallest) {
@@ -137,6 +149,7 @@ LambdaScan judge(std::vector<ScanPoint> points, double n_data, double n_removabl
     const double misfit = p.removable_misfit.value_or(p.misfit);
     return -(2 * misfit + lambda2 * p.norm - 2 * scan.variance * (n_removable - p.degrees)) / lambda2;
   });
+  if (stated_variance) scan.by_discrepancy = lambda_of_misfit(scan.points, n_data * *stated_variance);
   const RiskScale scale(scan.risk);
   std::vector<double> tamed;
   for (const double r : scan.risk) tamed.push_back(scale.to(r));
@@ -185,6 +198,14 @@ double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion) {
       return scan.by_gcv;
     case LambdaCriterion::evidence:
       return scan.by_evidence;
+    case LambdaCriterion::discrepancy:
+      if (scan.by_discrepancy) return *scan.by_discrepancy;
+      throw NotSolved({.converged = false,
+                       .iterations = 0,
+                       .last_change = 0,
+                       .reason = "no lambda brings the misfit down to what the stated errors leave, or none are "
+                                 "stated: set lambda_by = risk, which takes lambda " +
+                                 brief(scan.by_risk) + " here"});
     case LambdaCriterion::l_curve:
       break;
   }

@@ -29,12 +29,13 @@ struct LambdaScan {
   std::vector<double> risk;                         ///< expected |t − true|² up to a constant (15), to be small
   double by_gcv = 0, by_evidence = 0, by_risk = 0;  ///< lambda by each
   std::optional<double> by_l_curve;                 ///< none where the curve has no corner
+  std::optional<double> by_discrepancy;             ///< none where the data state no errors, or are fitted worse
   double variance = 0;                              ///< of one datum, that the risk was found with
   std::string variance_source;
 };
 
-enum class LambdaCriterion { risk, gcv, l_curve, evidence };
-constexpr auto words(LambdaCriterion) { return std::array{"risk", "gcv", "l-curve", "evidence"}; }
+enum class LambdaCriterion { risk, gcv, l_curve, evidence, discrepancy };
+constexpr auto words(LambdaCriterion) { return std::array{"risk", "gcv", "l-curve", "evidence", "discrepancy"}; }
 
 /// @param points           at least 5, evenly spaced in log lambda, falling
 /// @param n_data           components of displacement
@@ -51,7 +52,8 @@ std::vector<double> log_determinants_of(const std::vector<ScanPoint>& points);
 /// over what is left of Gaussian noise where the tractions have followed it, tr (1 − H)² of n.
 double robust_variance(std::vector<double> residuals, double degrees, double degrees_of_square);
 
-/// @throws NotSolved where the criterion is the L-curve and has no corner; it says which criterion to take
+/// @throws NotSolved where the criterion is the L-curve and has no corner, or the discrepancy and the misfit never is
+///         what the stated errors leave; it says which criterion to take
 double chosen_lambda(const LambdaScan& scan, LambdaCriterion criterion);
 
 /// Quantities of the scan between its points too, as the criteria see them: by splines through to(value).

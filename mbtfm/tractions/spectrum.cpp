@@ -11,6 +11,13 @@ using Eigen::ArrayXd;
 using Eigen::MatrixXd;
 using Eigen::VectorXd;
 
+namespace {
+
+/// Below, rounding of the normal matrix is all there is.
+Eigen::Array<bool, Eigen::Dynamic, 1> is_felt(const ArrayXd& values) { return values > 1e-12 * values.maxCoeff(); }
+
+}  // namespace
+
 Spectrum::Spectrum(MatrixXd normal, VectorXd pulled, double data_squared, double n_data)
     : data_squared_(data_squared), n_data_(n_data) {
   auto [values, vectors] = numerics::symmetric_eigen(std::move(normal));
@@ -25,25 +32,25 @@ LambdaScan Spectrum::scan(std::optional<double> stated_variance) const {
   // of the normal matrix is all there is.
   const double smallest = std::max(0.1 * std::sqrt(values_.minCoeff()), 1e-6 * largest);
   std::vector<ScanPoint> points;
-  const Eigen::Array<bool, Eigen::Dynamic, 1> is_felt = values_ > 1e-12 * largest * largest;
-  for (const double lambda : lambdas_between(largest, smallest)) {
-    const ArrayXd shares = projected_ / (values_ + lambda * lambda);
-    points.push_back(
-        {.lambda = lambda,
-         .misfit = misfit(lambda),
-         .norm = shares.square().sum(),
-         .degrees = degrees(lambda),
-         .removable_misfit = is_felt.select(shares.square() / values_, 0).sum() * std::pow(lambda, 4)});
-  }
+  for (const double lambda : lambdas_between(largest, smallest)) points.push_back(point_at(lambda));
   // Few loads follow many beads nowhere quite: what they leave, noise or not, is the error of each bead. (Its median,
   // for tractions that follow all but a few, would call most of it signal.)
-  return judge(std::move(points), n_data_, static_cast<double>(is_felt.count()), stated_variance,
+  return judge(std::move(points), n_data_, static_cast<double>(is_felt(values_).count()), stated_variance,
                [&](double lambda) { return misfit(lambda) / (n_data_ - degrees(lambda)); });
 }
 
-VectorXd Spectrum::solve(double lambda) const {
-  return vectors_ * (projected_ / (values_ + lambda * lambda)).matrix();
+ScanPoint Spectrum::point_at(double lambda) const {
+  const ArrayXd shares = projected_ / (values_ + lambda * lambda);
+  return {.lambda = lambda,
+          .misfit = misfit(lambda),
+          .norm = shares.square().sum(),
+          .degrees = degrees(lambda),
+          .removable_misfit = is_felt(values_).select(shares.square() / values_, 0).sum() * std::pow(lambda, 4)};
 }
+
+double Spectrum::explained(double lambda) const { return (projected_.square() / (values_ + lambda * lambda)).sum(); }
+
+VectorXd Spectrum::solve(double lambda) const { return vectors_ * (projected_ / (values_ + lambda * lambda)).matrix(); }
 
 MatrixXd Spectrum::outer(const ArrayXd& shares) const {
   MatrixXd sum = MatrixXd::Zero(vectors_.rows(), vectors_.rows());

@@ -24,6 +24,9 @@ class Spectrum {
   Eigen::MatrixXd posterior(double lambda, double variance) const;
   /// By unknown: how much of a change of it solve(lambda) shows, 0 … 1.
   Eigen::VectorXd resolved(double lambda) const;
+  double explained(double lambda) const;  ///< uᵀ H u, H the matrix that takes u to A s
+  /// What a scan tells of one lambda.
+  ScanPoint point_at(double lambda) const;
   double misfit(double lambda) const;       ///< |u − A s|² of solve(lambda)
   double degrees(double lambda) const;      ///< trace of the matrix that takes u to A s
   double relative_l2(double lambda) const;  ///< |u − A s| / |u|

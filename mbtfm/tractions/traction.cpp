@@ -14,14 +14,16 @@ namespace mbtfm::tractions {
 
 void declare(stage::ParameterList& list, TractionParameters& p) {
   list.table("traction");
-  list.add("method", p.method, "how the tractions are found");
+  list.add("method", p.method,
+           "how the tractions are found; auto: fttc, of beads in space group-l1 if there are adhesions, else tikhonov");
   list.add("gel_model", p.gel_model, "elastic model of the gel");
   list.add("lambda_by", p.lambda_by, "criterion that chooses the regularisation (not for adhesion-forces)");
   list.add("lambda_um_per_kPa", p.lambda_um_per_kPa, Range::between(1e-12, 1e12),
            "regularisation, fixed: |u − G t|² + lambda² |t|² over a lattice (um/kPa); unset: by the criterion");
-  list.add("spacing_um", p.spacing_um, Range::mesh_um(),
-           "fttc, sparse: spacing of the lattice (um); unset: that of beads on a lattice, half the mean distance of "
-           "scattered ones");
+  list.add(
+      "spacing_um", p.spacing_um, Range::mesh_um(),
+      "spacing of the lattice (um; not of trpf, bem); unset: that of beads on a lattice, half the mean distance of "
+      "scattered ones, four fifths of it in space");
   list.add("padding", p.padding, Range::between(1, 8),
            "fttc, sparse: period over the field's size; 1: the field is periodic itself");
   list.add("read_out", p.read_out, "fttc: tractions at the nodes, or their means over the cells around them");
@@ -42,7 +44,8 @@ void declare(stage::ParameterList& list, TractionParameters& p) {
 namespace {
 
 Reconstruction reconstruct_by_method(const TractionInputs& inputs, const TractionParameters& parameters, int threads) {
-  switch (parameters.method) {
+  const TractionMethod method = parameters.method.value_or(TractionMethod::fttc);
+  switch (method) {
     case TractionMethod::fttc:
       return reconstruct_fttc(inputs, parameters, threads);
     case TractionMethod::sparse:
@@ -53,8 +56,12 @@ Reconstruction reconstruct_by_method(const TractionInputs& inputs, const Tractio
       return reconstruct_elements(inputs, parameters, threads);
     case TractionMethod::adhesion_forces:
       return reconstruct_adhesion_forces(inputs, parameters, threads);
+    default:
+      throw UsageError(
+          std::string(name_of(method)) +
+          " takes beads in space: give a displacement_3d.csv, with z_um and uz_um, or choose fttc, sparse, "
+          "trpf, bem or adhesion-forces");
   }
-  throw InternalError("unknown method");
 }
 
 void add_intervals(std::vector<AdhesionForce>& forces) {

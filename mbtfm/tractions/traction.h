@@ -16,8 +16,26 @@
 
 namespace mbtfm::tractions {
 
-enum class TractionMethod { fttc, sparse, trpf, bem, adhesion_forces };
-constexpr auto words(TractionMethod) { return std::array{"fttc", "sparse", "trpf", "bem", "adhesion-forces"}; }
+enum class TractionMethod {
+  // beads of a flat surface, displaced along it
+  fttc,
+  sparse,
+  trpf,
+  bem,
+  adhesion_forces,
+  // beads in space: mbtfm/spatial
+  tikhonov,   ///< one lambda for all
+  group_l1,   ///< zero in most places
+  patches,    ///< a force on each adhesion, and a weak background
+  adjoint,    ///< the equations of tikhonov, by its adjoint
+  direct,     ///< the displacement measured is imposed on the surface
+  green,      ///< even tractions on facets
+  thesis_cg,  ///< the minimum of tikhonov, by the thesis' minimiser
+};
+constexpr auto words(TractionMethod) {
+  return std::array{"fttc",     "sparse",  "trpf",    "bem",    "adhesion-forces", "tikhonov",
+                    "group-l1", "patches", "adjoint", "direct", "green",           "thesis-cg"};
+}
 
 /// How the tractions of a lattice are read out.
 enum class ReadOut {
@@ -27,7 +45,8 @@ enum class ReadOut {
 constexpr auto words(ReadOut) { return std::array{"cells", "points"}; }
 
 struct TractionParameters {
-  TractionMethod method = TractionMethod::fttc;
+  /// Unset: fttc; of beads in space group-l1 where there are adhesions, else tikhonov.
+  std::optional<TractionMethod> method;
   GelModel gel_model = GelModel::layer;               ///< gels are some tens of um thick: a cell feels the base
   LambdaCriterion lambda_by = LambdaCriterion::risk;  ///< aims at the tractions; the others at the displacements
   std::optional<double> lambda_um_per_kPa;            ///< fixed instead

@@ -71,6 +71,14 @@ enum class FindingKind {
   surface_repaired,
   surface_level,
   surface_off_zero,
+  // traction in space
+  beads_off_the_gel,
+  beads_far,
+  beads_tell_little,
+  misfit_in_space,
+  patches_do_not_fit,
+  tractions_out_of_balance,
+  beads_stray,
   // fit: the gel
   modulus_error_unknown,
   // indent

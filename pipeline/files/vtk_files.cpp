@@ -350,6 +350,25 @@ void write_ellipses_vtp(const Path& file, const std::vector<Adhesion>& adhesions
   write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
 }
 
+void write_quads_vtp(const Path& file, const Grid& grid) {
+  MBTFM_ASSERT(grid.corners == 4);
+  vtkNew<vtkPoints> points;
+  points->SetDataTypeToDouble();
+  for (const auto& p : grid.points_um) points->InsertNextPoint(p.data());
+  vtkNew<vtkCellArray> quads;
+  for (std::size_t first = 0; first < grid.cells.size(); first += 4) {
+    vtkIdType corners[4];
+    std::copy_n(grid.cells.begin() + static_cast<std::ptrdiff_t>(first), 4, corners);
+    quads->InsertNextCell(4, corners);
+  }
+  vtkNew<vtkPolyData> poly;
+  poly->SetPoints(points);
+  poly->SetPolys(quads);
+  for (const GridArray& array : grid.point_arrays) poly->GetPointData()->AddArray(double_array(array));
+  for (const GridArray& array : grid.cell_arrays) poly->GetCellData()->AddArray(double_array(array));
+  write_xml<vtkXMLPolyDataWriter>(file, poly.Get());
+}
+
 void write_grid_vtu(const Path& file, const Grid& grid) {
   vtkNew<vtkPoints> points;
   points->SetDataTypeToDouble();

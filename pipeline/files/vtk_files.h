@@ -35,6 +35,8 @@ struct Grid {
   std::vector<GridArray> point_arrays, cell_arrays;
 };
 void write_grid_vtu(const Path& file, const Grid& grid);
+/// The same of quadrilaterals, as a surface.
+void write_quads_vtp(const Path& file, const Grid& grid);
 
 /// Outline, adhesion ellipses and fibres as polygons and lines, with adhesion_id, fibre_id and fibre_type by cell.
 void write_cell_vtp(const Path& file, const Cell& cell);

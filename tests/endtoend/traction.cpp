@@ -1,11 +1,14 @@
 /// The executables that reconstruct tractions and compare them with the fit.
 #include <gtest/gtest.h>
 
+#include <random>
+
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
 #include "pipeline/files/json_record.h"
+#include "pipeline/files/text.h"
 #include "tests/support/ellipse_scene.h"
 #include "tests/support/program.h"
 
@@ -121,6 +124,91 @@ TEST(TractionProgram, refuses_a_modulus_in_pascal_unless_told_to_and_takes_an_in
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8400\n[checks]\nallow = [\"youngs_modulus_kPa\"]\n").code, 0);
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.5\n").code, 0);
   EXPECT_EQ(run("[gel]\nyoungs_modulus_kPa = 8.4\npoisson_ratio = 0.501\n").code, 3);
+}
+
+/// Two adhesions on a wave that pull at each other and at the gel, and beads below.
+class TractionInSpace : public testing::Test {
+ protected:
+  void SetUp() override {
+    files::write_text(folder_ / "cell.toml",
+                      "[gel]\nyoungs_modulus_kPa = 10\npoisson_ratio = 0.45\nthickness_um = 30\n[substrate]\n"
+                      "displacement_tolerance = 0\n");
+    const auto surface = test::run_program(
+        "mbtfm-surface --formula 'wave amplitude_um=3 period_um=40' --low_x_um -24 "
+        "--low_y_um -24 --high_x_um 24 --high_y_um 24 --out " +
+        at("surface.vtp"));
+    ASSERT_EQ(surface.code, 0) << surface.output;
+    files::write_text(folder_ / "adhesions.csv",
+                      "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg\n"
+                      "1,-9,2,38.48,7,7,0\n2,9,-2,38.48,7,7,0\n");
+    files::write_text(folder_ / "adhesion_forces.csv", "adhesion_id,fx_nN,fy_nN,fz_nN\n1,60,-10,-15\n2,-60,10,15\n");
+    std::mt19937_64 random(7);
+    std::uniform_real_distribution<double> across(-18, 18), down(4, 14);
+    std::string points = "x_um,y_um,z_um\n";
+    for (int b = 0; b < 350; ++b)
+      points += brief(across(random)) + "," + brief(across(random)) + "," + brief(down(random)) + "\n";
+    files::write_text(folder_ / "points.csv", points);
+    const auto gel =
+        test::run_program("mbtfm-substrate --gel " + at("cell.toml") + " --surface " + at("surface.vtp") +
+                          " --adhesions " + at("adhesions.csv") + " --forces " + at("adhesion_forces.csv") +
+                          " --points " + at("points.csv") + " --out " + at("exact.csv"));
+    ASSERT_EQ(gel.code, 0) << gel.output;
+    std::vector<BeadInSpace> beads = files::read_displacement_in_space(folder_ / "exact.csv");
+    std::normal_distribution<double> noise(0, 0.01);
+    for (BeadInSpace& b : beads) {
+      const double x = noise(random), y = noise(random), z = 3 * noise(random);
+      b.displacement_um += Vec3{x, y, z};
+      b.sigma_um = 0.01;
+      b.sigma_z_um = 0.03;
+    }
+    files::write_displacement_in_space(folder_ / "displacement_3d.csv", beads);
+  }
+  std::string at(const std::string& name) const { return (folder_ / name).string(); }
+  test::Outcome run(const std::string& more, const std::string& displacement = "displacement_3d.csv") const {
+    return test::run_program("mbtfm-traction --gel " + at("cell.toml") + " --surface " + at("surface.vtp") +
+                             " --displacement " + at(displacement) + " --out " + at("traction_3d.csv") + " " + more);
+  }
+  test::TemporaryFolder folder_;
+};
+
+TEST_F(TractionInSpace, finds_forces_of_adhesions_on_a_wave_with_their_errors) {
+  for (const std::string method : {"auto", "patches"}) {
+    const auto outcome = run("--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv") + " --method " + method);
+    ASSERT_EQ(outcome.code, 0) << outcome.output;
+    const files::CsvTable forces(folder_ / "traction_3d_adhesion_forces.csv");
+    ASSERT_EQ(forces.n_rows(), 2);
+    for (int row = 0; row < 2; ++row) {
+      const double sign = row == 0 ? 1 : -1;
+      const auto is_within = [&](const char* of, double truth) {
+        const double sigma = forces.number(row, std::string("sigma_") + of);
+        // four standard errors, and what coarse elements without a tolerance leave: a tenth of 63 nN
+        EXPECT_NEAR(forces.number(row, of), truth, 4 * sigma + 6.3) << method << ", " << of << " of " << row + 1;
+        EXPECT_GT(sigma, 0);
+      };
+      is_within("fx_nN", 60 * sign);
+      is_within("fy_nN", -10 * sign);
+      is_within("fz_nN", -15 * sign);
+    }
+    const files::CsvTable map(folder_ / "traction_3d.csv");
+    map.require({"x_um", "y_um", "z_um", "tx_kPa", "ty_kPa", "tz_kPa", "sigma_tx_kPa", "resolution_um", "normal_kPa"});
+    for (const char* name : {"traction_3d.vtp", "traction_3d.json"}) EXPECT_TRUE(fs::exists(folder_ / name)) << name;
+  }
+}
+
+TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
+  files::write_text(folder_ / "flat.csv", "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.2,0.01\n");
+  files::write_text(folder_ / "few.csv", "x_um,y_um,z_um,ux_um,uy_um,uz_um\n1,2,5,0.1,0.2,0.01\n3,2,5,0.1,0.2,0.01\n");
+  files::write_text(folder_ / "outline.csv", "x_um,y_um\n100,100\n120,100\n120,120\n");
+  const auto refused = [&](const test::Outcome& outcome, int code, const char* says) {
+    EXPECT_EQ(outcome.code, code) << outcome.output;
+    EXPECT_NE(outcome.output.find(says), std::string::npos) << outcome.output;
+    EXPECT_FALSE(fs::exists(folder_ / "traction_3d.csv"));
+  };
+  refused(run("", "flat.csv"), exit_code::kInput, "z_um");
+  refused(run("", "few.csv"), exit_code::kInput, "at least 4 beads");
+  refused(run("--outline " + at("outline.csv")), exit_code::kInput, "the outline above the beads");
+  refused(run("--method fttc"), exit_code::kUsage, "group-l1");
+  refused(run("--method patches"), exit_code::kUsage, "--adhesions");
 }
 
 TEST(CalibrateProgram, finds_the_lambda_at_which_both_methods_have_the_same_force) {

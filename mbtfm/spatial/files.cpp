@@ -1,0 +1,171 @@
+#include "mbtfm/spatial/files.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/files/tables.h"
+#include "pipeline/files/vtk_files.h"
+#include "pipeline/numerics/order_statistics.h"
+
+namespace mbtfm::spatial {
+namespace {
+
+constexpr files::ColumnOptions kResult = {.digits = files::kForPeople};
+
+struct Row {
+  Vec3 position_um, traction_kPa;
+  std::optional<double> sigma_x_kPa, sigma_y_kPa, sigma_z_kPa;
+  double area_um2 = 0;
+  std::optional<double> resolution_um;
+  double normal_kPa = 0, tangential_kPa = 0;
+  Vec3 displacement_um;
+};
+
+const files::Table<Row>& traction_table() {
+  static const files::Table<Row> table{
+      .file = "traction_3d.csv",
+      .row = "each vertex of the tractions of `mbtfm-traction` in space, which are bilinear between them",
+      .columns = {
+          {"x_um", "the vertex", files::x_of(&Row::position_um)},
+          {"y_um", "the vertex", files::y_of(&Row::position_um)},
+          {"z_um", "the vertex, into the gel", files::z_of(&Row::position_um)},
+          {"tx_kPa", "traction of the cell on the gel, per area of the relaxed surface",
+           files::x_of(&Row::traction_kPa)},
+          {"ty_kPa", "the same along y", files::y_of(&Row::traction_kPa)},
+          {"tz_kPa", "the same into the gel", files::z_of(&Row::traction_kPa)},
+          {"sigma_tx_kPa", "standard error: the beads' noise, and what they do not resolve", &Row::sigma_x_kPa,
+           kResult},
+          {"sigma_ty_kPa", "the same along y", &Row::sigma_y_kPa, kResult},
+          {"sigma_tz_kPa", "the same into the gel", &Row::sigma_z_kPa, kResult},
+          {"resolution_um", "how far apart two forces must be to be seen as two", &Row::resolution_um, kResult},
+          {"normal_kPa", "traction along the normal out of the gel: above 0 it pulls", &Row::normal_kPa, kResult},
+          {"tangential_kPa", "size of the traction along the surface", &Row::tangential_kPa, kResult},
+          {"area_um2", "of the curved surface around the vertex", &Row::area_um2, kResult},
+          {"ux_um", "the model's displacement there", files::x_of(&Row::displacement_um), kResult},
+          {"uy_um", "the model's displacement there", files::y_of(&Row::displacement_um), kResult},
+          {"uz_um", "the model's displacement there, into the gel", files::z_of(&Row::displacement_um), kResult}}};
+  return table;
+}
+
+std::vector<Row> rows_of(const Problem& problem, const SpatialReconstruction& r) {
+  const std::vector<Vec3> vertices = problem.vertices_um();
+  const Eigen::VectorXd u = problem.surface_displacement_um(r.traction_kPa);
+  const std::vector<double> resolution = resolution_um(problem, r);
+  std::vector<Row> rows;
+  for (std::size_t v = 0; v < vertices.size(); ++v) {
+    const auto at = 3 * static_cast<Eigen::Index>(v);
+    const auto vector = [at](const Eigen::VectorXd& of) { return Vec3{of[at], of[at + 1], of[at + 2]}; };
+    Row& row = rows.emplace_back();
+    row.position_um = vertices[v];
+    row.traction_kPa = vector(r.traction_kPa);
+    row.displacement_um = vector(u);
+    row.area_um2 = problem.mesh.areas_um2[v];
+    const Vec3 normal = problem.ground.normal(problem.mesh.quads.points_um[v]);
+    row.normal_kPa = dot(row.traction_kPa, normal);
+    row.tangential_kPa = norm(row.traction_kPa - row.normal_kPa * normal);
+    if (!resolution.empty()) row.resolution_um = resolution[v];
+    if (r.covariance_kPa2.size() == 0) continue;
+    const auto sigma = [&](Eigen::Index c) { return std::sqrt(std::max(0.0, r.covariance_kPa2(at + c, at + c))); };
+    row.sigma_x_kPa = sigma(0);
+    row.sigma_y_kPa = sigma(1);
+    row.sigma_z_kPa = sigma(2);
+  }
+  return rows;
+}
+
+const files::Table<PartForce>& force_table() {
+  static const files::Table<PartForce> table{
+      .file = "traction_3d_adhesion_forces.csv",
+      .row = "each adhesion of `mbtfm-traction` in space",
+      .columns = {{"adhesion_id", "label of the adhesion", &PartForce::adhesion_id},
+                  {"x_um", "middle of its part of the surface", files::x_of(&PartForce::position_um)},
+                  {"y_um", "middle of its part of the surface", files::y_of(&PartForce::position_um)},
+                  {"z_um", "middle of its part of the surface", files::z_of(&PartForce::position_um)},
+                  {"area_um2", "of the curved surface", &PartForce::area_um2, kResult},
+                  {"fx_nN", "force of the cell on the gel", files::x_of(&PartForce::force_nN)},
+                  {"fy_nN", "the same along y", files::y_of(&PartForce::force_nN)},
+                  {"fz_nN", "the same into the gel", files::z_of(&PartForce::force_nN)},
+                  {"sigma_fx_nN", "standard error: the beads' noise, and what they do not resolve",
+                   files::x_of(&PartForce::sigma_nN), kResult},
+                  {"sigma_fy_nN", "the same along y", files::y_of(&PartForce::sigma_nN), kResult},
+                  {"sigma_fz_nN", "the same into the gel", files::z_of(&PartForce::sigma_nN), kResult},
+                  {"force_nN", "its size", [](const PartForce& f) { return norm(f.force_nN); }, kResult},
+                  {"sigma_nN", "standard error along the force", &PartForce::magnitude_sigma_nN, kResult}}};
+  return table;
+}
+
+}  // namespace
+
+std::string pages_of_tables() { return page_of(traction_table()) + page_of(force_table()); }
+
+void write_tractions(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction) {
+  write(file, traction_table(), rows_of(problem, reconstruction));
+}
+
+void write_part_forces(const Path& file, const std::vector<PartForce>& forces) { write(file, force_table(), forces); }
+
+void write_tractions_vtp(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction) {
+  files::Grid grid;
+  for (const auto& face : problem.mesh.quads.faces) grid.cells.insert(grid.cells.end(), face.begin(), face.end());
+  const auto array = [&](const char* name, int components) -> std::vector<double>& {
+    return grid.point_arrays.emplace_back(files::GridArray{name, components, {}}).values;
+  };
+  grid.point_arrays.reserve(7);
+  auto &traction = array("traction_kPa", 3), &normal = array("normal_kPa", 1), &tangential = array("tangential_kPa", 1),
+       &displacement = array("displacement_um", 3);
+  const bool has_errors = reconstruction.covariance_kPa2.size() > 0, is_resolved = reconstruction.resolved.size() > 0;
+  auto* sigma = has_errors ? &array("sigma_traction_kPa", 3) : nullptr;
+  auto* resolution = is_resolved ? &array("resolution_um", 1) : nullptr;
+  for (const Row& row : rows_of(problem, reconstruction)) {
+    grid.points_um.push_back({row.position_um.x, row.position_um.y, row.position_um.z});
+    traction.insert(traction.end(), {row.traction_kPa.x, row.traction_kPa.y, row.traction_kPa.z});
+    displacement.insert(displacement.end(), {row.displacement_um.x, row.displacement_um.y, row.displacement_um.z});
+    normal.push_back(row.normal_kPa);
+    tangential.push_back(row.tangential_kPa);
+    if (sigma) sigma->insert(sigma->end(), {*row.sigma_x_kPa, *row.sigma_y_kPa, *row.sigma_z_kPa});
+    if (resolution) resolution->push_back(*row.resolution_um);
+  }
+  files::write_quads_vtp(file, grid);
+}
+
+Figures summary_of(const Problem& problem, const SpatialReconstruction& r, const Balance& balance) {
+  Figures figures;
+  const auto add = [&](const std::string& name, double value) { figures.emplace_back(name, value); };
+  const auto add_vector = [&](const std::string& name, const std::string& unit, const Vec3& value) {
+    add(name + "_x_" + unit, value.x);
+    add(name + "_y_" + unit, value.y);
+    add(name + "_z_" + unit, value.z);
+  };
+  figures.emplace_back("method", std::string(name_of(r.method)));
+  add("total_force_nN", balance.total_force_nN);
+  add("normal_force_nN", balance.normal_force_nN);
+  add_vector("net_force", "nN", balance.force_nN);
+  add_vector("moment", "nN_um", balance.moment_nN_um);
+  if (r.covariance_kPa2.size() > 0) {
+    add_vector("net_force_sigma", "nN", balance.force_sigma_nN);
+    add_vector("moment_sigma", "nN_um", balance.moment_sigma_nN_um);
+  }
+  add_vector("centre", "um", balance.centre_um);
+  add("strain_energy_fJ", balance.strain_energy_fJ);
+  add("relative_l2", r.relative_l2);
+  add("noise_um", r.noise_um);
+  if (r.chi_squared > 0) add("chi_squared_per_datum", r.chi_squared);
+  if (r.degrees > 0) add("effective_unknowns", r.degrees);
+  if (r.resolved.size() > 0) add("median_resolution_um", numerics::median(resolution_um(problem, r)));
+  if (r.lambda) add("lambda", *r.lambda);
+  figures.emplace_back("tractions_over", problem.expected.where);
+  figures.emplace_back("n_unknowns", std::int64_t{problem.n_unknowns()});
+  add("spacing_x_um", problem.mesh.spacing_um.x);
+  add("spacing_y_um", problem.mesh.spacing_um.y);
+  figures.emplace_back("n_beads", std::int64_t{problem.observed.n_beads});
+  figures.emplace_back("n_beads_flagged", std::int64_t{problem.observed.n_flagged});
+  figures.emplace_back("n_beads_above", std::int64_t{problem.observed.n_above});
+  figures.emplace_back("n_beads_below_base", std::int64_t{problem.observed.n_below_base});
+  add("bead_distance_um", problem.observed.distance_um);
+  add("median_depth_um", problem.observed.depth_um);
+  for (const auto& figure : r.figures) figures.push_back(figure);
+  for (const auto& figure : problem.figures) figures.push_back(figure);
+  return figures;
+}
+
+}  // namespace mbtfm::spatial

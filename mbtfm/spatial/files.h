@@ -1,0 +1,21 @@
+/// Files of a reconstruction in space.
+#pragma once
+
+#include <string>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/path.h"
+
+namespace mbtfm::spatial {
+
+/// traction_3d.csv: a row for each vertex.
+void write_tractions(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction);
+/// traction.vtp: the surface with the same.
+void write_tractions_vtp(const Path& file, const Problem& problem, const SpatialReconstruction& reconstruction);
+void write_part_forces(const Path& file, const std::vector<PartForce>& forces);
+/// Their part of docs/columns.md.
+std::string pages_of_tables();
+
+Figures summary_of(const Problem& problem, const SpatialReconstruction& reconstruction, const Balance& balance);
+
+}  // namespace mbtfm::spatial

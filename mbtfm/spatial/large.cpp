@@ -1,0 +1,78 @@
+/// Tikhonov with so many tractions that the matrix of their answers is not formed.
+#include <algorithm>
+#include <cmath>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "mbtfm/tractions/recurrences.h"
+#include "pipeline/contract/errors.h"
+#include "substrate/response.h"
+
+namespace mbtfm::spatial {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// W S G L and its transpose, by solutions of the gel.
+tractions::LinearMap map_of(const Problem& problem, const Basis& basis, const VectorXd& roots) {
+  const Index n_points = problem.map->rows(), n = problem.observed.n_components();
+  tractions::LinearMap map;
+  map.n_data = roots.size();
+  map.n_unknowns = 3 * basis.size();
+  map.forward = [&problem, &basis, roots](const MatrixXd& x) -> MatrixXd {
+    MatrixXd t(problem.n_unknowns(), x.cols());
+    for (Index k = 0; k < x.cols(); ++k) t.col(k) = basis.tractions(x.col(k));
+    return roots.asDiagonal() * problem.at_beads(problem.map->displace(t));
+  };
+  map.transposed = [&problem, &basis, roots, n_points, n](const MatrixXd& y) -> MatrixXd {
+    const MatrixXd weighed = roots.asDiagonal() * y;
+    MatrixXd at_points = MatrixXd::Zero(n_points, y.cols());
+    for (Index b = 0; b < problem.observed.n_beads; ++b) at_points.middleRows(3 * b, n) = weighed.middleRows(n * b, n);
+    const MatrixXd pulled = problem.map->pull_back(at_points);
+    MatrixXd x(3 * basis.size(), y.cols());
+    for (Index k = 0; k < y.cols(); ++k) x.col(k) = basis.transposed(pulled.col(k));
+    return x;
+  };
+  return map;
+}
+
+}  // namespace
+
+SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
+                                        const SpatialParameters& parameters) {
+  const Observed& observed = problem.observed;
+  const Basis basis =
+      orthonormal_basis(norm_of(problem.mesh, problem.ground, [&](Vec2 p) { return problem.expected.amplitude(p); }));
+  SpatialReconstruction r;
+  r.traction_kPa = VectorXd::Zero(problem.n_unknowns());
+  if (observed.displacement_um.isZero(0)) {
+    r.remark = "no bead has moved: there is no traction";
+    return r;
+  }
+  const int n_rounds = parameters.loss == BeadLoss::l2 ? 1 : 5;
+  r.weighing = weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed,
+                     problem.residual(r.traction_kPa), 0);
+  for (int round = 0; round < n_rounds; ++round) {
+    const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(observed.sigma_um);
+    const tractions::Recurrences recurrences(map_of(problem, basis, roots),
+                                             roots.cwiseProduct(observed.displacement_um), {});
+    const double least = std::max({observed.states_errors ? 1.0 : 0.0, problem.variance_of_model(),
+                                   parameters.loss == BeadLoss::l2 || round == 0 ? 0.0 : r.weighing.variance});
+    r.scan = recurrences.scan(least > 0 ? std::optional(least) : std::nullopt);
+    r.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
+                                          : chosen_lambda(*r.scan, traction.lambda_by);
+    r.traction_kPa = basis.tractions(recurrences.solve(*r.lambda));
+    r.degrees = recurrences.degrees(*r.lambda);
+    r.relative_l2 = recurrences.relative_l2(*r.lambda);
+    r.variance = std::max(r.scan->variance, least);
+    r.weighing = weigh(parameters.loss, observed, problem.residual(r.traction_kPa), r.degrees);
+  }
+  r.length_um = *r.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
+  r.remark = "standard errors are computed of up to " + std::to_string(kMostVertices) + " vertices, and there are " +
+             std::to_string(problem.mesh.n_vertices());
+  return r;
+}
+
+}  // namespace mbtfm::spatial

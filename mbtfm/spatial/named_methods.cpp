@@ -1,0 +1,166 @@
+/// Methods of others, on the same gel and the same beads, to be compared with.
+#include <algorithm>
+#include <array>
+#include <chrono>
+#include <cmath>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
+
+namespace mbtfm::spatial {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// |W (u − A x)|² + lambda² |x|², of which tikhonov found the minimum.
+struct Functional {
+  MatrixXd response;  ///< W A
+  VectorXd data;      ///< W u
+  double lambda2 = 0;
+
+  double value(const VectorXd& x) const { return (data - response * x).squaredNorm() + lambda2 * x.squaredNorm(); }
+  VectorXd half_slope(const VectorXd& x) const { return lambda2 * x - response.transpose() * (data - response * x); }
+};
+
+Functional functional_of(const Problem& problem, const Basis& basis, const SpatialReconstruction& r, int threads) {
+  const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
+  return {roots.asDiagonal() * basis.response(problem.response_um_per_kPa, threads),
+          roots.cwiseProduct(problem.displacement_um()), *r.lambda * *r.lambda};
+}
+
+Basis basis_of(const Problem& problem) {
+  return orthonormal_basis(
+      norm_of(problem.mesh, problem.ground, [&](Vec2 p) { return problem.expected.amplitude(p); }));
+}
+
+/// The displacement of the beads around a vertex, by the inverse of their distance.
+Eigen::Vector3d interpolated_um(const Problem& problem, const Vec3& at) {
+  constexpr std::size_t kNearest = 4;
+  const auto& beads = std::get<std::vector<Vec3>>(problem.observed.at.points_um);
+  std::vector<std::pair<double, std::size_t>> by_distance;
+  for (std::size_t b = 0; b < beads.size(); ++b) by_distance.emplace_back(norm(beads[b] - at), b);
+  std::partial_sort(by_distance.begin(), by_distance.begin() + kNearest, by_distance.end());
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double weights = 0;
+  for (std::size_t k = 0; k < kNearest; ++k) {
+    const double weight = 1 / std::max(by_distance[k].first, 1e-6);
+    const auto row = 3 * static_cast<Index>(by_distance[k].second);
+    sum += weight * problem.observed.displacement_um.segment<3>(row);
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+}  // namespace
+
+SpatialReconstruction reconstruct_adjoint(const Problem& problem, const tractions::TractionParameters& traction,
+                                          const SpatialParameters& parameters, int threads) {
+  SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
+  if (!r.lambda) return r;
+  const Basis basis = basis_of(problem);
+  const Functional f = functional_of(problem, basis, r, threads);
+  constexpr double kSettled = 1e-12;
+  constexpr int kMost = 20000;
+  VectorXd x = VectorXd::Zero(f.response.cols()), downhill = -f.half_slope(x), step = downhill;
+  const double first = downhill.squaredNorm();
+  double square = first;
+  int iterations = 0;
+  for (; iterations < kMost && square > kSettled * kSettled * first; ++iterations) {
+    const VectorXd moved = f.response.transpose() * (f.response * step) + f.lambda2 * step;
+    const double length = square / step.dot(moved);
+    x += length * step;
+    downhill -= length * moved;
+    const double next = downhill.squaredNorm();
+    step = downhill + next / square * step;
+    square = next;
+  }
+  if (iterations == kMost)
+    throw NotSolved({.reason = "adjoint: the equations are not solved after " + std::to_string(kMost) + " steps"});
+  r.traction_kPa = basis.tractions(x);
+  r.figures.emplace_back("adjoint_solves", std::int64_t{2 * iterations});
+  return r;
+}
+
+SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tractions::TractionParameters& traction,
+                                            const SpatialParameters& parameters, int threads) {
+  SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
+  if (!r.lambda) return r;
+  const Basis basis = basis_of(problem);
+  const Functional f = functional_of(problem, basis, r, threads);
+  constexpr double kSettled = 1e-6;                // of the slope
+  constexpr int kMost = 5000, kSolvesOfLine = 10;  // Numerical Recipes' bracket and parabolas take about so many
+  VectorXd x = VectorXd::Zero(f.response.cols());
+  // the differences of a sum of squares: of each unknown by a step e, [T(x + e) − T(x − e)] / 2e, is the slope itself
+  VectorXd downhill = -2 * f.half_slope(x), step = downhill;
+  const double first = downhill.norm();
+  int steps = 0;
+  for (; steps < kMost && downhill.norm() > kSettled * first; ++steps) {
+    const VectorXd moved = f.response * step;
+    const double length = 0.5 * downhill.dot(step) / (moved.squaredNorm() + f.lambda2 * step.squaredNorm());
+    x += length * step;
+    const VectorXd next = -2 * f.half_slope(x);
+    step = next + next.squaredNorm() / downhill.squaredNorm() * step;  // Fletcher & Reeves
+    downhill = next;
+  }
+  r.traction_kPa = basis.tractions(x);
+  r.figures.emplace_back("thesis_steps", std::int64_t{steps});
+  r.figures.emplace_back("thesis_direct_solves", std::int64_t{steps} * (f.response.cols() + 1 + kSolvesOfLine));
+  r.remark = "the thesis' program would solve the gel " +
+             std::to_string(std::int64_t{steps} * (f.response.cols() + 1 + kSolvesOfLine)) + " times for this";
+  return r;
+}
+
+SpatialReconstruction reconstruct_direct(const Problem& problem, int threads) {
+  if (problem.observed.n_components() != 3) throw UsageError("direct: displacement along z is missing");
+  SpatialReconstruction r;
+  const std::vector<Vec3> vertices = problem.vertices_um();
+  VectorXd imposed(problem.n_unknowns());
+  for (std::size_t v = 0; v < vertices.size(); ++v)
+    imposed.segment<3>(3 * static_cast<Index>(v)) = interpolated_um(problem, vertices[v]);
+  // by normal equations: the compliance of the surface is symmetric but for the lattice
+  MatrixXd normal = numerics::gram(problem.surface_um_per_kPa, threads);
+  MatrixXd right = problem.surface_um_per_kPa.transpose() * imposed;
+  normal.diagonal().array() += 1e-12 * normal.diagonal().maxCoeff();  // rounding
+  if (!numerics::upper_cholesky(normal, threads))
+    throw NotSolved({.reason = "direct: tractions do not follow from the displacement of the surface"});
+  numerics::solve_upper_transposed(normal, right);
+  numerics::solve_upper(normal, right);
+  r.traction_kPa = right.col(0);
+  const VectorXd residual = problem.residual(r.traction_kPa);
+  r.weighing = weigh(BeadLoss::l2, problem.observed, residual, 0);
+  r.relative_l2 = residual.norm() / std::max(problem.residual(VectorXd::Zero(problem.n_unknowns())).norm(), 1e-300);
+  r.remark = "direct imposes the noise of the beads with their displacement: no map to be believed";
+  return r;
+}
+
+SpatialReconstruction reconstruct_green(const Problem& problem, const tractions::TractionParameters& traction,
+                                        const SpatialParameters& parameters, int threads) {
+  const auto& faces = problem.mesh.quads.faces;
+  const auto n_faces = static_cast<Index>(faces.size());
+  MBTFM_ASSERT(problem.facet_response_um_per_kPa.cols() == 3 * n_faces);
+  // for people, the traction of a vertex is the mean over its facets; |x|² the sum of squares times area
+  const double area = problem.mesh.spacing_um.x * problem.mesh.spacing_um.y;
+  VectorXd roots(n_faces), n_at = VectorXd::Zero(problem.mesh.n_vertices());
+  MatrixXd shapes = MatrixXd::Zero(problem.mesh.n_vertices(), n_faces);
+  for (Index f = 0; f < n_faces; ++f) {
+    const Vec2 middle = problem.mesh.low_corners_um[static_cast<std::size_t>(f)] + 0.5 * problem.mesh.spacing_um;
+    roots[f] = problem.expected.amplitude(middle) / std::sqrt(area * problem.ground.stretch(middle));
+    for (const int v : faces[static_cast<std::size_t>(f)]) {
+      shapes(v, f) = 1;
+      n_at[v] += 1;
+    }
+  }
+  shapes = n_at.cwiseInverse().asDiagonal() * shapes * roots.asDiagonal();
+  MatrixXd response(problem.facet_response_um_per_kPa.rows(), 3 * n_faces);
+  for (Index c = 0; c < 3; ++c) {
+    for (Index f = 0; f < n_faces; ++f)
+      response.col(c * n_faces + f) = roots[f] * problem.facet_response_um_per_kPa.col(3 * f + c);
+  }
+  return reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
+}
+
+}  // namespace mbtfm::spatial

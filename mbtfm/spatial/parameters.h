@@ -1,0 +1,35 @@
+/// What a user says of a reconstruction in space.
+#pragma once
+
+#include <optional>
+
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/words.h"
+#include "pipeline/stage/parameters.h"
+
+namespace mbtfm::spatial {
+
+/// Where tractions are looked for; outside of it only `background` of them are expected.
+enum class Region {
+  automatic,  ///< the outline where there is one, else all
+  all,        ///< wherever there are beads
+  outline,    ///< the cell, grown by two distances of beads
+  adhesions   ///< their ellipses, grown
+};
+constexpr auto words(Region) { return std::array{"auto", "all", "outline", "adhesions"}; }
+
+/// What the misfit of a bead costs. Of the length of its residual over its errors, so that no axis is special; but for
+/// the last.
+enum class BeadLoss { l2, l1, huber, biweight, l1_by_component };
+constexpr auto words(BeadLoss) { return std::array{"l2", "l1", "huber", "biweight", "l1-by-component"}; }
+
+struct SpatialParameters {
+  Region region = Region::automatic;
+  double background = 0.1;  ///< a tenth: a patch left out is seen, noise far from the cell is not
+  BeadLoss loss = BeadLoss::l2;
+  double axial_sigma_ratio = 3;  ///< of confocal stacks (thesis 2.3.2)
+  bool with_axial = true;        ///< displacement along z counts
+};
+void declare(stage::ParameterList& list, SpatialParameters& parameters);
+
+}  // namespace mbtfm::spatial

@@ -1,0 +1,78 @@
+/// A force on each adhesion, spread evenly over its part of the surface, and a weak background everywhere else.
+/// docs/theory.md, section 4.
+#include <algorithm>
+#include <cmath>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/dense.h"
+
+namespace mbtfm::spatial {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// By adhesion: the tractions at the vertices that stand for a force of one on it; in the answer of the beads it is the
+/// ellipse itself.
+MatrixXd shapes_of(const Problem& problem, const MatrixXd& areas_um2) {
+  const Eigen::Map<const VectorXd> areas(problem.mesh.areas_um2.data(), problem.mesh.n_vertices());
+  MatrixXd shapes = MatrixXd::Zero(areas.size(), areas_um2.rows());
+  for (Index a = 0; a < areas_um2.rows(); ++a)
+    shapes.col(a) = areas_um2.row(a).transpose().cwiseQuotient(areas) / areas_um2.row(a).sum();
+  return shapes;
+}
+
+/// Misfit per datum that is left, of patches alone.
+double misfit_alone(const Problem& problem, const MatrixXd& response, const VectorXd& weights, double n_data,
+                    int threads) {
+  const auto spectrum = spectrum_of(problem, response, weights, n_data, threads);
+  const double least = 1e-8 * std::sqrt(spectrum.values().maxCoeff());
+  return spectrum.misfit(least) / std::max(1.0, n_data - static_cast<double>(response.cols()));
+}
+
+}  // namespace
+
+SpatialReconstruction reconstruct_patches(const Problem& problem, const tractions::TractionParameters& traction,
+                                          const SpatialParameters& parameters, int threads) {
+  if (problem.adhesion_areas_um2.rows() == 0) throw UsageError("patches: --adhesions is missing or holds none");
+  SpatialReconstruction r;
+  const Index n_patches = problem.adhesion_areas_um2.rows();
+  const MatrixXd& G = problem.patch_response_um_per_nN;
+  MatrixXd of_patches(G.rows(), G.cols());  // by component
+  for (Index a = 0; a < n_patches; ++a) {
+    for (Index c = 0; c < 3; ++c) of_patches.col(c * n_patches + a) = G.col(3 * a + c);
+  }
+  // |x|² is the integral of the squares of an even traction, too
+  const VectorXd scales = problem.adhesion_areas_um2.rowwise().sum().cwiseSqrt();
+  const MatrixXd patch_shapes = shapes_of(problem, problem.adhesion_areas_um2) * scales.asDiagonal();
+  of_patches = of_patches * scales.replicate(3, 1).asDiagonal();
+  const bool has_background = parameters.background > 0;
+  MatrixXd shapes = patch_shapes, response = of_patches;
+  if (has_background) {
+    const double weak = parameters.background;
+    const Basis background = orthonormal_basis(norm_of(problem.mesh, problem.ground, [weak](Vec2) { return weak; }));
+    const MatrixXd of_background = background.response(problem.response_um_per_kPa, threads);
+    const Index n = background.size(), m = n + n_patches;
+    shapes.resize(patch_shapes.rows(), m);
+    shapes << background.shapes(), patch_shapes;
+    response.resize(G.rows(), 3 * m);
+    for (Index c = 0; c < 3; ++c) {
+      response.middleCols(c * m, n) = of_background.middleCols(c * n, n);
+      response.middleCols(c * m + n, n_patches) = of_patches.middleCols(c * n_patches, n_patches);
+    }
+  }
+  r = reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
+  if (r.covariance_kPa2.size() == 0) return r;  // nothing has moved
+  const double alone = misfit_alone(problem, of_patches, r.weighing.by_row, r.weighing.n_data, threads);
+  r.figures.emplace_back("misfit_of_patches_alone", alone / r.variance);
+  r.findings.push_back(noticed(
+      FindingKind::patches_do_not_fit, alone / r.variance,
+      "Forces on the patches alone leave " + brief(alone / r.variance) + " times the squares that the noise has."));
+  return r;
+}
+
+}  // namespace mbtfm::spatial

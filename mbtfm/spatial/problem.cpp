@@ -1,0 +1,172 @@
+#include "mbtfm/spatial/problem.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/dense.h"
+#include "substrate/choice/factory.h"
+#include "substrate/response.h"
+
+namespace mbtfm::spatial {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+/// Beads closer than that tell no finer tractions apart; at their distance the lattice itself would be felt.
+constexpr double kSpacingOfBeads = 0.83;
+
+TractionMesh lattice_for(const Ground& ground, const Expected& expected, const Meshing& meshing, double beads_um) {
+  const Vec2 size = expected.over.high_um - expected.over.low_um;
+  const double smallest = std::sqrt(size.x * size.y / kMostVertices);
+  const double spacing = meshing.spacing_um.value_or(std::max(kSpacingOfBeads * beads_um, smallest));
+  if (spacing > std::max(size.x, size.y)) {
+    throw UsageError("traction.spacing_um = " + brief(spacing) + ": the beads lie over " + brief(size.x) + " x " +
+                     brief(size.y) + " um");
+  }
+  TractionMesh mesh = make_traction_mesh(
+      ground, expected.over, spacing, [&](Vec2 middle) { return expected.background > 0 || expected.is_part(middle); });
+  constexpr int kMostAtAll = 5000;  // the norm's own decomposition then takes half a minute
+  if (mesh.n_vertices() > kMostAtAll) {
+    throw UsageError("traction.spacing_um = " + brief(spacing) + " makes " + std::to_string(mesh.n_vertices()) +
+                     " vertices of tractions, " + std::to_string(kMostAtAll) +
+                     " are the most: choose a wider spacing, or a region with traction.background = 0");
+  }
+  return mesh;
+}
+
+/// Displacements under an even traction on each face: of quads that share no vertex, all four alike.
+MatrixXd facet_response(const substrate::Substrate& model, const TractionMesh& mesh,
+                        const substrate::Observations& at) {
+  substrate::SurfaceMesh apart;
+  const auto n_faces = static_cast<Index>(mesh.quads.faces.size());
+  MatrixXd even = MatrixXd::Zero(12 * n_faces, 3 * n_faces);
+  for (Index f = 0; f < n_faces; ++f) {
+    std::array<int, 4> corners{};
+    for (std::size_t i = 0; i < 4; ++i) {
+      corners[i] = static_cast<int>(apart.points_um.size());
+      apart.points_um.push_back(
+          mesh.quads.points_um[static_cast<std::size_t>(mesh.quads.faces[static_cast<std::size_t>(f)][i])]);
+      for (Index c = 0; c < 3; ++c) even(3 * Index{corners[i]} + c, 3 * f + c) = 1;
+    }
+    apart.faces.push_back(corners);
+  }
+  return model.response({apart, 3}, at)->displace(even);
+}
+
+}  // namespace
+
+std::vector<Vec3> Problem::vertices_um() const {
+  std::vector<Vec3> places;
+  for (const Vec2 p : mesh.quads.points_um) places.push_back({p.x, p.y, ground.height_um(p)});
+  return places;
+}
+
+substrate::Observations Problem::all_observed() const {
+  std::vector<Vec3> points = std::get<std::vector<Vec3>>(observed.at.points_um);
+  for (const Vec3& v : vertices_um()) points.push_back(v);
+  return {std::move(points), substrate::Components::all};
+}
+
+MatrixXd Problem::at_beads(const MatrixXd& of_all) const {
+  const Index n = observed.n_components();
+  MatrixXd rows(n * observed.n_beads, of_all.cols());
+  for (Index b = 0; b < observed.n_beads; ++b) rows.middleRows(n * b, n) = of_all.middleRows(3 * b, n);
+  return rows;
+}
+
+VectorXd Problem::displacement_um() const {
+  if (offset_um.size() == 0) return observed.displacement_um;
+  return observed.displacement_um - offset_um;
+}
+
+VectorXd Problem::surface_displacement_um(const VectorXd& traction_kPa) const {
+  if (map) return map->displace(traction_kPa).bottomRows(n_unknowns()).col(0);
+  const VectorXd u = surface_um_per_kPa * traction_kPa;
+  if (surface_offset_um.size() == 0) return u;
+  return u + surface_offset_um;
+}
+
+VectorXd Problem::residual(const VectorXd& traction_kPa) const {
+  const VectorXd explained =
+      map ? VectorXd(at_beads(map->displace(traction_kPa)).col(0)) : VectorXd(response_um_per_kPa * traction_kPa);
+  return (displacement_um() - explained).cwiseQuotient(observed.sigma_um);
+}
+
+Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced_um, const VectorXd& about_kPa) const {
+  Problem other = *this;
+  other.surface_um_per_kPa = matrix.bottomRows(n_unknowns());
+  other.response_um_per_kPa = at_beads(matrix);
+  if (about_kPa.size() == 0) return other;
+  const VectorXd offset = displaced_um - matrix * about_kPa;
+  other.surface_offset_um = offset.tail(n_unknowns());
+  other.offset_um = at_beads(offset).col(0);
+  return other;
+}
+
+double Problem::variance_of_model() const {
+  const double in_sigma = observed.displacement_um.cwiseQuotient(observed.sigma_um).squaredNorm();
+  return model_error * model_error * in_sigma / static_cast<double>(observed.displacement_um.size());
+}
+
+Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& parameters, const Meshing& meshing,
+                     const substrate::SubstrateParameters& gel, int threads) {
+  const Ground ground(inputs.gel.surface.get());
+  Observed observed = observe(inputs.beads, inputs.gel, ground, parameters);
+  Expected expected = expected_tractions(inputs, observed, ground, parameters, meshing.grow_um);
+  TractionMesh mesh = lattice_for(ground, expected, meshing, observed.distance_um);
+  substrate::SubstrateParameters of_model = gel;
+  of_model.model = substrate::ModelKind::curved;  // the one that takes quads
+  const std::shared_ptr<const substrate::Substrate> model = choice::make_substrate(inputs.gel, of_model, threads);
+  Problem problem{.observed = std::move(observed),
+                  .gel = inputs.gel,
+                  .ground = ground,
+                  .expected = std::move(expected),
+                  .mesh = std::move(mesh),
+                  .response_um_per_kPa = {},
+                  .surface_um_per_kPa = {},
+                  .model = {},
+                  .map = {},
+                  .offset_um = {},
+                  .surface_offset_um = {},
+                  .patch_response_um_per_nN = {},
+                  .adhesion_areas_um2 = {},
+                  .facet_response_um_per_kPa = {},
+                  .model_error = 0,
+                  .figures = {}};
+  // beads and vertices at once: the gel's factor is made once
+  const auto map = model->response({problem.mesh.quads, 3}, problem.all_observed());
+  if (problem.mesh.n_vertices() <= kMostVertices) {
+    problem = problem.with_response(map->matrix(), {}, {});
+  } else {
+    problem.model = model;
+    problem.map = map;
+    map->displace(Eigen::VectorXd::Zero(problem.n_unknowns()));  // makes the mesh, whose error is asked below
+  }
+  if (meshing.has_patches && !inputs.adhesions.empty()) {
+    std::vector<substrate::Ellipse> ellipses;
+    for (const Adhesion& a : inputs.adhesions) ellipses.push_back(substrate::ellipse_of(a));
+    problem.patch_response_um_per_nN = model->response({ellipses, 3}, problem.observed.at)->matrix();
+    problem.adhesion_areas_um2 = adhesion_areas_um2(problem.mesh, ground, inputs.adhesions, 0);
+  }
+  if (meshing.has_facets) problem.facet_response_um_per_kPa = facet_response(*model, problem.mesh, problem.observed.at);
+  problem.model_error = model->stated_error();
+  problem.figures = model->figures();
+  return problem;
+}
+
+tractions::Spectrum spectrum_of(const Problem& problem, const MatrixXd& response, const VectorXd& weights_by_row,
+                                double n_data, int threads) {
+  const VectorXd roots = weights_by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
+  const MatrixXd weighed = roots.asDiagonal() * response;
+  const VectorXd data = roots.cwiseProduct(problem.displacement_um());
+  MatrixXd normal = MatrixXd::Zero(weighed.cols(), weighed.cols());
+  numerics::add_upper_gram(weighed, normal, threads);
+  return {std::move(normal), weighed.transpose() * data, data.squaredNorm(), n_data};
+}
+
+}  // namespace mbtfm::spatial

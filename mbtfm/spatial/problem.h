@@ -1,0 +1,73 @@
+/// Beads in a gel as the answer to tractions on its surface, as numbers.
+#pragma once
+
+#include <Eigen/Core>
+#include <memory>
+
+#include "mbtfm/spatial/basis.h"
+#include "mbtfm/spatial/region.h"
+#include "mbtfm/tractions/spectrum.h"
+#include "substrate/compliance.h"
+#include "substrate/response.h"
+
+namespace mbtfm::spatial {
+
+/// Up to so many vertices of tractions the matrix of their answers is formed: with twice as many its decomposition
+/// takes a minute and a gigabyte.
+inline constexpr int kMostVertices = 1100;
+
+/// u = G t + u_0. Tractions are three numbers a vertex; u_0 is zero but about a strained gel.
+struct Problem {
+  Observed observed;
+  Gel gel;
+  Ground ground;
+  Expected expected;
+  TractionMesh mesh;
+  Eigen::MatrixXd response_um_per_kPa;           ///< G by row of `observed`
+  Eigen::MatrixXd surface_um_per_kPa;            ///< displacement of the vertices
+  Eigen::VectorXd offset_um, surface_offset_um;  ///< u_0 of beads and vertices; empty: zero
+  // where forces on adhesions are asked for:
+  Eigen::MatrixXd patch_response_um_per_nN;   ///< to forces spread evenly over them, x, y, z of each in turn
+  Eigen::MatrixXd adhesion_areas_um2;         ///< adhesions × vertices: the area of each, as weights of the vertices
+  Eigen::MatrixXd facet_response_um_per_kPa;  ///< to even tractions on the faces, where they are asked for
+  double model_error = 0;                     ///< relative, of G, as the gel's model states it
+  Figures figures;                            ///< of that model
+
+  Eigen::Index n_unknowns() const { return 3 * Eigen::Index{mesh.n_vertices()}; }
+  std::vector<Vec3> vertices_um() const;
+  /// What the gel answers to: the beads, then the vertices.
+  substrate::Observations all_observed() const;
+  /// The rows of `observed`, of those of all_observed().
+  Eigen::MatrixXd at_beads(const Eigen::MatrixXd& of_all) const;
+  /// The displacement that tractions explain: measured less u_0.
+  Eigen::VectorXd displacement_um() const;
+  /// Of the vertices.
+  Eigen::VectorXd surface_displacement_um(const Eigen::VectorXd& traction_kPa) const;
+  /// S (u − u_0 − G t)
+  Eigen::VectorXd residual(const Eigen::VectorXd& traction_kPa) const;
+  /// The same with other answers: G = `matrix`, and u = `displacement_um` under the tractions `about_kPa`.
+  Problem with_response(const Eigen::MatrixXd& matrix, const Eigen::VectorXd& displaced_um,
+                        const Eigen::VectorXd& about_kPa) const;
+  /// What the model's error leaves of a datum, as a variance in units of sigma².
+  double variance_of_model() const;
+};
+
+struct Meshing {
+  std::optional<double> spacing_um;  ///< unset: four fifths of the distance of the beads, or what memory takes
+  double grow_um = 0;                ///< of adhesions
+  bool has_patches = false;          ///< forces on adhesions are asked for
+  bool has_facets = false;           ///< even tractions on faces are asked for
+};
+
+/// Lattice of tractions, mesh of the gel, and the displacement of each bead under each traction.
+/// @throws as observe, expected_tractions, make_traction_mesh and Substrate::response; UsageError where a lattice asked
+///         for has too many vertices
+Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& parameters, const Meshing& meshing,
+                     const substrate::SubstrateParameters& gel, int threads);
+
+/// Least squares of the weighed beads over the unknowns of a basis.
+/// @param response  of the beads to them
+tractions::Spectrum spectrum_of(const Problem& problem, const Eigen::MatrixXd& response,
+                                const Eigen::VectorXd& weights_by_row, double n_data, int threads);
+
+}  // namespace mbtfm::spatial

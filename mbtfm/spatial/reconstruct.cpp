@@ -1,0 +1,124 @@
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/numerics/order_statistics.h"
+
+namespace mbtfm::spatial {
+namespace {
+
+using tractions::TractionMethod;
+
+SpatialReconstruction by_method(TractionMethod method, const Problem& problem,
+                                const tractions::TractionParameters& traction, const SpatialParameters& parameters,
+                                int threads) {
+  switch (method) {
+    case TractionMethod::tikhonov:
+      return reconstruct_tikhonov(problem, traction, parameters, threads);
+    case TractionMethod::group_l1:
+      return reconstruct_group_l1(problem, traction, parameters, threads);
+    case TractionMethod::patches:
+      return reconstruct_patches(problem, traction, parameters, threads);
+    case TractionMethod::adjoint:
+      return reconstruct_adjoint(problem, traction, parameters, threads);
+    case TractionMethod::direct:
+      return reconstruct_direct(problem, threads);
+    case TractionMethod::green:
+      return reconstruct_green(problem, traction, parameters, threads);
+    case TractionMethod::thesis_cg:
+      return reconstruct_thesis_cg(problem, traction, parameters, threads);
+    default:
+      throw UsageError(std::string(name_of(method)) +
+                       " takes beads that a flat surface moves along itself; the file of displacements has uz_um: "
+                       "choose tikhonov, group-l1 or patches");
+  }
+}
+
+/// From the middle of what may carry tractions to the nearest bead.
+double distance_to_beads_um(const Problem& problem) {
+  const auto& beads = std::get<std::vector<Vec3>>(problem.observed.at.points_um);
+  std::vector<double> distances;
+  for (const Vec3& v : problem.vertices_um()) {
+    if (!problem.expected.is_part({v.x, v.y})) continue;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (const Vec3& b : beads) nearest = std::min(nearest, norm(b - v));
+    distances.push_back(nearest);
+  }
+  return numerics::median(std::move(distances));
+}
+
+/// Share of the beads whose residuals noise does not have.
+double share_astray(const Problem& problem, const Eigen::VectorXd& residual) {
+  constexpr double kFar = 5;  // of a component's standard deviation, as most beads have it
+  const Eigen::Index n = problem.observed.n_components();
+  const double scale = weigh(BeadLoss::biweight, problem.observed, residual, 0).scale;
+  int n_far = 0;
+  for (Eigen::Index b = 0; b < problem.observed.n_beads; ++b) n_far += residual.segment(n * b, n).norm() > kFar * scale;
+  return scale > 0 ? static_cast<double>(n_far) / problem.observed.n_beads : 0;
+}
+
+void find(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {
+  const Observed& observed = problem.observed;
+  const int n_off = observed.n_above + observed.n_below_base;
+  r.findings.push_back(noticed(FindingKind::beads_off_the_gel, static_cast<double>(n_off) / (n_off + observed.n_beads),
+                               std::to_string(observed.n_above) + " beads lie above the gel's surface and " +
+                                   std::to_string(observed.n_below_base) + " below its base, of " +
+                                   std::to_string(n_off + observed.n_beads) + "."));
+  const double away_um = distance_to_beads_um(problem);
+  r.findings.push_back(noticed(FindingKind::beads_far, away_um / observed.distance_um,
+                               "The nearest beads lie " + brief(away_um) + " um from the surface, and " +
+                                   brief(observed.distance_um) + " um from each other."));
+  if (r.degrees > 0) {
+    constexpr double kEnough = 24;  // as the table of findings has it
+    // Ten times the noise tells 4.5 times fewer numbers, and noise falls as the root of the number of beads: they grow
+    // about as its cube root. Measured (docs/accuracy.md).
+    const double ratio = kEnough / r.degrees;
+    r.findings.push_back(noticed(FindingKind::beads_tell_little, ratio,
+                                 "The beads tell " + brief(r.degrees) + " numbers of the tractions; " +
+                                     brief(std::ceil(observed.n_beads * std::pow(ratio, 3))) +
+                                     " beads of the same noise would tell " + brief(kEnough) + "."));
+  }
+  if (r.chi_squared > 0) {
+    r.findings.push_back(noticed(FindingKind::misfit_in_space, r.chi_squared,
+                                 "The tractions leave " + brief(r.chi_squared) +
+                                     " times the squares that the stated errors of the beads explain."));
+  }
+  if (parameters.loss == BeadLoss::l2) {
+    const double share = share_astray(problem, problem.residual(r.traction_kPa));
+    r.findings.push_back(
+        noticed(FindingKind::beads_stray, share,
+                brief(100 * share) + " % of the beads lie further from the model than noise has them."));
+  }
+}
+
+}  // namespace
+
+SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& inputs,
+                                  const tractions::TractionParameters& traction, const SpatialParameters& parameters,
+                                  int threads) {
+  const TractionMethod method =
+      traction.method.value_or(inputs.adhesions.empty() ? TractionMethod::tikhonov : TractionMethod::group_l1);
+  if (problem.map && method != TractionMethod::tikhonov) {
+    throw UsageError(std::string(name_of(method)) + " takes up to " + std::to_string(kMostVertices) +
+                     " vertices of tractions, not " + std::to_string(problem.mesh.n_vertices()) +
+                     ": choose a wider traction.spacing_um, or tikhonov");
+  }
+  SpatialReconstruction r = by_method(method, problem, traction, parameters, threads);
+  r.method = method;
+  if (!inputs.adhesions.empty() && r.forces.empty()) {
+    r.forces =
+        forces_on(problem, r, adhesion_areas_um2(problem.mesh, problem.ground, inputs.adhesions, traction.grow_um));
+    for (std::size_t a = 0; a < r.forces.size(); ++a) r.forces[a].adhesion_id = inputs.adhesions[a].adhesion_id;
+  }
+  const Observed& observed = problem.observed;
+  r.noise_um = r.weighing.scale *
+               (observed.states_errors
+                    ? numerics::median(std::vector<double>(observed.sigma_um.begin(), observed.sigma_um.end()))
+                    : 1);
+  return r;
+}
+
+}  // namespace mbtfm::spatial

@@ -1,0 +1,114 @@
+/// Tractions in space, with what is known of them.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "mbtfm/spatial/loss.h"
+#include "mbtfm/spatial/problem.h"
+#include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/findings.h"
+
+namespace mbtfm::spatial {
+
+/// The force on a part of the surface, an adhesion's.
+struct PartForce {
+  int adhesion_id = 0;
+  Vec3 position_um;
+  double area_um2 = 0;  ///< of the curved surface
+  Vec3 force_nN;
+  Vec3 sigma_nN;                  ///< standard error, with what smoothing took away
+  double magnitude_sigma_nN = 0;  ///< along the force
+};
+
+struct SpatialReconstruction {
+  tractions::TractionMethod method{};
+  Eigen::VectorXd traction_kPa;     ///< three a vertex
+  Eigen::VectorXd unshortened_kPa;  ///< what forces are the sums of; empty: traction_kPa
+  /// Of tractions: by the noise, and by what is not resolved. Empty: the method tells none.
+  Eigen::MatrixXd covariance_kPa2;
+  Eigen::VectorXd resolved;  ///< by vertex, 0 … 1: the mean share of a change of its traction that is seen
+  std::optional<tractions::LambdaScan> scan;
+  std::optional<double> lambda;     ///< of |S (u − G t)|² + lambda² |s|²
+  std::optional<double> length_um;  ///< lambda times E, the same for every method
+  double degrees = 0;               ///< how many numbers the beads tell
+  double relative_l2 = 0;           ///< |S (u − G t)| / |S u|, weighed by the loss
+  double noise_um = 0;              ///< along the surface, as the beads have it
+  double chi_squared = 0;           ///< misfit over what the stated errors leave, per datum; 0: not stated
+  Weighing weighing;
+  double variance = 1;            ///< of one datum as weighed, in units of sigma²
+  std::vector<PartForce> forces;  ///< by adhesion
+  std::string remark;
+  Figures figures;
+  std::vector<std::optional<Finding>> findings;
+};
+
+/// By the method that the parameters name; of its own choice group-l1 where there are adhesions, else tikhonov.
+/// @throws UsageError, InvalidData, NotSolved
+SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& inputs,
+                                  const tractions::TractionParameters& traction, const SpatialParameters& parameters,
+                                  int threads);
+
+/// The minimum of |S (u − G t)|² + lambda² |x|² over the unknowns of a basis, with its loss and its lambda by the data.
+/// @param response  of the beads to the unknowns
+SpatialReconstruction reconstruct_in(const Basis& basis, const Eigen::MatrixXd& response, const Problem& problem,
+                                     const tractions::TractionParameters& traction, const SpatialParameters& parameters,
+                                     int threads);
+
+SpatialReconstruction reconstruct_patches(const Problem& problem, const tractions::TractionParameters& traction,
+                                          const SpatialParameters& parameters, int threads);
+
+/// lambda of |S (u − G t)|² + lambda² ∫ |t|² dA per um/kPa: as flat methods have it, the sum over beads stands for an
+/// integral over the surface, and their weights have a mean of one.
+double lambda_per_um_per_kPa(const Problem& problem);
+
+/// The same as tikhonov where the problem has no matrix. No standard errors.
+SpatialReconstruction reconstruct_large(const Problem& problem, const tractions::TractionParameters& traction,
+                                        const SpatialParameters& parameters);
+
+SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractions::TractionParameters& traction,
+                                           const SpatialParameters& parameters, int threads);
+
+/// By vertex: the mean over its components of the diagonal of I − C Q, C the covariance of the tractions with what was
+/// known before, Q the inverse of the latter alone, the same for each component.
+Eigen::VectorXd resolved_shares(const Eigen::MatrixXd& covariance, const Eigen::MatrixXd& precision_before);
+
+SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractions::TractionParameters& traction,
+                                           const SpatialParameters& parameters, int threads);
+
+/// The equations of tikhonov by conjugate gradients, each step a solution of the gel and one of its adjoint, which is
+/// the gel itself (Ambrosi, SIAM J. Appl. Math. 66 (2006) 2049, with tractions on a surface).
+SpatialReconstruction reconstruct_adjoint(const Problem& problem, const tractions::TractionParameters& traction,
+                                          const SpatialParameters& parameters, int threads);
+/// The minimum of tikhonov's functional by Fletcher and Reeves, as the thesis: what its differences would cost is told.
+SpatialReconstruction reconstruct_thesis_cg(const Problem& problem, const tractions::TractionParameters& traction,
+                                            const SpatialParameters& parameters, int threads);
+/// The displacement measured, interpolated from the nearest beads, is imposed on the surface (Hur et al., Cell. Mol.
+/// Bioeng. 2 (2009) 425). No regularisation: it shows what noise does then.
+SpatialReconstruction reconstruct_direct(const Problem& problem, int threads);
+/// Even tractions on the faces (Legant et al., Nat. Methods 7 (2010) 969), with tikhonov's lambda.
+SpatialReconstruction reconstruct_green(const Problem& problem, const tractions::TractionParameters& traction,
+                                        const SpatialParameters& parameters, int threads);
+
+/// The forces of the tractions, and their errors where the reconstruction has a covariance.
+std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruction& reconstruction,
+                                 const Eigen::MatrixXd& areas_um2);
+
+/// Sums over the surface.
+struct Balance {
+  Vec3 force_nN, force_sigma_nN;
+  Vec3 moment_nN_um, moment_sigma_nN_um;  ///< about `centre_um`
+  Vec3 centre_um;
+  double total_force_nN = 0;   ///< ∫ |t| dA
+  double normal_force_nN = 0;  ///< ∫ |t . n| dA
+  double strain_energy_fJ = 0;
+};
+Balance balance_of(const Problem& problem, const SpatialReconstruction& reconstruction);
+
+/// How far apart two forces must be to be seen as two: the side of the area over which the beads tell one number for
+/// each component.
+std::vector<double> resolution_um(const Problem& problem, const SpatialReconstruction& reconstruction);
+
+}  // namespace mbtfm::spatial

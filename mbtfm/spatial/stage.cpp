@@ -1,0 +1,148 @@
+#include "mbtfm/spatial/stage.h"
+
+#include <algorithm>
+
+#include "mbtfm/spatial/files.h"
+#include "mbtfm/spatial/strained.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
+#include "pipeline/files/csv_files.h"
+#include "pipeline/files/fit_summary.h"
+#include "pipeline/files/vtk_files.h"
+#include "substrate/choice/large_strain.h"
+
+namespace mbtfm::spatial {
+namespace {
+
+SpatialInputs read_inputs(const StageParameters& p, stage::StageContext& context) {
+  SpatialInputs inputs{.beads = files::read_displacement_in_space(context.input("displacement")),
+                       .gel = p.gel,
+                       .adhesions = {},
+                       .outline_um = {}};
+  if (context.has_input("surface"))
+    inputs.gel.surface = std::make_shared<const HeightMap>(files::read_surface(context.input("surface")));
+  if (context.has_input("adhesions")) inputs.adhesions = files::read_adhesions(context.input("adhesions"));
+  if (context.has_input("outline")) inputs.outline_um = files::read_outline(context.input("outline")).front();
+  return inputs;
+}
+
+/// The criteria by lambda: files and picture of the flat methods.
+void write_scan(stage::StageContext& context, const StageParameters& p, const SpatialReconstruction& r) {
+  tractions::Reconstruction shown;
+  shown.scan = r.scan;
+  shown.lambda = r.lambda;
+  shown.length_um = r.length_um;
+  tractions::write_lambda_scan(context.output_beside("out", "_lambda.csv"), *r.scan, *r.length_um / *r.lambda);
+  tractions::write_lambda_picture(
+      context.output_beside("out", "_lambda.svg"), shown,
+      p.traction.lambda_um_per_kPa ? "as given" : std::string("by ") + name_of(p.traction.lambda_by));
+}
+
+void write_outputs(stage::StageContext& context, const StageParameters& p, const Problem& problem,
+                   const SpatialReconstruction& r, const Figures& summary) {
+  write_tractions(context.output("out"), problem, r);
+  write_tractions_vtp(context.output_beside("out", ".vtp"), problem, r);
+  files::write_figures(context.output_beside("out", ".json"), summary);
+  if (r.scan) write_scan(context, p, r);
+  if (!r.forces.empty()) write_part_forces(context.output_beside("out", "_adhesion_forces.csv"), r.forces);
+}
+
+std::string summary_line(const SpatialReconstruction& r, const Balance& balance) {
+  std::string line = name_of(r.method) + std::string(": total force ") + brief(balance.total_force_nN) +
+                     " nN, net force " + brief(norm(balance.force_nN)) + " nN, strain energy " +
+                     brief(balance.strain_energy_fJ) + " fJ, relative L2 " + brief(r.relative_l2);
+  if (r.length_um) line += ", lambda E " + brief(*r.length_um) + " um";
+  if (r.degrees > 0) line += ", " + brief(r.degrees) + " numbers resolved";
+  if (!r.remark.empty()) line += "; " + r.remark;
+  return line;
+}
+
+std::string left_out_of(const Observed& observed) {
+  std::string text;
+  const auto tell = [&](int n, const char* what) {
+    if (n > 0) text += "; " + std::to_string(n) + what;
+  };
+  tell(observed.n_flagged, " flagged beads left out");
+  tell(observed.n_above, " beads above the surface left out");
+  tell(observed.n_below_base, " beads below the base left out");
+  return text;
+}
+
+void notice_balance(stage::StageContext& context, const SpatialReconstruction& r, const Balance& balance) {
+  if (r.covariance_kPa2.size() == 0) return;
+  const double net = norm(balance.force_nN), sigma = norm(balance.force_sigma_nN);
+  context.notice(noticed(FindingKind::tractions_out_of_balance, sigma > 0 ? net / sigma : 0,
+                         "The tractions add up to " + brief(net) + " nN, with a standard error of " + brief(sigma) +
+                             " nN; the sum of their sizes is " + brief(balance.total_force_nN) + " nN."));
+}
+
+Meshing meshing_of(const StageParameters& p) {
+  using tractions::TractionMethod;
+  return {.spacing_um = p.traction.spacing_um,
+          .grow_um = p.traction.grow_um,
+          .has_patches = p.traction.method == TractionMethod::patches,
+          .has_facets = p.traction.method == TractionMethod::green};
+}
+
+/// Strains are small until tractions are known that make them large.
+substrate::SubstrateParameters linear_gel(substrate::SubstrateParameters gel) {
+  gel.effects.large_strain = Switch::off;
+  return gel;
+}
+
+/// Whether it can go on about a strained gel.
+bool has_tangent(const Problem& problem, tractions::TractionMethod method) {
+  using enum tractions::TractionMethod;
+  return !problem.map && method != patches && method != green && method != direct;
+}
+
+}  // namespace
+
+void declare(stage::ParameterList& list, StageParameters& p) {
+  declare(list, p.gel);
+  declare(list, p.traction);
+  declare(list, p.spatial);
+  declare(list, p.substrate);
+  declare(list, p.substrate.effects, {"large_strain", "effect_tolerance"});
+}
+
+StageReport run_in_space(const StageParameters& p, stage::StageContext& context) {
+  context.progress(0, "reading");
+  const SpatialInputs inputs = read_inputs(p, context);
+  context.progress(0.05, "displacing the gel");
+  Problem problem = make_problem(inputs, p.spatial, meshing_of(p), linear_gel(p.substrate), context.threads);
+  context.progress(0.6, "reconstructing tractions");
+  const auto find = [&](const Problem& of) { return reconstruct(of, inputs, p.traction, p.spatial, context.threads); };
+  SpatialReconstruction r = find(problem);
+  StageReport report;
+  Effect strain = decide_strain(problem, r.traction_kPa, p.substrate);
+  if (strain.is_on && !has_tangent(problem, r.method)) {
+    strain.is_on = false;
+    strain.why += "; but not with " + std::string(name_of(r.method)) + ", or with so many tractions";
+  }
+  report.effects = {strain};
+  if (strain.is_on) {
+    context.progress(0.7, "large strains of the gel");
+    Strained strained = on_strained_gel(problem, std::move(r), p.substrate, find, context.threads);
+    problem = std::move(strained.problem);
+    r = std::move(strained.reconstruction);
+    r.figures.emplace_back("steps_on_strained_gel", std::int64_t{strained.steps});
+  } else {
+    const double left_out = choice::left_out_in_gel(problem.gel, mean_traction_kPa(problem, r.traction_kPa));
+    context.notice(noticed(FindingKind::strain_beyond_linear, left_out,
+                           "Tractions of " + brief(mean_traction_kPa(problem, r.traction_kPa)) + " kPa on a gel of " +
+                               brief(problem.gel.youngs_modulus_kPa) + " kPa: linear elasticity leaves out " +
+                               brief(100 * left_out) + " % of the displacement."));
+  }
+  for (const auto& finding : r.findings) context.notice(finding);
+  const Balance balance = balance_of(problem, r);
+  notice_balance(context, r, balance);
+  const Figures summary = summary_of(problem, r, balance);
+  write_outputs(context, p, problem, r, summary);
+  context.progress(1, "done");
+  report.summary = summary_line(r, balance) + left_out_of(problem.observed);
+  report.figures = summary;
+  return report;
+}
+
+}  // namespace mbtfm::spatial

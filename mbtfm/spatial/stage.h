@@ -1,0 +1,21 @@
+/// mbtfm-traction where the displacements are in space.
+#pragma once
+
+#include "mbtfm/spatial/parameters.h"
+#include "pipeline/stage/stage.h"
+#include "substrate/compliance.h"
+
+namespace mbtfm::spatial {
+
+struct StageParameters {
+  Gel gel;
+  tractions::TractionParameters traction;
+  SpatialParameters spatial;
+  substrate::SubstrateParameters substrate;
+};
+
+void declare(stage::ParameterList& list, StageParameters& parameters);
+
+StageReport run_in_space(const StageParameters& parameters, stage::StageContext& context);
+
+}  // namespace mbtfm::spatial

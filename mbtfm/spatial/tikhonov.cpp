@@ -1,0 +1,110 @@
+#include <algorithm>
+#include <cmath>
+
+#include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/contract/errors.h"
+#include "pipeline/numerics/dense.h"
+
+namespace mbtfm::spatial {
+
+using Eigen::Index;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+
+namespace {
+
+struct Fit {
+  std::optional<tractions::Spectrum> spectrum;
+  tractions::LambdaScan scan;
+  double lambda = 0;
+  VectorXd x;
+  Weighing weighing;
+};
+
+}  // namespace
+
+double lambda_per_um_per_kPa(const Problem& problem) {
+  const double area = [&] {
+    double sum = 0;
+    for (const double a : problem.mesh.areas_um2) sum += a;
+    return sum;
+  }();
+  const auto n = static_cast<double>(problem.observed.n_beads);
+  return std::sqrt(n / area * problem.observed.sigma_um.cwiseAbs2().cwiseInverse().mean());
+}
+
+SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& response, const Problem& problem,
+                                     const tractions::TractionParameters& traction, const SpatialParameters& parameters,
+                                     int threads) {
+  SpatialReconstruction r;
+  const Observed& observed = problem.observed;
+  const auto floor = [&](double variance) {
+    return std::max({variance, observed.states_errors ? 1.0 : 0.0, problem.variance_of_model()});
+  };
+  // the tractions of the weighed beads with the lambda of their own noise
+  const auto fit = [&](Weighing weighing) {
+    Fit made;
+    made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
+    std::optional<double> stated;
+    if (parameters.loss != BeadLoss::l2) {
+      stated = floor(weighing.variance);
+    } else if (floor(0) > 0) {
+      stated = floor(0);
+    }
+    made.scan = made.spectrum->scan(stated);
+    made.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
+                                             : chosen_lambda(made.scan, traction.lambda_by);
+    made.x = made.spectrum->solve(made.lambda);
+    made.weighing = std::move(weighing);
+    return made;
+  };
+  const VectorXd displacement_um = problem.displacement_um();
+  const VectorXd of_nothing = displacement_um.cwiseQuotient(observed.sigma_um);
+  const auto residual = [&](const VectorXd& x) -> VectorXd {
+    return (displacement_um - response * x).cwiseQuotient(observed.sigma_um);
+  };
+  if (displacement_um.isZero(0)) {
+    r.traction_kPa = VectorXd::Zero(problem.n_unknowns());
+    r.resolved = VectorXd::Zero(problem.mesh.n_vertices());
+    r.remark = "no bead has moved: there is no traction";
+    return r;
+  }
+  Fit last = fit(weigh(BeadLoss::l2, observed, of_nothing, 0));
+  if (parameters.loss != BeadLoss::l2) {
+    // From tractions that no bead has pulled on: biweight has several minima, and beads far off hide in those of l2.
+    constexpr int kMostRounds = 12;
+    constexpr double kSettled = 0.005;
+    Weighing weighing =
+        weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed, of_nothing, 0);
+    double change = 1;
+    for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
+      Fit next = fit(std::move(weighing));
+      change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
+      weighing = weigh(parameters.loss, observed, residual(next.x), next.spectrum->degrees(next.lambda));
+      last = std::move(next);
+    }
+  }
+  r.degrees = last.spectrum->degrees(last.lambda);
+  r.weighing = weigh(parameters.loss, observed, residual(last.x), r.degrees);
+  r.variance = std::max(last.scan.variance, floor(0));
+  r.traction_kPa = basis.tractions(last.x);
+  r.covariance_kPa2 = basis.covariance(last.spectrum->posterior(last.lambda, r.variance), threads);
+  r.scan = std::move(last.scan);
+  r.lambda = last.lambda;
+  r.length_um = last.lambda / lambda_per_um_per_kPa(problem) * problem.gel.youngs_modulus_kPa;
+  r.relative_l2 = last.spectrum->relative_l2(last.lambda);
+  return r;
+}
+
+SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractions::TractionParameters& traction,
+                                           const SpatialParameters& parameters, int threads) {
+  if (problem.map) return reconstruct_large(problem, traction, parameters);
+  const MatrixXd norm = norm_of(problem.mesh, problem.ground, [&](Vec2 p) { return problem.expected.amplitude(p); });
+  const Basis basis = orthonormal_basis(norm);
+  SpatialReconstruction r = reconstruct_in(basis, basis.response(problem.response_um_per_kPa, threads), problem,
+                                           traction, parameters, threads);
+  if (r.lambda) r.resolved = resolved_shares(r.covariance_kPa2, *r.lambda * *r.lambda / r.variance * norm);
+  return r;
+}
+
+}  // namespace mbtfm::spatial

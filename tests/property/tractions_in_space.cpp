@@ -1,0 +1,240 @@
+/// Laws of reconstructions in space: on a half-space, whose answer is a closed form.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "mbtfm/tractions/recurrences.h"
+#include "pipeline/contract/errors.h"
+#include "tests/support/half_space_problem.h"
+
+namespace {
+
+using namespace mbtfm;
+using namespace mbtfm::spatial;
+using Eigen::MatrixXd;
+using Eigen::VectorXd;
+using test::HalfSpaceScene;
+using tractions::TractionParameters;
+
+double apart(const VectorXd& a, const VectorXd& b) { return (a - b).norm() / b.norm(); }
+
+/// Of values 1, q, q², … as those of a gel fall.
+MatrixXd smoothing_matrix(int rows, int cols) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal;
+  const auto filled = [&](int r, int c) {
+    return MatrixXd(MatrixXd::NullaryExpr(r, c, [&]() { return normal(random); }));
+  };
+  const MatrixXd left = filled(rows, cols).householderQr().householderQ() * MatrixXd::Identity(rows, cols);
+  const MatrixXd right = filled(cols, cols).householderQr().householderQ();
+  const VectorXd values = VectorXd::NullaryExpr(cols, [&](Eigen::Index k) { return std::pow(0.97, k); });
+  return left * values.asDiagonal() * right.transpose();
+}
+
+TEST(Recurrences, agree_with_the_dense_decomposition_at_every_lambda_and_in_their_own) {
+  const MatrixXd A = smoothing_matrix(500, 240);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> normal;
+  constexpr double kNoise = 0.02;
+  const VectorXd truth = VectorXd::NullaryExpr(240, [&]() { return normal(random); });
+  const VectorXd u = A * truth + kNoise * VectorXd::NullaryExpr(500, [&]() { return normal(random); });
+  const tractions::Spectrum dense(A.transpose() * A, A.transpose() * u, u.squaredNorm(), 500);
+  const tractions::LinearMap map{[&](const MatrixXd& x) { return MatrixXd(A * x); },
+                                 [&](const MatrixXd& y) { return MatrixXd(A.transpose() * y); }, 500, 240};
+  const tractions::Recurrences recurrences(map, u, {.steps = 150, .probes = 8, .seed = 1});
+  for (const double lambda : {0.3, 0.1, 0.03})
+    EXPECT_LE(apart(recurrences.solve(lambda), dense.solve(lambda)), 1e-6) << lambda;
+  const auto ours = recurrences.scan(kNoise * kNoise), theirs = dense.scan(kNoise * kNoise);
+  for (const auto criterion : {tractions::LambdaCriterion::risk, tractions::LambdaCriterion::gcv,
+                               tractions::LambdaCriterion::evidence, tractions::LambdaCriterion::discrepancy}) {
+    // traces by eight probes vary by sqrt(2 / (8 tr)) of themselves, tr ~ 100: 5 %; lambda follows by half of it
+    EXPECT_NEAR(chosen_lambda(ours, criterion) / chosen_lambda(theirs, criterion), 1, 0.05) << name_of(criterion);
+  }
+}
+
+TEST(Losses, weigh_beads_by_the_length_of_their_residual_whatever_its_direction) {
+  for (const BeadLoss loss : {BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
+    EXPECT_LE(loss_weight(loss, 4, 3), loss_weight(loss, 1, 3)) << name_of(loss);
+    EXPECT_GE(loss_weight(loss, 1, 3), 0) << name_of(loss);
+  }
+  EXPECT_EQ(loss_weight(BeadLoss::biweight, 6, 3), 0);
+  EXPECT_EQ(loss_weight(BeadLoss::huber, 1, 3), 1);
+}
+
+TEST(Losses, find_the_scale_of_most_beads_and_their_variance) {
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  Observed observed;
+  observed.at = {std::vector<Vec3>(4000), substrate::Components::all};
+  observed.states_errors = false;
+  VectorXd residual = VectorXd::NullaryExpr(12000, [&]() { return 2 * normal(random); });
+  for (Eigen::Index b = 0; b < 400; ++b) residual.segment<3>(3 * b) *= 30;  // a tenth astray
+  for (const BeadLoss loss : {BeadLoss::huber, BeadLoss::biweight}) {
+    const Weighing w = weigh(loss, observed, residual, 0);
+    // the median of the good is the 0.55 quantile of all: 4 % up; its own error is 1 %
+    EXPECT_NEAR(w.scale / 2, 1.07, 0.07) << name_of(loss);
+    // 95 % efficiency costs 5 % of variance, and outliers what they keep of weight
+    EXPECT_NEAR(w.variance / 4, 1.2, 0.25) << name_of(loss);
+  }
+}
+
+TEST(Bases, an_orthonormal_one_has_the_integral_of_squares_for_its_norm) {
+  const Ground ground(nullptr);
+  const TractionMesh mesh = make_traction_mesh(ground, {{0, 0}, {20, 12}}, 3, [](Vec2) { return true; });
+  const auto amplitude = [](Vec2 p) { return p.x < 10 ? 1.0 : 0.5; };
+  const MatrixXd norm = norm_of(mesh, ground, amplitude);
+  const Basis basis = orthonormal_basis(norm);
+  const VectorXd x = VectorXd::LinSpaced(3 * basis.size(), -1, 2), t = basis.tractions(x);
+  double square = 0;
+  for (Eigen::Index v = 0; v < norm.rows(); ++v) {
+    for (Eigen::Index w = 0; w < norm.rows(); ++w) square += norm(v, w) * t.segment<3>(3 * v).dot(t.segment<3>(3 * w));
+  }
+  EXPECT_NEAR(square, x.squaredNorm(), 1e-9 * square);
+  const MatrixXd covariance = basis.covariance(MatrixXd(x * x.transpose()), 1);
+  EXPECT_LE((covariance - t * t.transpose()).norm(), 1e-12 * covariance.norm());
+}
+
+class InSpace : public testing::Test {
+ protected:
+  HalfSpaceScene scene;
+  SpatialParameters parameters;
+  TractionParameters traction;
+};
+
+TEST_F(InSpace, adjoint_and_thesis_cg_end_at_the_minimum_of_tikhonov) {
+  const Problem problem = scene.problem(scene.beads(0.02), parameters);
+  const auto tikhonov = reconstruct_tikhonov(problem, traction, parameters, 1);
+  EXPECT_LE(apart(reconstruct_adjoint(problem, traction, parameters, 1).traction_kPa, tikhonov.traction_kPa), 1e-8);
+  EXPECT_LE(apart(reconstruct_thesis_cg(problem, traction, parameters, 1).traction_kPa, tikhonov.traction_kPa), 1e-3);
+}
+
+TEST_F(InSpace, twice_the_displacement_with_twice_the_errors_is_twice_the_traction) {
+  std::vector<BeadInSpace> beads = scene.beads(0.02);
+  const Problem problem = scene.problem(beads, parameters);
+  Problem doubled = problem;
+  doubled.observed.displacement_um *= 2;
+  doubled.observed.sigma_um *= 2;
+  for (const auto method : {tractions::TractionMethod::tikhonov, tractions::TractionMethod::group_l1}) {
+    traction.method = method;
+    const SpatialInputs inputs{{}, scene.gel, {}, {}};
+    const auto one = reconstruct(problem, inputs, traction, parameters, 1);
+    const auto two = reconstruct(doubled, inputs, traction, parameters, 1);
+    EXPECT_LE(apart(two.traction_kPa, 2 * one.traction_kPa), 1e-6) << name_of(method);
+    EXPECT_LE((two.covariance_kPa2 - 4 * one.covariance_kPa2).norm(), 1e-5 * two.covariance_kPa2.norm());
+  }
+}
+
+/// What noise does, against what the lattice does, on the same beads.
+TEST_F(InSpace, the_answer_does_not_depend_on_the_lattice) {
+  const std::vector<BeadInSpace> beads = scene.beads(0.03), exact = scene.beads(1e-9);
+  const auto force_map = [&](double spacing, const std::vector<BeadInSpace>& seen) {
+    scene.spacing_um = spacing;
+    const Problem problem = scene.problem(seen, parameters);
+    traction.lambda_um_per_kPa = 0.15;  // the same for all: a length, not a number of the lattice
+    const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
+    // forces on eight by eight squares
+    std::vector<Adhesion> squares;
+    MatrixXd areas = MatrixXd::Zero(64, problem.mesh.n_vertices());
+    over_faces(problem.mesh, problem.ground, 8, Places::even,
+               [&](Vec2 at, const std::array<int, 4>& corners, const std::array<double, 4>& shares, double area) {
+                 const int i = std::min(7, static_cast<int>((at.x + scene.half_um) / 6));
+                 const int j = std::min(7, static_cast<int>((at.y + scene.half_um) / 6));
+                 for (std::size_t k = 0; k < 4; ++k) areas(8 * j + i, corners[k]) += shares[k] * area;
+               });
+    VectorXd forces(192);
+    for (Eigen::Index s = 0; s < 64; ++s) {
+      forces.segment<3>(3 * s).setZero();
+      for (Eigen::Index v = 0; v < areas.cols(); ++v)
+        forces.segment<3>(3 * s) += areas(s, v) * r.traction_kPa.segment<3>(3 * v);
+    }
+    return forces;
+  };
+  const VectorXd middle = force_map(4, beads);
+  const double by_noise = (middle - force_map(4, exact)).norm();
+  EXPECT_LE((force_map(3.2, beads) - middle).norm(), 0.25 * by_noise);
+  EXPECT_LE((force_map(4.8, beads) - middle).norm(), 0.25 * by_noise);
+}
+
+TEST_F(InSpace, forces_lie_within_their_standard_errors) {
+  for (const auto method :
+       {tractions::TractionMethod::tikhonov, tractions::TractionMethod::group_l1, tractions::TractionMethod::patches}) {
+    double square = 0;
+    constexpr int kSeeds = 4;
+    for (int seed = 1; seed <= kSeeds; ++seed) {
+      scene.seed = static_cast<std::uint64_t>(seed);
+      const Problem problem = scene.problem(scene.beads(0.03), parameters);
+      traction.method = method;
+      traction.grow_um = 3;
+      const SpatialInputs inputs{{}, scene.gel, scene.adhesions(), {}};
+      const auto r = reconstruct(problem, inputs, traction, parameters, 1);
+      for (std::size_t a = 0; a < scene.spots.size(); ++a) {
+        const Vec3 off = r.forces[a].force_nN - scene.spots[a].force_nN, s = r.forces[a].sigma_nN;
+        square += (std::pow(off.x / s.x, 2) + std::pow(off.y / s.y, 2) + std::pow(off.z / s.z, 2)) / (9.0 * kSeeds);
+      }
+    }
+    // 36 numbers: chance is 12 % of the root, one way; the errors have the smoothing in them, which may do less
+    EXPECT_LE(std::sqrt(square), 1.3) << name_of(method);
+    EXPECT_GE(std::sqrt(square), 0.4) << name_of(method);
+  }
+}
+
+TEST_F(InSpace, beads_that_are_wrong_do_not_pull_with_a_robust_loss) {
+  std::vector<BeadInSpace> beads = scene.beads(0.03);
+  const Problem good = scene.problem(beads, parameters);
+  const auto without = reconstruct_tikhonov(good, traction, parameters, 1);
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> box(-5, 5);
+  for (std::size_t b = 0; b < beads.size(); b += 10) beads[b].displacement_um = {box(random), box(random), box(random)};
+  const Problem bad = scene.problem(beads, parameters);
+  const double by_squares =
+      apart(reconstruct_tikhonov(bad, traction, parameters, 1).traction_kPa, without.traction_kPa);
+  for (const BeadLoss loss : {BeadLoss::l1, BeadLoss::huber, BeadLoss::biweight}) {
+    parameters.loss = loss;
+    const auto robust = reconstruct_tikhonov(bad, traction, parameters, 1);
+    EXPECT_LE(apart(robust.traction_kPa, without.traction_kPa), 0.35 * by_squares) << name_of(loss);
+  }
+}
+
+TEST_F(InSpace, beads_that_did_not_move_make_no_traction) {
+  std::vector<BeadInSpace> beads = scene.beads(0.02);
+  for (BeadInSpace& b : beads) b.displacement_um = {};
+  const Problem problem = scene.problem(beads, parameters);
+  const auto r = reconstruct_group_l1(problem, traction, parameters, 1);
+  EXPECT_TRUE(r.traction_kPa.isZero(0));
+  EXPECT_FALSE(r.remark.empty());
+}
+
+TEST_F(InSpace, beads_above_the_surface_are_left_out_and_too_few_are_refused) {
+  std::vector<BeadInSpace> beads = scene.beads(0.02);
+  beads[0].position_um.z = -3;
+  beads[1].flag = "out of focus";
+  beads[2].position_um.z = 1001;
+  const Ground ground(nullptr);
+  const Observed observed = observe(beads, scene.gel, ground, parameters);
+  EXPECT_EQ(observed.n_above, 1);
+  EXPECT_EQ(observed.n_flagged, 1);
+  EXPECT_EQ(observed.n_below_base, 1);
+  EXPECT_EQ(observed.n_beads, scene.n_beads - 3);
+  beads.resize(5);
+  EXPECT_THROW(observe(beads, scene.gel, ground, parameters), InvalidData);
+}
+
+TEST_F(InSpace, a_region_that_covers_no_bead_is_refused) {
+  const SpatialInputs inputs{scene.beads(0.02), scene.gel, {}, {{200, 200}, {220, 200}, {220, 220}}};
+  const Ground ground(nullptr);
+  const Observed observed = observe(inputs.beads, scene.gel, ground, parameters);
+  EXPECT_THROW(expected_tractions(inputs, observed, ground, parameters, 0), InvalidData);
+}
+
+TEST_F(InSpace, the_resolution_is_finer_with_less_noise) {
+  const auto median_um = [&](double sigma_um) {
+    const Problem problem = scene.problem(scene.beads(sigma_um), parameters);
+    std::vector<double> lengths = resolution_um(problem, reconstruct_tikhonov(problem, traction, parameters, 1));
+    std::nth_element(lengths.begin(), lengths.begin() + std::ssize(lengths) / 2, lengths.end());
+    return lengths[lengths.size() / 2];
+  };
+  EXPECT_LT(median_um(0.005), 0.8 * median_um(0.1));
+}
+
+}  // namespace
