@@ -24,16 +24,27 @@ std::vector<std::string> commands_of(const fs::path& page) {
   return blocks;
 }
 
+/// One after the other, as somebody would who has built the project: its programs are below the folder.
+void run_commands_of(const fs::path& page, const fs::path& folder) {
+  fs::create_directory_symlink(MBTFM_BINARY_DIR, folder / "build");
+  std::string script = "set -eu\ncd '" + folder.string() + "'\n";
+  for (const std::string& block : commands_of(page)) script += block;
+  files::write_text(folder / "commands.sh", script);
+  const std::string log = (folder / "log").string();
+  const int status = std::system(("bash '" + (folder / "commands.sh").string() + "' > '" + log + "' 2>&1").c_str());
+  EXPECT_EQ(status, 0) << files::read_text(log);
+}
+
+TEST(Readme, every_command_runs) {
+  const test::TemporaryFolder folder;
+  run_commands_of(kProject / "README.md", folder.path());
+  for (const char* file : {"study/cell_1/report.html", "study/statistics/report.html"})
+    EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
+}
+
 TEST(Tutorial, every_command_runs) {
   const test::TemporaryFolder folder;
-  // as somebody sees it who has built the project: its programs are below the folder
-  fs::create_directory_symlink(MBTFM_BINARY_DIR, folder / "build");
-  std::string script = "set -eu\ncd '" + folder.path().string() + "'\n";
-  for (const std::string& block : commands_of(kDocs / "tutorial.md")) script += block;
-  files::write_text(folder / "tutorial.sh", script);
-  const std::string log = (folder / "log").string();
-  const int status = std::system(("bash '" + (folder / "tutorial.sh").string() + "' > '" + log + "' 2>&1").c_str());
-  EXPECT_EQ(status, 0) << files::read_text(log);
+  run_commands_of(kDocs / "tutorial.md", folder.path());
   for (const char* file : {"tutorial/cell_1/report.html", "tutorial/cell_1/1_segment/overlay.png",
                            "tutorial/cell_4/report.html", "tutorial/statistics/report.html"})
     EXPECT_TRUE(fs::is_regular_file(folder / file)) << file;
