@@ -17,7 +17,7 @@ using charts::html_escaped;
 using charts::readable;
 using report::Table;
 
-std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : charts::readable(p); }
+std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : charts::readable(p); }
 
 std::string number_text(const std::optional<double>& value) { return value ? charts::readable(*value) : "–"; }
 
@@ -94,7 +94,7 @@ report::Table tests_table(const Measure& m) {
                           is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
                           is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
                           charts::readable(t.statistic), t.degrees ? charts::readable(*t.degrees) : "–",
-                          p_text(t.p_value), t.p_holm ? p_text(*t.p_holm) : "–",
+                          p_cell(t.p_value), t.p_holm ? p_cell(*t.p_holm) : "–",
                           t.effect_name.empty() ? "–" : charts::readable(t.effect), interval_text(t.interval),
                           charts::html_escaped(t.effect_name)});
   }
