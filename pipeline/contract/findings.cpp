@@ -328,7 +328,8 @@ std::string findings_page() {
       "- **caution**: the results may be off by more than their error bars say.\n"
       "- **bad**: do not use what the finding names.\n\n"
       "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
-  for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "indent", "mean"}) {
+  for (const char* stage :
+       {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "indent", "mean"}) {
     bool has_title = false;
     for (const KindOfFinding& k : kinds_of_findings()) {
       if (std::string(stage) != k.stage) continue;
