@@ -33,6 +33,7 @@ struct Parameters {
   Gel gel;
   substrate::SubstrateParameters substrate;
   SheetParameters sheet;
+  double most_unbalanced = kMostUnbalanced;
   std::optional<double> traction_sigma_kPa, traction_correlation_um;
   bool fit_line_tension = false;                  ///< most colonies have none
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
@@ -50,6 +51,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.substrate);
   declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
   declare(list, p.sheet);
+  list.add("most_unbalanced", p.most_unbalanced, Range::between(0, 1),
+           "with --traction: share of net force or torque up to which it is taken off; more is refused");
   list.add("traction_sigma_kPa", p.traction_sigma_kPa, Range::between(0, 1e4),
            "with --traction: standard error of a traction's component, for errors of the tensions (kPa); unset: none");
   list.add(
@@ -344,7 +347,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   std::optional<TractionNoise> noise;
   if (p.traction_sigma_kPa)
     noise = {*p.traction_sigma_kPa, p.traction_correlation_um.value_or(std::sqrt(tractions.front().area_um2))};
-  FromTraction found = tensions_from(tractions, area, material, size, context.threads, noise);
+  FromTraction found = tensions_from(tractions, area, material, size, context.threads, p.most_unbalanced, noise);
   const Polygon& outline = region.rims.front().points_um();
   const TensionFigures inside = figures_inside(found.solution, outline);
   Run result{.solution = std::move(found.solution), .figures = {}, .effects = {}};
@@ -364,7 +367,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   // what Poisson's ratio, which nobody knows, makes of it
   for (const double nu : {0.0, 0.5}) {
     const Material other{material.youngs_modulus_kPa, nu, material.thickness_um};
-    const FromTraction with_nu = tensions_from(tractions, area, other, size, context.threads);
+    const FromTraction with_nu = tensions_from(tractions, area, other, size, context.threads, p.most_unbalanced);
     result.figures.emplace_back(nu == 0 ? "inside_mean_tension_nu_0_nN_per_um" : "inside_mean_tension_nu_05_nN_per_um",
                                 figures_inside(with_nu.solution, outline).mean_nN_per_um);
   }

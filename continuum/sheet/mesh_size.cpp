@@ -55,7 +55,7 @@ TriangleSize size_for_tractions(const Region& region, const std::vector<GroundPa
   for (const GroundPatch& patch : tractions) areas.push_back(patch.area_um2);
   const double side = areas.empty() ? narrow / 20 : std::sqrt(numerics::median(areas));
   const double size = std::clamp(1.5 * side, narrow / 100, narrow / 8);
-  return {.at_curves_um = size, .largest_um = size, .growth = 0.3, .most_turn_rad = 0.3};
+  return {.at_curves_um = size, .largest_um = size, .growth = 0.5, .most_turn_rad = 0.6, .most_notch_rad = 0.6};
 }
 
 TriangleSize with_edge(TriangleSize size, double at_curves_um) {

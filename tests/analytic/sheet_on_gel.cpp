@@ -143,7 +143,7 @@ TEST(SheetOnGel, halved_triangles_err_by_two_thirds_or_less) {
 TEST(SheetOnGel, on_a_rigid_gel_it_is_a_sheet_on_springs) {
   DiscOnGel disc = disc_of(test::chapter4("disc_on_gel"), 28);
   disc.gel.youngs_modulus_kPa = 1e6;
-  disc.scene.size = with_edge(disc.scene.size, disc.radius_um / 20);
+  disc.scene.size = with_edge(disc.scene.size, disc.radius_um / 50);
   const Solution on_gel = solved(disc), on_springs = solve_on_springs(disc.scene, 1);
   ASSERT_EQ(on_gel.u.size(), on_springs.u.size());
   // patches carry even tractions, springs what the sheet makes of them
