@@ -203,6 +203,7 @@ Figures figures_of(const Solution& solution, const Balance& balance) {
           {"total_force_nN", balance.total_force_nN},
           {"net_force_nN", norm(balance.net_force_nN)},
           {"net_torque_nN_um", balance.net_torque_nN_um},
+          {"energy_fJ", balance.elastic_energy_fJ},
           {"mesh_relative_error", relative_error(*solution.elements, solution.at_points, solution.at_nodes)},
           {"iterations", std::int64_t{solution.report.iterations}}};
 }
@@ -327,7 +328,8 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
 
 // --- the sheet under given tractions
 
-Region grown(const Region& region, stage::StageContext& context, const Parameters& p) {
+/// Where the sheet ends.
+Region area_around(const Region& region, stage::StageContext& context, const Parameters& p) {
   if (context.has_input("area")) return region_of(read_rings(context.input("area"), p.pixel_size_um));
   return region;
 }
@@ -335,9 +337,11 @@ Region grown(const Region& region, stage::StageContext& context, const Parameter
 Run run_from_traction(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (p.sheet.ground && *p.sheet.ground != Ground::none)
     throw UsageError("with --traction the ground is the tractions: leave ground out, or set ground = none");
+  if (p.sheet.strain == Strain::large)
+    throw UsageError("strain = large is for sheets on springs: tensions from tractions have small ones");
   context.assumed.clear();  // of a gel: none takes part
   const std::vector<GroundPatch> tractions = read_tractions(context.input("traction"));
-  const Region area = grown(region, context, p);
+  const Region area = area_around(region, context, p);
   // any modulus gives the same tensions
   const Material material{p.sheet.youngs_modulus_kPa.value_or(1), p.sheet.poisson_ratio,
                           p.sheet.thickness_um.value_or(1)};
@@ -422,6 +426,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (p.sheet.contraction_nN_per_um || p.sheet.contraction_kPa)
     throw UsageError(
         "with --displacement the contraction is fitted: leave contraction_nN_per_um and contraction_kPa out");
+  if (p.sheet.line_tension_nN > 0)
+    throw UsageError("with --displacement a line tension is fitted (fit_line_tension): leave line_tension_nN out");
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
   Gel gel = p.gel;
   gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
@@ -500,6 +506,10 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   if (has_beads && has_tractions) throw UsageError("expected --displacement or --traction, not both");
   if (context.has_input("beads") && (has_beads || has_tractions))
     throw UsageError("--beads is for a sheet of given contraction: leave out --displacement and --traction");
+  if (context.has_input("area") && !has_tractions)
+    throw UsageError("--area is for --traction: without it the outline is the area");
+  if (context.has_input("adhesions") && !has_beads)
+    throw UsageError("--adhesions are compared with a fit: give --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
              : has_beads   ? run_fit(p, context, region)
                            : run_forward(p, context, region);

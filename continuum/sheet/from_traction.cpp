@@ -193,7 +193,8 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
   solution.sheet.n_rims = static_cast<int>(region.rims.size());
   Stiffness stiffness(elements, pins(elements));
   for (int t = 0; t < elements.n_triangles(); ++t) stiffness.add(t, elastic_stiffness(elements, t, material));
-  MBTFM_ASSERT(stiffness.factorise(0, threads));
+  const bool is_definite = stiffness.factorise(0, threads);
+  MBTFM_ASSERT(is_definite);
   solution.u = stiffness.solve(load_of(parts, elements));
   solution.report = {.converged = true, .iterations = 1, .last_change = 0, .reason = "one linear solve"};
   solution.at_points = tension_at_points(elements, solution.sheet, solution.u);
