@@ -269,7 +269,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_outside, "tractions-outside", "sheet", note,
        "share of the sum of forces that acts outside of the area", 0,
        "a sheet with a free edge cannot carry what acts beyond it",
-       "Give a larger area (--area, or sheet.grow_um): smoothed tractions spill over the edge."},
+       "Give a larger area (--area): smoothed tractions spill over the edge."},
   };
   return kinds;
 }
