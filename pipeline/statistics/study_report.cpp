@@ -229,7 +229,7 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
     html += "<p class=\"what\"><b>" + html_escaped(text) + ".</b></p>\n";
   }
   for (const Figure& figure : figures) {
-    if (figure.name == "primary") html += charts_of(figure);
+    if (figure.name == kPrimaryFigure) html += charts_of(figure);
   }
   if (!primary.differences.empty())
     html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
@@ -278,7 +278,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   body += report::section("What was found, exploratory", found);
   std::string pictures;
   for (const Figure& figure : figures) {
-    if (figure.name != "primary") pictures += embedded(figure);
+    if (figure.name != kPrimaryFigure) pictures += embedded(figure);
   }
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const report::Table& table, const std::string& name) {
