@@ -145,11 +145,6 @@ Posterior posterior_of(const GroupLasso& lasso, const MatrixXd& normal, double m
 
 SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractions::TractionParameters& traction,
                                            const SpatialParameters& parameters, int threads) {
-  if (traction.lambda_um_per_kPa) {
-    throw UsageError(
-        "group-l1: lambda_um_per_kPa belongs to the other methods; this one has a penalty of its own, at which the "
-        "misfit is what the noise leaves");
-  }
   SpatialReconstruction r = reconstruct_tikhonov(problem, traction, parameters, threads);
   if (!r.scan) return r;  // nothing has moved
   const Index n = problem.mesh.n_vertices();
@@ -196,7 +191,7 @@ SpatialReconstruction reconstruct_group_l1(const Problem& problem, const tractio
   r.lambda.reset();
   r.length_um.reset();
   r.scan.reset();
-  r.figures = {{"penalty_per_kPa", mu},
+  r.figures = {{"penalty_per_nN", mu},
                {"spot_width_um", width_um},
                {"n_active_spots", static_cast<std::int64_t>((lengths_of(at_minimum) > 0).count())},
                {"n_steps", std::int64_t{steps}}};

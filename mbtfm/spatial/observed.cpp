@@ -43,7 +43,8 @@ Observed observe(const std::vector<BeadInSpace>& beads, const Gel& gel, const Gr
       continue;
     }
     const double height = ground.height_um({at.x, at.y});
-    if (height - at.z > kErrorsAbove * bead.sigma_z_um + kRounding_um) {
+    const double sigma_z = bead.sigma_z_um > 0 ? bead.sigma_z_um : parameters.axial_sigma_ratio * bead.sigma_um;
+    if (height - at.z > kErrorsAbove * sigma_z + kRounding_um) {
       ++observed.n_above;
       continue;
     }

@@ -38,7 +38,6 @@ double misfit_alone(const Problem& problem, const MatrixXd& response, const Vect
 
 SpatialReconstruction reconstruct_patches(const Problem& problem, const tractions::TractionParameters& traction,
                                           const SpatialParameters& parameters, int threads) {
-  if (problem.adhesion_areas_um2.rows() == 0) throw UsageError("patches: --adhesions is missing or holds none");
   SpatialReconstruction r;
   const Index n_patches = problem.adhesion_areas_um2.rows();
   const MatrixXd& G = problem.patch_response_um_per_nN;

@@ -31,9 +31,7 @@ SpatialReconstruction by_method(TractionMethod method, const Problem& problem,
     case TractionMethod::thesis_cg:
       return reconstruct_thesis_cg(problem, traction, parameters, threads);
     default:
-      throw UsageError(std::string(name_of(method)) +
-                       " takes beads that a flat surface moves along itself; the file of displacements has uz_um: "
-                       "choose tikhonov, group-l1 or patches");
+      throw InternalError("a method of flat surfaces");
   }
 }
 
@@ -60,7 +58,7 @@ double share_astray(const Problem& problem, const Eigen::VectorXd& residual) {
   return scale > 0 ? static_cast<double>(n_far) / problem.observed.n_beads : 0;
 }
 
-void find(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {
+void find_doubts(const Problem& problem, const SpatialParameters& parameters, SpatialReconstruction& r) {
   const Observed& observed = problem.observed;
   const int n_off = observed.n_above + observed.n_below_base;
   r.findings.push_back(noticed(FindingKind::beads_off_the_gel, static_cast<double>(n_off) / (n_off + observed.n_beads),
@@ -74,7 +72,7 @@ void find(const Problem& problem, const SpatialParameters& parameters, SpatialRe
   if (r.degrees > 0) {
     constexpr double kEnough = 24;  // as the table of findings has it
     // Ten times the noise tells 4.5 times fewer numbers, and noise falls as the root of the number of beads: they grow
-    // about as its cube root. Measured (docs/accuracy.md).
+    // about as its cube root. Measured (docs/developers/tractions_in_space.md).
     const double ratio = kEnough / r.degrees;
     r.findings.push_back(noticed(FindingKind::beads_tell_little, ratio,
                                  "The beads tell " + brief(r.degrees) + " numbers of the tractions; " +
@@ -96,11 +94,37 @@ void find(const Problem& problem, const SpatialParameters& parameters, SpatialRe
 
 }  // namespace
 
+tractions::TractionMethod checked_method(const tractions::TractionParameters& traction, const SpatialInputs& inputs) {
+  using enum TractionMethod;
+  const TractionMethod method = traction.method.value_or(inputs.adhesions.empty() ? tikhonov : group_l1);
+  switch (method) {
+    case fttc:
+    case sparse:
+    case trpf:
+    case bem:
+    case adhesion_forces:
+      throw UsageError(std::string(name_of(method)) +
+                       " takes beads that a flat surface moves along itself, and these are in space: choose tikhonov, "
+                       "group-l1 or patches");
+    case patches:
+      if (inputs.adhesions.empty()) throw UsageError("patches: --adhesions is missing or holds none");
+      return method;
+    case group_l1:
+      if (traction.lambda_um_per_kPa) {
+        throw UsageError(
+            "group-l1: lambda_um_per_kPa belongs to the other methods; this one has a penalty of its own, at which the "
+            "misfit is what the noise leaves");
+      }
+      return method;
+    default:
+      return method;
+  }
+}
+
 SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& inputs,
                                   const tractions::TractionParameters& traction, const SpatialParameters& parameters,
                                   int threads) {
-  const TractionMethod method =
-      traction.method.value_or(inputs.adhesions.empty() ? TractionMethod::tikhonov : TractionMethod::group_l1);
+  const TractionMethod method = checked_method(traction, inputs);
   if (problem.map && method != TractionMethod::tikhonov) {
     throw UsageError(std::string(name_of(method)) + " takes up to " + std::to_string(kMostVertices) +
                      " vertices of tractions, not " + std::to_string(problem.mesh.n_vertices()) +
@@ -118,6 +142,8 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
                (observed.states_errors
                     ? numerics::median(std::vector<double>(observed.sigma_um.begin(), observed.sigma_um.end()))
                     : 1);
+  if (observed.states_errors && r.degrees > 0) r.chi_squared = r.weighing.scale * r.weighing.scale;
+  find_doubts(problem, parameters, r);
   return r;
 }
 

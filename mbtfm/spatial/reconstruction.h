@@ -45,7 +45,11 @@ struct SpatialReconstruction {
   std::vector<std::optional<Finding>> findings;
 };
 
-/// By the method that the parameters name; of its own choice group-l1 where there are adhesions, else tikhonov.
+/// The method that the parameters name; unset group-l1 where there are adhesions, else tikhonov.
+/// @throws UsageError where it takes no beads in space, or what it takes is not given
+tractions::TractionMethod checked_method(const tractions::TractionParameters& traction, const SpatialInputs& inputs);
+
+/// By checked_method().
 /// @throws UsageError, InvalidData, NotSolved
 SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& inputs,
                                   const tractions::TractionParameters& traction, const SpatialParameters& parameters,

@@ -76,12 +76,12 @@ void notice_balance(stage::StageContext& context, const SpatialReconstruction& r
                              " nN; the sum of their sizes is " + brief(balance.total_force_nN) + " nN."));
 }
 
-Meshing meshing_of(const StageParameters& p) {
+Meshing meshing_of(const StageParameters& p, tractions::TractionMethod method) {
   using tractions::TractionMethod;
   return {.spacing_um = p.traction.spacing_um,
           .grow_um = p.traction.grow_um,
-          .has_patches = p.traction.method == TractionMethod::patches,
-          .has_facets = p.traction.method == TractionMethod::green};
+          .has_patches = method == TractionMethod::patches,
+          .has_facets = method == TractionMethod::green};
 }
 
 /// Strains are small until tractions are known that make them large.
@@ -109,8 +109,9 @@ void declare(stage::ParameterList& list, StageParameters& p) {
 StageReport run_in_space(const StageParameters& p, stage::StageContext& context) {
   context.progress(0, "reading");
   const SpatialInputs inputs = read_inputs(p, context);
+  const tractions::TractionMethod method = checked_method(p.traction, inputs);
   context.progress(0.05, "displacing the gel");
-  Problem problem = make_problem(inputs, p.spatial, meshing_of(p), linear_gel(p.substrate), context.threads);
+  Problem problem = make_problem(inputs, p.spatial, meshing_of(p, method), linear_gel(p.substrate), context.threads);
   context.progress(0.6, "reconstructing tractions");
   const auto find = [&](const Problem& of) { return reconstruct(of, inputs, p.traction, p.spatial, context.threads); };
   SpatialReconstruction r = find(problem);

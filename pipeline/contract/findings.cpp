@@ -215,7 +215,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "with the errors right it is 1 to a few per cent; the error bars are widened by its root",
        "Check sigma_um and sigma_z_um, the surface and the region in which tractions are looked for."},
       {patches_do_not_fit, "patches-do-not-fit", "traction", caution,
-       "misfit with tractions on the patches alone over the one with a background, per datum", 1.1,
+       "misfit with tractions on the patches alone over what the noise leaves, per datum", 1.1,
        "of some thousand data chance makes less than a tenth; what lies outside of the patches then pulls at their "
        "forces",
        "Use the forces with the background (traction.background above 0), and look for adhesions that are missing in "
@@ -328,8 +328,8 @@ std::string findings_page() {
       "- **caution**: the results may be off by more than their error bars say.\n"
       "- **bad**: do not use what the finding names.\n\n"
       "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
-  for (const char* stage :
-       {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "indent", "mean"}) {
+  for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "traction",
+                            "sheet", "indent", "mean"}) {
     bool has_title = false;
     for (const KindOfFinding& k : kinds_of_findings()) {
       if (std::string(stage) != k.stage) continue;

@@ -1,6 +1,7 @@
 /// Laws of reconstructions in space: on a half-space, whose answer is a closed form.
 #include <gtest/gtest.h>
 
+#include <Eigen/QR>
 #include <cmath>
 #include <random>
 
@@ -134,7 +135,6 @@ TEST_F(InSpace, the_answer_does_not_depend_on_the_lattice) {
     traction.lambda_um_per_kPa = 0.15;  // the same for all: a length, not a number of the lattice
     const auto r = reconstruct_tikhonov(problem, traction, parameters, 1);
     // forces on eight by eight squares
-    std::vector<Adhesion> squares;
     MatrixXd areas = MatrixXd::Zero(64, problem.mesh.n_vertices());
     over_faces(problem.mesh, problem.ground, 8, Places::even,
                [&](Vec2 at, const std::array<int, 4>& corners, const std::array<double, 4>& shares, double area) {
