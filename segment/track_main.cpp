@@ -369,7 +369,7 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
 
 struct TrackStageParameters {
   TrackParameters track;
-  stacks::StackParameters stacks;
+  stacks::StackParameters in_space;
   images::PlaneChoice surface_plane;
   int binning = 1;  ///< to be quick: beads closer than a few pixels of the reduced images are lost
   stage::EffectSwitches effects;
@@ -380,7 +380,7 @@ void declare(stage::ParameterList& list, TrackStageParameters& p) {
   list.table("track");
   list.add("binning", p.binning, Range::between(1, images::kLargestBinning),
            "the images are reduced first: means of blocks of so many pixels a side");
-  declare(list, p.stacks);
+  declare(list, p.in_space);
   declare(list, p.surface_plane, "surface", "the stack of beads on the surface");
   declare(list, p.effects, {"drift_affine", "effect_tolerance"});
 }
@@ -414,8 +414,8 @@ StageReport run(const TrackStageParameters& given, stage::StageContext& context)
       throw UsageError("--" + std::string(name) + " is missing: the two bead images, or --displacement");
     }
   }
-  if (stacks::are_in_space(parameters, given.stacks))
-    return stacks::run(parameters, given.surface_plane, given.stacks, context);
+  if (stacks::are_in_space(parameters, given.in_space))
+    return stacks::run(parameters, given.surface_plane, given.in_space, context);
   return track(parameters, given.binning, context);
 }
 

@@ -70,11 +70,6 @@ double pixel_um(const Frame& first, const Frame& other, std::optional<double> gi
 }
 
 Scale scale_of(const Frame& first, const Frame& other, const beads::TrackParameters& track, const StackParameters& p) {
-  if (!p.z_points) {
-    throw UsageError(
-        "expected track.z_points with stacks: into-gel where the slices lead from the surface into the gel, out-of-gel "
-        "where the first slice is the deepest");
-  }
   return {.pixel_um = pixel_um(first, other, track.pixel_size_um),
           .step_um = step_um(first, other, p) * p.refractive_index_ratio,
           .first_um = p.first_slice_z_um,
@@ -311,6 +306,11 @@ StageReport run(const beads::TrackParameters& track, const images::PlaneChoice& 
   const fs::path relaxed_file = context.input("relaxed"), stressed_file = context.input("stressed");
   if (track.stressed_last > 0)
     throw UsageError("stressed_last is for images in the plane: track the stacks of a time series one by one");
+  if (!parameters.z_points) {
+    throw UsageError(
+        "expected track.z_points with stacks: into-gel where the slices lead from the surface into the gel, out-of-gel "
+        "where the first slice is the deepest");
+  }
   tell(0, "finding beads of the relaxed stack");
   const Read relaxed = with_names(relaxed_file.string(), [&] {
     return read_and_detect(relaxed_file, track.relaxed_plane, "relaxed", track.detection_snr, nullptr, context);
