@@ -48,7 +48,7 @@ TEST(Curve, steps_of_pixels_are_no_corners_and_corners_are_kept) {
 
 TEST(Curve, a_loop_is_found_and_a_neighbour_is_none) {
   EXPECT_TRUE(crossing_of({test::circle(10), test::circle(5)}).empty());
-  EXPECT_EQ(crossing_of({{{0, 0}, {4, 4}, {4, 0}, {0, 4}}}), "piece 1 of ring 0 and piece 3 of ring 0");
+  EXPECT_EQ(crossing_of({Polygon{{0, 0}, {4, 4}, {4, 0}, {0, 4}}}), "piece 1 of ring 0 and piece 3 of ring 0");
   EXPECT_FALSE(crossing_of({test::circle(10), test::rectangle(30, 5)}).empty()) << "a hole that reaches out";
 }
 
