@@ -277,6 +277,7 @@ TEST(Sheet, tensions_follow_from_tractions) {
     scene.adhesion_nN_per_um3 = value("kappa_nN_per_um3");
     scene.size =
         size_on_springs(scene.region, std::sqrt(scene.material.stiffness_nN_per_um() / value("kappa_nN_per_um3")));
+    scene.size = with_edge(scene.size, 1.5 * scene.size.at_curves_um);  // bars of 1 % and not of 1e-4
     const Solution forward = solve_on_springs(scene, 1);
     while (row < csv.n_rows() && csv.text(row, "shape") == shape) {
       const double nu = value("nu_assumed"), s = value("s_nN_per_um"), mean = value("mean_tension_nN_per_um");
