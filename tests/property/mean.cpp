@@ -187,8 +187,8 @@ tractions::TractionParameters fttc() {
   return parameters;
 }
 
-/// A length lambda E of 2.4 um. Tractions of 0.7 um, the nodes' distance, are then left out; with less FTTC follows what
-/// lies between its nodes, which do not turn with the cell.
+/// A length lambda E of 2.4 um. Tractions of 0.7 um, the nodes' distance, are then left out; with less FTTC follows
+/// what lies between its nodes, which do not turn with the cell.
 constexpr double kLambda_um_per_kPa = 0.3;
 
 TEST(Mean, turning_the_beads_turns_the_tractions) {
@@ -221,7 +221,8 @@ TEST(Mean, a_model_is_blurred_as_beads_blur_the_truth) {
     }
     return traction;
   };
-  const CellField found = field_of(cell, fttc(), kLambda_um_per_kPa), model = blurred(truth, cell, fttc(), kLambda_um_per_kPa);
+  const CellField found = field_of(cell, fttc(), kLambda_um_per_kPa),
+                  model = blurred(truth, cell, fttc(), kLambda_um_per_kPa);
   double difference = 0, size = 0;
   for (double y = -30; y <= 30; y += 2) {
     for (double x = -30; x <= 30; x += 2) {
