@@ -24,7 +24,7 @@ std::vector<CellNumbers> cells_of(const Scene& scene, const Computed& computed, 
 }
 
 Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
-  const Work work(context.threads, context.progress);
+  const tensions::Work work{.threads = context.threads, .progress = context.progress};
   const Scene scene = scene_of(parameters, context);
   const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
   const Asked asked = asked_by(parameters, own_kPa);
@@ -51,8 +51,8 @@ void write(const Plan& plan, stage::StageContext& context) {
   if (plan.drawn) files::write(out("plan_drawn.csv"), drawn_table(), plan.drawn->tensions);
   const std::string svg = svg_of(plan);
   files::write_text(out("plan.svg"), svg);
-  constexpr double kPage_mm = 178, kDotsPerInch = 300;  // the width of a page; sharp in print and on screens
-  statistics::write_png(out("plan.png"), svg, kPage_mm, kDotsPerInch);
+  constexpr double kColumn_mm = 90, kDotsPerInch = 300;  // of a page with two columns
+  statistics::write_png(out("plan.png"), svg, kColumn_mm * (plan.asked.noise_um.size() > 1 ? 2 : 1), kDotsPerInch);
   files::write_text(out("plan.html"), html_of(plan));
 }
 

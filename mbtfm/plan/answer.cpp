@@ -59,8 +59,10 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
   if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
   const std::string distance = about(*alone.least_distance_um) + " µm";
   return text + pair +
-         (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on."
-                                                           : "told apart even where they touch, at " + distance + ".");
+         (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on"
+                                                           : "told apart even where they touch, at " + distance) +
+         ", where beads lie near them; with fewer than one bead per µm² chance decides, and twice to three times that "
+         "distance is safe.";
 }
 
 std::string about_cells(const Plan& plan) {
