@@ -46,6 +46,7 @@ bool is_alike(const std::string& known, std::string_view word) {
 std::string did_you_mean(const std::string& word) { return "did you mean '" + word + "'?"; }
 
 std::string suggestion(const CLI::App& app, const std::string& error) {
+  if (!error.starts_with("The following argument")) return {};  // was, or were, not expected: CLI::ExtrasError
   const DeclaredCommand program = declared(app);
   std::vector<std::string> flags, commands;
   add_words(program, flags);
