@@ -55,10 +55,7 @@ struct Parameters {
 
 void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.gel);
-  for (stage::Parameter& of_gel : list.all()) {
-    of_gel.is_required = false;
-    of_gel.meaning += "; that in a cell's own cell.toml counts more";
-  }
+  for (stage::Parameter& of_gel : list.all()) of_gel.is_required = false;  // a cell's own cell.toml has it, too
   list.table("mean");
   list.add("reference", p.reference,
            "name of the cell whose outline is the reference; empty: the pattern, or the most typical outline");

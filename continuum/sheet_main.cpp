@@ -33,6 +33,7 @@ struct Parameters {
   Gel gel;
   substrate::SubstrateParameters substrate;
   SheetParameters sheet;
+  double most_unbalanced = kMostUnbalanced;
   std::optional<double> traction_sigma_kPa, traction_correlation_um;
   bool fit_line_tension = false;                  ///< most colonies have none
   tensions::Loss loss = tensions::Loss::squares;  ///< beads are Gaussian to first order
@@ -50,6 +51,8 @@ void declare(stage::ParameterList& list, Parameters& p) {
   declare(list, p.substrate);
   declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
   declare(list, p.sheet);
+  list.add("most_unbalanced", p.most_unbalanced, Range::between(0, 1),
+           "with --traction: share of net force or torque up to which it is taken off; more is refused");
   list.add("traction_sigma_kPa", p.traction_sigma_kPa, Range::between(0, 1e4),
            "with --traction: standard error of a traction's component, for errors of the tensions (kPa); unset: none");
   list.add(
@@ -200,6 +203,7 @@ Figures figures_of(const Solution& solution, const Balance& balance) {
           {"total_force_nN", balance.total_force_nN},
           {"net_force_nN", norm(balance.net_force_nN)},
           {"net_torque_nN_um", balance.net_torque_nN_um},
+          {"energy_fJ", balance.elastic_energy_fJ},
           {"mesh_relative_error", relative_error(*solution.elements, solution.at_points, solution.at_nodes)},
           {"iterations", std::int64_t{solution.report.iterations}}};
 }
@@ -324,7 +328,8 @@ Run run_forward(const Parameters& p, stage::StageContext& context, const Region&
 
 // --- the sheet under given tractions
 
-Region grown(const Region& region, stage::StageContext& context, const Parameters& p) {
+/// Where the sheet ends.
+Region area_around(const Region& region, stage::StageContext& context, const Parameters& p) {
   if (context.has_input("area")) return region_of(read_rings(context.input("area"), p.pixel_size_um));
   return region;
 }
@@ -332,9 +337,11 @@ Region grown(const Region& region, stage::StageContext& context, const Parameter
 Run run_from_traction(const Parameters& p, stage::StageContext& context, const Region& region) {
   if (p.sheet.ground && *p.sheet.ground != Ground::none)
     throw UsageError("with --traction the ground is the tractions: leave ground out, or set ground = none");
+  if (p.sheet.strain == Strain::large)
+    throw UsageError("strain = large is for sheets on springs: tensions from tractions have small ones");
   context.assumed.clear();  // of a gel: none takes part
   const std::vector<GroundPatch> tractions = read_tractions(context.input("traction"));
-  const Region area = grown(region, context, p);
+  const Region area = area_around(region, context, p);
   // any modulus gives the same tensions
   const Material material{p.sheet.youngs_modulus_kPa.value_or(1), p.sheet.poisson_ratio,
                           p.sheet.thickness_um.value_or(1)};
@@ -344,7 +351,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   std::optional<TractionNoise> noise;
   if (p.traction_sigma_kPa)
     noise = {*p.traction_sigma_kPa, p.traction_correlation_um.value_or(std::sqrt(tractions.front().area_um2))};
-  FromTraction found = tensions_from(tractions, area, material, size, context.threads, noise);
+  FromTraction found = tensions_from(tractions, area, material, size, context.threads, p.most_unbalanced, noise);
   const Polygon& outline = region.rims.front().points_um();
   const TensionFigures inside = figures_inside(found.solution, outline);
   Run result{.solution = std::move(found.solution), .figures = {}, .effects = {}};
@@ -364,7 +371,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
   // what Poisson's ratio, which nobody knows, makes of it
   for (const double nu : {0.0, 0.5}) {
     const Material other{material.youngs_modulus_kPa, nu, material.thickness_um};
-    const FromTraction with_nu = tensions_from(tractions, area, other, size, context.threads);
+    const FromTraction with_nu = tensions_from(tractions, area, other, size, context.threads, p.most_unbalanced);
     result.figures.emplace_back(nu == 0 ? "inside_mean_tension_nu_0_nN_per_um" : "inside_mean_tension_nu_05_nN_per_um",
                                 figures_inside(with_nu.solution, outline).mean_nN_per_um);
   }
@@ -419,6 +426,8 @@ Run run_fit(const Parameters& p, stage::StageContext& context, const Region& reg
   if (p.sheet.contraction_nN_per_um || p.sheet.contraction_kPa)
     throw UsageError(
         "with --displacement the contraction is fitted: leave contraction_nN_per_um and contraction_kPa out");
+  if (p.sheet.line_tension_nN > 0)
+    throw UsageError("with --displacement a line tension is fitted (fit_line_tension): leave line_tension_nN out");
   if (!p.sheet.thickness_um) throw UsageError("[sheet] thickness_um is missing: give it in cell.toml");
   Gel gel = p.gel;
   gel.youngs_modulus_kPa = *p.gel_modulus_kPa;
@@ -497,6 +506,10 @@ StageReport run(const Parameters& p, stage::StageContext& context) {
   if (has_beads && has_tractions) throw UsageError("expected --displacement or --traction, not both");
   if (context.has_input("beads") && (has_beads || has_tractions))
     throw UsageError("--beads is for a sheet of given contraction: leave out --displacement and --traction");
+  if (context.has_input("area") && !has_tractions)
+    throw UsageError("--area is for --traction: without it the outline is the area");
+  if (context.has_input("adhesions") && !has_beads)
+    throw UsageError("--adhesions are compared with a fit: give --displacement");
   Run done = has_tractions ? run_from_traction(p, context, region)
              : has_beads   ? run_fit(p, context, region)
                            : run_forward(p, context, region);
@@ -539,6 +552,12 @@ int main(int argc, char** argv) {
              "tensions follow from it"},
             {"displacement", Kind::optional_input,
              "displacement.csv of the beads: contraction and stiffness are fitted to them"},
+            {"adhesions", Kind::optional_input,
+             "with --displacement: adhesions.csv, whose forces are compared with the sheet in sheet_models.csv"},
+            {"beads", Kind::optional_input,
+             "on a gel: points of its surface, x_um, y_um, at which displacement.csv is written"},
+            {"cells", Kind::optional_input,
+             "label image of the cells: borders.csv has the forces between them, cell_tension.csv what is in each"},
             {"area", Kind::optional_input,
              "with --traction: where the sheet is free to end, around the outline; the outline, if not given"},
             {"points", Kind::optional_input, "points at which sheet.csv is written: x_um, y_um; else at the nodes"},

@@ -5,7 +5,7 @@
 #include "pipeline/files/text.h"
 #include "pipeline/stage/console.h"
 #include "pipeline/stage/stage.h"
-#include "pipeline/statistics/png.h"
+#include "pipeline/statistics/picture.h"
 
 namespace mbtfm::plan {
 namespace {
@@ -51,8 +51,8 @@ void write(const Plan& plan, stage::StageContext& context) {
   if (plan.drawn) files::write(out("plan_drawn.csv"), drawn_table(), plan.drawn->tensions);
   const std::string svg = svg_of(plan);
   files::write_text(out("plan.svg"), svg);
-  constexpr double kScale = 2;  // sharp on a screen of many pixels
-  statistics::write_png(out("plan.png"), svg, kScale);
+  constexpr double kPage_mm = 178, kDotsPerInch = 300;  // the width of a page; sharp in print and on screens
+  statistics::write_png(out("plan.png"), svg, kPage_mm, kDotsPerInch);
   files::write_text(out("plan.html"), html_of(plan));
 }
 

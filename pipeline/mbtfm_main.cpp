@@ -130,7 +130,9 @@ runner::CellOutcome run_to_accuracy(const CommandLine& line, runner::RunOptions 
 }
 
 /// The stages leave it to us to tell of them.
-void speak_for_stages(const CommandLine& line) { setenv(stage::kRunnerVariable, line.is_json ? "json" : "text", 1); }
+void speak_for_stages(const CommandLine& line) {
+  setenv(stage::kRunnerVariable, line.is_json ? stage::kForProgram : stage::kForPerson, 1);
+}
 
 int run(const CommandLine& line) {
   speak_for_stages(line);

@@ -94,8 +94,9 @@ StageReport check(const fs::path& folder, int threads, bool& is_fine) {
   const runner::FoundCells found = runner::find_cells(folder);
   std::vector<Seen> seen(found.cells.size());
   numerics::parallel_for(static_cast<int>(seen.size()), threads, [&](int i) {
-    const fs::path name = found.cells[i].lexically_relative(folder);
-    seen[i] = look_at(found.cells[i], name == "." ? fs::weakly_canonical(folder).filename().string() : name.string());
+    const bool is_folder_itself = found.cells[i] == folder;
+    seen[i] = look_at(found.cells[i], is_folder_itself ? fs::weakly_canonical(folder).filename().string()
+                                                       : found.cells[i].lexically_relative(folder).string());
   });
   for (const Seen& cell : seen) stage::print(cell.text);
   stage::print(disk_doubt(folder, seen.size()));

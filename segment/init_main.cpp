@@ -2,7 +2,9 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <iterator>
 #include <optional>
+#include <string_view>
 
 #include "pipeline/contract/errors.h"
 #include "pipeline/contract/listed.h"
@@ -20,10 +22,12 @@ using namespace mbtfm;
 struct InitParameters {};
 void declare(stage::ParameterList&, InitParameters&) {}
 
+constexpr std::string_view kImages[] = {".tif", ".tiff", ".png", ".jpg", ".jpeg"};
+
 bool is_image(const fs::path& file) {
   std::string type = file.extension().string();
   std::ranges::transform(type, type.begin(), [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return type == ".tif" || type == ".tiff" || type == ".png" || type == ".jpg" || type == ".jpeg";
+  return std::ranges::find(kImages, type) != std::end(kImages);
 }
 
 std::vector<std::string> images_in(const fs::path& folder) {

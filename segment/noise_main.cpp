@@ -68,7 +68,7 @@ StageReport run(const NoiseParameters& given, stage::StageContext& context) {
   const double pixel_um = images::common_pixel_size_um(first, second, parameters.pixel_size_um);
   try {
     const Tracking tracking =
-        track_beads(first.image, second.image, pixel_um, parameters, context.threads, context.progress);
+        track_beads(first.image, second.image, pixel_um, parameters, Work(context.threads, context.progress));
     const UnloadedPlace place = unloaded_place(tracking, pixel_um * first.image.width, pixel_um * first.image.height);
     context.progress(1, "done");
     stage::print(text_of(place));

@@ -4,7 +4,7 @@
 set -euo pipefail
 cd "$(dirname "$0")/.."
 ./cmake/install_packages.sh chromium clang-format doxygen python3-numpy python3-pandas man-db strace zsh fish  # chromium: to look at the pages; those tests skip where there is none
-find mbtfm network pipeline samples segment substrate tests -name '*.cpp' -o -name '*.h' -o -name '*.inc' |
+find continuum mbtfm network pipeline samples segment substrate tests -name '*.cpp' -o -name '*.h' -o -name '*.inc' |
   xargs clang-format --dry-run -Werror || { echo "mbtfm: run clang-format -i on these files" >&2; exit 1; }
 # Sources of a library are compiled together, so that their headers are read once: for machines without a cache.
 cmake --preset release -DMBTFM_STRICT=ON -DCMAKE_UNITY_BUILD=ON >build-configure.log 2>&1 || { cat build-configure.log >&2; exit 1; }

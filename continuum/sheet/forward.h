@@ -77,7 +77,7 @@ struct Balance {
   Vec2 net_force_nN;
   double net_torque_nN_um = 0;          ///< about the centre of area
   double largest_torque_nN_um = 0;      ///< sum of distance times magnitude
-  double elastic_energy_fJ = 0;         ///< of sheet and ground: half of what contraction has done
+  double elastic_energy_fJ = 0;         ///< of sheet and ground at small strains: half of the contraction's work
   double mean_tension_nN_per_um = 0;    ///< ½ tr S, mean over the area
   double virial_tension_nN_per_um = 0;  ///< −1/(2A) Σ x · F, less Λ × the rim / (2 A)
   double area_um2 = 0;

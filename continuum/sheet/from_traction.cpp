@@ -167,7 +167,8 @@ TensionErrors errors_by(const TractionNoise& noise, Parts parts, const Solution&
 }  // namespace
 
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
-                           const TriangleSize& size, int threads, const std::optional<TractionNoise>& noise) {
+                           const TriangleSize& size, int threads, double most_unbalanced,
+                           const std::optional<TractionNoise>& noise) {
   constexpr std::size_t kMostTriangles = 200000;
   FromTraction result;
   Solution& solution = result.solution;
@@ -179,18 +180,21 @@ FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Regi
                      "outline and tractions must have one origin");
   result.unbalanced = balance(parts);
   const double worst = std::max(result.unbalanced.net_force_share, result.unbalanced.net_torque_share);
-  if (worst > kMostUnbalanced)
+  if (worst > most_unbalanced)
     throw InputError("the tractions inside of the outline",
-                     "a net force and torque below " + brief(kMostUnbalanced) + " of what the forces could add up to",
+                     "a net force and torque below " + brief(most_unbalanced) + " of what the forces could add up to",
                      "a net force of " + brief(result.unbalanced.net_force_share) + " and a net torque of " +
                          brief(result.unbalanced.net_torque_share),
-                     "the outline must hold the whole colony; or the tractions belong to another field");
+                     "give an --area that holds the whole colony and all of its forces; if the tractions do not lie on "
+                     "another field, "
+                     "sheet.most_unbalanced lets more be taken off");
   solution.sheet.material = material;
   solution.sheet.contraction_nN_per_um = even(elements, 0);
   solution.sheet.n_rims = static_cast<int>(region.rims.size());
   Stiffness stiffness(elements, pins(elements));
   for (int t = 0; t < elements.n_triangles(); ++t) stiffness.add(t, elastic_stiffness(elements, t, material));
-  MBTFM_ASSERT(stiffness.factorise(0, threads));
+  const bool is_definite = stiffness.factorise(0, threads);
+  MBTFM_ASSERT(is_definite);
   solution.u = stiffness.solve(load_of(parts, elements));
   solution.report = {.converged = true, .iterations = 1, .last_change = 0, .reason = "one linear solve"};
   solution.at_points = tension_at_points(elements, solution.sheet, solution.u);

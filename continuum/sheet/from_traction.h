@@ -35,14 +35,16 @@ struct FromTraction {
   std::optional<TensionErrors> errors;
 };
 
+/// A fifth: what smoothing and noise leave of a whole colony's forces is below.
+inline constexpr double kMostUnbalanced = 0.2;
+
 /// S of a free sheet under −T: div S = T, S n = 0 on the rims. An elastic law decides what balance alone does not; S
 /// does not depend on its modulus. A patch whose centre lies in the region acts as the square of its area; the
 /// others are left out. A net force and torque are taken off by an even traction and an even turn (least squares in T).
-/// @throws InputError where more than kMostUnbalanced is out of balance
+/// @param most_unbalanced  share of net force or torque. @throws InputError where more is out of balance
 FromTraction tensions_from(const std::vector<GroundPatch>& tractions, const Region& region, const Material& material,
-                           const TriangleSize& size, int threads, const std::optional<TractionNoise>& noise = {});
-
-inline constexpr double kMostUnbalanced = 0.2;
+                           const TriangleSize& size, int threads, double most_unbalanced = kMostUnbalanced,
+                           const std::optional<TractionNoise>& noise = {});
 
 /// Of ½ tr S and S_xy, over the part of the sheet inside of an outline.
 struct TensionFigures {

@@ -38,7 +38,10 @@ TriangleSize size_on_gel(const Region& region, const Material& material, const G
   if (adhesion_nN_per_um3) reach = std::max(reach, std::sqrt(material.stiffness_nN_per_um() / *adhesion_nN_per_um3));
   // measured: 1 % of the largest displacement, which lies at the edge; finer where a soft sheet gives way near it alone
   const double per_width = std::clamp(1.6 * narrow / reach, 60.0, 90.0);
-  return {.at_curves_um = narrow / per_width, .largest_um = narrow / 4, .growth = 0.9, .most_turn_rad = 0.35};
+  constexpr double kMostPatches = 1500;  // as expected_triangles() counts: half a GB of compliances at the most
+  TriangleSize size{.at_curves_um = narrow / per_width, .largest_um = narrow / 4, .growth = 0.9, .most_turn_rad = 0.35};
+  while (expected_triangles(region, size) > kMostPatches) size = with_edge(size, 1.1 * size.at_curves_um);
+  return size;
 }
 
 TriangleSize size_for_fit(const Region& region) {
@@ -52,7 +55,7 @@ TriangleSize size_for_tractions(const Region& region, const std::vector<GroundPa
   for (const GroundPatch& patch : tractions) areas.push_back(patch.area_um2);
   const double side = areas.empty() ? narrow / 20 : std::sqrt(numerics::median(areas));
   const double size = std::clamp(1.5 * side, narrow / 100, narrow / 8);
-  return {.at_curves_um = size, .largest_um = size, .growth = 0.3, .most_turn_rad = 0.3};
+  return {.at_curves_um = size, .largest_um = size, .growth = 0.5, .most_turn_rad = 0.6, .most_notch_rad = 0.6};
 }
 
 TriangleSize with_edge(TriangleSize size, double at_curves_um) {

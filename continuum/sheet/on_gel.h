@@ -39,9 +39,6 @@ class OnGel {
   const std::vector<double>& areas_um2() const { return areas_um2_; }
   /// Displacement of the gel under each patch.
   Eigen::VectorXd gel_um(const Eigen::VectorXd& forces_nN) const;
-  std::optional<double> adhesion_nN_per_um3() const { return adhesion_; }
-  /// Another stiffness of the adhesions; the gel's compliance stays.
-  void set_adhesion(std::optional<double> nN_per_um3) { adhesion_ = nN_per_um3; }
 
  private:
   void average_near(const substrate::Substrate& gel, const std::vector<Vec2>& centres);

@@ -63,13 +63,13 @@ void draw_values(Chart& map, const Solution& solution, const Frame& frame, const
   });
   const double range = high > low ? high - low : 1;
   for (const Square& s : squares) {
-    const std::string colour = charts::hex(charts::colour_at(charts::ColourMap::viridis, (s.value - low) / range));
-    const Vec2 d{1.02 * s.half, 1.02 * s.half};  // no white lines between
+    const std::string colour = charts::hex(charts::colour_at(charts::ColourMap::plasma, (s.value - low) / range));
+    const Vec2 d{1.15 * s.half, 1.15 * s.half};  // no white lines between
     map.bar(s.middle - d, s.middle + d, "fill:" + colour + ";stroke:none");
   }
   for (const double share : {1.0, 0.5, 0.0})
     map.key(charts::readable(low + share * range) + " " + unit,
-            charts::hex(charts::colour_at(charts::ColourMap::viridis, share)));
+            charts::hex(charts::colour_at(charts::ColourMap::plasma, share)));
 }
 
 void draw_rims(Chart& map, const Solution& solution) {
@@ -107,7 +107,7 @@ void draw_tractions(Chart& map, const Solution& solution, const Frame& frame) {
   if (longest == 0) return;
   const double px_per_kPa = 1.5 * Chart::kFrameWidth_px / kAcross / longest;
   for (const auto& [square, sum] : sums)
-    map.arrow(1 / sum.area * sum.place, px_per_kPa / sum.area * sum.force, "stroke:#D55E00;stroke-width:1.5");
+    map.arrow(1 / sum.area * sum.place, px_per_kPa / sum.area * sum.force, "stroke:#0072B2;stroke-width:1.5");
   map.subtitle("longest arrow: a mean of " + charts::readable(1000 * longest) + " Pa", "#555");
 }
 

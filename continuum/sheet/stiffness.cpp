@@ -105,18 +105,6 @@ Eigen::MatrixXd Stiffness::solve(const Eigen::MatrixXd& forces_nN) const {
   return u;
 }
 
-NodeVectors Stiffness::times(const NodeVectors& u) const {
-  NodeVectors f = NodeVectors::Zero(u.size());
-  for (int column = 0; column < matrix_.n; ++column)
-    for (int k = matrix_.start[column]; k < matrix_.start[column + 1]; ++k) {
-      const int row = matrix_.row[k];
-      const Eigen::Map<const Eigen::Matrix<double, 2, 2, Eigen::RowMajor>> block(matrix_.value.data() + 4 * k);
-      f.segment<2>(2 * row) += block * u.segment<2>(2 * column);
-      if (row != column) f.segment<2>(2 * column) += block.transpose() * u.segment<2>(2 * row);
-    }
-  return f;
-}
-
 Stiffness::OfElement elastic_stiffness(const Elements& elements, int triangle, const Material& material) {
   const double M = material.stiffness_nN_per_um(), nu = material.poisson_ratio;
   Stiffness::OfElement K = Stiffness::OfElement::Zero();

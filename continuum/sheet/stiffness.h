@@ -22,11 +22,9 @@ class Stiffness {
   bool factorise(double shift = 0, int threads = 1);
   /// With the last factor; what is held stays. @param forces_nN  2·nodes × any number
   Eigen::MatrixXd solve(const Eigen::MatrixXd& forces_nN) const;
-  /// Entry by entry, before it was factorised.
-  NodeVectors times(const NodeVectors& u) const;
-  double mean_diagonal() const;
 
  private:
+  double mean_diagonal() const;
   const Elements& elements_;
   std::vector<std::array<bool, 2>> held_;
   numerics::BlockMatrix<2> matrix_;

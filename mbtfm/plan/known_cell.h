@@ -7,8 +7,8 @@
 
 #include "mbtfm/plan/scene.h"
 #include "mbtfm/tensions/error_budget.h"
-#include "pipeline/contract/work.h"
 #include "network/cables/cables.h"
+#include "pipeline/contract/work.h"
 
 namespace mbtfm::plan {
 

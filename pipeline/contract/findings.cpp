@@ -269,7 +269,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_outside, "tractions-outside", "sheet", note,
        "share of the sum of forces that acts outside of the area", 0,
        "a sheet with a free edge cannot carry what acts beyond it",
-       "Give a larger area (--area, or sheet.grow_um): smoothed tractions spill over the edge."},
+       "Give a larger area (--area): smoothed tractions spill over the edge."},
   };
   return kinds;
 }
@@ -328,7 +328,8 @@ std::string findings_page() {
       "- **caution**: the results may be off by more than their error bars say.\n"
       "- **bad**: do not use what the finding names.\n\n"
       "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
-  for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "indent", "mean"}) {
+  for (const char* stage :
+       {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "indent", "mean"}) {
     bool has_title = false;
     for (const KindOfFinding& k : kinds_of_findings()) {
       if (std::string(stage) != k.stage) continue;

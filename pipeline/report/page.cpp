@@ -75,8 +75,8 @@ std::string html_of(const Table& table, const Download& csv) {
 std::string html_of_pairs(const std::vector<std::pair<std::string, std::string>>& pairs) {
   std::string html = "<div class=\"scroll\"><table><tbody>\n";
   for (const auto& [name, value] : pairs) {
-    html += "<tr><th scope=\"row\">" + charts::html_escaped(name) + "</th><td class=\"long\">" + charts::html_escaped(value) +
-            "</td></tr>\n";
+    html += "<tr><th scope=\"row\">" + charts::html_escaped(name) + "</th><td class=\"long\">" +
+            charts::html_escaped(value) + "</td></tr>\n";
   }
   return html + "</tbody></table></div>\n";
 }

@@ -91,6 +91,8 @@ std::string lower(std::string text) {
   return text;
 }
 
+constexpr std::string_view kOfMicroscopes[] = {".nd2", ".czi", ".lif", ".oib", ".oif"};
+
 /// Where there is no such file: one that was probably meant; else what can be done.
 std::string advice_on_missing(const fs::path& folder, const std::string& name, const std::string& key) {
   const std::string place = "'" + key + "' in [images] of cell.toml";
@@ -105,7 +107,7 @@ std::string advice_on_missing(const fs::path& folder, const std::string& name, c
   }
   for (const fs::path& file : there) {
     const std::string type = lower(file.extension().string());
-    if (type == ".nd2" || type == ".czi" || type == ".lif" || type == ".oib" || type == ".oif")
+    if (std::ranges::find(kOfMicroscopes, type) != std::end(kOfMicroscopes))
       return "there is '" + file.string() + "', a file of a microscope: save it as TIFF in Fiji (File > Import > " +
              "Bio-Formats, then File > Save As > Tiff), or: bfconvert '" + file.string() + "' '" +
              file.stem().string() + ".ome.tif'; then name it as " + place;

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <iterator>
+#include <string_view>
 
 #include "pipeline/stage/declared.h"
 #include "pipeline/stage/manual.h"
@@ -42,8 +44,10 @@ std::string quoted(const std::string& text, const std::string& quote) {
   return result + "'";
 }
 
+constexpr std::string_view kPaths[] = {"FILE", "FOLDER", "CELL"};
+
 bool is_file(const DeclaredOption& option) {
-  return option.name == "FILE" || option.name == "FOLDER" || option.name == "CELL" || option.flag.empty();
+  return option.flag.empty() || std::ranges::find(kPaths, option.name) != std::end(kPaths);
 }
 
 std::string zsh_arguments(const DeclaredCommand& command, const WordsOfFlags& words) {

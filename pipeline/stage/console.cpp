@@ -46,10 +46,11 @@ void print(std::string_view text) {
 bool is_terminal() { return isatty(STDERR_FILENO) != 0 || std::getenv("MBTFM_TERMINAL") != nullptr; }
 
 std::string warning(const std::string& text) {
+  constexpr std::string_view kWithoutColours = "dumb";
   const char* no_color = std::getenv("NO_COLOR");
   const char* terminal = std::getenv("TERM");
   const bool is_plain = !is_terminal() || (no_color != nullptr && *no_color != '\0') ||
-                        (terminal != nullptr && std::string_view(terminal) == "dumb");
+                        (terminal != nullptr && terminal == kWithoutColours);
   return is_plain ? text : "\033[33m" + text + "\033[0m";
 }
 
@@ -71,7 +72,7 @@ Reader reader(bool is_quiet, bool is_json) {
   if (is_quiet) return Reader::nobody;
   const char* runner = std::getenv(kRunnerVariable);
   if (runner == nullptr) return Reader::person;
-  return std::string_view(runner) == "json" ? Reader::json_runner : Reader::runner;
+  return std::string_view(runner) == kForProgram ? Reader::json_runner : Reader::runner;
 }
 
 void watch_signals(SecondSignal second) {

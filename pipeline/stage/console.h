@@ -29,8 +29,8 @@ enum class Reader {
 };
 /// As the flags and the environment (kRunnerVariable) say.
 Reader reader(bool is_quiet, bool is_json);
-/// Set for the stages by `mbtfm run`: "text" or "json".
-constexpr const char* kRunnerVariable = "MBTFM_RUNNER";
+/// Set for the stages by `mbtfm run`: for whom it speaks.
+constexpr const char *kRunnerVariable = "MBTFM_RUNNER", *kForPerson = "text", *kForProgram = "json";
 
 enum class SecondSignal { ends_at_once, is_noted };
 

@@ -1,6 +1,8 @@
 #include "pipeline/stage/manual.h"
 
 #include <algorithm>
+#include <cctype>
+#include <cstdio>
 
 #include "pipeline/contract/version.h"
 #include "pipeline/files/text.h"
@@ -47,15 +49,18 @@ std::string synopsis(const std::string& name, const DeclaredCommand& command) {
   return line + "[" + italic("OPTIONS") + "]\n";
 }
 
-/// @param heading  ".SH" or ".SS", before each group of options
-std::string options(const DeclaredCommand& command, const std::string& heading) {
+enum class Groups { have_titles, are_one };
+
+std::string upper(std::string text) {
+  std::ranges::transform(text, text.begin(), [](unsigned char c) { return static_cast<char>(std::toupper(c)); });
+  return text;
+}
+
+std::string options(const DeclaredCommand& command, Groups groups) {
   std::string text, group;
   for (const DeclaredOption& option : command.options) {
-    if (!heading.empty() && option.group != group) {
-      std::string title = option.group;
-      if (heading == ".SH")
-        std::ranges::transform(title, title.begin(), [](unsigned char c) { return std::toupper(c); });
-      text += heading + " " + troff(title) + "\n";
+    if (groups == Groups::have_titles && option.group != group) {
+      text += ".SH " + troff(upper(option.group)) + "\n";
       group = option.group;
     }
     text += ".TP\n" + (option.flag.empty() ? italic(option.name) : bold(option.flag));
@@ -76,18 +81,16 @@ std::string exit_codes() {
 
 std::string manual_page(const CLI::App& app) {
   const DeclaredCommand program = declared(app);
-  std::string title = program.name;
-  std::ranges::transform(title, title.begin(), [](unsigned char c) { return std::toupper(c); });
-  std::string page = ".TH " + troff(title) + " 1 \"\" \"mbtfm " + troff(kVersion) + "\" \"mbtfm\"\n.SH NAME\n" +
-                     troff(program.name) + " \\- " + troff(program.meaning) + "\n.SH SYNOPSIS\n" +
-                     synopsis(program.name, program) + options(program, ".SH");
+  std::string page = ".TH " + troff(upper(program.name)) + " 1 \"\" \"mbtfm " + troff(kVersion) +
+                     "\" \"mbtfm\"\n.SH NAME\n" + troff(program.name) + " \\- " + troff(program.meaning) +
+                     "\n.SH SYNOPSIS\n" + synopsis(program.name, program) + options(program, Groups::have_titles);
   if (!program.subcommands.empty()) page += ".SH COMMANDS\n";
   for (const DeclaredCommand& command : program.subcommands) {
     page += ".SS " + troff(command.name) + "\n" + synopsis(program.name + " " + command.name, command) + ".PP\n" +
-            troff(command.meaning) + ".\n" + options(command, "");
+            troff(command.meaning) + ".\n" + options(command, Groups::are_one);
   }
   page += ".SH EXIT STATUS\n" + troff(exit_codes()) + "\n.SH SEE ALSO\n";
-  page += program.name == "mbtfm"
+  page += !program.subcommands.empty()
               ? "The stages that it starts: mbtfm\\-segment(1), mbtfm\\-track(1), mbtfm\\-network(1), mbtfm\\-fit(1).\n"
               : "mbtfm(1)\n";
   return page + ".PP\nThe documentation is in the folder doc/mbtfm of the installation.\n";

@@ -123,7 +123,7 @@ std::optional<Figure> primary_figure(const Study& study, const Analysis& analysi
   const Measure& m = parameters.primary == PrimaryMeasure::tension ? analysis.tensions : analysis.cells.front();
   if (m.sample.values.empty()) return {};
   const int kind = kind_of(study, m.sample, parameters);
-  Figure figure{.name = "primary",
+  Figure figure{.name = kPrimaryFigure,
                 .title = "Primary comparison",
                 .caption = std::string(m.sample.each == Observed::cells ? "A dot is a cell"
                                                                         : "Small dots: fibres; large dots: cells") +

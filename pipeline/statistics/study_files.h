@@ -22,6 +22,8 @@ struct Figure {
   std::vector<charts::Chart> charts;
   int n_columns = 1;
 };
+/// The one that answers the study's question: it comes first in the report.
+inline constexpr const char* kPrimaryFigure = "primary";
 std::vector<Figure> figures_of(const Study& study, const Analysis& analysis, const StudyParameters& parameters);
 /// As a file of its own.
 std::string svg_of(const Figure& figure);

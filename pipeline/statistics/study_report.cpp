@@ -17,7 +17,7 @@ using charts::html_escaped;
 using charts::readable;
 using report::Table;
 
-std::string p_text(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : charts::readable(p); }
+std::string p_cell(double p) { return p < 1e-4 ? fmt::format("{:.1e}", p) : charts::readable(p); }
 
 std::string number_text(const std::optional<double>& value) { return value ? charts::readable(*value) : "–"; }
 
@@ -94,7 +94,7 @@ report::Table tests_table(const Measure& m) {
                           is_pair ? fmt::format("{}, {}", t.n_a, t.n_b) : std::to_string(t.n_a),
                           is_pair ? fmt::format("{}, {}", t.cells_a, t.cells_b) : std::to_string(t.cells_a),
                           charts::readable(t.statistic), t.degrees ? charts::readable(*t.degrees) : "–",
-                          p_text(t.p_value), t.p_holm ? p_text(*t.p_holm) : "–",
+                          p_cell(t.p_value), t.p_holm ? p_cell(*t.p_holm) : "–",
                           t.effect_name.empty() ? "–" : charts::readable(t.effect), interval_text(t.interval),
                           charts::html_escaped(t.effect_name)});
   }
@@ -229,7 +229,7 @@ std::string primary_section(const Study& study, const Analysis& analysis, const 
     html += "<p class=\"what\"><b>" + html_escaped(text) + ".</b></p>\n";
   }
   for (const Figure& figure : figures) {
-    if (figure.name == "primary") html += charts_of(figure);
+    if (figure.name == kPrimaryFigure) html += charts_of(figure);
   }
   if (!primary.differences.empty())
     html += "<p class=\"sub\">Test: " + html_escaped(primary.test) +
@@ -278,7 +278,7 @@ std::string study_html(const Study& study, const Analysis& analysis, const std::
   body += report::section("What was found, exploratory", found);
   std::string pictures;
   for (const Figure& figure : figures) {
-    if (figure.name != "primary") pictures += embedded(figure);
+    if (figure.name != kPrimaryFigure) pictures += embedded(figure);
   }
   const auto files = tables_of(study, analysis);
   const auto with_file = [&](const report::Table& table, const std::string& name) {

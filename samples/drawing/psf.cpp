@@ -66,9 +66,7 @@ Field intensity(const Optics& o, double wavelength_um, double depth_um, int n_r,
 }
 
 /// Where the focus lies by the rays near the axis: a bead at depth d is in focus when z = d (n_i/n - 1) …
-double paraxial_shift_um(const Optics& o, double depth_um) {
-  return depth_um * (o.gel_index / o.immersion_index - 1);
-}
+double paraxial_shift_um(const Optics& o, double depth_um) { return depth_um * (o.gel_index / o.immersion_index - 1); }
 
 /// Points spread over the bead's volume and the pixel's face (R3 sequence of the plastic number, Roberts 2018).
 std::vector<std::array<double, 3>> smear(const Optics& o, double pixel_um) {
@@ -125,11 +123,13 @@ PointSpread::PointSpread(const Optics& optics, double deepest_um, double pixel_u
 double PointSpread::at(double r_um, double z_um, double depth_um) const {
   const double x = r_um / kStep_um, y = z_um / kStep_um + kHalfAlong;
   const double w = std::clamp(depth_um / deepest_um_, 0.0, 1.0) * (kDepths - 1);
-  const int i = static_cast<int>(x), j = static_cast<int>(std::floor(y)), d = std::min(static_cast<int>(w), kDepths - 2);
+  const int i = static_cast<int>(x), j = static_cast<int>(std::floor(y)),
+            d = std::min(static_cast<int>(w), kDepths - 2);
   if (i + 1 >= kAcross || j < 0 || j + 1 >= kAlong) return 0;
   const auto a = static_cast<float>(x - i), b = static_cast<float>(y - j), c = static_cast<float>(w - d);
   const auto plane = [&](int depth) {
-    const float* v = table_.data() + (static_cast<std::size_t>(depth) * kAlong + static_cast<std::size_t>(j)) * kAcross +
+    const float* v = table_.data() +
+                     (static_cast<std::size_t>(depth) * kAlong + static_cast<std::size_t>(j)) * kAcross +
                      static_cast<std::size_t>(i);
     return (1 - b) * ((1 - a) * v[0] + a * v[1]) + b * ((1 - a) * v[kAcross] + a * v[kAcross + 1]);
   };

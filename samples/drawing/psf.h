@@ -7,10 +7,10 @@ namespace mbtfm::drawing {
 
 /// The optics that look into a gel.
 struct Optics {
-  double numerical_aperture = 0.9;        ///< of an objective for thick specimens
+  double numerical_aperture = 0.9;  ///< of an objective for thick specimens
   double excitation_um = 0.488, emission_um = 0.52;
-  double gel_index = 1.36;                ///< polyacrylamide of 10 %
-  double immersion_index = 1.333;         ///< water
+  double gel_index = 1.36;         ///< polyacrylamide of 10 %
+  double immersion_index = 1.333;  ///< water
   double bead_diameter_um = 0.5;
 };
 

@@ -11,10 +11,13 @@ namespace {
 
 void add_bead(images::Image& slice, const GlowingBead& bead, const PointSpread& spread, double above_um,
               double depth_um, double light, Vec2 shift_um, double pixel_um) {
-  const double x = (bead.position_um.x + shift_um.x) / pixel_um - 0.5, y = (bead.position_um.y + shift_um.y) / pixel_um - 0.5;
+  const double x = (bead.position_um.x + shift_um.x) / pixel_um - 0.5,
+               y = (bead.position_um.y + shift_um.y) / pixel_um - 0.5;
   const int reach = static_cast<int>(PointSpread::kReach_um / pixel_um) + 1;
-  const int left = std::max(0, static_cast<int>(x) - reach), right = std::min(slice.width - 1, static_cast<int>(x) + reach);
-  const int top = std::max(0, static_cast<int>(y) - reach), bottom = std::min(slice.height - 1, static_cast<int>(y) + reach);
+  const int left = std::max(0, static_cast<int>(x) - reach),
+            right = std::min(slice.width - 1, static_cast<int>(x) + reach);
+  const int top = std::max(0, static_cast<int>(y) - reach),
+            bottom = std::min(slice.height - 1, static_cast<int>(y) + reach);
   for (int j = top; j <= bottom; ++j) {
     for (int i = left; i <= right; ++i)
       slice.at(i, j) += static_cast<float>(light * spread.at(pixel_um * std::hypot(i - x, j - y), above_um, depth_um));
@@ -52,8 +55,8 @@ std::vector<images::Image> recorded_stack(const std::vector<GlowingBead>& beads,
                          static_cast<unsigned>(j);
       Random random(seed, Stream::camera, index);
       for (int i = 0; i < slice.width; ++i) {
-        const double value = m.camera_offset + m.counts_per_photon * random.poisson(slice.at(i, j)) +
-                             m.read_noise * random.normal();
+        const double value =
+            m.camera_offset + m.counts_per_photon * random.poisson(slice.at(i, j)) + m.read_noise * random.normal();
         slice.at(i, j) = static_cast<float>(std::clamp(std::round(value), 0.0, 65535.0));
       }
     }

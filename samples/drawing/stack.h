@@ -16,16 +16,16 @@ struct StackMicroscope {
   double pixel_size_um = 0.18;
   int image_size_px = 512;
   int n_slices = 100;
-  double z_step_um = 0.5;            ///< of the stage; the focus moves by the ratio of the indices more
-  double first_um = 0;               ///< z of the first slice's outer face, in the gel
-  double bead_photons = 150;         ///< of a bead in focus, in its brightest voxel
+  double z_step_um = 0.5;     ///< of the stage; the focus moves by the ratio of the indices more
+  double first_um = 0;        ///< z of the first slice's outer face, in the gel
+  double bead_photons = 150;  ///< of a bead in focus, in its brightest voxel
   double bead_brightness_log_sd = 0.25;
   double background_photons = 4;
-  double attenuation_um = 150;       ///< depth at which light is down to a third
-  double bleached = 0.1;             ///< share of the light that is lost over a stack
+  double attenuation_um = 150;  ///< depth at which light is down to a third
+  double bleached = 0.1;        ///< share of the light that is lost over a stack
   double counts_per_photon = 2;
   double camera_offset = 100;
-  double read_noise = 3;             ///< counts
+  double read_noise = 3;  ///< counts
 
   double focus_step_um() const { return z_step_um * optics.gel_index / optics.immersion_index; }
 };

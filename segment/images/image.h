@@ -16,9 +16,9 @@ struct Image {
   int width = 0;
   int height = 0;
   std::vector<float> pixels;
-  std::optional<double> pixel_size_um;  ///< from the file's own calibration
-  double full_scale = 0;                ///< the value at which the detector saturates; 0: none (float)
-  bool is_lossy = false;                ///< as a JPEG is: intensities, and with them positions, are not the camera's
+  std::optional<double> pixel_size_um;   ///< from the file's own calibration
+  double full_scale = 0;                 ///< the value at which the detector saturates; 0: none (float)
+  bool is_lossy = false;                 ///< as a JPEG is: intensities, and with them positions, are not the camera's
   std::optional<double> z_step_um = {};  ///< to the next slice of its stack, from the file's own calibration
   float at(int column, int row) const { return pixels[static_cast<std::size_t>(row) * width + column]; }
   float& at(int column, int row) { return pixels[static_cast<std::size_t>(row) * width + column]; }

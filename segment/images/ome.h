@@ -21,10 +21,10 @@ struct OmeImage {
   std::string uuid;             ///< of this file
   std::string order = "XYCZT";  ///< which dimension runs fastest
   int n_channels = 1, n_slices = 1, n_frames = 1;
-  std::vector<std::string> channel_names;      ///< empty where one has none
-  std::vector<OmePages> pages;                 ///< none: all pages in order
+  std::vector<std::string> channel_names;                      ///< empty where one has none
+  std::vector<OmePages> pages;                                 ///< none: all pages in order
   std::string size_x, unit_x, size_y, unit_y, size_z, unit_z;  ///< PhysicalSizeX, …; empty: not given
-  std::string companion;                       ///< the file that holds the metadata in this one's stead; empty: none
+  std::string companion;  ///< the file that holds the metadata in this one's stead; empty: none
 };
 
 bool is_ome(std::string_view description);

@@ -16,16 +16,6 @@
 namespace mbtfm::stacks {
 namespace {
 
-constexpr int kChunk = 64;
-
-template <class Body>
-void for_each(std::size_t n, int threads, const Body& body) {
-  const auto count = static_cast<int>(n);
-  numerics::parallel_for((count + kChunk - 1) / kChunk, threads, [&](int chunk) {
-    for (int k = chunk * kChunk; k < std::min(count, (chunk + 1) * kChunk); ++k) body(static_cast<std::size_t>(k));
-  });
-}
-
 Eigen::Vector3d as_eigen(Vec3 v) { return {v.x, v.y, v.z}; }
 Vec3 as_vec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }
 
@@ -66,7 +56,7 @@ Cloud cloud_of(const std::vector<PlacedBead>& beads) {
 Constellations constellations_of(const Cloud& cloud, int n, int threads) {
   const int most = std::min<int>(n, static_cast<int>(cloud.beads.size()) - 1);
   Constellations result{most, std::vector<Eigen::Vector3f>(cloud.beads.size() * static_cast<std::size_t>(most))};
-  for_each(cloud.beads.size(), threads, [&](std::size_t bead) {
+  numerics::parallel_for_each(cloud.beads.size(), threads, [&](std::size_t bead) {
     const Vec3 here = cloud.beads[bead].position_um;
     std::size_t at = bead * static_cast<std::size_t>(most);
     const std::size_t end = at + static_cast<std::size_t>(most);
@@ -384,7 +374,7 @@ class Matcher {
   void assign(const Look& look_for) {
     const std::size_t n = relaxed_.beads.size();
     std::vector<Found> found(n);
-    for_each(n, threads_, [&](std::size_t bead) { found[bead] = look_for(bead); });
+    numerics::parallel_for_each(n, threads_, [&](std::size_t bead) { found[bead] = look_for(bead); });
     std::vector<int> owner(stressed_.beads.size(), -1);
     for (std::size_t bead = 0; bead < n; ++bead) {
       if (found[bead].partner < 0) continue;
@@ -458,7 +448,7 @@ class Matcher {
   void drop_contradicting() {
     std::vector<char> is_bad(result_.matches.size());
     std::vector<double> across(good_.size()), along(good_.size());
-    for_each(good_.size(), threads_, [&](std::size_t k) {
+    numerics::parallel_for_each(good_.size(), threads_, [&](std::size_t k) {
       const auto bead = static_cast<std::size_t>(good_[k]);
       const LocalMotion around = motion_around(bead, kAround);
       is_bad[bead] = !around.is_sound || contradiction(bead, around) > limit();
@@ -505,7 +495,7 @@ class Matcher {
   void verify() {
     drop_contradicting();
     std::vector<LocalMotion> motions(result_.matches.size());
-    for_each(result_.matches.size(), threads_, [&](std::size_t bead) {
+    numerics::parallel_for_each(result_.matches.size(), threads_, [&](std::size_t bead) {
       if (result_.matches[bead].partner >= 0) motions[bead] = motion_around(bead, kAround);
     });
     for (std::size_t bead = 0; bead < motions.size(); ++bead) {

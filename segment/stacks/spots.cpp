@@ -22,15 +22,6 @@ constexpr double kTouching = 4;     // widths: nearer spots are fitted jointly
 constexpr int kMostNeighbours = 3;  // fitted with a spot; further ones are where they were
 constexpr double kStep = 0.5;       // widths, of one step
 constexpr double kSettled = 2e-3;   // widths, and of the height: well below the noise of the brightest
-constexpr int kChunk = 32;
-
-template <class Body>
-void for_each(std::size_t n, int threads, const Body& body) {
-  const auto count = static_cast<int>(n);
-  numerics::parallel_for((count + kChunk - 1) / kChunk, threads, [&](int chunk) {
-    for (int k = chunk * kChunk; k < std::min(count, (chunk + 1) * kChunk); ++k) body(static_cast<std::size_t>(k));
-  });
-}
 
 /// Voxels around a place, both ends included.
 struct Box {
@@ -169,7 +160,7 @@ void SpotFit::find_neighbours() {
   std::vector<Vec3> places;
   for (const Spot& spot : spots_) places.push_back(stretched(spot));
   const Near near(places, kTouching * shape_.at(spots_[0].place).xy);
-  for_each(spots_.size(), threads_, [&](std::size_t s) {
+  numerics::parallel_for_each(spots_.size(), threads_, [&](std::size_t s) {
     const double reach = kTouching * shape_.at(spots_[s].place).xy;
     for (const int other : near.within(places[s], reach, kMostNeighbours + 1)) {
       if (static_cast<std::size_t>(other) != s) touching_[s].push_back(other);
@@ -282,7 +273,7 @@ void SpotFit::improve(int rounds) {
   const std::vector<Spot> first = spots_;
   for (int round = 0; round < rounds && !wanted.empty(); ++round) {
     std::vector<Step> steps(wanted.size());
-    for_each(wanted.size(), threads_, [&](std::size_t k) { steps[k] = step_of(wanted[k], false); });
+    numerics::parallel_for_each(wanted.size(), threads_, [&](std::size_t k) { steps[k] = step_of(wanted[k], false); });
     std::vector<int> unsettled;
     for (std::size_t k = 0; k < wanted.size(); ++k) {
       Spot& spot = spots_[static_cast<std::size_t>(wanted[k])];
@@ -407,8 +398,9 @@ void SpotFit::measure_shape() {
     chosen.insert(chosen.end(), layer.begin(), layer.end());
   }
   std::vector<Widths> widths(chosen.size());
-  for_each(chosen.size(), threads_,
-           [&](std::size_t k) { widths[k] = fitted_widths(spots_[static_cast<std::size_t>(chosen[k])]); });
+  numerics::parallel_for_each(chosen.size(), threads_, [&](std::size_t k) {
+    widths[k] = fitted_widths(spots_[static_cast<std::size_t>(chosen[k])]);
+  });
   std::vector<SpotShape::Sample> samples;
   for (std::size_t k = 0; k < chosen.size(); ++k) {
     const Vec3 place = spots_[static_cast<std::size_t>(chosen[k])].place;
@@ -483,7 +475,8 @@ void SpotFit::measure_noise() {
 
 void SpotFit::measure_errors() {
   std::vector<Step> steps(spots_.size());
-  for_each(spots_.size(), threads_, [&](std::size_t s) { steps[s] = step_of(static_cast<int>(s), true); });
+  numerics::parallel_for_each(spots_.size(), threads_,
+                              [&](std::size_t s) { steps[s] = step_of(static_cast<int>(s), true); });
   for (std::size_t s = 0; s < spots_.size(); ++s) {
     if (steps[s].is_sound) spots_[s] = steps[s].spot;
   }

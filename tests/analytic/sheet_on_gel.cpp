@@ -5,8 +5,10 @@
 #include <chrono>
 #include <numbers>
 
+#include "continuum/sheet/decide.h"
 #include "continuum/sheet/forward.h"
 #include "continuum/sheet/mesh_size.h"
+#include "pipeline/contract/errors.h"
 #include "substrate/greens/models.h"
 #include "tests/support/sheets.h"
 
@@ -143,7 +145,7 @@ TEST(SheetOnGel, halved_triangles_err_by_two_thirds_or_less) {
 TEST(SheetOnGel, on_a_rigid_gel_it_is_a_sheet_on_springs) {
   DiscOnGel disc = disc_of(test::chapter4("disc_on_gel"), 28);
   disc.gel.youngs_modulus_kPa = 1e6;
-  disc.scene.size = with_edge(disc.scene.size, disc.radius_um / 20);
+  disc.scene.size = with_edge(disc.scene.size, disc.radius_um / 50);
   const Solution on_gel = solved(disc), on_springs = solve_on_springs(disc.scene, 1);
   ASSERT_EQ(on_gel.u.size(), on_springs.u.size());
   // patches carry even tractions, springs what the sheet makes of them
@@ -180,6 +182,41 @@ TEST(SheetOnGel, other_outlines_are_within_the_error_of_the_independent_solution
       EXPECT_NEAR(u.y, value("uy_um"), 1.5 * value("u_error_um")) << shape << " row " << row;
     }
   }
+}
+
+/// What `auto` decides is right to both sides of its threshold: below it springs alone are 2.5 % off at most, well
+/// above it they are not.
+TEST(SheetOnGel, springs_stand_for_a_gel_where_beta_says_so_and_only_there) {
+  const Gel gel{8.4, 0.49, 60};
+  const Material material{1, 0.49, 4};
+  const double mu = gel.youngs_modulus_kPa / (2 * (1 + gel.poisson_ratio));
+  for (const double beta : {0.039, 0.041, 0.2}) {
+    // beta = sqrt(kappa M) (1 − nu) / mu
+    const double kappa = std::pow(beta * mu / (1 - gel.poisson_ratio), 2) / material.stiffness_nN_per_um();
+    EXPECT_NEAR(gel_over_adhesions(material, kappa, gel), beta, 1e-12);
+    const GroundChoice choice = decide_ground(std::nullopt, material, kappa, gel);
+    EXPECT_EQ(choice.ground, beta > kLargestBeta ? Ground::gel : Ground::springs) << beta;
+    EXPECT_EQ(choice.effect.is_on, beta > kLargestBeta);
+    DiscOnGel disc{.radius_um = 25, .scene = {}, .gel = gel};
+    disc.scene.region.rims.emplace_back(test::circle(25));
+    disc.scene.material = material;
+    disc.scene.contraction.nN_per_um = 1;
+    disc.scene.adhesion_nN_per_um3 = kappa;
+    disc.scene.size = with_edge(size_on_gel(disc.scene.region, material, gel, kappa), 1);
+    const Solution on_gel = solved(disc), on_springs = solve_on_springs(disc.scene, 1);
+    const double off = (on_gel.u - on_springs.u).lpNorm<Eigen::Infinity>() / on_gel.u.lpNorm<Eigen::Infinity>();
+    if (beta < 0.1) EXPECT_LE(off, 0.025) << beta;
+    if (beta > 0.1) EXPECT_GT(off, 0.1) << beta;
+  }
+}
+
+TEST(SheetOnGel, large_strain_is_on_where_a_free_sheet_would_contract_by_more_than_a_twentieth) {
+  const Material material{1, 0.5, 4};  // x = s / 8
+  EXPECT_DOUBLE_EQ(free_contraction(material, 0.8), 0.1);
+  for (const double x : {0.049, 0.051}) EXPECT_EQ(decide_strain(std::nullopt, x, Ground::springs).is_on, x > 0.05) << x;
+  EXPECT_FALSE(decide_strain(std::nullopt, 0.2, Ground::gel).is_on);
+  EXPECT_TRUE(decide_strain(Strain::large, 0.01, Ground::springs).is_on);
+  EXPECT_THROW(decide_strain(Strain::large, 0.01, Ground::gel), UsageError);
 }
 
 }  // namespace

@@ -292,8 +292,8 @@ void expect_forces_err_as_stated(const TractionParameters& parameters, double no
       sum += z * z / 40;
     }
   }
-  std::printf("%s, noise %g, lambda %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n", name_of(*parameters.method),
-              noise, parameters.lambda_um_per_kPa.value_or(0), offset, sum);
+  std::printf("%s, noise %g, lambda %g: mean error/sigma %.2f, mean (error/sigma)^2 %.2f\n",
+              name_of(*parameters.method), noise, parameters.lambda_um_per_kPa.value_or(0), offset, sum);
   EXPECT_LE(std::abs(offset), 3 * std::sqrt(1 / 40.0)) << name_of(*parameters.method) << ", noise " << noise;
   EXPECT_NEAR(sum, 1, 3 * std::sqrt(2 / 40.0)) << name_of(*parameters.method) << ", noise " << noise;
 }

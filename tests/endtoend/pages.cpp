@@ -29,9 +29,9 @@ class Pages : public testing::Test {
     const statistics::StudyParameters parameters;
     const auto study = statistics::read_study(folder_.path(), parameters, {}, 2);
     const auto analysis = statistics::analyse(study, parameters);
-    files::write_text(
-        study_page(),
-        statistics::study_html(study, analysis, statistics::figures_of(study, analysis, parameters), parameters, "statistics"));
+    files::write_text(study_page(),
+                      statistics::study_html(study, analysis, statistics::figures_of(study, analysis, parameters),
+                                             parameters, "statistics"));
   }
   /// One for all tests: it takes seconds to start.
   static Browser& opened(const std::filesystem::path& page) {

@@ -49,15 +49,16 @@ tensions::LinearData unit_data(const KnownCell& cell, const BeadsOnGel& beads) {
   return tensions::reduce(exact, beads.response, {}, 1, tensions::affine_motions(exact));
 }
 
-/// The fit of one experiment, on a network that is not the cell's.
-Eigen::VectorXd fitted(const KnownCell& cell, const tensions::LinearData& unit, double noise_um, std::uint64_t seed) {
+/// The fit of one experiment, on a network that is not the cell's. @param near  a trial of that network
+Eigen::VectorXd fitted(const KnownCell& cell, const tensions::LinearData& unit, double noise_um, std::uint64_t seed,
+                       const tensions::Trial& near) {
   tensions::ReducedData drawn = unit.reduced;
   drawn.target =
       reduced_target(unit, unit.displacement_um + noise_um * noise_of(unit.displacement_um.size(), seed)) / noise_um;
   drawn.compliance = std::make_shared<const Eigen::MatrixXd>(*unit.reduced.compliance / noise_um);
   drawn.floor_squared = static_cast<double>(unit.n_used);
   const tensions::TensionProblem problem(cell.networks.front(), drawn, cell.adhesion_ids);
-  return tensions::fit_gauss_newton(problem, {}, problem.evaluate(cell.tensions_nN)).trial.tensions_nN;
+  return tensions::fit_gauss_newton(problem, {}, problem.evaluate(cell.tensions_nN, &near)).trial.tensions_nN;
 }
 
 struct Scatters {
@@ -120,13 +121,16 @@ void study_errors(int only) {
     const double shares[] = {0.02, 0.05, 0.1};
     std::vector<Eigen::MatrixXd> with_same(3, Eigen::MatrixXd(cell.tensions_nN.size(), kDraws)), with_other = with_same;
     const tensions::LinearData data_of_same = unit_data(cell, same);
+    const tensions::Trial near =
+        tensions::TensionProblem(cell.networks.front(), data_of_same.reduced, cell.adhesion_ids)
+            .evaluate(cell.tensions_nN);
     numerics::parallel_for(kDraws, kThreads, [&](int d) {
       const auto draw = static_cast<std::uint64_t>(d) + 1;
       drawing::Random random(draw, drawing::Stream::beads);
       const tensions::LinearData data_of_other = unit_data(cell, some_of(pool, kDensity / kPool, random));
       for (std::size_t k = 0; k < 3; ++k) {
-        with_same[k].col(d) = fitted(cell, data_of_same, shares[k] * largest_um, draw);
-        with_other[k].col(d) = fitted(cell, data_of_other, shares[k] * largest_um, draw);
+        with_same[k].col(d) = fitted(cell, data_of_same, shares[k] * largest_um, draw, near);
+        with_other[k].col(d) = fitted(cell, data_of_other, shares[k] * largest_um, draw, near);
       }
     });
     for (std::size_t k = 0; k < 3; ++k) {

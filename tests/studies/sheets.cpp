@@ -123,10 +123,13 @@ double blurred_kPa(const Solution& solution, Vec2 at, double sd_um) {
   return norm(sum);
 }
 
-double largest_along(const Solution& solution, double from_um, double sd_um) {
+/// The largest within a spike's half width and three resolutions of a tip at (tip_um, 0).
+double largest_near(const Solution& solution, double tip_um, double sd_um) {
+  constexpr double kHalfWidth_um = 8.3;
   double largest = 0;
-  for (double r = from_um; r > from_um - 3 * sd_um; r -= 0.25 * sd_um)
-    largest = std::max(largest, blurred_kPa(solution, {r, 0}, sd_um));
+  for (double x = tip_um + 0.5 * sd_um; x > tip_um - 3 * sd_um; x -= 0.5 * sd_um)
+    for (double y = 0; y <= kHalfWidth_um; y += 0.25 * kHalfWidth_um)
+      largest = std::max(largest, blurred_kPa(solution, {x, y}, sd_um));
   return largest;
 }
 
@@ -151,7 +154,7 @@ void print_spikes_on_gel() {
     const Solution disc = solve_on_gel(scene_of(0), *model, 2);
     for (const double sd : {4.0, 6.0, 12.0})
       std::printf("%g x %g | %g | %.2f | %.3g | %d | %.2f\n", E, h, sd,
-                  largest_along(spikes, 150, sd) / largest_along(disc, 100, sd), 1000 * largest_along(disc, 100, sd),
+                  largest_near(spikes, 150, sd) / largest_near(disc, 100, sd), 1000 * largest_near(disc, 100, sd),
                   spikes.elements->n_triangles(), seconds);
   }
 }
