@@ -24,7 +24,7 @@ std::vector<CellNumbers> cells_of(const Scene& scene, const Computed& computed, 
 }
 
 Plan plan_of(const Parameters& parameters, stage::StageContext& context) {
-  const tensions::Work work{.threads = context.threads, .progress = context.progress};
+  const Work work(context.threads, context.progress);
   const Scene scene = scene_of(parameters, context);
   const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
   const Asked asked = asked_by(parameters, own_kPa);

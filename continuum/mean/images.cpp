@@ -13,7 +13,7 @@
 namespace mbtfm::mean {
 namespace {
 
-constexpr int kAngles = 120;
+constexpr int kImageAngles = 120;
 constexpr int kCoarse_px = 160;  // of the longer side while angles are tried: 3 degrees are then four pixels at the rim
 constexpr int kFine_px = 800;    // of the longer side at last: more tells the place no better than the outline is drawn
 constexpr int kWays = 4;         // that are refined
@@ -169,15 +169,16 @@ std::vector<ImageWay> ways_by_images(const Brightness& image, const Brightness& 
   for (const bool is_mirrored : {false, true}) {
     if (is_mirrored && mirrors == Mirrors::not_tried) continue;
     std::vector<Start> around;
-    for (int k = 0; k < kAngles; ++k) {
-      Motion motion{0.5 * coarse.size_um(), 0.5 * coarse_reference.size_um(), 2 * std::numbers::pi * k / kAngles,
+    for (int k = 0; k < kImageAngles; ++k) {
+      Motion motion{0.5 * coarse.size_um(), 0.5 * coarse_reference.size_um(), 2 * std::numbers::pi * k / kImageAngles,
                     is_mirrored};
       const Peak peak = best_shift(laid(coarse, coarse_reference, motion).values, coarse_reference);
       motion.to_um += peak.shift_um;
       around.push_back({motion, peak.height});
     }
-    for (int k = 0; k < kAngles; ++k) {
-      const double before = around[(k + kAngles - 1) % kAngles].height, after = around[(k + 1) % kAngles].height;
+    for (int k = 0; k < kImageAngles; ++k) {
+      const double before = around[(k + kImageAngles - 1) % kImageAngles].height,
+                   after = around[(k + 1) % kImageAngles].height;
       if (around[k].height > before && around[k].height >= after) starts.push_back(around[k]);
     }
   }

@@ -13,9 +13,9 @@ namespace {
 
 /// Fibres that meet at a smaller angle lie side by side, and keep the least distance of a carpet.
 constexpr double kAlongside_rad = 12 * std::numbers::pi / 180;
-constexpr double kShortestVentral_um = 10;  ///< ventral fibres span a good part of the cell
-constexpr double kMerge_um = 6;             ///< the last part of a fibre that bends to its neighbour's adhesion
-constexpr int kTries = 60;                  ///< for one fibre of a group, before the next place is tried
+constexpr double kShortestDenseVentral_um = 10;  ///< ventral fibres span a good part of the cell
+constexpr double kMerge_um = 6;                  ///< the last part of a fibre that bends to its neighbour's adhesion
+constexpr int kTries = 60;                       ///< for one fibre of a group, before the next place is tried
 
 /// One end of a fibre: free, on an adhesion of its own, or on one that is there already.
 struct End {
@@ -184,7 +184,7 @@ std::optional<Plan> plan_ventral(const Sketch& sketch, const Carpet& carpet, dou
     reach[k] = reach_um(sketch, own, offset, 2 * k - 1, random.uniform(1.5, 6));
     if (random.uniform() < 0.25) reach[k] *= random.uniform(0.5, 0.9);  // some end in the middle of the cell
   }
-  if (reach[0] + reach[1] < kShortestVentral_um) return std::nullopt;
+  if (reach[0] + reach[1] < kShortestDenseVentral_um) return std::nullopt;
   Plan plan;
   const double swing_um = 0.1 * random.normal(), wave_per_um = 2 * std::numbers::pi / random.uniform(6, 15);
   for (double s = -reach[0]; s <= reach[1]; s += kFibreSpacing_um)

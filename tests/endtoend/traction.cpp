@@ -4,6 +4,7 @@
 #include <random>
 
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/contract/errors.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"

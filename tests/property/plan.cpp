@@ -35,7 +35,7 @@ Scene small_scene(double youngs_modulus_kPa = 8) {
 
 struct Small {
   Scene scene = small_scene();
-  KnownCell cell = known_cell(scene, {.threads = kThreads});
+  KnownCell cell = known_cell(scene, kThreads);
 };
 const Small& small() {
   static const Small small;
@@ -61,7 +61,7 @@ TEST(Plan, its_error_by_beads_is_that_which_a_fit_states) {
   const std::vector<cables::CableNetwork> one = {cell.networks.front()};
   const tensions::EnsembleFit fit = tensions::fit_ensemble(
       one, tensions::reduce(field, beads.response, {}, kThreads, tensions::affine_motions(field)), cell.adhesion_ids,
-      scene.fit.fit, kThreads, {}, {}, &truth);
+      scene.fit.fit, kThreads, {}, &truth);
   for (std::size_t i = 0; i < fit.tensions_nN.size(); ++i) {
     const double planned = kNoise_um * scene.fit.gel.youngs_modulus_kPa * unit.tensions[static_cast<Eigen::Index>(i)];
     // the plan takes the mean of two meshes, of which the fit has the first: tensions differ by some per cent
@@ -81,7 +81,7 @@ TEST(Plan, twice_the_modulus_is_twice_the_error) {
 
 TEST(Plan, four_times_the_beads_halve_the_error) {
   const auto& [scene, cell] = small();
-  const Densities d = precision_at(scene, cell, {0.5, 2}, {.threads = kThreads});
+  const Densities d = precision_at(scene, cell, {0.5, 2}, kThreads);
   const double thin = median_of(d.precision[0].tensions), dense = median_of(d.precision[1].tensions);
   // But for which places few beads have by chance: of a tension the beads near its two adhesions tell half, and of
   // some six of these the number scatters by 40 %, the error by 20 %, the median of five over three draws by 10 %.
@@ -91,7 +91,7 @@ TEST(Plan, four_times_the_beads_halve_the_error) {
 
 TEST(Plan, between_densities_the_error_lies_between_and_beyond_them_it_follows_the_law) {
   const auto& [scene, cell] = small();
-  const Densities d = precision_at(scene, cell, {0.5, 2}, {.threads = kThreads});
+  const Densities d = precision_at(scene, cell, {0.5, 2}, kThreads);
   const double thin = unit_error(d, 1, 0.5), dense = unit_error(d, 1, 2);
   EXPECT_DOUBLE_EQ(thin, d.precision[0].tensions[1]);
   EXPECT_NEAR(dense, d.precision[1].tensions[1], 1e-12 * dense);
@@ -108,7 +108,7 @@ TEST(Plan, at_the_density_that_is_needed_half_of_the_fibres_meet_the_target) {
   p.youngs_modulus_kPa = "4,8";
   p.within = "50%";
   const Asked asked = asked_by(p, 8);
-  const Computed computed = compute(scene, asked, {.threads = kThreads});
+  const Computed computed = compute(scene, asked, kThreads);
   const Grid grid = grid_of(scene, asked, computed);
   ASSERT_EQ(grid.needed.size(), 2u);
   for (const Needed& n : grid.needed) {
