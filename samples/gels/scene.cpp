@@ -1,5 +1,6 @@
 #include "samples/gels/scene.h"
 
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>

@@ -243,7 +243,7 @@ TEST(DenseProblem, its_degrees_of_freedom_and_covariance_are_those_of_its_answer
       for (Bead& b : one) b.displacement_um = {};
       Bead& bead = one[static_cast<std::size_t>(component / 2)];
       (component % 2 == 0 ? bead.displacement_um.x : bead.displacement_um.y) = bead.sigma_um;
-      const VectorXd answer = problem_of(scene, one).solve(lambda);
+      const VectorXd answer = problem_of(scene, one).spectrum().solve(lambda);
       degrees += scene.G.row(component).dot(answer) / bead.sigma_um;
       covariance += answer * answer.transpose();
     }
@@ -251,7 +251,7 @@ TEST(DenseProblem, its_degrees_of_freedom_and_covariance_are_those_of_its_answer
     // one datum of weight 1 has the variance that the errors state for the mean weight
     double mean_weight = 0;
     for (const Bead& b : scene.beads) mean_weight += 1 / (b.sigma_um * b.sigma_um) / kBeads;
-    const MatrixXd stated = problem_of(scene, scene.beads).covariance(lambda, 1 / mean_weight);
+    const MatrixXd stated = problem_of(scene, scene.beads).spectrum().covariance(lambda, 1 / mean_weight);
     EXPECT_LE((stated - covariance).norm(), 1e-9 * covariance.norm());
   }
 }

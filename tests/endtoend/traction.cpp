@@ -5,6 +5,7 @@
 
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/errors.h"
+#include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"

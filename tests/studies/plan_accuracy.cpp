@@ -108,9 +108,9 @@ void study_errors(int only) {
     p.scenario = name;
     p.seed = static_cast<std::uint64_t>(seed);
     const Scene scene = simulated_scene(p);
-    const KnownCell cell = known_cell(scene, {.threads = kThreads});
+    const KnownCell cell = known_cell(scene, kThreads);
     const double own_kPa = scene.fit.gel.youngs_modulus_kPa;
-    const Precision plan = precision_at(scene, cell, {kDensity}, {.threads = kThreads}).precision.front();
+    const Precision plan = precision_at(scene, cell, {kDensity}, kThreads).precision.front();
     const BeadsOnGel same = beads_on_gel(scene, cell, kDensity, 10, kThreads),
                      pool = beads_on_gel(scene, cell, kPool, 11, kThreads);
     const Precision of_same = precision_of(scene, cell, same, kThreads);
@@ -250,7 +250,7 @@ void study_pairs() {
 void study_scaling() {
   Parameters p;
   const Scene scene = simulated_scene(p);
-  const KnownCell cell = known_cell(scene, {.threads = kThreads});
+  const KnownCell cell = known_cell(scene, kThreads);
   std::printf("beads_per_um2,draw,median_tension_error,total_force_error,median_force_error,median_free_error\n");
   for (const double density : {0.125, 0.25, 0.5, 1.0, 2.0}) {
     for (const std::uint64_t draw : {1, 2, 3}) {
