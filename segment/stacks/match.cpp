@@ -11,20 +11,11 @@
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
 #include "segment/beads/track.h"
+#include "segment/stacks/chunks.h"
 #include "segment/stacks/near.h"
 
 namespace mbtfm::stacks {
 namespace {
-
-constexpr int kChunk = 64;
-
-template <class Body>
-void for_each(std::size_t n, int threads, const Body& body) {
-  const auto count = static_cast<int>(n);
-  numerics::parallel_for((count + kChunk - 1) / kChunk, threads, [&](int chunk) {
-    for (int k = chunk * kChunk; k < std::min(count, (chunk + 1) * kChunk); ++k) body(static_cast<std::size_t>(k));
-  });
-}
 
 Eigen::Vector3d as_eigen(Vec3 v) { return {v.x, v.y, v.z}; }
 Vec3 as_vec(const Eigen::Vector3d& v) { return {v[0], v[1], v[2]}; }

@@ -10,6 +10,7 @@
 #include "pipeline/contract/errors.h"
 #include "pipeline/numerics/order_statistics.h"
 #include "pipeline/numerics/parallel.h"
+#include "segment/stacks/chunks.h"
 #include "segment/stacks/near.h"
 
 namespace mbtfm::stacks {
@@ -22,16 +23,6 @@ constexpr double kTouching = 4;     // widths: nearer spots are fitted jointly
 constexpr int kMostNeighbours = 3;  // fitted with a spot; further ones are where they were
 constexpr double kStep = 0.5;       // widths, of one step
 constexpr double kSettled = 2e-3;   // widths, and of the height: well below the noise of the brightest
-constexpr int kChunk = 32;
-
-template <class Body>
-void for_each(std::size_t n, int threads, const Body& body) {
-  const auto count = static_cast<int>(n);
-  numerics::parallel_for((count + kChunk - 1) / kChunk, threads, [&](int chunk) {
-    for (int k = chunk * kChunk; k < std::min(count, (chunk + 1) * kChunk); ++k) body(static_cast<std::size_t>(k));
-  });
-}
-
 /// Voxels around a place, both ends included.
 struct Box {
   int low[3], high[3];
