@@ -127,8 +127,8 @@ inline std::string drawn(const Graph& graph, const std::string& title) {
   constexpr double kHeight = 26, kRise = 84, kTop = 64;
   const Layout layout = layout_of(graph);
   const std::map<std::string, std::string> colours = {
-      {"pipeline", "#dfe7f2"}, {"segment", "#e2f0d9"}, {"network", "#fff2cc"}, {"substrate", "#f8dfcf"},
-      {"mbtfm", "#ead9ee"},    {"samples", "#d9eeee"}, {"programs", "#eeeeee"}};
+      {"pipeline", "#dfe7f2"}, {"segment", "#e2f0d9"},   {"network", "#fff2cc"}, {"substrate", "#f8dfcf"},
+      {"mbtfm", "#ead9ee"},    {"continuum", "#f6dde3"}, {"samples", "#d9eeee"}, {"programs", "#eeeeee"}};
   std::ostringstream svg;
   const double height = kTop + (layout.n_rows - 1) * kRise + kHeight + 20;
   svg << "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"" << kPage << "\" height=\"" << height
