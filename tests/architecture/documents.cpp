@@ -5,8 +5,8 @@
 #include <regex>
 #include <sstream>
 
-#include "mbtfm/tensions/tables.h"
 #include "mbtfm/spatial/files.h"
+#include "mbtfm/tensions/tables.h"
 #include "mbtfm/tractions/traction.h"
 #include "pipeline/contract/findings.h"
 #include "pipeline/cost/study_report.h"
@@ -64,8 +64,8 @@ std::string column_page() {
          "[formats.md](formats.md). *May lack*: older files, or files made elsewhere, need not have this column.\n"
          "Results have six significant digits; numbers that a later stage computes with have all digits.\n" +
          files::pages_of_cell_tables() + tensions::pages_of_tables() + tractions::pages_of_tables() +
-         spatial::pages_of_tables() +
-         runner::pages_of_tables() + cost::pages_of_tables() + statistics::pages_of_tables();
+         spatial::pages_of_tables() + runner::pages_of_tables() + cost::pages_of_tables() +
+         statistics::pages_of_tables();
 }
 
 TEST(Documents, the_page_of_columns_is_what_the_tables_declare) {
