@@ -50,7 +50,7 @@ class GroupLasso {
   void minimise(double mu) {
     constexpr double kSettled = 1e-3;  // of x: below what the noise makes of it
     constexpr int kMost = 600;
-    // about where shortening is a tenth of the largest vectors: measured, fewer steps than at 0.01 and 1
+    // about where shortening is a tenth of the largest vectors, as mbtfm/tractions/sparse.cpp has it
     constexpr double kShortening = 0.1;
     const double rho = mu * weights_.mean() / (kShortening * largest_);
     VectorXd x;
@@ -125,7 +125,7 @@ struct Posterior {
 };
 
 Posterior posterior_of(const GroupLasso& lasso, const MatrixXd& normal, double mu, double variance, int threads) {
-  constexpr int kRounds = 4;  // the errors change by a hundredth in the last one
+  constexpr int kRounds = 4;
   const Index n = lasso.weights().size();
   Posterior posterior{lasso.x(), {}, {}};
   ArrayXd spread = ArrayXd::Constant(n, lengths_of(lasso.x()).square().mean());
