@@ -50,11 +50,11 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   const MatrixXd patch_shapes = shapes_of(problem, problem.adhesion_areas_um2) * scales.asDiagonal();
   of_patches = of_patches * scales.replicate(3, 1).asDiagonal();
   const bool has_background = parameters.background > 0;
-  MatrixXd shapes = patch_shapes, response = of_patches;
+  MatrixXd shapes = patch_shapes, response = of_patches, of_background(G.rows(), 0);
   if (has_background) {
     const double weak = parameters.background;
     const Basis background = orthonormal_basis(norm_of(problem.mesh, problem.ground, [weak](Vec2) { return weak; }));
-    const MatrixXd of_background = background.response(problem.response_um_per_kPa, threads);
+    of_background = background.response(problem.response_um_per_kPa, threads);
     const Index n = background.size(), m = n + n_patches;
     shapes.resize(patch_shapes.rows(), m);
     shapes << background.shapes(), patch_shapes;
@@ -66,6 +66,7 @@ SpatialReconstruction reconstruct_patches(const Problem& problem, const traction
   }
   r = reconstruct_in(Basis(std::move(shapes)), response, problem, traction, parameters, threads);
   if (r.covariance_kPa2.size() == 0) return r;  // nothing has moved
+  r.forces = forces_beside_background(problem, of_background, r, threads);
   const double alone = misfit_alone(problem, of_patches, r.weighing.by_row, r.weighing.n_data, threads);
   r.figures.emplace_back("misfit_of_patches_alone", alone / r.variance);
   r.findings.push_back(noticed(

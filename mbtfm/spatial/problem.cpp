@@ -105,6 +105,7 @@ Problem Problem::with_response(const MatrixXd& matrix, const VectorXd& displaced
   const VectorXd offset = displaced_um - matrix * about_kPa;
   other.surface_offset_um = offset.tail(n_unknowns());
   other.offset_um = at_beads(offset).col(0);
+  other.patch_response_um_per_nN.resize(0, 0);  // that of the gel at rest
   return other;
 }
 

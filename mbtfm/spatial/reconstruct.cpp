@@ -135,8 +135,8 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
   if (!inputs.adhesions.empty() && r.forces.empty()) {
     r.forces =
         forces_on(problem, r, adhesion_areas_um2(problem.mesh, problem.ground, inputs.adhesions, traction.grow_um));
-    for (std::size_t a = 0; a < r.forces.size(); ++a) r.forces[a].adhesion_id = inputs.adhesions[a].adhesion_id;
   }
+  for (std::size_t a = 0; a < r.forces.size(); ++a) r.forces[a].adhesion_id = inputs.adhesions[a].adhesion_id;
   const Observed& observed = problem.observed;
   r.noise_um = r.weighing.scale *
                (observed.states_errors

@@ -96,6 +96,21 @@ SpatialReconstruction reconstruct_direct(const Problem& problem, int threads);
 SpatialReconstruction reconstruct_green(const Problem& problem, const tractions::TractionParameters& traction,
                                         const SpatialParameters& parameters, int threads);
 
+/// Forces on the adhesions beside a background that is only known to be weak: what the beads say of an even load on
+/// each, least squares with the background's displacement as a part of the noise. Smoothing takes nothing from them,
+/// and their errors hold noise and background. Where the surface carries more than these adhesions do, it is in the
+/// errors only as far as it is as weak as lambda says.
+///
+///   f = (PᵀWP)⁻¹ PᵀW u,  cov f = (PᵀWP)⁻¹,  W⁻¹ = v (I + A Aᵀ/lambda²)
+///
+/// u, A and P weighed by S: the displacement, what it answers to the background's unknowns and to the forces; v the
+/// variance of a datum. Source: generalised least squares (Aitken 1936), with (I + A Aᵀ/lambda²)⁻¹ =
+/// I − A (AᵀA + lambda²)⁻¹ Aᵀ.
+/// @param background  of the beads to the unknowns of the background, |x|² their norm
+/// @param reconstruction  with its lambda, weights and variance
+std::vector<PartForce> forces_beside_background(const Problem& problem, const Eigen::MatrixXd& background,
+                                                const SpatialReconstruction& reconstruction, int threads);
+
 /// The forces of the tractions, and their errors where the reconstruction has a covariance.
 std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruction& reconstruction,
                                  const Eigen::MatrixXd& areas_um2);

@@ -77,11 +77,11 @@ void notice_balance(stage::StageContext& context, const SpatialReconstruction& r
 }
 
 Meshing meshing_of(const StageParameters& p, tractions::TractionMethod method) {
-  using tractions::TractionMethod;
+  using enum tractions::TractionMethod;
   return {.spacing_um = p.traction.spacing_um,
           .grow_um = p.traction.grow_um,
-          .has_patches = method == TractionMethod::patches,
-          .has_facets = method == TractionMethod::green};
+          .has_patches = method == patches || method == tikhonov || method == group_l1,
+          .has_facets = method == green};
 }
 
 /// Strains are small until tractions are known that make them large.

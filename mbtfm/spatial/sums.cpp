@@ -1,6 +1,8 @@
+#include <Eigen/Cholesky>
 #include <cmath>
 
 #include "mbtfm/spatial/reconstruction.h"
+#include "pipeline/numerics/dense.h"
 
 namespace mbtfm::spatial {
 
@@ -38,27 +40,65 @@ VectorXd resolved_shares(const MatrixXd& covariance, const MatrixXd& precision_b
   return shares.cwiseMax(0).cwiseMin(1);
 }
 
-std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruction& r, const MatrixXd& areas_um2) {
+namespace {
+
+/// Where they act, and on how much of the surface.
+std::vector<PartForce> parts_of(const Problem& problem, const MatrixXd& areas_um2) {
   const std::vector<Vec3> vertices = problem.vertices_um();
-  std::vector<PartForce> forces;
+  std::vector<PartForce> parts;
   for (Index a = 0; a < areas_um2.rows(); ++a) {
-    PartForce& force = forces.emplace_back();
-    MatrixXd sums = MatrixXd::Zero(3, r.traction_kPa.size());
+    PartForce& part = parts.emplace_back();
     Vec3 centre;
     for (Index v = 0; v < areas_um2.cols(); ++v) {
-      const double area = areas_um2(a, v);
-      for (Index c = 0; c < 3; ++c) sums(c, 3 * v + c) = area;
-      force.area_um2 += area;
-      centre += area * vertices[static_cast<std::size_t>(v)];
+      part.area_um2 += areas_um2(a, v);
+      centre += areas_um2(a, v) * vertices[static_cast<std::size_t>(v)];
     }
-    if (force.area_um2 > 0) force.position_um = 1 / force.area_um2 * centre;
+    if (part.area_um2 > 0) part.position_um = 1 / part.area_um2 * centre;
+  }
+  return parts;
+}
+
+void set_force(PartForce& part, const Vector3d& force_nN, const Matrix3d& covariance_nN2) {
+  part.force_nN = vec(force_nN);
+  part.sigma_nN = vec(covariance_nN2.diagonal().cwiseMax(0).cwiseSqrt());
+  const Vector3d along = force_nN.norm() > 0 ? Vector3d(force_nN.normalized()) : Vector3d::UnitX();
+  part.magnitude_sigma_nN = std::sqrt(std::max(0.0, along.dot(covariance_nN2 * along)));
+}
+
+}  // namespace
+
+std::vector<PartForce> forces_beside_background(const Problem& problem, const MatrixXd& background,
+                                                const SpatialReconstruction& r, int threads) {
+  const VectorXd roots = r.weighing.by_row.cwiseSqrt().cwiseQuotient(problem.observed.sigma_um);
+  const MatrixXd A = roots.asDiagonal() * background, P = roots.asDiagonal() * problem.patch_response_um_per_nN;
+  const VectorXd u = roots.cwiseProduct(problem.displacement_um());
+  MatrixXd inner = MatrixXd::Zero(A.cols(), A.cols());
+  numerics::add_upper_gram(A, inner, threads);
+  inner.diagonal().array() += *r.lambda * *r.lambda;
+  const Eigen::LLT<MatrixXd, Eigen::Upper> factor(inner);
+  const MatrixXd AP = A.transpose() * P;
+  const MatrixXd hidden = factor.solve(AP);
+  const Eigen::LLT<MatrixXd> told(P.transpose() * P - AP.transpose() * hidden);
+  const VectorXd forces_nN = told.solve(P.transpose() * u - hidden.transpose() * (A.transpose() * u));
+  const MatrixXd covariance_nN2 = r.variance * told.solve(MatrixXd::Identity(P.cols(), P.cols()));
+  std::vector<PartForce> parts = parts_of(problem, problem.adhesion_areas_um2);
+  for (std::size_t a = 0; a < parts.size(); ++a) {
+    const auto at = 3 * static_cast<Index>(a);
+    set_force(parts[a], forces_nN.segment<3>(at), covariance_nN2.block<3, 3>(at, at));
+  }
+  return parts;
+}
+
+std::vector<PartForce> forces_on(const Problem& problem, const SpatialReconstruction& r, const MatrixXd& areas_um2) {
+  std::vector<PartForce> forces = parts_of(problem, areas_um2);
+  for (std::size_t a = 0; a < forces.size(); ++a) {
+    MatrixXd sums = MatrixXd::Zero(3, r.traction_kPa.size());
+    for (Index v = 0; v < areas_um2.cols(); ++v) {
+      for (Index c = 0; c < 3; ++c) sums(c, 3 * v + c) = areas_um2(static_cast<Index>(a), v);
+    }
     const Vector3d f = sums * (r.unshortened_kPa.size() > 0 ? r.unshortened_kPa : r.traction_kPa);
-    force.force_nN = vec(f);
-    if (r.covariance_kPa2.size() == 0) continue;
-    const Matrix3d covariance = sums * r.covariance_kPa2 * sums.transpose();
-    force.sigma_nN = vec(covariance.diagonal().cwiseMax(0).cwiseSqrt());
-    const Vector3d along = f.norm() > 0 ? Vector3d(f.normalized()) : Vector3d::UnitX();
-    force.magnitude_sigma_nN = std::sqrt(std::max(0.0, along.dot(covariance * along)));
+    forces[a].force_nN = vec(f);
+    if (r.covariance_kPa2.size() > 0) set_force(forces[a], f, sums * r.covariance_kPa2 * sums.transpose());
   }
   return forces;
 }

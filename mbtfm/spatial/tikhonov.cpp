@@ -101,8 +101,10 @@ SpatialReconstruction reconstruct_tikhonov(const Problem& problem, const tractio
   if (problem.map) return reconstruct_large(problem, traction, parameters);
   const MatrixXd norm = norm_of(problem.mesh, problem.ground, [&](Vec2 p) { return problem.expected.amplitude(p); });
   const Basis basis = orthonormal_basis(norm);
-  SpatialReconstruction r = reconstruct_in(basis, basis.response(problem.response_um_per_kPa, threads), problem,
-                                           traction, parameters, threads);
+  const MatrixXd response = basis.response(problem.response_um_per_kPa, threads);
+  SpatialReconstruction r = reconstruct_in(basis, response, problem, traction, parameters, threads);
+  if (r.lambda && problem.patch_response_um_per_nN.size() > 0)
+    r.forces = forces_beside_background(problem, response, r, threads);
   if (r.lambda) r.resolved = resolved_shares(r.covariance_kPa2, *r.lambda * *r.lambda / r.variance * norm);
   return r;
 }
