@@ -46,8 +46,8 @@ foreach(library ${interfaces})
     string(APPEND MBTFM_PC_LIBRARIES " -l${library}")
   endif()
   string(REPLACE _ / folder ${library})
-  install(DIRECTORY ${folder}/ DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbtfm/${folder} COMPONENT Development
-    FILES_MATCHING PATTERN *.h PATTERN */* EXCLUDE)
+  file(GLOB headers ${folder}/*.h)  # those of its subfolders are other libraries'
+  install(FILES ${headers} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/mbtfm/${folder} COMPONENT Development)
 endforeach()
 set(MBTFM_PC_THIRD_PARTY "")
 foreach(library IOXML IOXMLParser IOCore CommonExecutionModel CommonDataModel CommonMisc CommonSystem CommonTransforms CommonMath CommonCore)

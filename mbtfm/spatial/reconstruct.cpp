@@ -132,6 +132,7 @@ SpatialReconstruction reconstruct(const Problem& problem, const SpatialInputs& i
   }
   SpatialReconstruction r = by_method(method, problem, traction, parameters, threads);
   r.method = method;
+  if (inputs.adhesions.empty()) r.forces.clear();
   if (!inputs.adhesions.empty() && r.forces.empty()) {
     r.forces =
         forces_on(problem, r, adhesion_areas_um2(problem.mesh, problem.ground, inputs.adhesions, traction.grow_um));

@@ -41,17 +41,22 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
   const auto floor = [&](double variance) {
     return std::max({variance, observed.states_errors ? 1.0 : 0.0, problem.variance_of_model()});
   };
-  // the tractions of the weighed beads with the lambda of their own noise
-  const auto fit = [&](Weighing weighing) {
-    Fit made;
-    made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
+  const auto scanned = [&](const tractions::Spectrum& spectrum, const Weighing& weighing) {
     std::optional<double> stated;
     if (parameters.loss != BeadLoss::l2) {
       stated = floor(weighing.variance);
     } else if (floor(0) > 0) {
       stated = floor(0);
     }
-    made.scan = made.spectrum->scan(stated);
+    return spectrum.scan(stated);
+  };
+  // The tractions of the weighed beads with the lambda of their own noise, or with that of `judged`: beads far astray
+  // that keep some weight would be followed by ever smaller lambdas, so that lambda is chosen without them.
+  const auto fit = [&](Weighing weighing, const std::optional<Weighing>& judged = {}) {
+    Fit made;
+    made.spectrum.emplace(spectrum_of(problem, response, weighing.by_row, weighing.n_data, threads));
+    made.scan = judged ? scanned(spectrum_of(problem, response, judged->by_row, judged->n_data, threads), *judged)
+                       : scanned(*made.spectrum, weighing);
     made.lambda = traction.lambda_um_per_kPa ? *traction.lambda_um_per_kPa * lambda_per_um_per_kPa(problem)
                                              : chosen_lambda(made.scan, traction.lambda_by);
     made.x = made.spectrum->solve(made.lambda);
@@ -76,11 +81,15 @@ SpatialReconstruction reconstruct_in(const Basis& basis, const MatrixXd& respons
     constexpr double kSettled = 0.005;
     Weighing weighing =
         weigh(parameters.loss == BeadLoss::biweight ? BeadLoss::huber : parameters.loss, observed, of_nothing, 0);
+    std::optional<Weighing> judged;  // none before a residual is known
     double change = 1;
     for (int round = 0; round < kMostRounds && change > kSettled; ++round) {
-      Fit next = fit(std::move(weighing));
+      Fit next = fit(std::move(weighing), judged);
       change = (next.x - last.x).norm() / std::max(next.x.norm(), 1e-300);
-      weighing = weigh(parameters.loss, observed, residual(next.x), next.spectrum->degrees(next.lambda));
+      const VectorXd left = residual(next.x);
+      const double degrees = next.spectrum->degrees(next.lambda);
+      weighing = weigh(parameters.loss, observed, left, degrees);
+      if (parameters.loss != BeadLoss::biweight) judged = weigh(BeadLoss::biweight, observed, left, degrees);
       last = std::move(next);
     }
   }

@@ -54,8 +54,7 @@ class TiffReader {
     all.z = kProjection;
     std::vector<int> pages(static_cast<std::size_t>(n_pages()));
     std::iota(pages.begin(), pages.end(), 0);
-    if (const auto stack = stack_of(of_first_page_.description, file_.filename().string()))
-      pages = chosen_pages(*stack, all, file_.string());
+    if (const auto stack = dimensions(all)) pages = chosen_pages(*stack, all, file_.string());
     const std::optional<double> z_step = z_step_um(of_first_page_);
     std::vector<Image> slices;
     for (const int page : pages) {

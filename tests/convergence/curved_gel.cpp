@@ -358,9 +358,8 @@ TEST(AnEllipse, pulls_at_the_centre_of_the_area_that_it_covers_of_the_slope) {
     if (free >= 0) place[static_cast<std::size_t>(free)] = {at.x(), at.y()};
   }
   Vec2 pulled, centre;
-  for (const boxes::NodeWeight& w :
-       load_weights(block, space, {.shapes = std::vector<substrate::Ellipse>{ellipse}}).front())
-    pulled += w.weight * place[static_cast<std::size_t>(w.node)];
+  const auto loads = load_weights(block, space, {.shapes = std::vector<substrate::Ellipse>{ellipse}});
+  for (const boxes::NodeWeight& w : loads.front()) pulled += w.weight * place[static_cast<std::size_t>(w.node)];
   double area = 0;
   constexpr int kRings = 400;
   for (int k = 0; k < kRings * kRings; ++k) {

@@ -30,7 +30,7 @@ class LargeStrains : public ::testing::Test {
 
   Outcome run(const std::string& settings) {
     files::write_text(cell() / "cell.toml", toml_ + settings);
-    return run_program("mbtfm run " + cell().string());
+    return run_program("mbtfm run --verbose " + cell().string());
   }
   /// Of the forces found, |F − true| / |true|.
   double error() const {

@@ -56,8 +56,9 @@ class Stacks : public testing::Test {
 };
 
 TEST_F(Stacks, beads_are_followed_to_the_truth_within_their_errors) {
-  const auto outcome =
-      run_program(track(relaxed(), stressed(), "--surface_beads " + (cell() / "surface_beads.tif").string()));
+  const auto outcome = run_program(track(relaxed(), stressed(),
+                                         "--surface_beads " + (cell() / "surface_beads.tif").string() + " --record " +
+                                             (*folder_ / "out/record.json").string()));
   ASSERT_EQ(outcome.code, 0) << outcome.output;
   const fs::path out = *folder_ / "out";
   const auto found = files::read_displacement_in_space(out / "displacement_3d.csv");
@@ -154,8 +155,8 @@ TEST_F(Stacks, scenes_are_in_balance_and_at_rest_at_the_base) {
       const Vec3 difference{off("fx_nN", "aimed_fx_nN"), off("fy_nN", "aimed_fy_nN"), off("fz_nN", "aimed_fz_nN")};
       const Vec3 aimed{patches.number(row, "aimed_fx_nN"), patches.number(row, "aimed_fy_nN"),
                        patches.number(row, "aimed_fz_nN")};
-      // sources 3 um above the surface cannot make bumps of 6 um to better than a fifth
-      EXPECT_LT(norm(difference), 0.25 * norm(aimed)) << "patch " << row + 1;
+      // within 30 degrees of where it is aimed: sources above the surface blur what patches near each other do
+      EXPECT_LT(norm(difference), 0.5 * norm(aimed)) << "patch " << row + 1;
     }
   }
 }

@@ -140,9 +140,10 @@ class TractionInSpace : public testing::Test {
         "--low_y_um -24 --high_x_um 24 --high_y_um 24 --out " +
         at("surface.vtp"));
     ASSERT_EQ(surface.code, 0) << surface.output;
-    files::write_text(folder_ / "adhesions.csv",
-                      "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg\n"
-                      "1,-9,2,38.48,7,7,0\n2,9,-2,38.48,7,7,0\n");
+    files::write_text(
+        folder_ / "adhesions.csv",
+        "adhesion_id,x_um,y_um,area_um2,major_axis_um,minor_axis_um,angle_deg,eccentricity,mean_intensity\n"
+        "1,-9,2,38.48,7,7,0,0,1\n2,9,-2,38.48,7,7,0,0,1\n");
     files::write_text(folder_ / "adhesion_forces.csv", "adhesion_id,fx_nN,fy_nN,fz_nN\n1,60,-10,-15\n2,-60,10,15\n");
     std::mt19937_64 random(7);
     std::uniform_real_distribution<double> across(-18, 18), down(4, 14);

@@ -25,7 +25,9 @@ TractionInputs inputs_of(const EllipseScene& scene) {
   return {.beads = scene.field, .gel = scene.gel, .adhesions = scene.adhesions, .outline_um = {}};
 }
 
-const std::vector<TractionMethod> kMethods = values_of<TractionMethod>();
+/// Those of flat surfaces.
+const std::vector<TractionMethod> kMethods = {TractionMethod::fttc, TractionMethod::sparse, TractionMethod::trpf,
+                                              TractionMethod::bem, TractionMethod::adhesion_forces};
 
 /// With what every method asks for.
 TractionInputs full_inputs_of(const EllipseScene& scene) {
