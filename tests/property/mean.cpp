@@ -196,16 +196,28 @@ TEST(Mean, turning_the_beads_turns_the_tractions) {
   const CellField still = field_of(registered(p.beads, {}), fttc(), kLambda_um_per_kPa);
   const Motion motion{{0, 0}, {7, -3}, 37 * kDegree, true};
   const CellField turned = field_of(registered(p.beads, motion), fttc(), kLambda_um_per_kPa);
-  double difference = 0, size = 0;
+  double difference = 0, error = 0;
+  const auto truth_kPa = [&](Vec2 at) {
+    Vec2 traction;
+    for (std::size_t j = 0; j < p.patches.size(); ++j) {
+      const substrate::Ellipse& e = p.patches[j];
+      const Vec2 along{std::cos(e.angle_rad), std::sin(e.angle_rad)}, off = at - e.centre_um;
+      const double u = dot(off, along) / e.semi_major_um, v = cross(along, off) / e.semi_minor_um;
+      if (u * u + v * v <= 1) traction += 1 / (std::numbers::pi * e.semi_major_um * e.semi_minor_um) * p.forces_nN[j];
+    }
+    return traction;
+  };
   for (double y = -30; y <= 30; y += 2) {
     for (double x = -30; x <= 30; x += 2) {
       const Vec2 here = motion.vector(still.at({x, y})->traction_kPa);
       const Vec2 there = turned.at(motion.place_um({x, y}))->traction_kPa;
       difference += dot(here - there, here - there);
-      size += dot(here, here);
+      const Vec2 off = still.at({x, y})->traction_kPa - truth_kPa({x, y});
+      error += dot(off, off);
     }
   }
-  EXPECT_LT(std::sqrt(difference / size), 0.02);
+  // beads lie 1.6 um apart, and the nodes do not turn with them: of the error of the map, less than a third
+  EXPECT_LT(std::sqrt(difference / error), 1.0 / 3);
 }
 
 TEST(Mean, a_model_is_blurred_as_beads_blur_the_truth) {
