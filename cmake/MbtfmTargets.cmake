@@ -2,6 +2,7 @@
 # a target with the project's include root and warnings.
 
 add_library(mbtfm_options INTERFACE)
+target_compile_features(mbtfm_options INTERFACE cxx_std_20)
 target_include_directories(mbtfm_options INTERFACE
   $<BUILD_INTERFACE:${CMAKE_SOURCE_DIR}> $<INSTALL_INTERFACE:include/mbtfm>)
 # -Wno-restrict: GCC 12 sees overlapping copies in std::string concatenation that are not there (GCC PR 105651)
