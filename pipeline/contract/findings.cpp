@@ -74,9 +74,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "of simulated pairs the errors are 1.0 to 1.1 times sigma up to a ratio of 1.47, and 1.2 to 1.7 times at 1.6",
        "Focus both images on the same plane of beads. Of a stack, choose the plane with relaxed_z or stressed_z."},
       {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
-       "of simulated stacks of 2 000 to 20 000 beads 1 to 3 of a hundred are lost; where many are, those of the "
-       "strained "
-       "parts are lost first",
+       "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; where many are, those of the "
+       "strained parts are lost first",
        "Look at the flags in displacement_3d.csv. `no partner`: a larger track.largest_displacement_um, a lower "
        "track.detection_snr, or stacks that show the same depth. `ambiguous`: fewer beads."},
       {little_at_rest, "little-at-rest", "track", caution, "share of the beads that do not move with the others", 0.6,
@@ -87,7 +86,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Nothing where it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
        "scatter of beads in space about their neighbours over their standard errors", 1.5,
-       "the standard errors of pictures hold to a quarter in simulated stacks; what is beyond comes from pictures that "
+       "the standard errors of simulated pictures hold to a seventh; what is beyond comes from pictures that "
        "are not those of beads, or from strains that neighbours do not share",
        "Nothing: the standard errors hold it. Look for clumps of beads and for motion while a stack was recorded."},
       {light_lost, "light-lost", "track", caution, "share of the light that the dimmer stack lacks", 0.5,
