@@ -239,11 +239,11 @@ int repeat(const CommandLine& line) {
       "--out",     files::inside(line.folder, "statistics", line.folder.string()).string(),
       "--threads", std::to_string(line.threads)};
   if (line.is_quiet) arguments.emplace_back("--quiet");
-  for (const std::string& argument : further) {
-    // the one flag that people write with a dash
-    constexpr std::string_view kDashed = "--condition-from";
-    const bool is_dashed = argument.starts_with(kDashed);
-    arguments.push_back(is_dashed ? "--condition_from" + argument.substr(kDashed.size()) : argument);
+  for (std::string argument : further) {
+    // flags are written with dashes, too: --condition-from
+    const auto end = argument.begin() + static_cast<std::ptrdiff_t>(std::min(argument.find('='), argument.size()));
+    if (argument.starts_with("--")) std::replace(argument.begin() + 2, end, '-', '_');
+    arguments.push_back(std::move(argument));
   }
   become("mbtfm-stats", std::move(arguments));
 }

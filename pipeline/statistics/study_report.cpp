@@ -184,7 +184,7 @@ std::string gallery(const Study& study, const Path& page_folder) {
   }
   return html +
          "</div>\n<p class=\"sub\">Total force of each cell; a click opens its page. <b>!</b>: findings are open. To "
-         "leave cells out by a rule: <code>--exclude-findings</code>; one by one: a column <code>exclude</code> with "
+         "leave cells out by a rule: <code>--exclude_findings</code>; one by one: a column <code>exclude</code> with "
          "the "
          "reason in <code>--table</code>.</p>\n";
 }
