@@ -2,6 +2,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <fstream>
 #include <random>
 
 #include "pipeline/files/csv_files.h"
@@ -55,6 +56,18 @@ TEST_F(Sheet, its_tractions_give_its_tensions_back) {
   ASSERT_EQ(outcome.code, 0) << outcome.output;
   EXPECT_NEAR(figure("inside_mean_tension_nN_per_um"), mean, 0.01 * 0.02);
   EXPECT_NEAR(figure("mean_tension_nN_per_um"), figure("exact_virial_tension_nN_per_um"), 1e-9 * mean);
+}
+
+TEST_F(Sheet, tractions_in_pascals_are_refused) {
+  std::ofstream file(folder_ / "traction.csv");
+  file << "x_um,y_um,tx_kPa,ty_kPa\n";
+  for (int y = -30; y <= 30; y += 3)
+    for (int x = -30; x <= 30; x += 3) file << x << ',' << y << ',' << -10 * x << ',' << -10 * y << '\n';
+  file.close();
+  const auto outcome = run("[sheet]\npoisson_ratio = 0.3\n", "--traction " + (folder_ / "traction.csv").string());
+  EXPECT_EQ(outcome.code, 3) << outcome.output;
+  EXPECT_NE(outcome.output.find("200 Pa are 0.2 kPa"), std::string::npos) << outcome.output;
+  EXPECT_FALSE(std::filesystem::exists(folder_ / "out"));
 }
 
 TEST_F(Sheet, a_bonded_sheet_pulls_on_its_gel_without_net_force) {
