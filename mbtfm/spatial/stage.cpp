@@ -137,6 +137,8 @@ StageReport run_in_space(const StageParameters& p, stage::StageContext& context)
   }
   for (const auto& finding : r.findings) context.notice(finding);
   const Balance balance = balance_of(problem, r);
+  if (!inputs.outline_um.empty() || !inputs.adhesions.empty())  // of one cell: a whole field may hold many
+    context.expect_plausible("total_force_nN", balance.total_force_nN);
   notice_balance(context, r, balance);
   const Figures summary = summary_of(problem, r, balance);
   write_outputs(context, p, problem, r, summary);

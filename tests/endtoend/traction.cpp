@@ -198,6 +198,14 @@ TEST_F(TractionInSpace, finds_forces_of_adhesions_on_a_wave_with_their_errors) {
   }
 }
 
+TEST_F(TractionInSpace, doubts_a_total_force_that_no_cell_has) {
+  const std::string cell = "--spacing_um 4 --grow_um 3 --adhesions " + at("adhesions.csv");
+  EXPECT_EQ(run(cell).output.find("total force of the cell"), std::string::npos);
+  const auto outcome = run(cell + " --youngs_modulus_kPa 900");  // 90 times the gel's own: 125 nN become 11 000 nN
+  ASSERT_EQ(outcome.code, 0) << outcome.output;
+  EXPECT_NE(outcome.output.find("the total force of the cell is"), std::string::npos) << outcome.output;
+}
+
 TEST_F(TractionInSpace, refuses_what_tells_nothing_and_leaves_no_file) {
   files::write_text(folder_ / "flat.csv", "x_um,y_um,ux_um,uy_um,sigma_um\n1,2,0.1,0.2,0.01\n");
   files::write_text(folder_ / "few.csv", "x_um,y_um,z_um,ux_um,uy_um,uz_um\n1,2,5,0.1,0.2,0.01\n3,2,5,0.1,0.2,0.01\n");
