@@ -2,31 +2,21 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "pipeline/numerics/dense_panel.h"
+#include "pipeline/numerics/spring_matrix.h"
 
 namespace mbtfm::sheet {
 namespace {
 
 numerics::BlockMatrix<2> pattern_of(const Elements& elements) {
-  std::vector<std::vector<int>> rows(static_cast<std::size_t>(elements.n_nodes()));
+  std::vector<std::array<int, 2>> pairs;
   for (int t = 0; t < elements.n_triangles(); ++t)
     for (const int i : elements.nodes(t))
       for (const int j : elements.nodes(t))
-        if (i > j) rows[static_cast<std::size_t>(j)].push_back(i);
-  numerics::BlockMatrix<2> matrix;
-  matrix.n = elements.n_nodes();
-  matrix.start = {0};
-  for (int column = 0; column < matrix.n; ++column) {
-    std::vector<int>& below = rows[static_cast<std::size_t>(column)];
-    std::sort(below.begin(), below.end());
-    below.erase(std::unique(below.begin(), below.end()), below.end());
-    matrix.row.push_back(column);
-    matrix.row.insert(matrix.row.end(), below.begin(), below.end());
-    matrix.start.push_back(static_cast<int>(matrix.row.size()));
-  }
-  matrix.value.assign(4 * matrix.row.size(), 0);
-  return matrix;
+        if (i > j) pairs.push_back({i, j});
+  return numerics::matrix_of_pairs(elements.n_nodes(), pairs);
 }
 
 }  // namespace

@@ -5,9 +5,8 @@
 #include "pipeline/numerics/dense_panel.h"
 
 namespace mbtfm::numerics {
-namespace {
 
-BlockMatrix<2> matrix_of(int n_blocks, const std::vector<std::array<int, 2>>& pairs) {
+BlockMatrix<2> matrix_of_pairs(int n_blocks, const std::vector<std::array<int, 2>>& pairs) {
   std::vector<std::vector<int>> rows(n_blocks);
   for (const auto& [i, j] : pairs) rows[std::min(i, j)].push_back(std::max(i, j));
   BlockMatrix<2> matrix;
@@ -25,10 +24,9 @@ BlockMatrix<2> matrix_of(int n_blocks, const std::vector<std::array<int, 2>>& pa
   return matrix;
 }
 
-}  // namespace
-
 SpringMatrix::SpringMatrix(int n_blocks, const std::vector<std::array<int, 2>>& pairs)
-    : matrix_(matrix_of(n_blocks, pairs)), factor_(std::make_shared<const Elimination>(matrix_, Search::thorough)) {
+    : matrix_(matrix_of_pairs(n_blocks, pairs)),
+      factor_(std::make_shared<const Elimination>(matrix_, Search::thorough)) {
   for (const auto& [i, j] : pairs)
     springs_.push_back({matrix_.start[i], matrix_.start[j], matrix_.slot(std::max(i, j), std::min(i, j))});
 }

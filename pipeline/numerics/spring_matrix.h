@@ -9,6 +9,10 @@
 
 namespace mbtfm::numerics {
 
+/// A matrix of zeros with the diagonal and these blocks below it.
+/// @param pairs  (i, j), i != j, in any order; repetitions share one block
+BlockMatrix<2> matrix_of_pairs(int n_blocks, const std::vector<std::array<int, 2>>& pairs);
+
 class SpringMatrix {
  public:
   using Block = Eigen::Matrix2d;
