@@ -17,7 +17,8 @@ add_custom_command(OUTPUT ${share}/manuals.stamp ${commands} COMMAND ${CMAKE_COM
 add_custom_target(manuals ALL DEPENDS ${share}/manuals.stamp)
 install(DIRECTORY ${share}/man ${share}/bash-completion ${share}/zsh ${share}/fish DESTINATION ${CMAKE_INSTALL_DATADIR})
 
-install(DIRECTORY samples/scenarios pipeline/profiles pipeline/fiji DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
+install(DIRECTORY samples/scenarios pipeline/profiles pipeline/fiji DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm
+  USE_SOURCE_PERMISSIONS)
 install(FILES pipeline/Snakefile DESTINATION ${CMAKE_INSTALL_DATADIR}/mbtfm)
 install(FILES README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 install(DIRECTORY docs/ DESTINATION ${CMAKE_INSTALL_DOCDIR}/docs FILES_MATCHING

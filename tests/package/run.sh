@@ -20,7 +20,13 @@ if ! ls "$folder"/mbtfm_"${version}"_*.deb >/dev/null 2>&1; then
   rm -rf "$folder/mbtfm-$version"
   mkdir "$folder/mbtfm-$version"
   git ls-files -z --cached --others --exclude-standard | xargs -0 cp --parents -t "$folder/mbtfm-$version"
-  (cd "$folder/mbtfm-$version" && dpkg-buildpackage --build=full --no-sign --jobs=2) >"$folder/build.log" 2>&1 ||
+  # debhelper gives the build a home of its own: the compiler cache is named, and paths in it do not depend on the folder
+  if command -v ccache >/dev/null; then
+    CCACHE_DIR=$(ccache -k cache_dir) CCACHE_BASEDIR=$folder
+    export CCACHE_DIR CCACHE_BASEDIR
+  fi
+  # and Debian's own python3 is meant, whatever else is on the path
+  (cd "$folder/mbtfm-$version" && PATH=/usr/sbin:/usr/bin:/sbin:/bin dpkg-buildpackage --build=full --no-sign --jobs=2) >"$folder/build.log" 2>&1 ||
     { tail -n 30 "$folder/build.log" >&2; fail "dpkg-buildpackage ($folder/build.log)"; }
 fi
 
