@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <charconv>
+#include <optional>
 #include <sstream>
 
 #include "pipeline/contract/errors.h"
@@ -12,14 +13,20 @@ namespace {
 
 constexpr std::size_t kMostNumbers = 12;  // of a list: curves of more cannot be told apart
 
-double number_in(const std::string& name, const std::string& text, const Range& range) {
+/// None if the text is anything else.
+std::optional<double> as_number(const std::string& text) {
   double value = 0;
   const char* end = text.data() + text.size();
   const auto [stop, error] = std::from_chars(text.data() + (text.starts_with('+') ? 1 : 0), end, value);
-  if (error != std::errc() || stop != end || !is_inside(range, value))
+  return error == std::errc() && stop == end ? std::optional(value) : std::nullopt;
+}
+
+double number_in(const std::string& name, const std::string& text, const Range& range) {
+  const std::optional<double> value = as_number(text);
+  if (!value || !is_inside(range, *value))
     throw UsageError(name + ": expected " + describe("numbers", range) + " with commas between them, found '" + text +
                      "'");
-  return value;
+  return *value;
 }
 
 /// Ascending, each once.
@@ -41,9 +48,13 @@ std::vector<double> numbers_in(const std::string& name, const std::string& list,
 double share_in(const std::string& name, std::string text) {
   std::erase(text, ' ');
   const bool is_percent = text.ends_with('%');
-  if (is_percent) text.pop_back();
-  const Range range = Range::between(is_percent ? 0.1 : 0.001, is_percent ? 1000 : 10);
-  return number_in(name, text, range) / (is_percent ? 100 : 1);
+  const std::optional<double> number = as_number(is_percent ? text.substr(0, text.size() - 1) : text);
+  const Range shares = Range::between(0.001, 10);
+  if (number && is_inside(shares, *number / (is_percent ? 100 : 1))) return *number / (is_percent ? 100 : 1);
+  const bool is_percent_meant = !is_percent && number && is_inside(shares, *number / 100);
+  throw UsageError(name +
+                   ": expected a share from 0.001 to 10 (0.2), or a percentage from 0.1% to 1000% (20%), found '" +
+                   text + "'" + (is_percent_meant ? ". Did you mean " + text + "%?" : ""));
 }
 
 }  // namespace

@@ -138,8 +138,21 @@ TEST(Plan, a_list_that_is_none_is_refused) {
   EXPECT_EQ(asked_by(p, 8).noise_um, (std::vector<double>{0.05, 0.02})) << "the first stays the first";
   p.within = "20 %";
   EXPECT_DOUBLE_EQ(asked_by(p, 8).target_nN, 0.2 * p.tension_nN);
-  p.within = "often";
-  EXPECT_THROW(asked_by(p, 8), UsageError);
+  for (const char* bad : {"often", "", "%", "0", "-20%", "2000%", "20,30"}) {
+    p.within = bad;
+    EXPECT_THROW(asked_by(p, 8), UsageError) << bad;
+  }
+}
+
+TEST(Plan, a_percentage_without_its_sign_is_refused_and_named) {
+  Parameters p;
+  p.within = "20";
+  try {
+    asked_by(p, 8);
+    FAIL();
+  } catch (const UsageError& e) {
+    EXPECT_NE(std::string(e.what()).find("Did you mean 20%?"), std::string::npos) << e.what();
+  }
 }
 
 // --- pairs
