@@ -167,9 +167,10 @@ void study_time() {
   }
 }
 
-/// How often the primary test finds a difference where there is none.
+/// How often the primary test finds a difference if there is none. 500 simulations tell 5 % to 1 %, and the six figures
+/// together stray to 7 % by chance now and then; 10 000 tell it to 0.2 %.
 void study_primary(int n_simulations) {
-  std::printf("cells,replicates,simulations,p_below_0.05\n");
+  std::printf("cells,replicates,simulations,p_below_0.05,standard_error\n");
   for (const int n_cells : {8, 12, 24}) {
     for (const bool has_days : {false, true}) {
       int n = 0, n_found = 0;
@@ -182,7 +183,9 @@ void study_primary(int n_simulations) {
         const Primary primary = primary_of(study, sample, model.model, compare(sample, model.model), {});
         for (const PrimaryDifference& d : primary.differences) ++n, n_found += d.p_holm < 0.05 ? 1 : 0;
       }
-      std::printf("%d,%s,%d,%.4f\n", n_cells, has_days ? "4" : "none", n, static_cast<double>(n_found) / n);
+      const double share = static_cast<double>(n_found) / n;
+      std::printf("%d,%s,%d,%.4f,%.4f\n", n_cells, has_days ? "4" : "none", n, share,
+                  std::sqrt(share * (1 - share) / n));
       std::fflush(stdout);
     }
   }
