@@ -3,6 +3,7 @@
 
 #include "mbtfm/fit/files.h"
 #include "mbtfm/fit/report.h"
+#include "mbtfm/fit/usual_method.h"
 #include "pipeline/stage/stage.h"
 
 namespace mbtfm::fit {
@@ -23,6 +24,8 @@ StageReport run(const Parameters& parameters, stage::StageContext& context) {
   const FittedCell cell = fit_cell(inputs, parameters, {context.threads, context.progress});
   expect_plausible(context, cell.found, inputs.cell.adhesions);
   write_results(context, cell, inputs.beads);
+  context.progress(0.97, "tractions by the usual method");
+  write_usual_method(context, inputs, parameters.gel);
   context.progress(1, "done");
   return report_of(cell);
 }
@@ -45,6 +48,7 @@ int main(int argc, char** argv) {
                   "folder with frames.csv and displacement_0001.csv ... of a time series, each of which is fitted"},
                  {"kept", FileArgument::Kind::optional_input,
                   "output folder of a run that was alike but for single frames: the others' fits are kept"},
-                 {"out", FileArgument::Kind::output_folder, "tensions.csv, adhesion_forces.csv, fit.json, VTK files"}}},
+                 {"out", FileArgument::Kind::output_folder,
+                  "tensions.csv, adhesion_forces.csv, fit.json, fttc.csv, VTK files"}}},
       argc, argv, mbtfm::fit::run);
 }

@@ -67,7 +67,7 @@ std::string of_candidates(const Cell& cell) {
 std::string parts_of_total(const CellResults& results) {
   const auto network = results.tensions.find(0);
   if (network != results.tensions.end() && !network->second.identifiable)
-    return ". How much of it comes from the actin network, the beads do not tell.";
+    return ". The beads do not show how much of it comes from the actin network.";
   return fmt::format(": {} nN by the fibres, {} nN by the actin network.", charts::readable(results.fit.fibre_force_nN),
                      charts::readable(results.fit.network_force_nN));
 }
@@ -177,7 +177,10 @@ std::string item(const char* kind, const char* mark, const std::string& text, co
   return fmt::format("<li class=\"{}\">{}{}{}</li>\n", kind, mark, charts::html_escaped(text), more);
 }
 
-/// The remedy in sight; number, threshold and its reason unfold.
+constexpr const char* kPage = "docs/findings.md";
+
+/// The remedy in sight and the page's name; number, threshold and its reason unfold. A report goes where the
+/// pages do not: it names them, and links to none.
 std::string details_of(const Finding& f) {
   std::string html;
   if (is_open(f) && !f.remedy.empty()) html += "<br><i>What to do:</i> " + charts::html_escaped(f.remedy);
@@ -187,7 +190,8 @@ std::string details_of(const Finding& f) {
                     charts::html_escaped(f.number_is), charts::readable(*f.number), charts::readable(*f.threshold),
                     charts::html_escaped(f.reason), is_open(f) ? "" : " " + charts::html_escaped(f.remedy));
   }
-  return html;
+  return html +
+         (is_open(f) ? fmt::format(" <span class=\"page\">({}: “{}”)</span>", kPage, charts::html_escaped(f.id)) : "");
 }
 
 std::string item_of(const Finding& f) {

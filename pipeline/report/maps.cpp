@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
+#include <map>
 
 #include "pipeline/contract/polyline.h"
 #include "pipeline/files/base64.h"
@@ -186,6 +188,40 @@ Figure contracted_network(const CellResults& results) {
           legend(colour_bar(scale))};
 }
 
+/// Of the model's tractions; the usual method's map shares it.
+ColourScale traction_scale(const CellResults& results) {
+  const auto by_id = adhesions_by_id(results.cell);
+  std::vector<double> tractions_kPa;
+  for (const AdhesionForce& force : results.forces)
+    tractions_kPa.push_back(norm(force.force_nN) / area_stood_for_um2(*by_id.at(force.adhesion_id)));
+  return {.low = 0, .high = round_end(numerics::quantile(tractions_kPa, 0.98)), .label = "traction (kPa)"};
+}
+
+/// Squares in a picture of a few dozen colours: some ten thousand marks of their own would make the page slow.
+std::string picture_of_squares(const UsualMethod& usual, const Box& box, const ColourScale& colours) {
+  constexpr int kColours = 48;  // neighbours are hardly told apart
+  const double side_um = usual.spacing_um;
+  std::map<int, std::string> squares;  // by colour, as paths in a frame whose unit is a hundredth of a side
+  for (std::size_t i = 0; i < usual.positions_um.size(); ++i) {
+    const Vec2 p = usual.positions_um[i];
+    const Vec2 corner = 100 / side_um * (p - box.low) - Vec2{50, 50};
+    if (p.x < box.low.x - side_um || p.x > box.high.x + side_um || p.y < box.low.y - side_um ||
+        p.y > box.high.y + side_um)
+      continue;
+    const double share = colours.high > 0 ? std::min(1.0, norm(usual.tractions_kPa[i]) / colours.high) : 0;
+    squares[static_cast<int>(std::round(kColours * share))] +=
+        fmt::format("M{:.0f} {:.0f}h101v101h-101", corner.x, corner.y);
+  }
+  const Vec2 size = 100 / side_um * (box.high - box.low);
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
+      "preserveAspectRatio=\"none\">",
+      size.x, size.y);
+  for (const auto& [step, path] : squares)
+    svg += fmt::format("<path fill=\"{}\" d=\"{}\"/>", colours.colour(colours.high * step / kColours), path);
+  return "data:image/svg+xml;base64," + files::base64(svg + "</svg>");
+}
+
 /// Adhesions that were seen, and the dashed ones that nobody saw.
 std::string adhesion_keys(const Cell& cell) {
   const auto ring = [](const std::string& name) {
@@ -284,19 +320,16 @@ Figure bead_map(const CellResults& results) {
 Figure adhesion_map(const CellResults& results) {
   charts::Chart map = new_map(results, "Forces on the substrate");
   const auto by_id = adhesions_by_id(results.cell);
-  std::vector<double> tractions;
   std::vector<Vec2> forces;
-  for (const AdhesionForce& force : results.forces) {
-    tractions.push_back(norm(force.force_nN) / area_stood_for_um2(*by_id.at(force.adhesion_id)));
-    forces.push_back(force.force_nN);
-  }
-  const ColourScale colours{
-      .low = 0, .high = round_end(numerics::quantile(tractions, 0.98)), .label = "traction (kPa)"};
+  for (const AdhesionForce& force : results.forces) forces.push_back(force.force_nN);
+  const ColourScale colours = traction_scale(results);
   const ArrowScale scale = arrow_scale(forces);
-  for (std::size_t i = 0; i < results.forces.size(); ++i) {
-    const Adhesion& adhesion = *by_id.at(results.forces[i].adhesion_id);
-    map.polygon(ellipse_corners(adhesion, kEllipseCorners),
-                "stroke:#333;stroke-width:0.5;fill:" + colours.colour(tractions[i]), hover_of(adhesion, results));
+  for (const AdhesionForce& force : results.forces) {
+    const Adhesion& adhesion = *by_id.at(force.adhesion_id);
+    map.polygon(
+        ellipse_corners(adhesion, kEllipseCorners),
+        "stroke:#333;stroke-width:0.5;fill:" + colours.colour(norm(force.force_nN) / area_stood_for_um2(adhesion)),
+        hover_of(adhesion, results));
   }
   for (const AdhesionForce& force : results.forces) {
     map.arrow(by_id.at(force.adhesion_id)->position_um, scale.px_per_unit * force.force_nN,
@@ -315,6 +348,29 @@ Figure adhesion_map(const CellResults& results) {
               "at the bar’s end." +
               of_candidates + caption_of_cut(results.cell),
           legend(arrow_legend(scale, "nN") + colour_bar(colours))};
+}
+
+Figure usual_method_map(const CellResults& results) {
+  const UsualMethod& usual = results.usual_method.value();
+  const Box box = map_box(results);
+  charts::Chart map = empty_map(box, "What the usual method says");
+  const ColourScale colours = traction_scale(results);
+  map.picture(box.low, box.high, picture_of_squares(usual, box, colours));
+  draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#fff;stroke-dasharray:5 3");
+  draw_adhesions(map, results, "fill:none;stroke:#fff;stroke-width:0.7", Hover::none);
+  const std::string lambda =
+      usual.lambda_um_per_kPa
+          ? fmt::format(", λ = {} µm/kPa (criterion: {})", charts::readable(*usual.lambda_um_per_kPa), usual.lambda_by)
+          : "";
+  return {map,
+          fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
+                      "squares of {:.2g} µm, in the colours of “Forces on the substrate”. It knows neither adhesions "
+                      "nor fibres: a traction spreads around its adhesion, and noise makes tractions where there are "
+                      "none. Total force in the outline: {} nN; by the model: {} nN. White: outline and adhesions.",
+                      lambda, usual.spacing_um, charts::readable(usual.total_force_nN),
+                      charts::readable(results.fit.total_force_nN)) +
+              caption_of_cut(results.cell),
+          legend(colour_bar(colours))};
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {

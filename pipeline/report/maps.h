@@ -22,6 +22,8 @@ Figure segmentation_map(const CellResults& results);
 Figure bead_map(const CellResults& results);
 /// Ellipses coloured by traction, with the force on the substrate as arrows.
 Figure adhesion_map(const CellResults& results);
+/// Tractions of the usual method in the colours of the adhesion map; only if results.usual_method has tractions.
+Figure usual_method_map(const CellResults& results);
 /// Measured displacement, and where results.residual is known also the fitted one and the difference: means over the
 /// beads of small squares, drawn to one scale.
 std::vector<Figure> displacement_maps(const CellResults& results);

@@ -51,16 +51,25 @@ std::string tension_section(const CellResults& results) {
                      html_of(tension_table(results), file_of(results, "4_fit/tensions.csv")) + tension_notes(results));
 }
 
+/// Why the usual method has no map.
+std::string usual_method_note(const CellResults& results) {
+  if (!results.usual_method || results.usual_method->obstacle.empty()) return {};
+  return "<p class=\"sub\">The usual method (FTTC) has no answer for these beads: " +
+         charts::html_escaped(results.usual_method->obstacle) + ".</p>\n";
+}
+
 std::string map_section(const CellResults& results) {
   std::string html =
-      "<p class=\"sub screen\">The mouse tells what it rests on. Ctrl and wheel, or the buttons, zoom; dragging moves; "
+      "<p class=\"sub screen\">Rest the mouse on something to read about it. Ctrl and wheel, or the buttons, zoom; "
+      "dragging moves; "
       "a double click shows all again.</p><div class=\"grid\">\n" +
       html_of(segmentation_map(results)) + html_of(adhesion_map(results));
+  if (results.usual_method && results.usual_method->obstacle.empty()) html += html_of(usual_method_map(results));
   if (results.bead_images) html += html_of(bead_map(results));
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
   html += html_of(network_map(results, NetworkForm::contracted));
-  return section("Maps", html +
-                             "</div>\n<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
+  return section("Maps", html + "</div>\n" + usual_method_note(results) +
+                             "<p class=\"sub\">Axes: x to the right, y down, as in the image; origin at the "
                              "outer corner of its top left pixel.</p>");
 }
 
@@ -107,7 +116,7 @@ std::string adhesion_section(const CellResults& results) {
       "<p>The {} strongest of {}. Balance: the sum of all forces is {} of the sum of their magnitudes, that of their "
       "torques {}{}.</p>\n",
       top.rows.size(), all.rows.size(), power_of_ten(balance.net_force), power_of_ten(balance.net_torque),
-      balance.has_moments ? "" : " (without the moments inside single adhesions, which the table lacks)");
+      balance.has_moments ? "" : " (without the moments inside single adhesions, which are not in the table)");
   if (are_candidates)
     html +=
         "<p class=\"sub\">Candidates are places where an adhesion may be. Nobody saw one there: read their tractions "

@@ -3,8 +3,10 @@
 #include <cmath>
 
 #include "pipeline/contract/errors.h"
+#include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/fit_summary.h"
+#include "pipeline/files/json_record.h"
 #include "pipeline/files/own_files.h"
 #include "pipeline/files/tables.h"
 #include "pipeline/files/vtk_files.h"
@@ -46,6 +48,27 @@ std::vector<Row> rows_in(const Path& file, const files::Table<Row>& table) {
   return files::is_own_file(file) ? files::read(file, table) : std::vector<Row>();
 }
 
+/// None of a fit of a version that did not ask the usual method.
+std::optional<UsualMethod> usual_method_in(const Path& folder) {
+  if (!files::is_own_file(folder / "fttc.json")) return {};
+  const files::JsonRecord figures(folder / "fttc.json", "figures as mbtfm-fit writes them",
+                                  "run the fit again: mbtfm run --redo fit");
+  UsualMethod usual;
+  usual.obstacle = figures.text_or("obstacle", "");
+  if (!usual.obstacle.empty()) return usual;
+  usual.total_force_nN = figures.at("total_force_nN").number();
+  usual.lambda_by = figures.text_or("lambda_by", "");
+  if (const auto lambda = figures.find("lambda_um_per_kPa")) usual.lambda_um_per_kPa = lambda->number();
+  const files::CsvTable table(folder / "fttc.csv");
+  table.require({"x_um", "y_um", "tx_kPa", "ty_kPa", "area_um2"});
+  for (int row = 0; row < table.n_rows(); ++row) {
+    usual.positions_um.push_back({table.number(row, "x_um"), table.number(row, "y_um")});
+    usual.tractions_kPa.push_back({table.number(row, "tx_kPa"), table.number(row, "ty_kPa")});
+  }
+  if (table.n_rows() > 0) usual.spacing_um = std::sqrt(table.number(0, "area_um2", Range::size_um()));
+  return usual;
+}
+
 std::vector<MissingFibre> missing_fibres_in(const Path& file, const Cell& cell) {
   const auto by_id = adhesions_by_id(cell);
   std::vector<MissingFibre> fibres = rows_in(file, files::missing_fibre_table());
@@ -78,6 +101,7 @@ CellResults read_results(const Path& cell) {
   results.forces = files::read_adhesion_forces(cell / "4_fit/adhesion_forces.csv");
   results.fit = files::read_fit_summary(cell / "4_fit/fit.json");
   results.residual = residual_of(results.displacement, cell / "4_fit/fitted_displacement.csv");
+  results.usual_method = usual_method_in(cell / "4_fit");
   if (has_truth(cell)) results.comparison = compare_with_truth(cell);
   results.images = images_of(cell / "1_segment/images.jpg", cell / "1_segment/images.csv");
   results.bead_images = images_of(cell / "2_track/beads.jpg", cell / "2_track/beads_picture.csv");

@@ -26,6 +26,16 @@ struct Images {
   Vec2 low_um, high_um;
 };
 
+/// What the usual method (FTTC) says of the same beads: tractions at the middles of squares.
+struct UsualMethod {
+  std::vector<Vec2> positions_um, tractions_kPa;
+  double spacing_um = 0;  ///< side of the squares
+  double total_force_nN = 0;
+  std::optional<double> lambda_um_per_kPa;  ///< none if no bead has moved
+  std::string lambda_by;                    ///< the criterion that chose it
+  std::string obstacle;                     ///< why it has no tractions; empty: it has
+};
+
 struct CellResults {
   Path folder;
   std::string name;
@@ -38,6 +48,7 @@ struct CellResults {
   std::vector<AdhesionForce> forces;
   FitSummary fit;
   std::optional<Residual> residual;
+  std::optional<UsualMethod> usual_method;
   std::optional<Comparison> comparison;  ///< of a simulated cell
   std::optional<Images> images;          ///< of the cell
   std::optional<Images> bead_images;     ///< both on each other

@@ -61,7 +61,7 @@ const Graph kMayInclude = {
       "substrate", "substrate/greens"}},
     {"mbtfm/fit",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "pipeline/stage", "network/mesh", "network/cables",
-      "substrate", "substrate/choice", "mbtfm/tensions"}},
+      "substrate", "substrate/choice", "mbtfm/tensions", "mbtfm/tractions"}},
     {"mbtfm/sheets",
      {"pipeline/contract", "pipeline/files", "pipeline/numerics", "continuum/sheet", "mbtfm/tensions", "substrate"}},
     {"mbtfm/tractions",

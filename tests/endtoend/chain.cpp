@@ -145,7 +145,7 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
   const TemporaryFolder folder;
   const fs::path cell = folder / "cell";
   ASSERT_EQ(run_program("mbtfm-simulate --scenario ring --seed 1 --beads 1500 --quiet --out " + cell.string()).code, 0);
-  std::string first;
+  std::string first, first_of_usual_method;
   for (const char* threads : {"1", "2", "4"}) {
     fs::remove_all(cell / "4_fit");
     const Outcome run = run_program("mbtfm run --threads " + std::string(threads) + " " + cell.string());
@@ -153,7 +153,15 @@ TEST(Chain, one_two_and_four_threads_give_the_same_bytes) {
     const std::string tensions = files::read_text(cell / "4_fit/tensions.csv");
     if (first.empty()) first = tensions;
     EXPECT_EQ(tensions, first) << threads << " threads";
+    const std::string usual_method = files::read_text(cell / "4_fit/fttc.csv");
+    if (first_of_usual_method.empty()) first_of_usual_method = usual_method;
+    EXPECT_EQ(usual_method, first_of_usual_method) << threads << " threads";
   }
+  const Outcome alone = run_program("mbtfm-traction --displacement " + (cell / "2_track/displacement.csv").string() +
+                                    " --outline " + (cell / "1_segment/outline.csv").string() + " --config " +
+                                    (cell / "cell.toml").string() + " --out " + (folder / "traction.csv").string());
+  ASSERT_EQ(alone.code, 0) << alone.output;
+  EXPECT_EQ(files::read_text(folder / "traction.csv"), first_of_usual_method) << "the same as mbtfm-traction's";
 }
 
 /// The displacement of these cells as they come is that of other forces: all x components, then all y components, read

@@ -106,6 +106,31 @@ TEST(Report, shows_the_bead_images_where_tracking_has_left_them) {
   EXPECT_NE(html.find(files::base64("a picture")), std::string::npos);
 }
 
+TEST(Report, shows_what_the_usual_method_says_where_it_was_asked) {
+  const FakeCell cell;
+  const std::string title = "What the usual method says";
+  EXPECT_EQ(report_html(cell.folder.path()).find(title), std::string::npos) << "results of an older version";
+  files::write_text(cell.folder / "4_fit/fttc.csv",
+                    "x_um,y_um,tx_kPa,ty_kPa,area_um2,ux_um,uy_um\n30,30,0.3,0.4,4,0,0\n32,30,0,0,4,0,0\n");
+  const auto figures = cell.folder / "4_fit/fttc.json";
+  files::write_text(figures, R"({"total_force_nN": 123.4, "lambda_um_per_kPa": 0.056, "lambda_by": "risk"})");
+  const std::string html = report_html(cell.folder.path());
+  const std::size_t at = html.find("<h3>" + title);
+  ASSERT_NE(at, html.npos);
+  const std::string figure = html.substr(at, html.find("</figure>", at) - at);
+  for (const char* part :
+       {"λ = 0.056 µm/kPa (criterion: risk)", "squares of 2 µm", "123 nN", "data:image/svg+xml;base64,"})
+    EXPECT_NE(figure.find(part), std::string::npos) << part;
+
+  files::write_text(figures, R"({"obstacle": "all beads on one line"})");
+  const std::string without = report_html(cell.folder.path());
+  EXPECT_EQ(without.find("<h3>" + title), std::string::npos);
+  EXPECT_NE(without.find("has no answer for these beads: all beads on one line."), std::string::npos);
+  files::write_text(figures, R"({"total_force_nN": 1})");
+  files::write_text(cell.folder / "4_fit/fttc.csv", "x_um,y_um\n1,2\n");
+  EXPECT_THROW(report_html(cell.folder.path()), InputError);
+}
+
 TEST(Report, rejects_a_fitted_field_of_other_beads) {
   const FakeCell cell;
   const auto file = cell.folder / "4_fit/fitted_displacement.csv";
