@@ -1,6 +1,6 @@
 #!/usr/bin/env bash
-# Install the Debian packages that mbtfm builds with, those that lack only. As root or through sudo; says what lacks
-# where it can do neither. Arguments: further packages.
+# Install the Debian packages that mbtfm builds with, the missing ones only. As root or through sudo; says what is missing
+# if it can do neither. Arguments: further packages.
 set -euo pipefail
 
 packages=(
@@ -26,7 +26,7 @@ echo "mbtfm: installing ${#missing[@]} Debian packages: ${missing[*]}"
 as_root=()
 if [ "$(id -u)" -ne 0 ]; then
   if ! command -v sudo >/dev/null; then
-    echo "mbtfm: error: these packages lack, and this is neither root nor is there sudo. Ask for:" >&2
+    echo "mbtfm: error: these packages are missing, and you are not root and have no sudo. Ask an administrator for:" >&2
     echo "  apt-get install --no-install-recommends ${missing[*]}" >&2
     exit 1
   fi
@@ -37,7 +37,7 @@ install() {
 }
 if ! { "${as_root[@]}" apt-get update -q && install; } >/tmp/mbtfm-packages-$$.log 2>&1; then
   tail -n 20 "/tmp/mbtfm-packages-$$.log" >&2
-  echo "mbtfm: error: the packages could not be installed (log: /tmp/mbtfm-packages-$$.log). Lacking: ${missing[*]}" >&2
+  echo "mbtfm: error: the packages could not be installed (log: /tmp/mbtfm-packages-$$.log). Missing: ${missing[*]}" >&2
   exit 1
 fi
 rm -f "/tmp/mbtfm-packages-$$.log"

@@ -210,7 +210,7 @@ int batch(const CommandLine& line) {
 int tell(const runner::Verification& found, const std::string& what) {
   for (const std::string& difference : found.differences) stage::print(difference + "\n");
   if (found.differences.empty())
-    stage::print(what + ": " + std::to_string(found.n_files) + " files, all as run.json tells\n");
+    stage::print(what + ": " + std::to_string(found.n_files) + " files, all as recorded in run.json\n");
   return found.differences.empty() ? kDone : kFailed;
 }
 
@@ -392,7 +392,7 @@ int start(int argc, char** argv) {
   CLI::App* run_command = add_command(app, line, "run", "run all stages of a cell that are not up to date", kCell);
   add_stage_options(run_command, line);
   run_command->add_flag("--checked", line.is_checked, "the stages are known to accept the parameters")->group("");
-  run_command->add_flag("--explain", line.explain, "fit anew and say what each effect that is off would change");
+  run_command->add_flag("--explain", line.explain, "fit again and say what each effect that is off would change");
   for (CLI::App* command : {run_command, demo_command}) {
     command->add_flag("--verbose", line.is_verbose, "print every effect with its number, and why a stage is run");
   }
@@ -410,7 +410,7 @@ int start(int argc, char** argv) {
   batch_command->add_flag("--list", line.only_list, "run nothing; print every cell's stages and their state (CSV)");
   batch_command->add_flag("--table", line.only_table, "run nothing; write batch.csv of the cells as they are");
   CLI::App* verify_command =
-      add_command(app, line, "verify", "hash all inputs and outputs anew: as run.json tells?", kCell);
+      add_command(app, line, "verify", "check all inputs and outputs against the hashes in run.json", kCell);
   CLI::App* repeat_command =
       add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", kCell);
   repeat_command->add_option("--out", line.out, "the new cell folder")->required();

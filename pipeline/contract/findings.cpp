@@ -36,14 +36,14 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "out",
        "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
        "1_segment/RoiSet.zip)."},
-      {actin_shift, "actin-shift", "segment", note, "1 where the actin image is shifted against the adhesion image", 0,
+      {actin_shift, "actin-shift", "segment", note, "1 if the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
        "above "
        "27 elsewhere",
-       "Nothing where the fibres were moved. If it recurs, measure the shift between the filters with beads that shine "
+       "Nothing if the fibres were moved. If it recurs, measure the shift between the filters with beads that shine "
        "in both."},
       {adhesions_assumed, "adhesions-assumed", "segment", caution, "candidates for adhesions that nobody saw", 0,
-       "forces act where adhesions are; candidates stand where they may be",
+       "forces act where adhesions are; candidates are where they may be",
        "Give an adhesion image (images.adhesion; paxillin.tif if nothing is said), a mask of the adhesions "
        "(images.adhesion_mask) or draw them by hand (images.adhesion_rois). On an adhesive pattern set "
        "segment.adhesions = pattern, with the pattern as "
@@ -65,7 +65,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "a contracting cell has -0.7 or so, a layer of cells about 0",
        "Check whether the stressed and the relaxed image are exchanged."},
       {tracked_by_correlation, "tracked-by-correlation", "track", note,
-       "1 where windows of the images were followed in place of single beads", 0,
+       "1 if windows of the images were followed in place of single beads", 0,
        "a window shows what its beads do on average: what is narrower than the window is flattened",
        "Nothing, if the window is smaller than what you look for. Brighter, sharper or fewer beads give a finer "
        "field."},
@@ -79,18 +79,18 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Look at the flags in displacement_3d.csv. `no partner`: a larger track.largest_displacement_um, a lower "
        "track.detection_snr, or stacks that show the same depth. `ambiguous`: fewer beads."},
       {little_at_rest, "little-at-rest", "track", caution, "share of the beads that do not move with the others", 0.6,
-       "the common motion is found from the beads at rest; beyond two thirds that move they cannot be told any more",
+       "the common motion is found from the beads at rest; beyond two thirds that move they cannot be found any more",
        "Record a wider field or a deeper stack, so that part of the gel is at rest."},
       {slices_moved, "slices-moved", "track", note,
        "drift of the slices of one stack against the other's, over its standard error", 3, "chance alone makes it 1",
-       "Nothing where it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
+       "Nothing if it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
        "scatter of beads in space about their neighbours over their standard errors", 1.5,
        "the standard errors of simulated pictures hold to a seventh; what is beyond comes from pictures that "
        "are not those of beads, or from strains that neighbours do not share",
        "Nothing: the standard errors hold it. Look for clumps of beads and for motion while a stack was recorded."},
-      {light_lost, "light-lost", "track", caution, "share of the light that the dimmer stack lacks", 0.5,
-       "beads are told apart by their light, too; with half of it the dim ones are lost in the noise",
+      {light_lost, "light-lost", "track", caution, "share of the light that is missing in the dimmer stack", 0.5,
+       "beads are distinguished by their light, too; with half of it the dim ones are lost in the noise",
        "Record with less light, so that beads bleach less between the stacks."},
       {common_motion, "common-motion", "fit", note,
        "largest of growth, shears and turn of the whole field, over its standard error", 3,
@@ -126,7 +126,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Check "
        "the pixel size, and that no adhesion is drawn too small: the strain does not depend on the modulus."},
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
-       "without the noise nobody can tell whether the model fits", "Give sigma_um in displacement.csv."},
+       "without the noise nobody can know whether the model fits", "Give sigma_um in displacement.csv."},
       {noise_disagrees, "noise-disagrees", "fit", caution,
        "scatter of the beads far from the cell about the model, over their stated standard error", 1.3,
        "the error bars take the larger of both: a third more than stated is more than chance and model explain",
@@ -136,17 +136,17 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "noise alone does not reach 2 over the 30 beads that a region has at least",
        "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
        "adhesion that was not segmented."},
-      {cell_cut, "cell-cut", "fit", note, "1 where the image's border cuts the cell", 0,
+      {cell_cut, "cell-cut", "fit", note, "1 if the image's border cuts the cell", 0,
        "the total force is that of the adhesions in view, and what passes through the cut balances it",
-       "Record the whole cell if you can. A note where forces beyond the cut are allowed for; a caution where "
+       "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
        "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
-       "a pair of adhesions is named where chance would name one in one cell of twenty, all pairs tried",
+       "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
        "mbtfm-add-fibres --rois 1_segment/RoiSet.zip --missing 4_fit/missing_fibres.csv --out fibres.zip in the cell's "
        "folder, then mbtfm run."},
       {missing_adhesion, "missing-adhesion", "fit", caution, "forces that the beads call for away from all adhesions",
-       0, "a place is named where chance would name one in one cell of twenty, all places tried",
+       0, "a place is named if chance would name one in one cell of twenty, all places tried",
        "Look at these places in the adhesion image (4_fit/missing_adhesions.csv; dashed circles in the map). If an "
        "adhesion is there, lower segment.adhesion_seed_noise or segment.adhesion_smallest_um2, or draw it by hand."},
       {fibre_without_tension, "fibre-without-tension", "fit", caution, "segmented fibres that are not in the network",
@@ -155,7 +155,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "such a tension can take any value without the beads noticing",
        "Disregard these tensions (hollow marks; identifiable = FALSE). More beads near these fibres would help."},
       {network_not_identifiable, "network-not-identifiable", "fit", bad,
-       "1 where the tension of the actin network is not determined", 0,
+       "1 if the tension of the actin network is not determined", 0,
        "then the network's share of the force and its surface tension are not known either",
        "Disregard the tension and the force of the network."},
       {wide_interval, "wide-interval", "fit", note,
@@ -164,7 +164,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tension_at_zero, "tension-at-zero", "fit", note, "tensions that are zero, the least allowed", 0,
        "fibres do not push: zero is where a fit of a weak fibre ends",
        "Read the upper end of the interval as a limit."},
-      {single_mesh, "single-mesh", "fit", caution, "1 where one mesh was fitted", 0,
+      {single_mesh, "single-mesh", "fit", caution, "1 if one mesh was fitted", 0,
        "the choice of the mesh is usually a larger error than the noise of the beads, and one mesh cannot show it",
        "Use fit.n_meshes = 2 or more."},
       {forces_out_of_balance, "forces-out-of-balance", "fit", bad,
@@ -185,7 +185,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {surface_repaired, "surface-repaired", "surface", note,
        "share of the vertices in holes that were filled, and of triangles that were turned over", 0,
        "holes up to surface.largest_hole_um are filled by the plate that bends least",
-       "Nothing where the holes are small beside the cell's adhesions. Else measure the surface again."},
+       "Nothing if the holes are small beside the cell's adhesions. Else measure the surface again."},
       {surface_level, "surface-level", "surface", caution,
        "distance of the beads, n^(-1/3), over the difference between the surface's highest and lowest z", 4,
        "below a quarter of the beads' distance, a flat gel and the end of the imaged volume look alike",
@@ -206,9 +206,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "forces closer together than the beads are deep look like one: no lattice and no lambda brings them back",
        "Image beads nearer to the surface, or believe no detail finer than resolution_um."},
       {beads_tell_little, "beads-tell-little", "traction", caution,
-       "24 over the effective number of unknowns that the beads tell", 1,
+       "24 over the effective number of unknowns that the beads determine", 1,
        "the force and its couple on four adhesions are 24 numbers: with fewer, a map of tractions is mostly smoothing",
-       "Take more beads or less noise. The record tells how many beads it would take."},
+       "Take more beads or less noise. The record says how many beads are needed."},
       {misfit_in_space, "misfit-in-space", "traction", caution,
        "misfit of the beads over what their stated errors leave, per datum", 1.5,
        "with the errors right it is 1 to a few per cent; the error bars are widened by its root",
@@ -225,11 +225,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Is the whole cell above the beads, and the drift of the stage taken out? A shift of all beads looks like a net "
        "force."},
       {beads_stray, "beads-stray", "traction", caution,
-       "share of the beads that are further off than noise has them, where the loss is l2", 0.005,
+       "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
        "Set traction.loss = biweight."},
-      {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 where gel.youngs_modulus_sigma_kPa is not given",
-       0, "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
+      {modulus_error_unknown, "modulus-error-unknown", "fit", note, "1 if gel.youngs_modulus_sigma_kPa is not given", 0,
+       "all forces are proportional to the modulus: 10 % of it are 10 % of every force",
        "Give gel.youngs_modulus_sigma_kPa; the error budget then has a line for it."},
       {contraction_beyond_linear, "contraction-beyond-linear", "indent", caution,
        "contraction of the cell if nothing held it, (1 - 2 nu) stress / Young's modulus", 0.05,
@@ -250,14 +250,14 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "a solid disc bonded to a gel moves 2 to 4 % more than the sheet at 0.02, 5.5 to 8 % at 0.04",
        "Take a sheet for colonies and spread cells only; for a round cell use mbtfm-indent."},
       {sheet_strain, "sheet-strain", "sheet", caution,
-       "contraction of the sheet if nothing held it, s (1 - nu) / (E h), where small strains are computed", 0.05,
+       "contraction of the sheet if nothing held it, s (1 - nu) / (E h), if small strains are computed", 0.05,
        "on springs large strains change the displacement by 0.8 % at 0.05 and by 5 % at 0.15",
        "On springs set sheet.strain = large. On a gel read displacements and tensions to some per cent only."},
       {sheet_coarse, "sheet-coarse", "sheet", caution, "estimated relative error of the tensions, by the mesh", 0.05,
        "the estimate is the difference between the triangles' own tensions and smooth ones; those written are better",
        "Set a smaller sheet.mesh_um."},
       {sheet_not_identifiable, "sheet-not-identifiable", "sheet", caution,
-       "1 where the beads set no limit to a side of the sheet's stiffness", 0,
+       "1 if the beads set no limit to a side of the sheet's stiffness", 0,
        "a sheet much stiffer than its gel moves it by contraction over stiffness alone, a soft one by its contraction",
        "Read what is limited: contraction_over_stiffness of a stiff sheet, contraction_nN_per_um of a soft one. If the "
        "stiffness is known, give sheet.youngs_modulus_kPa."},
@@ -318,7 +318,7 @@ std::string open_ids(const std::vector<Finding>& findings) {
 std::string findings_page() {
   std::string page =
       "# Findings\n\n"
-      "The program tells what it notices about the images, the beads and its own answer. Each finding has an identity, "
+      "The program says what it notices about the images, the beads and its own answer. Each finding has an identity, "
       "a\n"
       "number, a threshold and a remedy. A finding appears on the terminal, in the report, in `run.json`, in "
       "`run.log`, in\n"

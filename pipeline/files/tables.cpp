@@ -151,7 +151,7 @@ const Table<FibreTension>& tension_table() {
           {"high_nN", "upper end of the 95 % interval; empty: there is none", &Tension::high_nN, kResultMayLack},
           {"sigma_nN", "standard error; the interval knows more, as a tension is never below 0", &Tension::sigma_nN,
            kResultMayLack},
-          {"identifiable", "the data tell it from any tension that occurs in the cell", &Tension::identifiable,
+          {"identifiable", "the data distinguish it from any tension that occurs in the cell", &Tension::identifiable,
            kMayLack}}};
   static const Table<FibreTension> table{
       .file = "4_fit/tensions.csv",
@@ -194,7 +194,7 @@ const Table<ForceOnAdhesion>& adhesion_force_table() {
           {of_force({"adhesion_id"}),
            columns_of<Row>(adhesion_table(), adhesion, {"x_um", "y_um", "area_um2"}),
            of_force({"fx_nN", "fy_nN", "force_nN"}),
-           {{"traction_kPa", "the force over the area that the adhesion stands for",
+           {{"traction_kPa", "the force over the area that the adhesion represents",
              [](const Row& row) { return norm(row.force.force_nN) / area_stood_for_um2(*row.adhesion); }, kResult}},
            of_force({"sigma_nN", "force_low_nN", "force_high_nN", "connected", "moment_nN_um"})}),
       .label = "adhesion"};

@@ -17,29 +17,30 @@ struct Key {
 const std::vector<Key>& switches() {
   using S = EffectSwitches;
   static const std::vector<Key> list = {
-      {"stress_fibres", &S::stress_fibres, "stress fibres in the network; auto: where any was found"},
-      {"finite_thickness", &S::finite_thickness, "the gel's rigid base; auto: where it changes the field"},
-      {"finite_sides", &S::finite_sides, "the gel's sides at side_distance_um; auto: where they change the field"},
-      {"depth_graded_gel", &S::depth_graded_gel, "modulus_profile; auto: where the modulus differs from even"},
+      {"stress_fibres", &S::stress_fibres, "stress fibres in the network; auto: if any was found"},
+      {"finite_thickness", &S::finite_thickness, "the gel's rigid base; auto: if it changes the field"},
+      {"finite_sides", &S::finite_sides, "the gel's sides at side_distance_um; auto: if they change the field"},
+      {"depth_graded_gel", &S::depth_graded_gel, "modulus_profile; auto: if the modulus changes with depth"},
       {"vertical_displacement", &S::vertical_displacement,
-       "displacement into the gel; auto: where a three-dimensional surface is written"},
+       "displacement into the gel; auto: if a three-dimensional surface is written"},
       {"large_strain", &S::large_strain,
-       "strains that small-strain theory gets wrong; auto: where material = neo-hooke and the tractions call for it"},
+       "strains that small-strain theory gets wrong; auto: if material = neo-hooke and the tractions are large enough"},
       {"drift_affine", &S::drift_affine,
-       "turn, growth and shear of the stressed image; auto: where what is at rest shows them"},
+       "turn, growth and shear of the stressed image; auto: if the beads at rest show them"},
       {"common_motion", &S::common_motion,
-       "shift, turn, growth and shear of all beads, found with the tensions; auto: on, where beads bear it"},
+       "shift, turn, growth and shear of all beads, found with the tensions; auto: on, if the beads allow it"},
       {"beads_under_load", &S::beads_under_load,
-       "beads are taken where they lie while the cell pulls, as its images show the cell; auto: where the beads say "
+       "beads are taken where they lie while the cell pulls, as its images show the cell; auto: if the beads say "
        "so"},
       {"channel_shift", &S::channel_shift,
-       "shift and turn of the cell against the beads, found with the tensions; auto: on, where beads tell it"},
+       "shift and turn of the cell against the beads, found with the tensions; auto: on, if the beads determine it"},
       {"beyond_cut", &S::beyond_cut,
-       "forces beyond the cut of a cell that its image cuts; auto: where the outline has a cut"},
+       "forces beyond the cut of a cell that its image cuts; auto: if the outline has a cut"},
       {"cable_elasticity", &S::cable_elasticity,
-       "cables resist to be longer than at rest; auto: where any would be longer"},
-      {"robust_loss", &S::robust_loss, "outlying beads count less; auto: where tails cost more than the loss does"},
-      {"time_coupling", &S::time_coupling, "start from the frame before; auto: where one is given"},
+       "cables resist to be longer than at rest; auto: if any would be longer"},
+      {"robust_loss", &S::robust_loss,
+       "outlying beads count less; auto: if outliers cost more accuracy than this loss does"},
+      {"time_coupling", &S::time_coupling, "start from the frame before; auto: if one is given"},
   };
   return list;
 }
