@@ -53,7 +53,9 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
                      " per µm² the force of the middle adhesion has a standard "
                      "error of " +
                      about(with.standard_error_nN) + " nN with the network and " + about(alone.standard_error_nN) +
-                     " nN without it; the smallest force seen is three times that. ";
+                     " nN without it, and FTTC errs by " +
+                     about(expected_of(plan.grid, p, Quantity::fttc_force).standard_error_nN) +
+                     " nN; the smallest force seen is three times that. ";
   const std::string pair =
       "Without the network two adhesions of " + brief(plan.parameters.tension_nN) + " nN each are ";
   if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
@@ -61,8 +63,7 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
   return text + pair +
          (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on"
                                                            : "told apart even where they touch, at " + distance) +
-         ", where beads lie near them; with fewer than one bead per µm² chance decides, and twice to three times that "
-         "distance is safe.";
+         ".";
 }
 
 std::string about_cells(const Plan& plan) {
