@@ -61,7 +61,7 @@ std::string about_adhesions(const Plan& plan, const Point& p) {
   if (!alone.least_distance_um) return text + pair + "not told apart at any distance in a cell.";
   const std::string distance = about(*alone.least_distance_um) + " µm";
   return text + pair +
-         (*alone.least_distance_um > plan.grid.touching_um ? "told apart from " + distance + " on"
+         (*alone.least_distance_um > plan.grid.touching_um ? "told apart if they are " + distance + " apart or more"
                                                            : "told apart even where they touch, at " + distance) +
          ".";
 }
@@ -72,11 +72,11 @@ std::string about_cells(const Plan& plan) {
     if (n.difference != plan.parameters.difference) continue;
     if (n.fibres_per_cell != std::max(1.0, std::round(n.scatter.fibres_per_cell))) continue;
     text += (text.empty() ? "" : ", ") + std::string(n.cells ? std::to_string(*n.cells) : "more than 10000") +
-            " for the " + name_of(n.scatter.type) + "s (" + brief(n.fibres_per_cell) + " a cell)";
+            " cells for " + name_of(n.scatter.type) + "s (" + brief(n.fibres_per_cell) + " in each cell)";
   }
   if (text.empty()) return text;
   return "To see a difference of " + percent(plan.parameters.difference) + " between two conditions with a chance of " +
-         percent(plan.parameters.power) + " takes so many cells of each: " + text + ".";
+         percent(plan.parameters.power) + ", each condition needs " + text + ".";
 }
 
 std::string about_drawn(const Drawn& d) {
