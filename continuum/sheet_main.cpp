@@ -47,7 +47,7 @@ void declare(stage::ParameterList& list, Parameters& p) {
   modulus.member = &p.gel_modulus_kPa;
   modulus.is_required = false;
   modulus.default_value = "";
-  modulus.meaning += "; unset: springs carry the sheet, or nothing does";
+  modulus.meaning += "; unset: the sheet stands on springs, or on nothing";
   declare(list, p.substrate);
   declare(list, p.substrate.effects, {"finite_thickness", "finite_sides", "depth_graded_gel", "effect_tolerance"});
   declare(list, p.sheet);

@@ -318,7 +318,7 @@ CLI::App* add_command(CLI::App& app, CommandLine& line, const std::string& name,
 
 void add_stage_options(CLI::App* command, CommandLine& line) {
   std::vector<std::string> names;
-  std::string meaning = "parameters, where cell.toml sets none";
+  std::string meaning = "parameters that cell.toml does not set";
   for (const cost::Preset& preset : cost::presets()) {
     names.push_back(preset.name);
     meaning += (names.size() == 1 ? ": " : ", ") + preset.name + " (" + preset.purpose + ")";
@@ -335,7 +335,7 @@ void add_stage_options(CLI::App* command, CommandLine& line) {
   command->add_option("--redo", line.redo, "run this stage even if up to date or changed by hand; several with commas")
       ->delimiter(',')
       ->allow_extra_args(false);
-  command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")->capture_default_str();
+  command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")->capture_default_str();
   const std::map<std::string, double> time_units = {{"s", 1}, {"min", 60}, {"h", 3600}};
   command->add_option("--timeout", line.timeout_s, "kill a stage that takes longer: 90, 10min, 2h")
       ->transform(CLI::AsNumberWithUnit(time_units, CLI::AsNumberWithUnit::CASE_INSENSITIVE, "TIME"))
@@ -414,8 +414,8 @@ int start(int argc, char** argv) {
   CLI::App* repeat_command =
       add_command(app, line, "repeat", "repeat the run of a run.json in a new folder and compare the outputs", kCell);
   repeat_command->add_option("--out", line.out, "the new cell folder")->required();
-  repeat_command->add_option("--inputs", line.inputs, "where the inputs are; default: beside run.json");
-  repeat_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
+  repeat_command->add_option("--inputs", line.inputs, "folder of the inputs; default: beside run.json");
+  repeat_command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")
       ->capture_default_str();
   CLI::App* stats_command = add_command(app, line, "stats", "statistics over all finished cells", kFolder);
   stats_command->allow_extras()->footer("Further arguments go to mbtfm-stats: see mbtfm-stats --help.");
@@ -429,7 +429,7 @@ int start(int argc, char** argv) {
       ->check(CLI::Range(1, 100))
       ->capture_default_str();
   cost_command->add_flag("--all", line.is_whole, "the choices that take minutes, too");
-  cost_command->add_option("--stages-dir", line.stage_folder, "where the stages' executables are")
+  cost_command->add_option("--stages-dir", line.stage_folder, "folder of the stages' executables")
       ->capture_default_str();
   // what follows is for the program that they become, --help included
   CLI::App* plan_command = app.add_subcommand(

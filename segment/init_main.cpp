@@ -76,7 +76,7 @@ Written cell_toml(const fs::path& folder) {
   for (const char* key : {"adhesion", "actin", "beads_stressed", "beads_relaxed"}) {
     const auto file = roles.files.find(key);
     if (file == roles.files.end()) {
-      images += "# " + std::string(key) + " = \"\"    # which file? no name shows it\n";
+      images += "# " + std::string(key) + " = \"\"    # which file? no name tells\n";
       open.push_back(std::string(key) + " in [images]");
       continue;
     }

@@ -20,7 +20,7 @@ void declare(stage::ParameterList& list, SubstrateParameters& p) {
            "refined "
            "until it is estimated to have; 0: the first mesh, no error estimated");
   list.add("modulus_profile", p.modulus_profile,
-           "depths (um) and Young's moduli (kPa), linear between, a step if a depth is given twice: '0:16, "
+           "depths (um) and Young's moduli (kPa), linear between, a step where a depth stands twice: '0:16, "
            "10:16, 10:8.4'; empty: youngs_modulus_kPa throughout");
   list.add("margin_thicknesses", p.margin_thicknesses, Range::between(0.5, 100),
            "split, refined, curved: from the adhesions and beads to the sides of the block where the gel's own are far "

@@ -20,7 +20,7 @@ void declare(stage::ParameterList& list, SheetParameters& p) {
            "stiffness of the adhesions per area, or of springs that stand for the ground (nN/um3 = kPa/um); unset: the "
            "sheet is bonded to the gel");
   list.add("ground", p.ground,
-           "what carries the sheet; auto: the gel, or springs if no gel is given or the gel is much stiffer than "
+           "what the sheet stands on; auto: the gel, or springs where no gel is given or the gel is much stiffer than "
            "the adhesions; none: the tractions are given");
   list.add("strain", p.strain,
            "small strains or large ones; auto: large on springs where the contraction calls for it");

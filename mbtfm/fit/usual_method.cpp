@@ -1,6 +1,8 @@
 #include "mbtfm/fit/usual_method.h"
 
+#include <algorithm>
 #include <string>
+#include <vector>
 
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
@@ -8,6 +10,26 @@
 #include "pipeline/files/fit_summary.h"
 
 namespace mbtfm::fit {
+
+namespace {
+
+/// Those in the outline's box and a little around it: a field far larger than the cell would fill the disk.
+std::vector<tractions::Patch> near(const Polygon& outline_um, std::vector<tractions::Patch> patches) {
+  constexpr double kMargin_um = 5;  // as around the report's maps
+  Vec2 low = outline_um.front(), high = low;
+  for (const Vec2 p : outline_um) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  std::erase_if(patches, [&](const tractions::Patch& patch) {
+    const Vec2 p = patch.position_um;
+    return p.x < low.x - kMargin_um || p.x > high.x + kMargin_um || p.y < low.y - kMargin_um ||
+           p.y > high.y + kMargin_um;
+  });
+  return patches;
+}
+
+}  // namespace
 
 void write_usual_method(stage::StageContext& context, const Inputs& inputs, const Gel& gel) {
   // no adhesions: the errors of their forces would take longer than all else
@@ -18,7 +40,7 @@ void write_usual_method(stage::StageContext& context, const Inputs& inputs, cons
   Figures figures;
   try {
     const tractions::Reconstruction r = tractions::reconstruct(given, parameters, context.threads);
-    tractions::write_tractions(context.output("out", "fttc.csv"), r.patches);
+    tractions::write_tractions(context.output("out", "fttc.csv"), near(given.outline_um, r.patches));
     figures = tractions::summary_of(r, tractions::sums_of(r, given, parameters.grow_um));
     figures.emplace_back("lambda_by", std::string(name_of(parameters.lambda_by)));
   } catch (const InvalidData& e) {

@@ -7,7 +7,7 @@
 
 namespace mbtfm::fit {
 
-/// fttc.csv and fttc.json: as mbtfm-traction writes them with its defaults, for the cell's outline. If the beads do not
+/// fttc.csv and fttc.json: as mbtfm-traction writes them with its defaults, on and around the cell. If the beads do not
 /// allow it, fttc.json has the reason as its `obstacle`, and there is no fttc.csv.
 void write_usual_method(stage::StageContext& context, const Inputs& inputs, const Gel& gel);
 

@@ -15,7 +15,7 @@ const files::Table<SheetEstimate>& estimate_table() {
       .columns = {{"quantity", "with its unit; stiffness is E h / (1 - nu²)", &Row::quantity},
                   {"value", "where the misfit is least", &Row::value, {.digits = kForPeople}},
                   {"sigma",
-                   "standard error; empty if the beads do not determine the quantity",
+                   "standard error; empty where the beads do not tell the quantity",
                    &Row::sigma,
                    {.digits = kForPeople}},
                   {"low", "lower end of the 95 % interval; empty: none", &Row::low, {.digits = kForPeople}},

@@ -279,6 +279,12 @@ ordered_json scale_of(Side side, const Axis& axis, const ordered_json& domain) {
           {"zero", false},         {"nice", false}};
 }
 
+std::size_t longest_name(const Axis& axis) {
+  std::size_t longest = 0;
+  for (const auto& [value, name] : axis.names) longest = std::max(longest, name.size());
+  return longest;
+}
+
 ordered_json axis_of(Side side, const Axis& axis) {
   const bool is_upright = side == Side::y;
   constexpr std::array kOrients = {"bottom", "left", "top"};
@@ -301,16 +307,18 @@ ordered_json axis_of(Side side, const Axis& axis) {
   result["values"] = values;
   if (!is_upright) result["grid"] = false;
   result["labelOverlap"] = false;
+  const std::string name = files::json_text(names) + "[indexof(" + files::json_text(values) + ", datum.value)]";
+  // side by side they need their lengths and a gap; in a narrower frame each word has its own line
+  const double needed_px = kTextWidth_px * static_cast<double>(axis.names.size() * (longest_name(axis) + 2));
   result["encode"]["labels"]["update"]["text"] =
-      signal(files::json_text(names) + "[indexof(" + files::json_text(values) + ", datum.value)]");
+      signal(is_upright ? name : fmt::format("width < {:.0f} ? split({}, ' ') : {}", needed_px, name, name));
   return result;
 }
 
 /// Room for the numbers or names of an upright axis and its title.
 double left_room_px(const Axis& axis) {
-  std::size_t longest = 5;
-  for (const auto& [value, name] : axis.names) longest = std::max(longest, name.size());
-  return kTextWidth_px * static_cast<double>(longest) + (axis.label.empty() ? 12 : 28);
+  return kTextWidth_px * static_cast<double>(std::max(std::size_t{5}, longest_name(axis))) +
+         (axis.label.empty() ? 12 : 28);
 }
 
 }  // namespace

@@ -32,7 +32,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {bright_actin, "bright-actin", "segment", caution, "length of bright actin that is in no fibre (um)", 0,
        "lines as bright as the cell's middle fibre, 3 um and longer, 3 um and more from the edge: none in six "
        "simulated "
-       "cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um where one fibre is taken "
+       "cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um if one fibre is taken "
        "out",
        "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
        "1_segment/RoiSet.zip)."},
@@ -74,7 +74,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "of simulated pairs the errors are 1.0 to 1.1 times sigma up to a ratio of 1.47, and 1.2 to 1.7 times at 1.6",
        "Focus both images on the same plane of beads. Of a stack, choose the plane with relaxed_z or stressed_z."},
       {beads_lost, "beads-lost", "track", caution, "share of the beads in space that were not followed", 0.2,
-       "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; where many are, those of the "
+       "of simulated stacks of 5 000 and 20 000 beads 2 of a hundred and fewer are lost; if many are, those of the "
        "strained parts are lost first",
        "Look at the flags in displacement_3d.csv. `no partner`: a larger track.largest_displacement_um, a lower "
        "track.detection_snr, or stacks that show the same depth. `ambiguous`: fewer beads."},

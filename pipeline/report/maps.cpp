@@ -201,23 +201,28 @@ ColourScale traction_scale(const CellResults& results) {
 std::string picture_of_squares(const UsualMethod& usual, const Box& box, const ColourScale& colours) {
   constexpr int kColours = 48;  // neighbours are hardly told apart
   const double side_um = usual.spacing_um;
-  std::map<int, std::string> squares;  // by colour, as paths in a frame whose unit is a hundredth of a side
-  for (std::size_t i = 0; i < usual.positions_um.size(); ++i) {
-    const Vec2 p = usual.positions_um[i];
-    const Vec2 corner = 100 / side_um * (p - box.low) - Vec2{50, 50};
-    if (p.x < box.low.x - side_um || p.x > box.high.x + side_um || p.y < box.low.y - side_um ||
-        p.y > box.high.y + side_um)
-      continue;
+  // by colour, as paths in a frame whose unit is a hundredth of a side; neighbours of one colour along x are one piece
+  std::map<int, std::string> pieces;
+  const std::size_t n = usual.positions_um.size();
+  const auto colour_at = [&](std::size_t i) {
     const double share = colours.high > 0 ? std::min(1.0, norm(usual.tractions_kPa[i]) / colours.high) : 0;
-    squares[static_cast<int>(std::round(kColours * share))] +=
-        fmt::format("M{:.0f} {:.0f}h101v101h-101", corner.x, corner.y);
+    return static_cast<int>(std::round(kColours * share));
+  };
+  for (std::size_t i = 0, next = 0; i < n; i = next) {
+    const int colour = colour_at(i);
+    const double y_um = usual.positions_um[i].y;
+    for (next = i + 1; next < n && usual.positions_um[next].y == y_um && colour_at(next) == colour;) ++next;
+    const Vec2 corner = 100 / side_um * (usual.positions_um[i] - box.low) - Vec2{50, 50};
+    // a hundredth more than its sides: no gaps by rounding
+    const auto width = 100 * (next - i) + 1;
+    pieces[colour] += fmt::format("M{:.0f} {:.0f}h{}v101h-{}", corner.x, corner.y, width, width);
   }
   const Vec2 size = 100 / side_um * (box.high - box.low);
   std::string svg = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" height=\"{1:.0f}\" "
-      "preserveAspectRatio=\"none\">",
+      "preserveAspectRatio=\"none\" shape-rendering=\"crispEdges\">",
       size.x, size.y);
-  for (const auto& [step, path] : squares)
+  for (const auto& [step, path] : pieces)
     svg += fmt::format("<path fill=\"{}\" d=\"{}\"/>", colours.colour(colours.high * step / kColours), path);
   return "data:image/svg+xml;base64," + files::base64(svg + "</svg>");
 }
@@ -342,7 +347,7 @@ Figure adhesion_map(const CellResults& results) {
           : "";
   return {map,
           std::string(are_all_candidates(results.cell)
-                          ? "Each candidate is coloured by the traction where it stands; the arrow is the force"
+                          ? "Each candidate is coloured by the traction at its place; the arrow is the force"
                           : "Each adhesion’s ellipse is coloured by its mean traction; the arrow is the force") +
               " of the cell on the substrate. Dashed: the cell’s outline. The few highest tractions share the colour "
               "at the bar’s end." +
@@ -358,19 +363,23 @@ Figure usual_method_map(const CellResults& results) {
   map.picture(box.low, box.high, picture_of_squares(usual, box, colours));
   draw_outline(map, results.cell, "fill:none;stroke-width:1.3;stroke:#fff;stroke-dasharray:5 3");
   draw_adhesions(map, results, "fill:none;stroke:#fff;stroke-width:0.7", Hover::none);
+  double largest_kPa = 0;
+  for (const Vec2 t : usual.tractions_kPa) largest_kPa = std::max(largest_kPa, norm(t));
   const std::string lambda =
       usual.lambda_um_per_kPa
           ? fmt::format(", λ = {} µm/kPa (criterion: {})", charts::readable(*usual.lambda_um_per_kPa), usual.lambda_by)
           : "";
-  return {map,
-          fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
-                      "squares of {:.2g} µm, in the colours of “Forces on the substrate”. It knows neither adhesions "
-                      "nor fibres: a traction spreads around its adhesion, and noise makes tractions where there are "
-                      "none. Total force in the outline: {} nN; by the model: {} nN. White: outline and adhesions.",
-                      lambda, usual.spacing_um, charts::readable(usual.total_force_nN),
-                      charts::readable(results.fit.total_force_nN)) +
-              caption_of_cut(results.cell),
-          legend(colour_bar(colours))};
+  return {
+      map,
+      fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
+                  "squares of {:.2g} µm, in the colours of “Forces on the substrate”; the largest is {} kPa. FTTC "
+                  "knows neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes "
+                  "tractions everywhere. Total force in the outline: {} nN; by the model: {} nN. White: outline and "
+                  "adhesions.",
+                  lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
+                  charts::readable(results.fit.total_force_nN)) +
+          caption_of_cut(results.cell),
+      legend(colour_bar(colours))};
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {

@@ -44,7 +44,7 @@ std::string tension_section(const CellResults& results) {
   return section("Tensions",
                  "<div class=\"grid\">\n" +
                      figure(tension_plot(results),
-                            "By type, the strongest first. The interval holds the bead noise and, where several meshes "
+                            "By type, the strongest first. The interval holds the bead noise and, if several meshes "
                             "were fitted, the spread between them.",
                             tension_plot_legend(results)) +
                      by_type(results) + html_of(network_map(results, NetworkForm::original)) + "</div>\n" +
@@ -63,9 +63,10 @@ std::string map_section(const CellResults& results) {
       "<p class=\"sub screen\">Rest the mouse on something to read about it. Ctrl and wheel, or the buttons, zoom; "
       "dragging moves; "
       "a double click shows all again.</p><div class=\"grid\">\n" +
-      html_of(segmentation_map(results)) + html_of(adhesion_map(results));
-  if (results.usual_method && results.usual_method->obstacle.empty()) html += html_of(usual_method_map(results));
+      html_of(segmentation_map(results));
   if (results.bead_images) html += html_of(bead_map(results));
+  html += html_of(adhesion_map(results));
+  if (results.usual_method && results.usual_method->obstacle.empty()) html += html_of(usual_method_map(results));
   for (const Figure& map : displacement_maps(results)) html += html_of(map);
   html += html_of(network_map(results, NetworkForm::contracted));
   return section("Maps", html + "</div>\n" + usual_method_note(results) +
@@ -183,7 +184,7 @@ std::string provenance_section(const CellResults& results, const Provenance& pro
                         charts::html_escaped(provenance.version), charts::html_escaped(provenance.started),
                         charts::html_escaped(provenance.ended), charts::html_escaped(provenance.processor));
   if (!provenance.preset.empty())
-    html += fmt::format("<p class=\"sub\">Preset: {}, where cell.toml says nothing.</p>\n",
+    html += fmt::format("<p class=\"sub\">Preset: {}; it holds for all that cell.toml does not set.</p>\n",
                         charts::html_escaped(provenance.preset));
   if (!provenance.effects.empty()) html += "<h3>Effects</h3>\n" + effects_table(provenance);
   html += folded("Figures of the fit", figure_pairs(results));

@@ -27,13 +27,13 @@ constexpr ImageKey kImages[] = {
     {"actin", &N::actin, "image of the actin"},
     {"beads_stressed", &N::beads_stressed, "image of the beads while the cell pulls"},
     {"beads_relaxed", &N::beads_relaxed, "image of the beads after the cell was removed"},
-    {"outline_roi", &N::outline_roi, "ImageJ area used as the cell's outline, where the file is there"},
-    {"adhesion_rois", &N::adhesion_rois, "ImageJ areas used as adhesions, where the file is there"},
-    {"fibre_rois", &N::fibre_rois, "ImageJ lines used as fibres, where the file is there"},
+    {"outline_roi", &N::outline_roi, "ImageJ area used as the cell's outline, if the file is there"},
+    {"adhesion_rois", &N::adhesion_rois, "ImageJ areas used as adhesions, if the file is there"},
+    {"fibre_rois", &N::fibre_rois, "ImageJ lines used as fibres, if the file is there"},
     {"outline_mask", &N::outline_mask,
-     "mask or label image of the cell (TIFF or PNG), used as its outline, where the file is there"},
+     "mask or label image of the cell (TIFF or PNG), used as its outline, if the file is there"},
     {"adhesion_mask", &N::adhesion_mask,
-     "mask or label image used as adhesions, where the file is there; with segment.adhesions = pattern the adhesive "
+     "mask or label image used as adhesions, if the file is there; with segment.adhesions = pattern the adhesive "
      "pattern"},
     {"displacement", &N::displacement,
      "displacements from another program (CSV), taken instead of the beads' images; columns and unit: [track]"}};

@@ -157,6 +157,14 @@ TEST_F(Pages, nothing_reaches_beyond_the_window_and_no_text_is_small) {
           ".fontSize) * (e.getScreenCTM ? Math.hypot(e.getScreenCTM().c, e.getScreenCTM().d) : 1) < 11.99).map(e => "
           "e.outerHTML.slice(0, 200))");
       EXPECT_EQ(small, test::json::array()) << page << " at " << width_px;
+      // names and numbers along an axis
+      const test::json overlapping = browser.evaluate(
+          "[...document.querySelectorAll('.chart svg .role-axis-label')].flatMap(axis => {"
+          "const texts = [...axis.querySelectorAll('text')].filter(e => e.getAttribute('opacity') !== '0');"
+          "const boxes = texts.map(e => e.getBoundingClientRect());"
+          "const meet = (r, q) => r.left < q.right && q.left < r.right && r.top < q.bottom - 2 && q.top < r.bottom - 2;"
+          "return texts.filter((e, i) => boxes.some((q, j) => j > i && meet(boxes[i], q))).map(e => e.textContent)})");
+      EXPECT_EQ(overlapping, test::json::array()) << page << " at " << width_px;
     }
   }
 }

@@ -43,22 +43,28 @@ inside() { DEBIAN_FRONTEND=noninteractive chroot "$root" "$@"; }
 listing() { (cd "$root" && find . -path ./proc -prune -o -path ./var/lib -prune -o -path ./var/log -prune -o -path ./var/cache -prune -o -path ./tmp -prune -o -print | sort); }
 dpkg-query --admindir="$root/var/lib/dpkg" -W -f '${Package}\n' | sort >"$folder/packages-before.txt"
 listing >"$folder/files-before.txt"
-mkdir "$root/tmp/packages"
-cp "$folder"/*_"${version}"_*.deb "$root/tmp/packages"
+# there is no engine here: the Dockerfile's COPY and RUN, as they are written
+copy() { mkdir -p "$root/tmp/packages" && cp "$folder"/$1 "$root/tmp/packages"; }
+copy "$(sed -n 's#^COPY \(.*\) /tmp/packages/$#\1#p' packaging/Dockerfile)"
+run=$(sed -n '/^RUN /,/[^\\]$/p' packaging/Dockerfile | sed '1s/^RUN //')
 cp /etc/resolv.conf "$root/etc/" 2>/dev/null || true
 
 begin=$(date +%s)
-inside sh -c 'apt-get update -q && apt-get install -y -q --no-install-recommends /tmp/packages/mbtfm_*.deb' >"$folder/install.log" 2>&1 ||
+inside sh -c "$run" >"$folder/install.log" 2>&1 ||
   { tail -n 20 "$folder/install.log" >&2; fail "the package does not install"; }
 installed=$(date +%s)
 inside mbtfm --version
-inside sh -c 'cd /tmp && mbtfm demo' || fail "the demo"
+# as docker run --user does: without rights, without a home
+chroot --userspec=1000:1000 "$root" env -i PATH=/usr/bin:/bin sh -c 'cd /tmp && mbtfm demo' || fail "the demo"
 [ -s "$root/tmp/mbtfm-demo/report.html" ] || fail "no report"
 end=$(date +%s)
 say "from bare to the demo's report: $((end - begin)) s ($((installed - begin)) s of them apt-get; bar: 180 s)"
 size=$(dpkg-query --admindir="$root/var/lib/dpkg" -W -f '${Installed-Size}' mbtfm)
 say "installed size: $((size / 1024)) MB beside dependencies (bar: 60 MB)"
 [ "$size" -le $((60 * 1024)) ] || fail "larger than 60 MB"
+
+mapfile -t entry < <(sed -n 's/^\(ENTRYPOINT\|CMD\) \["\(.*\)"\]$/\2/p' packaging/Dockerfile)
+inside "${entry[@]}" | grep -q '^ *batch ' || fail "the container without arguments: ${entry[*]}"
 
 say "finite elements, which are another package"
 # a gel with sides, which the layer does not have
@@ -69,6 +75,8 @@ fi
 grep -q "mbtfm-mesh" "$folder/no-mesh.log" || { cat "$folder/no-mesh.log"; fail "the missing package is not named"; }
 
 say "the other packages, and a program of somebody else"
+inside apt-get update -q >/dev/null
+copy "*_${version}_*.deb"
 inside apt-get install -y -q --no-install-recommends g++ cmake make pkg-config man-db bash-completion $(cd "$root" && ls -d tmp/packages/*.deb | sed 's#^#/#') \
   >"$folder/install-all.log" 2>&1 || { tail -n 20 "$folder/install-all.log" >&2; fail "the packages do not install together"; }
 if [ -e "$root/usr/lib/mbtfm/libmbtfm_mesh_maker.so" ]; then

@@ -230,7 +230,7 @@ TEST(Report, names_no_part_of_the_network_that_beads_do_not_tell) {
   EXPECT_NE(text_of(results).find("nN by the actin network"), std::string::npos);
   results.tensions.at(0).identifiable = false;
   EXPECT_EQ(text_of(results).find("nN by the actin network"), std::string::npos);
-  EXPECT_NE(text_of(results).find("the beads do not tell"), std::string::npos);
+  EXPECT_NE(text_of(results).find("The beads do not show"), std::string::npos);
 }
 
 TEST(Report, shows_no_more_digits_of_a_tension_than_its_interval_warrants) {
