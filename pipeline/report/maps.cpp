@@ -369,17 +369,17 @@ Figure usual_method_map(const CellResults& results) {
       usual.lambda_um_per_kPa
           ? fmt::format(", λ = {} µm/kPa (criterion: {})", charts::readable(*usual.lambda_um_per_kPa), usual.lambda_by)
           : "";
-  return {
-      map,
-      fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
-                  "squares of {:.2g} µm, in the colours of “Forces on the substrate”; the largest is {} kPa. FTTC "
-                  "knows neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes "
-                  "tractions everywhere. Total force in the outline: {} nN; by the model: {} nN. White: outline and "
-                  "adhesions.",
-                  lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
-                  charts::readable(results.fit.total_force_nN)) +
-          caption_of_cut(results.cell),
-      legend(colour_bar(colours))};
+  return {map,
+          fmt::format("Tractions by regularised Fourier transform traction cytometry (FTTC) from the same beads{}, on "
+                      "squares of {:.2g} µm, in the colours of “Forces on the substrate”; the largest is {} kPa. FTTC "
+                      "knows neither adhesions nor fibres: a traction spreads around its adhesion, and noise makes "
+                      "tractions everywhere. Total force in the outline, noise included: {} nN; by the model: {} nN. "
+                      "White: outline and "
+                      "adhesions.",
+                      lambda, usual.spacing_um, charts::readable(largest_kPa), charts::readable(usual.total_force_nN),
+                      charts::readable(results.fit.total_force_nN)) +
+              caption_of_cut(results.cell),
+          legend(colour_bar(colours))};
 }
 
 std::vector<Figure> displacement_maps(const CellResults& results) {
