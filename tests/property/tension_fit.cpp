@@ -388,6 +388,27 @@ TEST(TensionFit, intervals_by_profile_are_1_96_standard_errors_where_no_bound_is
   EXPECT_NEAR(sides.above, (-3 + std::sqrt(9 + 4 * 1.96 * 1.96)) / 4, 2e-3 * sides.above);
 }
 
+TEST(TensionFit, a_tension_that_no_bead_feels_is_not_known_and_leaves_the_errors_of_the_others_as_they_are) {
+  LocalMisfit two{
+      .tensions_nN = Eigen::Vector2d(10, 12), .H = Eigen::Matrix2d::Identity(), .g = Eigen::Vector2d::Zero()};
+  two.H << 2e4, 0.8e4, 0.8e4, 1e4;
+  LocalMisfit three{
+      .tensions_nN = Eigen::Vector3d(10, 12, 3), .H = Eigen::Matrix3d::Zero(), .g = Eigen::Vector3d::Zero()};
+  three.H.topLeftCorner<2, 2>() = two.H;
+  for (const bool has_model_error : {false, true}) {
+    if (has_model_error) {
+      two.model_variance = 0.1 * two.H;
+      three.model_variance = 0.1 * three.H;
+    }
+    const Eigen::MatrixXd known = covariance_nN2(two, 1.5), all = covariance_nN2(three, 1.5);
+    ASSERT_TRUE(all.allFinite()) << all;
+    // eigenvalues below 1e-12 of the largest are not told apart from rounding
+    EXPECT_LE((all.topLeftCorner<2, 2>() - known).norm(), 1e-10 * known.norm());
+    EXPECT_GT(std::sqrt(all(2, 2)), 1e6);
+    EXPECT_TRUE(past_bounds_nN(three, 1.5).allFinite());
+  }
+}
+
 TEST(ModelChecks, a_fibre_left_out_costs_what_a_fit_without_it_says) {
   const TensionScene scene = tension_scene("case_21", 2000, 0.05, 9);
   TensionScene same = tension_scene("case_21", 2000, 0.05, 9);
