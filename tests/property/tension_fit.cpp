@@ -464,6 +464,42 @@ TEST(ModelChecks, a_missing_fibre_is_hinted_at_its_adhesions_and_the_full_model_
   EXPECT_NEAR(missing[0].tension_nN, 5, 1);
 }
 
+TEST(ModelChecks, errors_of_the_segmentation_at_strong_adhesions_call_for_no_fibre) {
+  Cell cell = test::round_cell(15, 16);
+  for (const auto& [a, b] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, a, b);
+  const SegmentationErrors stated;
+  std::size_t n_told = 0, n_if_exact = 0;
+  for (std::uint64_t seed = 1; seed <= 4; ++seed) {
+    TensionScene scene = test::scene_of(cell, Eigen::Vector4d(0.06, 30, 40, 50), 3000, 0.002, seed);
+    std::mt19937_64 random(seed);
+    std::normal_distribution<double> normal;
+    Cell seen = cell;
+    std::vector<substrate::Ellipse> ellipses;
+    for (Adhesion& a : seen.adhesions) {
+      const double x = normal(random), y = normal(random);
+      a.position_um += stated.adhesion_shift_error_um * Vec2{x, y};
+      const double growth = std::exp(stated.adhesion_area_error * normal(random));
+      a.area_um2 *= growth;
+      a.major_axis_um *= std::sqrt(growth);
+      a.minor_axis_um *= std::sqrt(growth);
+      ellipses.push_back(substrate::ellipse_of(a));
+    }
+    std::vector<Vec2> points;
+    for (const Bead& bead : scene.beads) points.push_back(bead.position_um);
+    const auto gel = greens::make_greens({.youngs_modulus_kPa = 8.4, .poisson_ratio = 0.49, .thickness_um = 60},
+                                         {.model = substrate::ModelKind::layer}, 1);
+    std::vector<cables::CableNetwork> networks;
+    for (std::uint64_t m = 0; m < 2; ++m)
+      networks.emplace_back(mesh::generate_network(cell, {.seed = 10 * seed + m}).network);
+    const EnsembleFit fit = fit_ensemble(networks, reduce(scene.beads, gel->compliance_um_per_nN(points, ellipses)),
+                                         scene.adhesion_ids, {.loss = Loss::squares}, 1);
+    n_told += missing_fibres(fit, seen.adhesions, stated).size();
+    n_if_exact += missing_fibres(fit, seen.adhesions, {0, 0, 0, 0}).size();
+  }
+  EXPECT_LE(n_told, 1u);  // one in twenty cells by chance: two in four are one in 70
+  EXPECT_GT(n_if_exact, 2u) << "the errors must show for this to tell anything";
+}
+
 TEST(ModelChecks, tensions_drawn_by_type_explain_the_beads_better_than_with_types_exchanged) {
   Cell cell = test::round_cell(15, 16);
   for (const auto& [start, end] : {std::pair{1, 7}, {3, 12}, {5, 14}}) test::add_ventral(cell, start, end);
