@@ -53,16 +53,16 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
 
 TEST(AdhesionsWithoutBeads, are_those_that_the_bead_images_do_not_show) {
   const Cell cell = test::round_cell(14, 24);
-  const std::vector<Vec2> beads = test::scattered_points(2000, 50);  // about the cell's middle, at random
+  const std::vector<Vec2> beads = test::scattered_points(2000, 50, {30, 30});  // about the cell's middle
   EXPECT_TRUE(adhesions_without_beads(cell.adhesions, beads).empty());
   // of a camera that shows a quarter, which begins at the corner; and of images binned beside others that are not
   std::vector<Vec2> quarter, half;
   for (const Vec2 p : beads) {
-    if (p.x < 0 && p.y < 0) quarter.push_back(p);
-    half.push_back(0.5 * (p - Vec2{50, 50}));
+    if (p.x < 30 && p.y < 30) quarter.push_back(p);
+    half.push_back(Vec2{-20, -20} + 0.5 * (p - Vec2{-20, -20}));
   }
   std::size_t n_outside = 0;
-  for (const Adhesion& a : cell.adhesions) n_outside += a.position_um.x > 5 || a.position_um.y > 5;
+  for (const Adhesion& a : cell.adhesions) n_outside += a.position_um.x > 38 || a.position_um.y > 38;
   for (const auto& field : {quarter, half}) {
     const std::vector<int> ids = adhesions_without_beads(cell.adhesions, field);
     EXPECT_GE(ids.size(), n_outside);
