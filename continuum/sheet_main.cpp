@@ -141,16 +141,13 @@ std::vector<GroundPatch> read_tractions(const Path& file) {
 }
 
 /// What is known of adhesions' tractions holds of a colony's, which are weaker: pascals in the columns of kPa are seen.
-/// @return none where the mean traction, each weighed by its force, is usual
 std::optional<stage::Doubt> doubt_about_tractions(const std::vector<GroundPatch>& patches) {
-  double force_nN = 0, sum = 0;
-  for (const GroundPatch& p : patches) {
-    force_nN += norm(p.traction_kPa) * p.area_um2;
-    sum += dot(p.traction_kPa, p.traction_kPa) * p.area_um2;
-  }
-  std::optional<stage::Doubt> doubt = stage::doubt_about("traction_kPa", force_nN > 0 ? sum / force_nN : 0);
+  std::vector<stage::Load> loads;
+  for (const GroundPatch& p : patches) loads.push_back({norm(p.traction_kPa), norm(p.traction_kPa) * p.area_um2});
+  std::optional<stage::Doubt> doubt =
+      stage::doubt_about("traction_kPa", stage::traction_of_half_the_force_kPa(std::move(loads)));
   if (!doubt) return doubt;
-  doubt->quantity = "mean of the tractions, each weighed by its force,";
+  doubt->quantity = "traction where half of the force is borne";
   doubt->remedy = "check the unit of tx_kPa and ty_kPa: 200 Pa are 0.2 kPa";
   return doubt;
 }
@@ -356,7 +353,7 @@ Run run_from_traction(const Parameters& p, stage::StageContext& context, const R
     throw UsageError("strain = large is for sheets on springs: tensions from tractions have small ones");
   context.assumed.clear();  // of a gel: none takes part
   const std::vector<GroundPatch> tractions = read_tractions(context.input("traction"));
-  context.doubt(doubt_about_tractions(tractions), context.input("traction").string() + ": mean of the tractions");
+  context.doubt(doubt_about_tractions(tractions), context.input("traction").string() + ": tractions");
   const Region area = area_around(region, context, p);
   // any modulus gives the same tensions
   const Material material{p.sheet.youngs_modulus_kPa.value_or(1), p.sheet.poisson_ratio,

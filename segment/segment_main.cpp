@@ -2,6 +2,7 @@
 #include <numbers>
 #include <opencv2/core/utility.hpp>
 
+#include "pipeline/contract/errors.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/tables.h"
@@ -43,12 +44,12 @@ std::shared_ptr<const LabelMask> mask(stage::StageContext& context, const std::s
 /// another place.
 bool is_pattern_beside(const Segmentation& s) {
   constexpr double kHalf = 0.5;
-  return s.pattern_beneath && *s.pattern_beneath < kHalf;
+  return s.pattern && s.pattern->beneath && *s.pattern->beneath < kHalf;
 }
 
 std::string doubt_about_pattern(const Segmentation& s) {
   if (!is_pattern_beside(s)) return "";
-  return " Only " + brief(100 * *s.pattern_beneath) +
+  return " Only " + brief(100 * *s.pattern->beneath) +
          " % of the pattern that the cell touches lies beneath it: does the mask lie on these images?";
 }
 
@@ -77,6 +78,17 @@ std::string assumption_of(const Segmentation& s, bool is_by_itself) {
 Severity severity_of(const Segmentation& s) {
   // the pattern is known, and its candidates' places are in the error budget
   return s.source == AdhesionSource::pattern && !is_pattern_beside(s) ? Severity::note : Severity::caution;
+}
+
+std::vector<std::optional<Finding>> findings_of(const PatternAtCell& pattern, const std::vector<Adhesion>& adhesions) {
+  const auto candidate = std::ranges::find(adhesions, AdhesionOrigin::candidate, &Adhesion::origin);
+  const bool has_both = candidate != adhesions.end() && pattern.part_area_um2 > 0;
+  return {noticed(FindingKind::pattern_too_fine, has_both ? candidate->area_um2 / pattern.part_area_um2 : 0,
+                  "The pattern's parts beneath the cell have " + brief(pattern.part_area_um2) +
+                      " um² (median); a candidate for an adhesion has " +
+                      (has_both ? brief(candidate->area_um2) : std::string("none")) + " um²."),
+          noticed(FindingKind::pattern_as_cell, pattern.of_cell,
+                  brief(100 * pattern.of_cell) + " % of the cell's area lies on the pattern.")};
 }
 
 /// Length of bright actin in no fibre: the diagonals of the crests' boxes, as they hardly bend.
@@ -178,6 +190,10 @@ StageReport report_of(const Segmentation& s, bool is_assumed_by_itself) {
                            " ends of fibres that must be held reach no adhesion. They are held by anchors."))}) {
     if (found) report.findings.push_back(std::move(*found));
   }
+  if (s.pattern) {
+    for (std::optional<Finding>& found : findings_of(*s.pattern, s.cell.adhesions))
+      if (found) report.findings.push_back(std::move(*found));
+  }
   for (const std::string& sentence : s.unused)
     report.findings.push_back(*noticed(FindingKind::input_not_used, 1, sentence));
   if (s.is_cut_by_border) report.summary += "; the image's border cuts the cell";
@@ -273,6 +289,10 @@ StageReport run(const SegmentParameters& given, stage::StageContext& context) {
     context.doubt(images::doubt_about_calibration(*image, parameters.pixel_size_um), image->name + ": pixel_size_um");
     context.notice(images::noticed_loss(*image));
     context.notice(images::noticed_saturation(*image));
+  }
+  if (adhesion && actin && adhesion->image.pixels == actin->image.pixels) {
+    throw InputError(adhesion->name + ", " + actin->name, "images of adhesions and of actin", "the same pixels in both",
+                     "name the right file or channel of each in [images] of cell.toml");
   }
   const HandDrawn drawn{roi_set(context, "outline-roi", binning), roi_set(context, "adhesion-rois", binning),
                         roi_set(context, "fibre-rois", binning), mask(context, "outline-mask", binning),

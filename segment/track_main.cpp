@@ -361,7 +361,10 @@ StageReport track(TrackParameters parameters, int binning, stage::StageContext& 
   }
   if (frames.size() > 1) return track_series(frames, context, tracked_frame);
   const auto [tracking, pixel_size_um, picture] = tracked_frame(frames.front(), context.progress);
-  if (!tracking.windows.is_on) context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
+  if (!tracking.windows.is_on) {
+    context.expect_plausible("beads_per_um2", beads_per_um2(tracking.field));
+    context.expect_plausible("bead_sigma_um", tracking.bead_sigma_um);
+  }
   write_field(context, tracking.field, "displacement");
   write_picture(context, picture, relaxed.image, pixel_size_um);
   return report_of(tracking, pixel_size_um);

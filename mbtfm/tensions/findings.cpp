@@ -132,6 +132,13 @@ Noticed beads_disagree(const FitOutcome& o) {
                      " times the squares that the noise of the beads would leave.");
 }
 
+Noticed no_beads_at_adhesions(const FitOutcome& o) {
+  const std::vector<int> ids = adhesions_without_beads(o.cell.adhesions, o.data.position_um);
+  return noticed(FindingKind::adhesions_without_beads, static_cast<double>(ids.size()),
+                 counted(static_cast<std::int64_t>(ids.size()), "adhesion has", "adhesions have") +
+                     " no bead near by: " + listed(ids) + ".");
+}
+
 Noticed missing_fibres_noticed(const FitOutcome& o) {
   std::string text = "The beads call for " +
                      counted(static_cast<std::int64_t>(o.missing.size()), "fibre that was", "fibres that were") +
@@ -234,10 +241,11 @@ Noticed cell_cut(const FitOutcome& o) {
       FindingKind::cell_cut, 1,
       "The image's border cuts the cell. The fit holds the network along the cut; " + brief(force.value) + " +- " +
           brief(force.standard_error) + " nN pass through it. " +
-          (o.beyond ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors."
-                    : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
-                      "taken for forces of the adhesions near it."),
-      o.beyond ? Severity::note : Severity::caution);
+          (o.beyond
+               ? "Forces beyond the cut were allowed for; fibres and adhesions near it have larger errors, and the "
+                 "total force is somewhat too large."
+               : "Forces beyond the cut were not allowed for (effects.beyond_cut = off): they are "
+                 "taken for forces of the adhesions near it."));
 }
 
 Noticed common_motion(const FitOutcome& o) {
@@ -278,6 +286,23 @@ Noticed channel_shift(const FitOutcome& o) {
 
 }  // namespace
 
+std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions, const std::vector<Vec2>& beads_um) {
+  constexpr double kFar = 3;  // distances of beads: at random the chance is exp(−9 pi)
+  Vec2 low{1e300, 1e300}, high{-1e300, -1e300};
+  for (const Vec2 p : beads_um) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y)};
+  }
+  const double field_um2 = (high.x - low.x) * (high.y - low.y);
+  const double far_um = kFar * std::sqrt(field_um2 / std::max(1.0, static_cast<double>(beads_um.size())));
+  std::vector<int> ids;
+  for (const Adhesion& a : adhesions) {
+    const auto is_near = [&](Vec2 bead) { return norm(bead - a.position_um) <= far_um; };
+    if (std::ranges::none_of(beads_um, is_near)) ids.push_back(a.adhesion_id);
+  }
+  return ids;
+}
+
 Imbalance imbalance_of(const EnsembleFit& fit) {
   Eigen::Vector2d net_nN = Eigen::Vector2d::Zero();
   for (Eigen::Index i = 0; i < fit.forces_nN.size(); i += 2) net_nN += fit.forces_nN.segment<2>(i);
@@ -297,6 +322,7 @@ std::vector<Finding> findings_of(const FitOutcome& o) {
                         channel_shift(o),
                         missing_fibres_noticed(o),
                         missing_adhesions_noticed(o),
+                        no_beads_at_adhesions(o),
                         explains_little(o),
                         unexplained(o),
                         strain_beyond_linear(o),

@@ -33,6 +33,10 @@ struct FitOutcome {
 /// In the order in which a user should read them.
 std::vector<Finding> findings_of(const FitOutcome& outcome);
 
+/// Adhesions (their ids) whose nearest bead is three times the beads' distance away or further: the beads' distance is
+/// that of as many on a lattice over the field that they span.
+std::vector<int> adhesions_without_beads(const std::vector<Adhesion>& adhesions, const std::vector<Vec2>& beads_um);
+
 /// |sum of forces| and |sum of torques| over the sums of the adhesions' magnitudes, what passes through a cut included:
 /// rounding only.
 struct Imbalance {

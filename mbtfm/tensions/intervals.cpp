@@ -20,9 +20,11 @@ constexpr double kHalfHeld = 2;
 // it.
 constexpr double kPressedByMoreThanChance = 3;
 
-/// H⁻¹; eigenvalues lost in rounding count as its limit.
+/// H⁻¹; eigenvalues lost in rounding count as its limit. So far a tension moves that no bead feels that its square is
+/// still a number.
 Eigen::MatrixXd inverse_of(const Eigen::MatrixXd& H) {
-  const Eigen::VectorXd scale = H.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const double least = std::max(1e-30 * H.diagonal().maxCoeff(), 1e-100);
+  const Eigen::VectorXd scale = H.diagonal().cwiseMax(least).cwiseSqrt().cwiseInverse();
   const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scale.asDiagonal() * H * scale.asDiagonal());
   const double smallest = 1e-12 * std::max(eigen.eigenvalues().maxCoeff(), 1e-300);  // rounding of JᵀJ
   const Eigen::VectorXd roots =

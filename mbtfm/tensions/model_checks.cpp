@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <boost/math/distributions/normal.hpp>
 #include <cmath>
+#include <numbers>
 #include <numeric>
 
 #include "pipeline/numerics/dense.h"
@@ -151,12 +152,31 @@ std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Inf
   return fibres;
 }
 
-std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions, int threads) {
+Eigen::VectorXd segmentation_variance_nN2(const Eigen::VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
+                                          const SegmentationErrors& errors) {
+  Eigen::VectorXd variance(forces_nN.size());
+  const double turn_rad = errors.adhesion_angle_error_deg * std::numbers::pi / 180;
+  for (std::size_t a = 0; a < adhesions.size(); ++a) {
+    const auto row = 2 * static_cast<Eigen::Index>(a);
+    const double shift = errors.adhesion_shift_error_um / substrate::ellipse_of(adhesions[a]).semi_minor_um;
+    const double share = std::hypot(shift, errors.adhesion_area_error / 2, turn_rad);
+    variance.segment<2>(row).setConstant(share * share * forces_nN.segment<2>(row).squaredNorm());
+  }
+  return variance;
+}
+
+std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
+                                         const SegmentationErrors& segmentation, int threads) {
   const double n_pairs = 0.5 * static_cast<double>(adhesions.size()) * (static_cast<double>(adhesions.size()) - 1);
   if (n_pairs < 1) return {};
   const double limit = boost::math::quantile(boost::math::normal(), 1 - 0.05 / n_pairs);
   const MeshFit& mesh = fit.meshes.front();
-  const ReducedData data = fit.model_error ? whitened(fit.data.reduced, *fit.model_error, threads) : fit.data.reduced;
+  ReducedData data = fit.data.reduced;
+  if (fit.model_error) {
+    ModelError error = *fit.model_error;
+    error.force_variance_nN2 += segmentation_variance_nN2(fit.forces_nN, adhesions, segmentation);
+    data = whitened(data, error, threads);
+  }
   const Eigen::MatrixXd& C = *data.compliance;
   const Eigen::VectorXd residual = data.target - displace(data, fit.forces_nN);
   // What the tensions there are could explain themselves is taken out: P = 1 − J (JᵀJ)⁻¹ Jᵀ.

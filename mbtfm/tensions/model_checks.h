@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "mbtfm/tensions/ensemble.h"
+#include "mbtfm/tensions/error_budget.h"
 #include "pipeline/files/csv_files.h"
 
 namespace mbtfm::tensions {
@@ -53,8 +54,17 @@ struct FibreLeftOut {
 std::vector<FibreLeftOut> leave_each_fibre_out(const EnsembleFit& fit, const Influence& influence);
 
 /// The best ones, no adhesion twice. A gain is kept where chance would reach it in one cell of twenty, all pairs tried
-/// (Bonferroni).
+/// (Bonferroni), errors of the model and of the segmentation counted.
 std::vector<MissingFibre> missing_fibres(const EnsembleFit& fit, const std::vector<Adhesion>& adhesions,
-                                         int threads = 1);
+                                         const SegmentationErrors& segmentation = {}, int threads = 1);
+
+/// Variance of each component of the adhesions' forces, as the beads tell them, by errors of the adhesions' ellipses:
+///
+///   σ = |F| √( (δ/b)² + (ε/2)² + φ² ),
+///
+/// δ the error of the centre, b the semi-minor axis (over which the displacement falls off), ε the relative error of
+/// the area (the displacement on an adhesion goes as one over the root of its area), φ that of the angle.
+Eigen::VectorXd segmentation_variance_nN2(const Eigen::VectorXd& forces_nN, const std::vector<Adhesion>& adhesions,
+                                          const SegmentationErrors& errors);
 
 }  // namespace mbtfm::tensions

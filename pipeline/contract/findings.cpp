@@ -16,9 +16,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {unusual_value, "unusual-value", "any stage", caution, "values beyond what is usual", 0,
        "each value has its range and its source: docs/plausible.md", "Check the value and its unit."},
       {assumed_input, "assumed-input", "any stage", note, "physical inputs that cell.toml does not give", 0,
-       "forces depend on them, and nobody measured them", "Give them in cell.toml."},
+       "forces depend on them, and they were not measured", "Give them in cell.toml."},
       {lossy_image, "lossy-image", "any stage", caution, "images that are JPEG files", 0,
-       "JPEG leaves out what an eye does not miss, and measures do", "Use the microscope's own file."},
+       "JPEG drops detail that the eye does not see but measurements need", "Use the microscope's own file."},
       {saturated, "saturated", "any stage", caution, "share of the pixels that have the image's largest value", 1e-3,
        "in an image that is not saturated one or two pixels have it; adhesions cover 0.01 of an image",
        "Areas, positions and intensities of what is saturated are wrong. Record with less light or a shorter "
@@ -31,32 +31,40 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Look at the adhesion image: it shows actin where its signal bleeds through or the two channels are exchanged."},
       {bright_actin, "bright-actin", "segment", caution, "length of bright actin that is in no fibre (um)", 0,
        "lines as bright as the cell's middle fibre, 3 um and longer, 3 um and more from the edge: none in six "
-       "simulated "
-       "cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um if one fibre is taken "
-       "out",
+       "simulated cells with fibres, in two of three without, and in four of six real ones; 9 to 26 um if one fibre "
+       "is taken out",
        "Look at the dots in 1_segment/overlay.png. Draw what is missing by hand (images.fibre_rois; begin with "
        "1_segment/RoiSet.zip)."},
       {actin_shift, "actin-shift", "segment", note, "1 if the actin image is shifted against the adhesion image", 0,
        "twice the gain in log likelihood is above 16.25 near no shift, which chance makes in one cell of 370, and "
-       "above "
-       "27 elsewhere",
+       "above 27 elsewhere",
        "Nothing if the fibres were moved. If it recurs, measure the shift between the filters with beads that shine "
        "in both."},
-      {adhesions_assumed, "adhesions-assumed", "segment", caution, "candidates for adhesions that nobody saw", 0,
+      {adhesions_assumed, "adhesions-assumed", "segment", caution, "candidates for adhesions, which no image shows", 0,
        "forces act where adhesions are; candidates are where they may be",
        "Give an adhesion image (images.adhesion; paxillin.tif if nothing is said), a mask of the adhesions "
        "(images.adhesion_mask) or draw them by hand (images.adhesion_rois). On an adhesive pattern set "
-       "segment.adhesions = pattern, with the pattern as "
-       "images.adhesion_mask. Read sums of forces over neighbours, not single ones."},
+       "segment.adhesions = pattern, with the pattern as images.adhesion_mask. Read sums of forces over neighbours, "
+       "not single ones."},
+      {pattern_too_fine, "pattern-too-fine", "segment", caution,
+       "area of a candidate for an adhesion over that of the pattern's parts beneath the cell (median)", 1,
+       "a candidate then reaches beyond the part that holds it, and what the beads tell of its force is wrong",
+       "Leave segment.adhesions out: each part of the mask is then an adhesion. Or lower "
+       "segment.candidate_spacing_um."},
+      {pattern_as_cell, "pattern-as-cell", "segment", caution, "share of the cell's area that lies on the pattern", 0.9,
+       "such a pattern tells no more of the adhesions than the outline does; in simulated cells total forces are then "
+       "off by four of their standard errors",
+       "If the mask shows the cell, it is no pattern: take it as images.outline_mask, and give an adhesion image. If "
+       "the pattern is as large as the cell, read sums of forces over neighbours, not single ones."},
       {fibre_ends_anchored, "fibre-ends-anchored", "segment", note,
        "ends of fibres that reach no adhesion and are held by an anchor", 0,
        "ventral and edge fibres are held at both ends, dorsal ones at one; fibres that span the cell are ventral as a "
        "rule",
        "Check these ends in 1_segment/overlay.png (dashed circles). An adhesion that was missed: lower "
        "segment.adhesion_seed_noise, or draw it. A fibre that is not held there: draw it and name it dorsal or arc."},
-      {input_not_used, "input-not-used", "segment", note, "inputs that another one took the place of", 0,
-       "a selection drawn by hand counts more than a mask, and what [segment] says counts more than both",
-       "Remove the one that must not count."},
+      {input_not_used, "input-not-used", "segment", note, "inputs that were not used because another one counts more",
+       0, "a selection drawn by hand counts more than a mask, and a choice in [segment] counts more than both",
+       "Remove the input that you do not want."},
       {nothing_moves, "nothing-moves", "track", caution, "share of the beads that do not move by three standard errors",
        0.98, "chance moves 1 bead in 90 by that much",
        "Check that the two bead images belong to this cell, and that the cell was removed between them."},
@@ -86,8 +94,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "Nothing if it was taken off (track.slice_drift); slices.csv has it. If it recurs, let the stage settle."},
       {beads_scatter, "beads-scatter", "track", note,
        "scatter of beads in space about their neighbours over their standard errors", 1.5,
-       "the standard errors of simulated pictures hold to a seventh; what is beyond comes from pictures that "
-       "are not those of beads, or from strains that neighbours do not share",
+       "the standard errors of simulated pictures hold to a seventh; what is beyond comes from pictures that are not "
+       "those of beads, or from strains that neighbours do not share",
        "Nothing: the standard errors hold it. Look for clumps of beads and for motion while a stack was recorded."},
       {light_lost, "light-lost", "track", caution, "share of the light that is missing in the dimmer stack", 0.5,
        "beads are distinguished by their light, too; with half of it the dim ones are lost in the noise",
@@ -102,8 +110,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "noise and the error of the model exceed it in one cell of a thousand",
        "Follow the other findings first: a missing adhesion or another cell bends the field, too. Otherwise look for "
        "stitched tiles, a drift during the scan, another lens or an uneven gel. Record the bead images in one piece, "
-       "or "
-       "leave far beads out with fit.region_um."},
+       "or leave far beads out with fit.region_um."},
       {channel_shift, "channel-shift", "fit", note,
        "largest of shift and turn of the cell against the beads, over its standard error", 4,
        "chance alone takes one of three beyond 4 standard errors in one cell of five thousand",
@@ -123,10 +130,9 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "predicted part of the displacement that small-strain elasticity leaves out", 0.05,
        "forces are then off by about as much, which is more than the error of a good fit",
        "If the gel is rubber-like (polyacrylamide, silicone), set substrate.material = \"neo-hooke\" in cell.toml. "
-       "Check "
-       "the pixel size, and that no adhesion is drawn too small: the strain does not depend on the modulus."},
+       "Check the pixel size, and that no adhesion is drawn too small: the strain does not depend on the modulus."},
       {noise_unknown, "noise-unknown", "fit", caution, "beads whose noise is not known", 0,
-       "without the noise nobody can know whether the model fits", "Give sigma_um in displacement.csv."},
+       "without the noise one cannot tell whether the model fits", "Give sigma_um in displacement.csv."},
       {noise_disagrees, "noise-disagrees", "fit", caution,
        "scatter of the beads far from the cell about the model, over their stated standard error", 1.3,
        "the error bars take the larger of both: a third more than stated is more than chance and model explain",
@@ -136,10 +142,19 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "noise alone does not reach 2 over the 30 beads that a region has at least",
        "Look at the region in the map of what is left: a bead picture out of focus, another cell, or a fibre or an "
        "adhesion that was not segmented."},
-      {cell_cut, "cell-cut", "fit", note, "1 if the image's border cuts the cell", 0,
-       "the total force is that of the adhesions in view, and what passes through the cut balances it",
-       "Record the whole cell if you can. A note if forces beyond the cut are allowed for; a caution if "
-       "effects.beyond_cut = off: distrust then the fibres and adhesions near the cut, and the force through it."},
+      {adhesions_without_beads, "adhesions-without-beads", "fit", caution,
+       "adhesions whose nearest bead is three distances between beads away, or further", 0,
+       "of beads scattered at random, one such gap in 10^12 adhesions is chance: the beads do not show this part of "
+       "the "
+       "cell",
+       "Check that the bead images (or the displacement) show the whole cell at the same place and with the same pixel "
+       "size as its other images: neither cropped nor binned by themselves. Disregard the forces of these adhesions."},
+      {cell_cut, "cell-cut", "fit", caution, "1 if the image's border cuts the cell", 0,
+       "in six simulated cells cut on one side or two the intervals of the tensions held, but the total force of the "
+       "adhesions in view was too large by 2 to 4 of its standard errors: weak adhesions take up what noise there is",
+       "Record the whole cell if you can. Use the tensions, not the total force. With effects.beyond_cut = off "
+       "distrust "
+       "the fibres and adhesions near the cut, too, and the force through it."},
       {missing_fibre, "missing-fibre", "fit", caution, "fibres between adhesions that the beads call for", 0,
        "a pair of adhesions is named if chance would name one in one cell of twenty, all pairs tried",
        "Look for the fibre in the actin image between these adhesions (dashed in the map). If it is there, add it: "
@@ -171,11 +186,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "length of the sum of the adhesion forces and of the force through a cut, over the sum of the lengths of the "
        "adhesion forces",
        1e-6, "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
-       "Report this with the cell: it should not happen."},
+       "This is a fault of the program: please report it with the cell."},
       {torques_out_of_balance, "torques-out-of-balance", "fit", bad,
        "sum of the torques about the centre, over the sum of their magnitudes", 1e-6,
        "equilibria are solved to 1e-9 of the largest tension at some thousand vertices",
-       "Report this with the cell: it should not happen."},
+       "This is a fault of the program: please report it with the cell."},
       {off_the_surface, "off-the-surface", "surface", caution,
        "share of the beads that lie above the gel's surface, or of the points that lie off it", 0.01,
        "a few beads lie on every gel and in the cell; more of them are another surface, or an error of z larger than "
@@ -204,11 +219,11 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {beads_far, "beads-far", "traction", caution,
        "distance from the surface to the nearest bead, median, over the distance between the beads", 2,
        "forces closer together than the beads are deep look like one: no lattice and no lambda brings them back",
-       "Image beads nearer to the surface, or believe no detail finer than resolution_um."},
+       "Image beads nearer to the surface, and do not trust detail finer than resolution_um."},
       {beads_tell_little, "beads-tell-little", "traction", caution,
        "24 over the effective number of unknowns that the beads determine", 1,
        "the force and its couple on four adhesions are 24 numbers: with fewer, a map of tractions is mostly smoothing",
-       "Take more beads or less noise. The record says how many beads are needed."},
+       "Use more beads, or beads with less noise. The finding itself says how many beads would do."},
       {misfit_in_space, "misfit-in-space", "traction", caution,
        "misfit of the beads over what their stated errors leave, per datum", 1.5,
        "with the errors right it is 1 to a few per cent; the error bars are widened by its root",
@@ -222,8 +237,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {tractions_out_of_balance, "tractions-out-of-balance", "traction", caution,
        "length of the net force over its standard error", 4,
        "a cell at rest pulls as much one way as the other; four standard errors are more than chance",
-       "Is the whole cell above the beads, and the drift of the stage taken out? A shift of all beads looks like a net "
-       "force."},
+       "Check that the whole cell lies above the beads and that the drift of the stage was taken out: a shift of all "
+       "beads looks like a net force."},
       {beads_stray, "beads-stray", "traction", caution,
        "share of the beads that are further off than noise has them, if the loss is l2", 0.005,
        "of Gaussian noise five standard errors of three components are one in a hundred thousand",
@@ -240,8 +255,7 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
        "the second-best way fits within the error of the best: which side of such a cell is which was decided by "
        "chance",
        "If the shape is symmetric, set mean.symmetry to its group: the mean is then the same for all ways. If it is "
-       "not, "
-       "give outlines with more detail, or register by images (mean.register_by = images)."},
+       "not, give outlines with more detail, or register by images (mean.register_by = images)."},
       {cells_left_out, "cells-left-out", "mean", caution, "cells that are not in the mean", 0,
        "a mean over those that fit is a mean over a selection", "registration.csv has the reason for each."},
       {few_cells, "few-cells", "mean", caution, "five over the number of cells", 1,
@@ -252,7 +266,8 @@ const std::vector<KindOfFinding>& kinds_of_findings() {
       {sheet_strain, "sheet-strain", "sheet", caution,
        "contraction of the sheet if nothing held it, s (1 - nu) / (E h), if small strains are computed", 0.05,
        "on springs large strains change the displacement by 0.8 % at 0.05 and by 5 % at 0.15",
-       "On springs set sheet.strain = large. On a gel read displacements and tensions to some per cent only."},
+       "On springs set sheet.strain = large. On a gel displacements and tensions are then known to some per cent "
+       "only."},
       {sheet_coarse, "sheet-coarse", "sheet", caution, "estimated relative error of the tensions, by the mesh", 0.05,
        "the estimate is the difference between the triangles' own tensions and smooth ones; those written are better",
        "Set a smaller sheet.mesh_um."},
@@ -317,16 +332,12 @@ std::string open_ids(const std::vector<Finding>& findings) {
 
 std::string findings_page() {
   std::string page =
-      "# Findings\n\n"
-      "The program says what it notices about the images, the beads and its own answer. Each finding has an identity, "
-      "a\n"
-      "number, a threshold and a remedy. A finding appears on the terminal, in the report, in `run.json`, in "
-      "`run.log`, in\n"
-      "the column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n"
-      "- **note**: worth knowing; the results hold.\n"
-      "- **caution**: the results may be off by more than their error bars say.\n"
-      "- **bad**: do not use what the finding names.\n\n"
-      "A caution or a bad finding is *open*. The report shows a green tick only if no finding is open.\n";
+      "# Findings\n\nThe program tells what it notices about the images, the beads and its own answer. Each finding "
+      "has an identity, a\nnumber, a threshold and a remedy. A finding appears on the terminal, in the report, in "
+      "`run.json`, in `run.log`, in\nthe column `findings` of `batch.csv` and in `statistics/findings.csv`.\n\n- "
+      "**note**: worth knowing; the results hold.\n- **caution**: the results may be off by more than their error bars "
+      "say.\n- **bad**: do not use what the finding names.\n\nA caution or a bad finding is *open*. The report shows a "
+      "green tick only if no finding is open.\n";
   for (const char* stage : {"any stage", "segment", "track", "network", "fit", "surface", "substrate", "traction",
                             "sheet", "indent", "mean"}) {
     bool has_title = false;

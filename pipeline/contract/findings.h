@@ -31,6 +31,8 @@ enum class FindingKind {
   adhesions_long,
   bright_actin,
   adhesions_assumed,
+  pattern_too_fine,
+  pattern_as_cell,
   fibre_ends_anchored,
   input_not_used,
   // track
@@ -53,6 +55,7 @@ enum class FindingKind {
   noise_unknown,
   noise_disagrees,
   beads_disagree_by_region,
+  adhesions_without_beads,
   // fit: the cell
   cell_cut,
   missing_fibre,

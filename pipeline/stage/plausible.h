@@ -66,6 +66,11 @@ std::optional<Doubt> doubt_about_pixel_size(double used_um, double of_file_um);
 /// Adhesions of this traction (kPa) or more bear half of the force that is there at least: forces less two standard
 /// errors, over areas. A single adhesion drawn too small does not change it. @param forces  by adhesion
 double traction_of_half_the_force_kPa(const std::vector<AdhesionForce>& forces, const std::vector<Adhesion>& adhesions);
+struct Load {
+  double traction_kPa = 0, force_nN = 0;  ///< magnitudes
+};
+/// The same of any pieces of the ground; 0 of none.
+double traction_of_half_the_force_kPa(std::vector<Load> loads);
 /// The largest of the lower limits (nN) of the fibres' tensions; of a tension without one, itself.
 double surest_fibre_tension_nN(const std::vector<Tension>& tensions);
 

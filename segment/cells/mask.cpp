@@ -254,7 +254,7 @@ void require_upright_pattern(const LabelMask& mask) {
                    "the gel is adhesive, set segment.adhesions = cell");
 }
 
-std::optional<double> share_beneath(const LabelMask& pattern, const CellOutline& cell, const Field& field) {
+PatternAtCell pattern_at(const LabelMask& pattern, const CellOutline& cell, const Field& field) {
   constexpr double kStep_um = 0.25;  // of the points that are looked at: a pattern's bars are some um wide
   const LabelMask parts = with_parts_labelled(pattern);
   const double pixel_um = pixel_of(parts, field);
@@ -278,14 +278,19 @@ std::optional<double> share_beneath(const LabelMask& pattern, const CellOutline&
       if (is_in_cell({(i + 0.5) * pixel_um, (j + 0.5) * pixel_um})) part.beneath_um2 += area_um2;
       part.is_cut = part.is_cut || i < step || j < step || i + step >= parts.width || j + step >= parts.height;
     }
-  double area_um2 = 0, beneath_um2 = 0;
+  double area_um2 = 0, beneath_um2 = 0, on_um2 = 0;
+  std::vector<double> parts_um2;
   for (const auto& [label, part] : by_label) {
-    if (part.beneath_um2 == 0 || part.is_cut || part.area_um2 > 2 * cell.area_um2) continue;
+    if (part.beneath_um2 == 0) continue;
+    on_um2 += part.beneath_um2;
+    parts_um2.push_back(part.area_um2);
+    if (part.is_cut || part.area_um2 > 2 * cell.area_um2) continue;
     area_um2 += part.area_um2;
     beneath_um2 += part.beneath_um2;
   }
-  if (area_um2 == 0) return std::nullopt;
-  return beneath_um2 / area_um2;
+  return {.beneath = area_um2 > 0 ? std::optional(beneath_um2 / area_um2) : std::nullopt,
+          .of_cell = cell.area_um2 > 0 ? on_um2 / cell.area_um2 : 0,
+          .part_area_um2 = parts_um2.empty() ? 0 : numerics::median_in(parts_um2)};
 }
 
 LabelMask with_parts_labelled(LabelMask mask) {

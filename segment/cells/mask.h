@@ -47,9 +47,15 @@ LabelMask with_parts_labelled(LabelMask mask);
 /// Does the mask have a label there?
 bool covers(const LabelMask& mask, Vec2 point_um, const Field& field);
 
-/// Share of a pattern that lies beneath the cell, of the parts that it touches. Parts that the image cuts or that are
-/// larger than two cells are made for more than this cell. None without others.
-std::optional<double> share_beneath(const LabelMask& pattern, const CellOutline& cell, const Field& field);
+/// A pattern and the cell on it.
+struct PatternAtCell {
+  /// Share of the pattern that lies beneath the cell, of the parts that it touches. Parts that the image cuts or that
+  /// are larger than two cells are made for more than this cell. None without others.
+  std::optional<double> beneath;
+  double of_cell = 0;        ///< share of the cell's area that lies on it
+  double part_area_um2 = 0;  ///< median of the parts that the cell touches; 0: none
+};
+PatternAtCell pattern_at(const LabelMask& pattern, const CellOutline& cell, const Field& field);
 
 /// Rings around a label's pixels, in pixels: through the middles of the pixels' sides, so that a ring around n pixels
 /// has an area of n - 1/2, whatever its direction. Outer rings turn from +x towards +y, holes back.

@@ -44,7 +44,7 @@ struct Segmentation {
   std::vector<Polyline> unexplained_um{};       ///< actin as bright as the fibres that is in none of them
   bool is_aligned = false;                      ///< fibres and outline were moved by it
   AdhesionSource source = AdhesionSource::image;
-  std::optional<double> pattern_beneath{};  ///< share of the pattern that lies beneath the cell: see share_beneath()
+  std::optional<PatternAtCell> pattern{};  ///< where the cell sits on one: see pattern_at()
   int n_anchors = 0;                        ///< that hold ends of fibres where no adhesion is
   /// The cell with the candidates at other places, the same fibres tied to them; none where there is nothing to place.
   std::optional<Cell> second{};

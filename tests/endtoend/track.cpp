@@ -271,6 +271,18 @@ TEST(TrackEndToEnd, images_that_cannot_be_a_pair_are_refused_with_the_reason) {
   }
 }
 
+TEST(TrackEndToEnd, beads_narrower_than_a_lens_shows_them_are_told_of) {
+  const test::TemporaryFolder folder;
+  const auto pair = test::draw_bead_pair({}, {.width = 128, .n_beads = 330});  // 1.3 px: 0.26 and 0.065 um
+  for (const double pixel_um : {0.2, 0.05}) {
+    write(folder / "r.tif", pair.relaxed, pixel_um);
+    write(folder / "s.tif", pair.stressed, pixel_um);
+    const Ended ended = run_track(folder, files(folder, "r.tif", "s.tif"));
+    EXPECT_EQ(ended.code, 0) << ended.said;
+    EXPECT_EQ(ended.said.find("of the beads in the images is 0.0") != std::string::npos, pixel_um < 0.1) << ended.said;
+  }
+}
+
 TEST(TrackEndToEnd, a_field_that_does_not_move_and_one_with_positions_twice_are_told_of) {
   const test::TemporaryFolder folder;
   std::string still = "x_um,y_um,ux_um,uy_um\n", twice = still;

@@ -145,8 +145,8 @@ TEST(CutCells, motions_of_expected_size_are_a_covariance_of_the_beads) {
   EXPECT_EQ(data.n_used, 80) << "what is expected costs no component";
 }
 
-TEST(CutCells, a_cut_is_a_note_if_allowed_for_and_a_caution_if_not) {
-  EXPECT_EQ(properties_of(FindingKind::cell_cut).severity, Severity::note);
+TEST(CutCells, a_cut_is_open_and_forces_beyond_it_are_allowed_for_unless_told_otherwise) {
+  EXPECT_EQ(properties_of(FindingKind::cell_cut).severity, Severity::caution);
   stage::EffectSwitches switches;
   const Scene s = scene(41);
   EXPECT_TRUE(tensions::allows_forces_beyond(switches, s.cut.cell));

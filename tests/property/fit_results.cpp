@@ -8,6 +8,8 @@
 #include <numbers>
 
 #include "mbtfm/tensions/energy.h"
+#include "mbtfm/tensions/findings.h"
+#include "tests/support/substrate_scene.h"
 #include "tests/support/tension_scene.h"
 
 namespace mbtfm::tensions {
@@ -47,6 +49,25 @@ TEST(AdhesionForces, are_off_by_no_more_than_stated_where_the_cells_network_is_a
   }
   EXPECT_LT(stated / n, 1 + 4 * std::sqrt(2.0 / n));  // as if each told of itself
   EXPECT_GT(by_beads / n, 2) << "the beads' noise alone must not explain it for this to tell anything";
+}
+
+TEST(AdhesionsWithoutBeads, are_those_that_the_bead_images_do_not_show) {
+  const Cell cell = test::round_cell(14, 24);
+  const std::vector<Vec2> beads = test::scattered_points(2000, 50, {30, 30});  // about the cell's middle
+  EXPECT_TRUE(adhesions_without_beads(cell.adhesions, beads).empty());
+  // of a camera that shows a quarter, which begins at the corner; and of images binned beside others that are not
+  std::vector<Vec2> quarter, half;
+  for (const Vec2 p : beads) {
+    if (p.x < 30 && p.y < 30) quarter.push_back(p);
+    half.push_back(Vec2{-20, -20} + 0.5 * (p - Vec2{-20, -20}));
+  }
+  std::size_t n_outside = 0;
+  for (const Adhesion& a : cell.adhesions) n_outside += a.position_um.x > 38 || a.position_um.y > 38;
+  for (const auto& field : {quarter, half}) {
+    const std::vector<int> ids = adhesions_without_beads(cell.adhesions, field);
+    EXPECT_GE(ids.size(), n_outside);
+    EXPECT_LT(ids.size(), cell.adhesions.size());
+  }
 }
 
 double figure(const Figures& figures, const std::string& name) {

@@ -23,8 +23,10 @@
 #include "pipeline/files/csv_files.h"
 #include "pipeline/files/json_record.h"
 #include "pipeline/report/match_fibres.h"
+#include "segment/cells/cell_rois.h"
 #include "segment/images/image.h"
 #include "segment/images/png.h"
+#include "segment/rois/roi.h"
 #include "tests/support/program.h"
 
 namespace {
@@ -33,12 +35,20 @@ using namespace mbtfm;
 using images::Image;
 namespace fs = std::filesystem;
 
+constexpr double kTruePixel_um = 0.1;  // whatever cell.toml says
+
 /// A cell's images and settings; what a degradation changes.
 struct Set {
   images::Image adhesion, actin, relaxed, stressed;
-  std::string settings;  ///< further lines of cell.toml, before its tables
-  std::string pixel_size_um = "0.1", youngs_modulus_kPa = "8.4";
+  fs::path truth;              ///< folder
+  std::string settings;        ///< further tables of cell.toml
+  std::string image_settings;  ///< further lines of [images]
+  std::string pixel_size_um = "0.1", youngs_modulus_kPa = "8.4", thickness_um = "60";
   bool as_jpeg = false;
+  bool is_calibrated = true;                       ///< the files state their pixel size
+  std::map<std::string, images::Image> more = {};  ///< further images, by name
+  std::optional<DisplacementField> field = {};     ///< of another program, in the place of the bead images
+  std::vector<Fibre> fibres = {};                  ///< drawn by hand
   std::vector<images::Image*> all() { return {&adhesion, &actin, &relaxed, &stressed}; }
 };
 
@@ -112,6 +122,111 @@ void crop(Set& set, double left, double right, double top, double bottom) {
                        int((bottom - top) * image->height));
     put(*image, mat(*image)(box).clone());
   }
+}
+
+/// What the cameras of one set do to all of its images.
+void to_all(Set& set, const std::function<void(images::Image&)>& change) {
+  for (images::Image* image : set.all()) change(*image);
+}
+void to_beads(Set& set, const std::function<void(images::Image&)>& change) {
+  change(set.relaxed);
+  change(set.stressed);
+}
+
+void flip_rows(images::Image& image) {
+  cv::Mat flipped;
+  cv::flip(mat(image), flipped, 0);
+  put(image, flipped);
+}
+
+/// Of the camera, or of a copy: nobody corrects the pixel size.
+void bin(images::Image& image, int binning) { image = images::binned(image, binning); }
+
+void resize(images::Image& image, double across, double down) {
+  cv::Mat resized;
+  cv::resize(mat(image), resized, {}, across, down, cv::INTER_CUBIC);
+  put(image, cv::max(resized, 0));
+}
+
+void invert(images::Image& image) {
+  const float most = *std::ranges::max_element(image.pixels);
+  for (float& p : image.pixels) p = most - p;
+}
+
+/// As a copy of 8 bits has it, from the darkest to the brightest pixel.
+void to_8_bits(images::Image& image) {
+  const auto [least, most] = std::ranges::minmax(image.pixels);
+  for (float& p : image.pixels) p = std::round(255 * (p - least) / (most - least));
+}
+
+/// Pixels that shine by themselves, the same in each image of a camera.
+void add_hot_pixels(images::Image& image, int n) {
+  std::mt19937_64 random(7);
+  const float bright = *std::ranges::max_element(image.pixels);
+  std::uniform_int_distribution<std::size_t> any(0, image.pixels.size() - 1);
+  for (int k = 0; k < n; ++k) image.pixels[any(random)] = bright;
+}
+
+void sharpen(images::Image& image) {
+  cv::Mat blurred;
+  cv::GaussianBlur(mat(image), blurred, {}, 1.5);
+  const cv::Mat sharp = 2.5 * mat(image) - 1.5 * blurred;
+  put(image, cv::max(sharp, 0));
+}
+
+/// The background taken off, and what is below zero then cut off.
+void take_ground_off(images::Image& image) {
+  std::vector<float> values = image.pixels;
+  const auto middle = values.begin() + std::ptrdiff_t(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  for (float& p : image.pixels) p = std::max(0.f, p - *middle);
+}
+
+images::Image mask_of_outline(const fs::path& truth, int width, int height) {
+  const files::CsvTable table(truth / "outline.csv");
+  std::vector<cv::Point> corners;
+  for (int row = 0; row < table.n_rows(); ++row) {
+    if (table.integer(row, "ring", 0) != 0) continue;
+    corners.emplace_back(int(10 * table.number(row, "x_um")), int(10 * table.number(row, "y_um")));
+  }
+  cv::Mat mask = cv::Mat::zeros(height, width, CV_32F);
+  cv::fillPoly(mask, std::vector<std::vector<cv::Point>>{corners}, 255);
+  images::Image image{.width = 0, .height = 0, .pixels = {}, .pixel_size_um = {}};
+  put(image, mask);
+  return image;
+}
+
+images::Image mask_of_adhesions(const fs::path& truth, int width, int height) {
+  cv::Mat mask = cv::Mat::zeros(height, width, CV_32F);
+  for (const Adhesion& a : files::read_adhesions(truth / "adhesions.csv")) {
+    cv::ellipse(mask,
+                cv::RotatedRect({float(10 * a.position_um.x), float(10 * a.position_um.y)},
+                                {float(10 * a.major_axis_um), float(10 * a.minor_axis_um)},
+                                float(a.angle_rad * 180 / std::numbers::pi)),
+                255, cv::FILLED);
+  }
+  images::Image image{.width = 0, .height = 0, .pixels = {}, .pixel_size_um = {}};
+  put(image, mask);
+  return image;
+}
+
+/// As another program would have found it, with 20 nm of noise.
+DisplacementField true_field(const fs::path& truth, const std::function<void(Bead&)>& change) {
+  DisplacementField field = files::read_displacement(truth / "displacement.csv");
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, 0.02);
+  for (Bead& bead : field) {
+    bead.displacement_um += Vec2{normal(random), normal(random)};
+    bead.sigma_um = 0.02;
+    change(bead);
+  }
+  return field;
+}
+
+void scale(Bead& bead, double factor) {
+  bead.position_um = factor * bead.position_um;
+  bead.displacement_um = factor * bead.displacement_um;
+  bead.sigma_um *= factor;
 }
 
 void transpose(images::Image& image) { put(image, mat(image).t()); }
@@ -251,6 +366,147 @@ std::vector<Degradation> degradations() {
       {"pixel-size", "the pixel size of cell.toml is 30 % too large",
        [](Set& s, const Set&) { s.pixel_size_um = "0.13"; }},
       {"modulus-in-pascal", "the modulus is given in Pa", [](Set& s, const Set&) { s.youngs_modulus_kPa = "8400"; }},
+      {"binned", "all images were binned 2 x 2, the pixel size is that of before; the files do not state it",
+       [](Set& s, const Set&) {
+         to_all(s, [](Image& i) { bin(i, 2); });
+         s.is_calibrated = false;
+       }},
+      {"pixel-size-double", "the pixel size is twice too large; the files do not state it",
+       [](Set& s, const Set&) {
+         s.pixel_size_um = "0.2";
+         s.is_calibrated = false;
+       }},
+      {"beads-binned", "the bead images were binned 2 x 2, the others were not; the files do not state it",
+       [](Set& s, const Set&) {
+         to_beads(s, [](Image& i) { bin(i, 2); });
+         s.is_calibrated = false;
+       }},
+      {"resized", "all images were enlarged to twice as many pixels a side, with the right pixel size",
+       [](Set& s, const Set&) {
+         to_all(s, [](Image& i) { resize(i, 2, 2); });
+         s.pixel_size_um = "0.05";
+         s.is_calibrated = false;
+       }},
+      {"stretched", "all images are 10 % less high than they should be: pixels that are not square",
+       [](Set& s, const Set&) { to_all(s, [](Image& i) { resize(i, 1, 0.9); }); }},
+      {"8-bit", "each image was scaled to 8 bits by itself", [](Set& s, const Set&) { to_all(s, to_8_bits); }},
+      {"square-root", "of each image the square root was taken (gamma 0.5)",
+       [](Set& s, const Set&) {
+         to_all(s, [](Image& i) {
+           for (float& p : i.pixels) p = 100 * std::sqrt(p);
+         });
+       }},
+      {"beads-inverted", "both bead images are dark on bright", [](Set& s, const Set&) { to_beads(s, invert); }},
+      {"actin-inverted", "the actin image is dark on bright", [](Set& s, const Set&) { invert(s.actin); }},
+      {"adhesions-inverted", "the adhesion image is dark on bright", [](Set& s, const Set&) { invert(s.adhesion); }},
+      {"hot-pixels", "300 pixels of the camera shine in both bead images",
+       [](Set& s, const Set&) { to_beads(s, [](Image& i) { add_hot_pixels(i, 300); }); }},
+      {"beads-sharpened", "both bead images were sharpened (unsharp mask)",
+       [](Set& s, const Set&) { to_beads(s, sharpen); }},
+      {"beads-cut-off", "of both bead images the background was taken off, and what is negative",
+       [](Set& s, const Set&) { to_beads(s, take_ground_off); }},
+      {"beads-20px", "the stressed bead image shows the place 20 px beside",
+       [](Set& s, const Set&) {
+         move(s.stressed, {16, -12});
+       }},
+      {"relaxed-twice", "the stressed bead image shows the relaxed gel",
+       [](Set& s, const Set&) {
+         s.stressed = s.relaxed;
+         add_noise(s.stressed, 1, 5);
+       }},
+      {"actin-flipped", "the rows of the actin image run upwards", [](Set& s, const Set&) { flip_rows(s.actin); }},
+      {"adhesions-flipped", "the rows of the adhesion image run upwards",
+       [](Set& s, const Set&) { flip_rows(s.adhesion); }},
+      {"cell-flipped", "the rows of adhesion and actin image run upwards",
+       [](Set& s, const Set&) {
+         flip_rows(s.adhesion);
+         flip_rows(s.actin);
+       }},
+      {"actin-of-another-cell", "the actin image is that of another cell",
+       [](Set& s, const Set& o) { s.actin = o.actin; }},
+      {"adhesions-of-another-cell", "the adhesion image is that of another cell",
+       [](Set& s, const Set& o) { s.adhesion = o.adhesion; }},
+      {"outline-of-another-cell", "the outline is a mask of another cell",
+       [](Set& s, const Set& o) { s.more["outline_mask"] = mask_of_outline(o.truth, s.actin.width, s.actin.height); }},
+      {"beads-as-actin", "the relaxed bead image is given as actin", [](Set& s, const Set&) { s.actin = s.relaxed; }},
+      {"beads-as-adhesions", "the relaxed bead image is given as adhesions",
+       [](Set& s, const Set&) { s.adhesion = s.relaxed; }},
+      {"adhesions-as-actin", "the adhesion image is given as actin, too",
+       [](Set& s, const Set&) { s.actin = s.adhesion; }},
+      {"actin-as-adhesions", "the actin image is given as adhesions, too",
+       [](Set& s, const Set&) { s.adhesion = s.actin; }},
+      {"adhesions-as-pattern", "a mask of the adhesions is given as the adhesive pattern",
+       [](Set& s, const Set&) {
+         s.more["adhesion_mask"] = mask_of_adhesions(s.truth, s.actin.width, s.actin.height);
+         s.settings += "[segment]\nadhesions = \"pattern\"\n";
+       }},
+      {"cell-as-pattern", "a mask of the cell is given as the adhesive pattern",
+       [](Set& s, const Set&) {
+         s.more["adhesion_mask"] = mask_of_outline(s.truth, s.actin.width, s.actin.height);
+         s.settings += "[segment]\nadhesions = \"pattern\"\n";
+       }},
+      {"fibres-twice", "each fibre was drawn twice",
+       [](Set& s, const Set&) {
+         s.fibres = files::read_fibres(s.truth / "fibres.csv", s.truth / "fibre_points.csv");
+         const std::vector<Fibre> once = s.fibres;
+         for (Fibre f : once) {
+           f.fibre_id += int(once.size());
+           s.fibres.push_back(f);
+         }
+       }},
+      {"thickness-6", "the thickness is given as 6 um; it is 60", [](Set& s, const Set&) { s.thickness_um = "6"; }},
+      {"thickness-600", "the thickness is given as 600 um; it is 60",
+       [](Set& s, const Set&) { s.thickness_um = "600"; }},
+      {"field", "the displacement is of another program",
+       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead&) {}); }},
+      {"field-in-pixels", "the displacement is of another program, in px",
+       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead& b) { scale(b, 10); }); }},
+      {"field-half-in-pixels", "the displacement is of another program, in px, its places in um",
+       [](Set& s, const Set&) {
+         s.field = true_field(s.truth, [](Bead& b) {
+           b.displacement_um = 10 * b.displacement_um;
+           b.sigma_um *= 10;
+         });
+       }},
+      {"field-places-in-pixels", "the displacement is of another program, in um, its places in px",
+       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead& b) { b.position_um = 10 * b.position_um; }); }},
+      {"field-in-metres", "the displacement is of another program, in m",
+       [](Set& s, const Set&) { s.field = true_field(s.truth, [](Bead& b) { scale(b, 1e-6); }); }},
+      {"field-y-up", "the displacement is of another program, with y upwards",
+       [](Set& s, const Set&) {
+         const double height_um = 0.1 * s.actin.height;
+         s.field = true_field(s.truth, [=](Bead& b) {
+           b.position_um.y = height_um - b.position_um.y;
+           b.displacement_um.y = -b.displacement_um.y;
+         });
+       }},
+      {"field-uy-up", "the displacement is of another program, uy upwards and y downwards",
+       [](Set& s, const Set&) {
+         s.field = true_field(s.truth, [](Bead& b) { b.displacement_um.y = -b.displacement_um.y; });
+       }},
+      {"field-exchanged", "the displacement is of another program, from the stressed to the relaxed state",
+       [](Set& s, const Set&) {
+         s.field = true_field(s.truth, [](Bead& b) { b.displacement_um = -1 * b.displacement_um; });
+       }},
+      {"field-columns", "the displacement is of another program, ux and uy exchanged",
+       [](Set& s, const Set&) {
+         s.field = true_field(s.truth, [](Bead& b) { std::swap(b.displacement_um.x, b.displacement_um.y); });
+       }},
+      {"field-smoothed", "the displacement is of another program that smoothed it over 4 um",
+       [](Set& s, const Set&) {
+         const DisplacementField all = true_field(s.truth, [](Bead&) {});
+         s.field = true_field(s.truth, [&](Bead& b) {
+           Vec2 sum;
+           double weight = 0;
+           for (const Bead& other : all) {
+             const Vec2 d = other.position_um - b.position_um;
+             const double w = std::exp(-dot(d, d) / (2 * 2 * 2));
+             sum += w * other.displacement_um;
+             weight += w;
+           }
+           b.displacement_um = (1 / weight) * sum;
+         });
+       }},
   };
 }
 
@@ -259,11 +515,14 @@ Set read(const fs::path& folder) {
           .actin = images::read_image(folder / "actin.tif"),
           .relaxed = images::read_image(folder / "beads_relaxed.tif"),
           .stressed = images::read_image(folder / "beads_stressed.tif"),
-          .settings = {}};
+          .truth = folder / "truth",
+          .settings = {},
+          .image_settings = {}};
 }
 
 void write(const fs::path& folder, const Set& set) {
-  const auto image = [&](const std::string& name, const images::Image& i) {
+  const auto image = [&](const std::string& name, images::Image i) {
+    if (!set.is_calibrated) i.pixel_size_um.reset();
     if (!set.as_jpeg) return images::write_tiff(folder / (name + ".tif"), i);
     const float most = *std::ranges::max_element(i.pixels);
     images::Picture picture{.width = i.width, .height = i.height, .rgb = {}};
@@ -274,20 +533,32 @@ void write(const fs::path& folder, const Set& set) {
   };
   image("paxillin", set.adhesion);
   image("actin", set.actin);
-  image("beads_relaxed", set.relaxed);
-  image("beads_stressed", set.stressed);
-  std::string images;
+  std::string images = set.image_settings;
+  if (set.field) {
+    files::write_displacement(folder / "field.csv", *set.field);
+    images += "displacement = \"field.csv\"\n";
+  } else {
+    image("beads_relaxed", set.relaxed);
+    image("beads_stressed", set.stressed);
+  }
+  for (const auto& [name, further] : set.more) image(name, further);
+  if (!set.fibres.empty()) {
+    Cell drawn;
+    drawn.fibres = set.fibres;
+    std::vector<rois::Roi> lines = cells::rois_of(drawn, kTruePixel_um);
+    std::erase_if(lines, [](const rois::Roi& r) { return r.name == "outline"; });
+    rois::write_roi_set(folder / "fibres.zip", lines);
+  }
   if (set.as_jpeg) {
-    images =
-        "[images]\nadhesion = \"paxillin.jpg\"\nactin = \"actin.jpg\"\nbeads_relaxed = \"beads_relaxed.jpg\"\n"
+    images +=
+        "adhesion = \"paxillin.jpg\"\nactin = \"actin.jpg\"\nbeads_relaxed = \"beads_relaxed.jpg\"\n"
         "beads_stressed = \"beads_stressed.jpg\"\n";
   }
   files::write_text(folder / "cell.toml", "pixel_size_um = " + set.pixel_size_um +
                                               "\n[gel]\nyoungs_modulus_kPa = " + set.youngs_modulus_kPa +
-                                              "\npoisson_ratio = 0.49\nthickness_um = 60\n" + images + set.settings);
+                                              "\npoisson_ratio = 0.49\nthickness_um = " + set.thickness_um + "\n" +
+                                              (images.empty() ? "" : "[images]\n" + images) + set.settings);
 }
-
-constexpr double kTruePixel_um = 0.1;  // whatever cell.toml says
 
 /// Against the truth.
 struct Score {
@@ -401,8 +672,11 @@ void print_page(const fs::path& file) {
       "cell that\n"
       "  the border cuts, both are those of the adhesions in view.\n"
       "- **error**: of the tensions, relative; of two cells the larger, of more the median.\n"
-      "- **open findings** ([list](findings.md)): those of at least half of the cells. A cell with one has no green "
-      "tick.\n\n"
+      "- **open findings** ([list](findings.md)): those of at least half of the cells; of sound cells all of them, "
+      "with the "
+      "number of\n"
+      "  cells. A cell with one has no green tick.\n"
+      "- **not told**: the bars do not hold, no finding is open, and nothing was refused.\n\n"
       "| degradation | what was done | cells | refused | bars hold | error | open findings |\n"
       "|---|---|---|---|---|---|---|\n");
   for (const Degradation& d : degradations()) {
@@ -424,7 +698,9 @@ void print_page(const fs::path& file) {
     std::ranges::sort(errors);
     std::string names;
     for (const auto& [id, times] : findings) {
-      if (2 * times >= n) names += (names.empty() ? "`" : ", `") + id + "`";
+      if (2 * times < n && d.name != "sound") continue;
+      names += (names.empty() ? "`" : ", `") + id + "`";
+      if (d.name == "sound") names += " (" + std::to_string(times) + ")";
     }
     char error[16] = "–";
     if (!errors.empty()) std::snprintf(error, sizeof error, "%.2f", errors[errors.size() / 2]);

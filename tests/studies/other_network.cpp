@@ -4,6 +4,7 @@
 ///   truths         truths of several formulations, beads with and without noise; and, beside the fit as it is, one
 ///   that
 ///                  weighs the data by what the meshes tell of each adhesion's error
+///   edges          sums of the forces' magnitudes by the mesh's edge, tensions alike
 ///   forces         forces of the adhesions on networks of these truths, found and true, and their stated errors
 ///   meshes         by the number of meshes, with and without noise: error and processor time
 ///   parts          what the error is made of: the beads' noise, the ensemble's size, the truth's own network
@@ -11,6 +12,8 @@
 #include <cstdlib>
 #include <cstring>
 #include <ctime>
+#include <map>
+#include <string>
 
 #include "mbtfm/tensions/common_motion.h"
 #include "mbtfm/tensions/fit_results.h"
@@ -184,6 +187,64 @@ void forces(Cells cells) {
   }
 }
 
+/// Sums of the forces' magnitudes by the mesh's edge, of the same tensions: of single meshes, and of their mean over
+/// meshes (what of its roughness is left taken off), in all and by kind of adhesion.
+void edges(Cells cells) {
+  constexpr int kMeshes = 8;
+  std::printf("cell,edge_um,kind,adhesions,of_single_nN,of_mean_nN\n");
+  for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
+    drawing::ScenarioParameters scenario;
+    scenario.seed = c;
+    const experiment::Experiment experiment = experiment::simulate(scenario, 2);
+    std::vector<double> tensions_nN;
+    for (const Tension& t : experiment.tensions) tensions_nN.push_back(t.tension_nN);
+    for (const double edge_um : {1.5, 1.2, 0.9, 0.6}) {
+      std::vector<Eigen::VectorXd> forces_nN;
+      for (int m = 0; m < kMeshes; ++m) {
+        mesh::NetworkParameters p;
+        p.edge_length_um = edge_um;
+        p.seed = 100 + static_cast<std::uint64_t>(m);
+        Network network = mesh::generate_network(experiment.cell, p).network;
+        for (Link& link : network.links)
+          if (link.fibre_id == 0) link.share *= edge_um / experiment::kReferenceEdge_um;
+        const cables::CableNetwork cables(std::move(network));
+        forces_nN.push_back(cables.adhesion_forces_nN(tensions_nN, cables.equilibrium(tensions_nN)));
+      }
+      struct Sum {
+        int n = 0;
+        double single = 0, mean = 0;
+      };
+      std::map<std::string, Sum> sums;
+      for (std::size_t a = 0; a < experiment.cell.adhesions.size(); ++a) {
+        const auto row = 2 * static_cast<Eigen::Index>(a);
+        Eigen::Vector2d mean = Eigen::Vector2d::Zero();
+        double single = 0, squares = 0;
+        for (const Eigen::VectorXd& f : forces_nN) mean += f.segment<2>(row) / kMeshes;
+        for (const Eigen::VectorXd& f : forces_nN) single += f.segment<2>(row).norm() / kMeshes;
+        const Eigen::Vector2d along = mean.normalized(), across(-along[1], along[0]);
+        for (const Eigen::VectorXd& f : forces_nN) squares += std::pow(across.dot(f.segment<2>(row)), 2);
+        const double variance = squares / (kMeshes - 1.0) / kMeshes;
+        const int id = experiment.cell.adhesions[a].adhesion_id;
+        bool holds_fibre = false;
+        for (const Fibre& f : experiment.cell.fibres)
+          holds_fibre |= f.start_adhesion_id == id || f.end_adhesion_id == id;
+        const double from_edge_um =
+            distance_to_boundary_um(experiment.cell.outline_um, experiment.cell.adhesions[a].position_um);
+        for (const std::string& kind : {std::string("all"), std::string(holds_fibre        ? "fibre"
+                                                                        : from_edge_um < 2 ? "edge"
+                                                                                           : "inside")}) {
+          Sum& sum = sums[kind];
+          ++sum.n;
+          sum.single += single;
+          sum.mean += mean.norm() - variance / (2 * mean.norm());
+        }
+      }
+      for (const auto& [kind, sum] : sums)
+        std::printf("%d,%g,%s,%d,%.5g,%.5g\n", int(c), edge_um, kind.c_str(), sum.n, sum.single, sum.mean);
+    }
+  }
+}
+
 void truths(Cells cells) {
   std::printf("cell,truth,noise_nm,relative_error,rms_error_over_stated,coverage,relative_error_if_weighed\n");
   for (std::uint64_t c = cells.first; c <= cells.last; ++c) {
@@ -241,13 +302,14 @@ int main(int argc, char** argv) {
   Cells cells;
   if (argc > 3) cells.first = static_cast<std::uint64_t>(std::atoi(argv[3]));
   cells.last = cells.first + static_cast<std::uint64_t>(argc > 2 ? std::atoi(argv[2]) : 20) - 1;
-  const std::pair<const char*, void (*)(Cells)> studies[] = {
-      {"formulations", formulations}, {"truths", truths}, {"forces", forces}, {"meshes", meshes}, {"parts", parts}};
+  const std::pair<const char*, void (*)(Cells)> studies[] = {{"edges", edges},   {"formulations", formulations},
+                                                             {"truths", truths}, {"forces", forces},
+                                                             {"meshes", meshes}, {"parts", parts}};
   for (const auto& [name, study] : studies) {
     if (argc < 2 || std::strcmp(argv[1], name) != 0) continue;
     study(cells);
     return 0;
   }
-  std::fprintf(stderr, "other_network formulations|truths|forces|meshes|parts [cells] [first seed]\n");
+  std::fprintf(stderr, "other_network edges|formulations|truths|forces|meshes|parts [cells] [first seed]\n");
   return 2;
 }

@@ -204,10 +204,36 @@ TEST(Candidates, of_a_pattern_that_lies_beside_the_cell_are_doubted) {
         if (norm(0.1 * Vec2{i + 0.5, j + 0.5} - Vec2{12.8, 12.8} - shift_um) < 6) image.at(i, j) = 255;
     HandDrawn drawn;
     drawn.adhesion_mask = std::make_shared<const LabelMask>(mask_of(image, "pattern.tif"));
-    return segment_cell(std::nullopt, scene.actin, scene.parameters, drawn).pattern_beneath;
+    return segment_cell(std::nullopt, scene.actin, scene.parameters, drawn).pattern->beneath;
   };
   EXPECT_GT(beneath({0, 0}).value_or(0), 0.95);
   EXPECT_LT(beneath({4.5, 4.5}).value_or(1), beneath({0, 0}).value_or(0) - 0.05);
+}
+
+TEST(Pattern, tells_how_much_of_the_cell_lies_on_it_and_how_large_its_parts_are) {
+  const images::Image field = test::even_image(256, 256, 0);
+  const Field of_pixels{.width_px = 256, .height_px = 256, .pixel_um = 0.1};
+  CellOutline cell;
+  for (int i = 0; i < 120; ++i)
+    cell.outer_um.push_back(Vec2{12.8, 12.8} +
+                            10 * Vec2{std::cos(i * std::numbers::pi / 60), std::sin(i * std::numbers::pi / 60)});
+  cell.area_um2 = std::numbers::pi * 100;
+  const auto pattern_of = [&](const auto& is_pattern) {
+    images::Image image = field;
+    for (int j = 0; j < 256; ++j)
+      for (int i = 0; i < 256; ++i)
+        if (is_pattern(0.1 * Vec2{i + 0.5, j + 0.5})) image.at(i, j) = 255;
+    return pattern_at(mask_of(image, "pattern.tif"), cell, of_pixels);
+  };
+  const PatternAtCell whole = pattern_of([](Vec2 p) { return norm(p - Vec2{12.8, 12.8}) < 10; });
+  EXPECT_NEAR(whole.of_cell, 1, 0.02);  // points 0.2 um apart along a rim of 63 um
+  const PatternAtCell left = pattern_of([](Vec2 p) { return norm(p - Vec2{12.8, 12.8}) < 10 && p.x < 12.8; });
+  EXPECT_NEAR(left.of_cell, 0.5, 0.02);
+  const PatternAtCell dots = pattern_of([](Vec2 p) {
+    return norm(p - 4 * Vec2{std::round(p.x / 4), std::round(p.y / 4)}) < 0.8;
+  });
+  EXPECT_NEAR(dots.part_area_um2, std::numbers::pi * 0.64, 0.2);  // points of 0.04 um² along a rim of 5 um
+  EXPECT_NEAR(dots.of_cell, std::numbers::pi * 0.64 / 16, 0.03);
 }
 
 TEST(Candidates, are_not_asked_for_where_an_image_shows_the_adhesions) {

@@ -45,6 +45,8 @@ TEST(Plausible, what_published_experiments_used_and_found_is_not_doubted) {
                                                                                        {"pixel_size_um", 0.64},
                                                                                        {"pixel_size_um", 0.02025},
                                                                                        {"adhesion_area_um2", 0.46},
+                                                                                       {"bead_sigma_um", 0.098},
+                                                                                       {"bead_sigma_um", 0.8},
                                                                                        {"total_force_nN", 204},
                                                                                        {"total_force_nN", 920},
                                                                                        {"fibre_tension_nN", 103},
