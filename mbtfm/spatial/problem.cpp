@@ -127,18 +127,7 @@ Problem make_problem(const SpatialInputs& inputs, const SpatialParameters& param
                   .gel = inputs.gel,
                   .ground = ground,
                   .expected = std::move(expected),
-                  .mesh = std::move(mesh),
-                  .response_um_per_kPa = {},
-                  .surface_um_per_kPa = {},
-                  .model = {},
-                  .map = {},
-                  .offset_um = {},
-                  .surface_offset_um = {},
-                  .patch_response_um_per_nN = {},
-                  .adhesion_areas_um2 = {},
-                  .facet_response_um_per_kPa = {},
-                  .model_error = 0,
-                  .figures = {}};
+                  .mesh = std::move(mesh)};
   // beads and vertices at once: the gel's factor is made once
   const auto map = model->response({problem.mesh.quads, 3}, problem.all_observed());
   if (problem.mesh.n_vertices() <= kMostVertices) {

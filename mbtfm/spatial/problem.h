@@ -23,17 +23,17 @@ struct Problem {
   Ground ground;
   Expected expected;
   TractionMesh mesh;
-  Eigen::MatrixXd response_um_per_kPa;                ///< G by row of `observed`; empty where there is only the map
-  Eigen::MatrixXd surface_um_per_kPa;                 ///< displacement of the vertices; likewise
-  std::shared_ptr<const substrate::Substrate> model;  ///< of the map
-  substrate::LazyResponse map;                        ///< to all_observed(); null where there are matrices
-  Eigen::VectorXd offset_um, surface_offset_um;       ///< u_0 of beads and vertices; empty: zero
+  Eigen::MatrixXd response_um_per_kPa = {};  ///< G by row of `observed`; empty where there is only the map
+  Eigen::MatrixXd surface_um_per_kPa = {};   ///< displacement of the vertices; likewise
+  std::shared_ptr<const substrate::Substrate> model = {};  ///< of the map
+  substrate::LazyResponse map = {};                        ///< to all_observed(); null where there are matrices
+  Eigen::VectorXd offset_um = {}, surface_offset_um = {};  ///< u_0 of beads and vertices; empty: zero
   // where forces on adhesions are asked for:
-  Eigen::MatrixXd patch_response_um_per_nN;   ///< to forces spread evenly over them, x, y, z of each in turn
-  Eigen::MatrixXd adhesion_areas_um2;         ///< adhesions × vertices: the area of each, as weights of the vertices
-  Eigen::MatrixXd facet_response_um_per_kPa;  ///< to even tractions on the faces, where they are asked for
-  double model_error = 0;                     ///< relative, of G, as the gel's model states it
-  Figures figures;                            ///< of that model
+  Eigen::MatrixXd patch_response_um_per_nN = {};  ///< to forces spread evenly over them, x, y, z of each in turn
+  Eigen::MatrixXd adhesion_areas_um2 = {};  ///< adhesions × vertices: the area of each, as weights of the vertices
+  Eigen::MatrixXd facet_response_um_per_kPa = {};  ///< to even tractions on the faces, where they are asked for
+  double model_error = 0;                          ///< relative, of G, as the gel's model states it
+  Figures figures = {};                            ///< of that model
 
   Eigen::Index n_unknowns() const { return 3 * Eigen::Index{mesh.n_vertices()}; }
   std::vector<Vec3> vertices_um() const;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -65,6 +66,21 @@ Eigen::MatrixXd dense(const BlockMatrix<kBlock>& m) {
           result(kBlock * column + q, kBlock * m.row[k] + p) = value;
         }
   return result;
+}
+
+TEST(Elimination, takes_each_panel_once_after_its_children_in_several_stages) {
+  const Elimination elimination(lattice<2>(60, 1), Search::quick);
+  std::vector<int> taken(elimination.panels.size());
+  const auto take = [&](int k) {
+    ++taken[k];
+    for (const int child : elimination.panels[k].children) EXPECT_EQ(taken[child], 1) << "before " << k;
+  };
+  for (const Elimination::Stage& stage : elimination.stages) {
+    for (const std::vector<int>& subtree : stage.subtrees) std::for_each(subtree.begin(), subtree.end(), take);
+    std::for_each(stage.above.begin(), stage.above.end(), take);
+  }
+  EXPECT_EQ(std::count(taken.begin(), taken.end(), 1), std::ssize(taken));
+  EXPECT_GT(elimination.stages.size(), 2u);
 }
 
 TYPED_TEST(OverKinds, solves_what_the_dense_matrix_solves) {
