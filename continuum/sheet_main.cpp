@@ -14,6 +14,7 @@
 #include "mbtfm/sheets/tables.h"
 #include "mbtfm/tractions/neighbour_noise.h"
 #include "mbtfm/tractions/traction.h"
+#include "pipeline/charts/chart.h"
 #include "pipeline/contract/numbers.h"
 #include "pipeline/files/csv.h"
 #include "pipeline/files/csv_files.h"
@@ -678,10 +679,10 @@ void write_page(stage::StageContext& context, const Run& done, const Balance& ba
   report::StagePage page{
       .title = "Contracting sheet", .facts = {}, .findings = context.findings_, .tables = {}, .figures = done.figures};
   if (!done.told.empty()) page.facts.push_back("Fitted to the beads: " + done.told + ".");
-  page.facts.push_back("The mean tension is " + brief(balance.mean_tension_nN_per_um) + " nN/µm over " +
-                       brief(balance.area_um2) + " µm²; the forces on the ground add up to " +
-                       brief(balance.total_force_nN) + " nN in size, and to a net force of " +
-                       brief(norm(balance.net_force_nN)) + " nN.");
+  page.facts.push_back("The mean tension is " + charts::readable(balance.mean_tension_nN_per_um) + " nN/µm over " +
+                       charts::readable(balance.area_um2) + " µm²; the forces on the ground add up to " +
+                       charts::readable(balance.total_force_nN) + " nN in size, and to a net force of " +
+                       charts::readable(norm(balance.net_force_nN)) + " nN.");
   page.picture_svg = picture_of(done.solution, "x to the right, y down");
   page.picture_title = "Tension and traction";
   page.picture_explained =
