@@ -28,6 +28,23 @@ std::shared_ptr<const sheet::Elements> coarse_elements(const sheet::Region& regi
   }
 }
 
+/// None where the sheet finds no balance with its gel.
+std::optional<StiffnessTable> table_of(const std::shared_ptr<const sheet::Elements>& elements,
+                                       const sheet::OnGel& ground, const Gel& gel, const sheet::Region& region,
+                                       int threads) {
+  try {
+    return StiffnessTable({.elements = elements,
+                           .contractions = {sheet::even(*elements, 1)},
+                           .poisson_ratio = 0.5,
+                           .thickness_um = 1,  // only its product with the modulus counts
+                           .n_rims = static_cast<int>(region.rims.size()),
+                           .has_line = false},
+                          ground, gel, sheet::narrow_um(region), threads);
+  } catch (const NotSolved&) {
+    return {};
+  }
+}
+
 }  // namespace
 
 std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& data,
@@ -41,19 +58,14 @@ std::optional<tensions::ModelScore> score_of_sheet(const tensions::LinearData& d
   const std::shared_ptr<const sheet::Elements> elements = coarse_elements(region);
   if (!elements) return {};
   const sheet::OnGel ground(*elements, model, std::nullopt, sheet::adhering_triangles(*elements, {}), threads);
-  const StiffnessTable table({.elements = elements,
-                              .contractions = {sheet::even(*elements, 1)},
-                              .poisson_ratio = 0.5,
-                              .thickness_um = 1,  // only its product with the modulus counts
-                              .n_rims = static_cast<int>(region.rims.size()),
-                              .has_line = false},
-                             ground, gel, sheet::narrow_um(region), threads);
+  const std::optional<StiffnessTable> table = table_of(elements, ground, gel, region, threads);
+  if (!table) return {};
   tensions::LinearData of_sheet = data;
   of_sheet.forces_by_motion.resize(0, 0);  // of adhesions, which the sheet has none of
   const auto response = model.response({ground.patches(), 2}, {data.position_um});
-  of_sheet.response = substrate::dense_response(response->displace(table.forces_nN()), threads);
+  of_sheet.response = substrate::dense_response(response->displace(table->forces_nN()), threads);
   of_sheet = tensions::reweighted(std::move(of_sheet), data.bead_weight);
-  const SheetFit fit = fit_sheet(of_sheet, table, tensions::Loss::squares);
+  const SheetFit fit = fit_sheet(of_sheet, *table, tensions::Loss::squares);
   constexpr int kParameters = 2;
   const double misfit =
       (tensions::displace(of_sheet.reduced, fit.node_amplitudes) - of_sheet.reduced.target).squaredNorm() +
